@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import os
+import shutil
+import stat
+import sys
+import tempfile
 from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
@@ -11,7 +16,6 @@ from msgflow.temporary_owner import is_abandoned, mark
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-    from pathlib import Path
 
 
 _SUFFIX = ".part"
@@ -19,24 +23,65 @@ _SUFFIX = ".part"
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Yield a path beside `path` to write to; it takes the place of `path` when all went well.
+    """Yield a path to write to; what was written there is at `path` when all went well.
+
+    A file is replaced. Behind a symbolic link, this happens at the target. Anything else that
+    stands there (a device, a pipe, the standard output of this process) stays and gets the bytes.
 
     Raises:
-        UsageError: the file cannot be created there.
+        UsageError: the file cannot be written there.
     """
-    _remove_abandoned(path)
-    temporary = path.with_name(f".{path.name}.{mark()}{_SUFFIX}")
     try:
-        yield temporary
-        temporary.replace(path)
+        way = _into_stream(path) if _is_stream(path) else _in_place_of(path)
+        with way as temporary:
+            yield temporary
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
         raise UsageError(
             f"cannot write the file: {reason} — {path}",
             "give a file in a directory that exists and can be written",
         ) from error
+
+
+@contextmanager
+def _in_place_of(path: Path) -> Iterator[Path]:
+    target = Path(os.path.realpath(path))
+    _remove_abandoned(target)
+    temporary = target.with_name(f".{target.name}.{mark()}{_SUFFIX}")
+    try:
+        yield temporary
+        temporary.replace(target)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def _into_stream(path: Path) -> Iterator[Path]:
+    with tempfile.TemporaryDirectory(prefix="msgflow-") as directory:
+        temporary = Path(directory) / path.name
+        yield temporary
+        # Opened by its name, stdout would be written from its beginning.
+        is_stdout = _is_stdout(path)
+        with (
+            temporary.open("rb") as source,
+            open(os.dup(sys.stdout.fileno()) if is_stdout else path, "wb") as stream,
+        ):
+            shutil.copyfileobj(source, stream)
+
+
+def _is_stream(path: Path) -> bool:
+    """Tell whether something stands at `path` that must not be replaced."""
+    try:
+        mode = path.stat().st_mode
+    except FileNotFoundError:
+        return False
+    return not stat.S_ISDIR(mode) and (not stat.S_ISREG(mode) or _is_stdout(path))
+
+
+def _is_stdout(path: Path) -> bool:
+    with suppress(OSError, ValueError):  # a closed stdout
+        return os.path.samestat(path.stat(), os.fstat(sys.stdout.fileno()))
+    return False
 
 
 def _remove_abandoned(path: Path) -> None:

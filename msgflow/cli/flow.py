@@ -159,7 +159,7 @@ def command(
 
     Times count from the first line. NA means that the trace does not show it.
     """
-    from msgflow.cli.output import print_note, print_runs, print_status, print_text
+    from msgflow.cli.output import print_drawing, print_note, print_runs, print_status, print_text
     from msgflow.database import Database
     from msgflow.export.formats import by_suffix
 
@@ -202,11 +202,11 @@ def command(
         print_status(f"{size:,} bytes written to {html}: open it in a browser")
         return
     if form is FlowFormat.JSON:
-        print_text(lambda width, color: flows[0].to_json(), output)
+        print_text(flows[0].to_json(), output)
     else:
         from msgflow.export.flow_tree import tree_text
 
-        print_text(
+        print_drawing(
             lambda width, color: "\n\n".join(
                 tree_text(flow, is_absolute=absolute, width=width, color=color) for flow in flows
             ),

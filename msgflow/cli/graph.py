@@ -45,7 +45,7 @@ def command(
     with Database(database) as opened:
         graph = opened.graph(**asdict(part), internal=internal)
     print_runs([graph.run])
-    print_text(lambda width, color: graph.to(form), output)
+    print_text(graph.to(form), output)
     if not graph.rows:
         print_note("nothing was sent or received")
     for note in graph.notes:

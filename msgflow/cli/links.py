@@ -72,7 +72,7 @@ def suggest(
             f"{doubtful} of {count(len(rows), 'candidate')} are doubtful, see the comments: "
             + ", ".join(dict.fromkeys(row["node"] for row in rows if row["doubt"]))
         )
-    print_text(lambda width, color: text, output)
+    print_text(text, output)
 
 
 @app.command("list")

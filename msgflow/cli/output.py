@@ -128,22 +128,35 @@ def print_runs(runs: Sequence[Run]) -> None:
         _labelled("run" if len(runs) == 1 else "runs", typer.colors.CYAN, names)
 
 
-def print_text(draw: Callable[[int | None, bool], str], path: Path | None) -> None:
-    """Write text to a file or stdout.
+def print_text(text: str, path: Path | None) -> None:
+    """Write text to a file or stdout; a terminal shows control characters in it as text.
 
     Args:
-        draw: returns the text for a width (of the terminal; None elsewhere), with colours or not.
+        text: without a line break at the end.
         path: file to write, replaced when it exists; stdout when None.
 
     Raises:
         UsageError: a closed stdout, or a file that cannot be written.
     """
-    from msgflow.atomic import replacing
-
     if path is not None:
-        with replacing(path) as temporary:
-            temporary.write_text(f"{draw(None, False)}\n", encoding="utf-8")
-        print_status(f"written to {path}")
+        _write_text(text, path)
+        return
+    print_lines([text])
+
+
+def print_drawing(draw: Callable[[int | None, bool], str], path: Path | None) -> None:
+    """Write a drawing to a file or stdout, on a terminal in colours.
+
+    Args:
+        draw: returns the text for a width (of the terminal; None elsewhere), with colours or not;
+            it has to replace control characters in names.
+        path: file to write, replaced when it exists; stdout when None.
+
+    Raises:
+        UsageError: a closed stdout, or a file that cannot be written.
+    """
+    if path is not None:
+        _write_text(draw(None, False), path)
         return
     stream = data_stream()
     if stream.isatty():
@@ -152,6 +165,14 @@ def print_text(draw: Callable[[int | None, bool], str], path: Path | None) -> No
     else:
         text = draw(None, False)
     stream.write(f"{text}\n".encode())
+
+
+def _write_text(text: str, path: Path) -> None:
+    from msgflow.atomic import replacing
+
+    with replacing(path) as temporary:
+        temporary.write_text(f"{text}\n", encoding="utf-8")
+    print_status(f"written to {path}")
 
 
 def print_lines(lines: Iterable[str]) -> None:

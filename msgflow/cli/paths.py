@@ -28,4 +28,4 @@ def suggest(
     for note in result.notes:
         if "cut off" in note:
             print_note(note)
-    print_text(lambda width, color: text, output)
+    print_text(text, output)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from typing import Annotated
 
 import typer
@@ -79,7 +80,10 @@ def label(
     for text in labels:
         key, sign, value = text.partition("=")
         if not sign:
-            raise UsageError(f"a label is KEY=VALUE — {text}", f"msgflow runs label {run} {text}=…")
+            raise UsageError(
+                f"a label is KEY=VALUE — {text}",
+                f"msgflow runs label {shlex.quote(run)} {shlex.quote(text)}=…",
+            )
         if key in values:
             raise UsageError(f"a run has one label of a key — {key}", "give it once")
         values[key] = value or None

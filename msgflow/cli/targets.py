@@ -36,4 +36,4 @@ def suggest(
 
     with Database(database) as opened:
         text = opened.suggest_targets(run=part.run, skip_first=part.skip_first, margin=margin / 100)
-    print_text(lambda width, color: text, output)
+    print_text(text, output)

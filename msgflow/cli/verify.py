@@ -88,7 +88,7 @@ def command(
     if form is VerifyFormat.JUNIT:
         print_runs([verification.run])
         text = verification.to_junit(allow_not_measured=allow_not_measured)
-        print_text(lambda width, color: text, output)
+        print_text(text, output)
     else:
         chosen = None if form is None else Format(form.value)
         print_result(verification.result, chosen, output, wide=wide)

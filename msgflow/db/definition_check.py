@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 _RENDERED = r"""
 SELECT 'view ' || schema_name || '.' || view_name AS name, sql
 FROM duckdb_views()
-WHERE NOT internal AND database_name = current_database() AND schema_name IN ('main', 'derive')
+WHERE NOT internal AND database_name = current_database()
+    AND schema_name IN ('store', 'main', 'derive')
 UNION ALL
 SELECT
     'macro ' || schema_name || '.' || function_name,
@@ -42,7 +43,7 @@ SELECT
     'table ' || schema_name || '.' || table_name,
     regexp_replace(sql, ',? PRIMARY KEY(\([^)]*\))?', '', 'g')
 FROM duckdb_tables()
-WHERE database_name = current_database() AND schema_name = 'store'
+WHERE database_name = current_database() AND schema_name IN ('store', 'main', 'derive')
     AND table_name <> 'alembic_version'
 UNION ALL
 SELECT 'trigger ' || schema_name || '.' || trigger_name, coalesce(sql, '')

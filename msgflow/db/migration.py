@@ -69,7 +69,7 @@ def _replace_by_new(path: Path) -> None:
         with database_errors(path), workspace(path) as directory:
             fresh = directory / "new.duckdb"
             write_empty(fresh)
-            os.replace(fresh, path)
+            os.replace(fresh, os.path.realpath(path))
     except OSError as error:
         raise DatabaseError(
             f"cannot create a database — {path}: {error.strerror}",

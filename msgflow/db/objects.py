@@ -201,7 +201,7 @@ def drop(con: duckdb.DuckDBPyConnection) -> None:
     con.execute("CREATE SCHEMA IF NOT EXISTS derive")
     for schema, name in con.execute(
         "SELECT schema_name, view_name FROM duckdb_views() WHERE NOT internal "
-        "AND database_name = current_database() AND schema_name IN ('main', 'derive')"
+        "AND database_name = current_database() AND schema_name IN ('main', 'derive', 'store')"
     ).fetchall():
         con.execute(f"DROP VIEW {identifier(schema)}.{identifier(name)}")
     for schema, name, kind in con.execute(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from msgflow.export.directory import replacing_entries
+from msgflow.atomic_directory import replacing_entries
 from msgflow.export.formats import csv_batch
 from msgflow.export.views import ExportedView, Selection
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
-from msgflow.export.directory import replacing_entries
+from msgflow.atomic_directory import replacing_entries
 from msgflow.export.views import ExportedView, Selection
 from msgflow.version import __version__
 

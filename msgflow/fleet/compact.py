@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import itertools
 import secrets
+import shlex
 import time
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from msgflow.errors import DatabaseError
 from msgflow.fleet.answers import answers
 from msgflow.fleet.lake import Lake, visible
-from msgflow.fleet.layout import DATABASE, RUN, VIEWS, metadata, part_path
+from msgflow.fleet.layout import DATABASE, RUN, VIEWS, is_file_of_part, metadata, part_path
 from msgflow.fleet.parquet import read_parquet
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     import pyarrow as pa
 
@@ -79,7 +82,7 @@ def compact(lake: Lake, *, older_than: float = DAY) -> Compaction:
 
 def _groups(rows: pa.Table, sizes: Mapping[str, int]) -> list[list[dict[str, Any]]]:
     """Return groups of runs whose answers are to go into one part."""
-    runs = visible(rows).to_pylist()
+    runs = [row for row in visible(rows).to_pylist() if row["part"] is not None]
     living = Counter(row["part"] for row in runs)
     named = Counter(part for _, part in {(row["run"], row["part"]) for row in rows.to_pylist()})
     full = {
@@ -133,14 +136,21 @@ def _together(lake: Lake, table: str, rows: Sequence[Mapping[str, Any]]) -> pa.T
     for row in rows:
         wanted.setdefault(row["part"], []).append(row["run"])
     with ThreadPoolExecutor(_READ_AT_ONCE) as pool:
-        found = [
-            read
-            for read in pool.map(lambda part: _read(lake, table, part, wanted[part]), wanted)
-            if read is not None
-        ]
-    if not found:
+        found = dict(
+            zip(
+                wanted,
+                pool.map(lambda part: _read(lake, table, part, wanted[part]), wanted),
+                strict=True,
+            )
+        )
+    there = {part: read for part, read in found.items() if read is not None}
+    if not there:
         return None
-    whole = pa.concat_tables(found, promote_options="permissive")
+    schema = pa.schema([])
+    for part, read in there.items():
+        with _usable(lake, table, part, wanted[part]):
+            schema = pa.unify_schemas([schema, read.schema], promote_options="permissive")
+    whole = pa.concat_tables(there.values(), promote_options="permissive")
     # The sort is stable: the rows of a run keep their order.
     return whole.take(pc.sort_indices(whole["run"]))
 
@@ -153,8 +163,26 @@ def _read(lake: Lake, table: str, part: str, runs: Sequence[str]) -> pa.Table | 
     # A part of an earlier msgflow may lack the table.
     if content is None:
         return None
-    read = read_parquet(content)
-    return read.filter(pc.is_in(read["run"], value_set=pa.array(runs, pa.string())))
+    with _usable(lake, table, part, runs):
+        read = read_parquet(content)
+        return read.filter(pc.is_in(read["run"], value_set=pa.array(runs, pa.string())))
+
+
+@contextmanager
+def _usable(lake: Lake, table: str, part: str, runs: Sequence[str]) -> Iterator[None]:
+    """Turn errors of the content of a file into a DatabaseError that names it."""
+    import pyarrow as pa
+
+    try:
+        yield
+    except (pa.ArrowException, KeyError, OSError) as error:
+        words = (str(error).strip().splitlines() or [type(error).__name__])[0]
+        raise DatabaseError(
+            f"a file of the lake cannot be used: {words}"
+            f" — {lake.store.url_of(part_path(table, part))}",
+            f"{shlex.join(['msgflow', 'fleet', 'remove', runs[0], '--lake', lake.store.url])};"
+            " ingest it again",
+        ) from error
 
 
 def _write(lake: Lake, name: str, part: str, table: pa.Table, revision: str) -> None:
@@ -201,7 +229,9 @@ def _clean_up(lake: Lake, older_than: float) -> list[Entry]:
         entry
         for folder, parts in needed.items()
         for entry in lake.store.entries(folder)
-        if entry.changed_ns < before_ns and _part_of(entry) not in parts
+        if entry.changed_ns < before_ns
+        and is_file_of_part(entry.path)
+        and _part_of(entry) not in parts
     ]
     entries = {entry.path: entry for entry in lake.store.entries(RUN, recursive=False)}
     # A reader that listed them before their replacement was there may still read them.
@@ -241,7 +271,7 @@ def _delete(lake: Lake, entry: Entry) -> bool:
 
 
 def _order(row: Mapping[str, Any]) -> tuple[int, int, str]:
-    return row["generation"], row["committed_ns"], row["part"]
+    return row["generation"], row["committed_ns"], row["part"] or ""
 
 
 def _part_of(entry: Entry) -> str | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from collections import Counter
 from dataclasses import dataclass, replace
 from statistics import NormalDist
@@ -168,7 +169,7 @@ def _sides(
         if base is not None or len(values) != 2:
             raise UsageError(
                 f"two values of {by} are compared, the runs have {len(values)}: {have or 'none'}",
-                f"msgflow fleet compare BASE OTHER --by {by}",
+                f"msgflow fleet compare BASE OTHER --by {shlex.quote(by)}",
             )
         return values[0], values[1]
     for value in (base, other):
@@ -224,7 +225,7 @@ def _one_sided(result: QueryResult, by: str) -> Iterator[str]:
     if not any(row["a_count"] and row["b_count"] for row in rows):
         raise UsageError(
             "the two sides have no path with latencies in common",
-            f"msgflow fleet query e2e-latency --group-by {by} tells what each has",
+            f"msgflow fleet query e2e-latency --group-by {shlex.quote(by)} tells what each has",
         )
     for side in ("A", "B"):
         number = sum(row["verdict"] == f"only in {side}" for row in rows)

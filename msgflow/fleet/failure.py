@@ -34,7 +34,7 @@ def read_failures(lake: Lake) -> pa.Table:
         if entry.path.endswith(".parquet") and (content := lake.store.read(entry.path)):
             try:
                 tables.append(read_parquet(content, schema))
-            except (pa.ArrowInvalid, OSError) as error:
+            except (pa.ArrowException, OSError) as error:
                 raise DatabaseError(
                     f"cannot read a failure of the lake — {lake.store.url_of(entry.path)}",
                     "delete this file; its recording will be tried again",

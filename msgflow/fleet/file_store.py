@@ -21,6 +21,7 @@ from urllib.parse import urlsplit
 
 from msgflow.errors import DatabaseError, UsageError
 from msgflow.temporary_owner import mark
+from msgflow.trace.regular_file import open_regular
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -44,7 +45,8 @@ _HOPELESS = re.compile(
     r"NETWORK_CONNECTION|ACCESS_DENIED|NO_SUCH|NOT_FOUND|INVALID|SIGNATURE|HTTP status 40[0134]"
 )
 _OF_THIS_MACHINE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES)
-_USERINFO = re.compile(r"//[^/@]*@")
+# A name of a user or a password before the host; a password may have any character.
+_USERINFO = re.compile(r"//([^/@]*|[^/]*:.*)@")
 
 
 @dataclass(frozen=True)
@@ -72,13 +74,18 @@ class Store:
         url: the address: an absolute path, or `s3://BUCKET/PREFIX`.
     """
 
-    def __init__(self, url: str | Path) -> None:
+    def __init__(self, url: str | Path, *, follows_links: bool = True) -> None:
         """Reach a store; nothing is read yet.
+
+        Args:
+            url: the address.
+            follows_links: whether files behind symbolic links below it belong to it.
 
         Raises:
             UsageError: an address of another kind, or with a name or password in it.
         """
         self.url = normal_url(url)
+        self._follows_links = follows_links
         self.is_local = not self.url.startswith(S3)
         self._root = self.url if self.is_local else self.url.removeprefix(S3)
         self._system: Any = None
@@ -98,7 +105,18 @@ class Store:
         """Return the address of a file, for DuckDB, Spark and people."""
         return f"{self.url}/{path}"
 
+    def _is_elsewhere(self, path: str) -> bool:
+        """Tell whether a symbolic link below the root, which counts for nothing, leads there."""
+        if self._follows_links or not self.is_local:
+            return False
+        root = os.path.realpath(self._root)
+        return os.path.realpath(self.full(path)) != os.path.normpath(os.path.join(root, path))
+
     def _reading(self, path: str) -> Any:
+        if self.is_local:
+            if self._is_elsewhere(path):
+                raise FileNotFoundError(errno.ENOENT, "a symbolic link", self.full(path))
+            return open_regular(Path(self.full(path)))
         # Otherwise pyarrow unpacks files called .gz or .zst, and packs them again when it writes.
         return self.filesystem.open_input_stream(self.full(path), compression=None)
 
@@ -117,13 +135,15 @@ class Store:
         with _reaching(self.url):
             found = self._patiently(lambda: self.filesystem.get_file_info(selector))
         files = [info for info in found if info.type == FileType.File]
+        if not self._follows_links:
+            files = [info for info in files if not self._is_elsewhere(self._below(info.path))]
         return sorted(
-            (
-                Entry(info.path[len(self._root) + 1 :], info.size, info.mtime_ns or 0)
-                for info in files
-            ),
+            (Entry(self._below(info.path), info.size, info.mtime_ns or 0) for info in files),
             key=lambda entry: entry.path,
         )
+
+    def _below(self, full: str) -> str:
+        return full[len(self._root.rstrip("/")) + 1 :]
 
     def folders(self, path: str = "") -> list[str]:
         """Return the names of the folders directly below a path, sorted.
@@ -148,26 +168,36 @@ class Store:
 
         with _reaching(self.url):
             info = self._patiently(lambda: self.filesystem.get_file_info(self.full(path)))
-        if info.type != FileType.File:
+        if info.type != FileType.File or self._is_elsewhere(path):
             return None
         return Entry(path, info.size, info.mtime_ns or 0)
 
-    def read(self, path: str) -> bytes | None:
+    def read(self, path: str, most: int | None = None) -> bytes | None:
         """Return the content of a small file, None if there is no such file.
 
+        Args:
+            path: from the root.
+            most: bytes that such a file has at most.
+
         Raises:
-            DatabaseError: the store cannot be reached or read.
+            DatabaseError: the store cannot be reached or read, or the file is larger.
         """
 
         def read() -> bytes | None:
             try:
                 with self._reading(path) as stream:
-                    return bytes(stream.read())
+                    return bytes(stream.read() if most is None else stream.read(most + 1))
             except FileNotFoundError:
                 return None
 
         with _reaching(self.url):
-            return self._patiently(read)
+            content = self._patiently(read)
+        if content is not None and most is not None and len(content) > most:
+            raise DatabaseError(
+                f"no file for this: it has more than {most:,} bytes — {self.url_of(path)}",
+                "give the file that you meant",
+            )
+        return content
 
     def fetch(self, path: str, target: Path) -> None:
         """Copy a file into a new local file.
@@ -253,6 +283,8 @@ class Store:
         """
         with _reaching(self.url, writing=True):
             if self.is_local:
+                if self._is_elsewhere(path):
+                    return
                 file = Path(self.full(path))
                 file.unlink(missing_ok=True)
                 # A bucket has no folders that could be left empty.
@@ -313,7 +345,8 @@ def _s3() -> Any:
         parts = urlsplit(url)
         if parts.scheme not in ("http", "https") or not parts.netloc:
             raise UsageError(
-                f"no address of a store — {url}", "AWS_ENDPOINT_URL=http://HOST:PORT, or https://"
+                f"no address of a store — {_USERINFO.sub('//…@', url)}",
+                "AWS_ENDPOINT_URL=http://HOST:PORT, or https://",
             )
         options = {"endpoint_override": parts.netloc, "scheme": parts.scheme}
     region = os.environ.get("AWS_REGION") or os.environ.get("AWS_DEFAULT_REGION")
@@ -333,6 +366,8 @@ def _reaching(url: str, *, writing: bool = False) -> Iterator[None]:
         yield
     except OSError as error:
         words = str(error.strerror or error).strip().splitlines()[0]
+        # pyarrow names the file in its text; Python has it apart.
+        place = error.filename if isinstance(error.filename, str) else url
         verb = "write to" if writing else "read"
         hint = "check that it exists and that its permissions allow it"
         if url.startswith(S3):
@@ -340,4 +375,4 @@ def _reaching(url: str, *, writing: bool = False) -> Iterator[None]:
                 "check the bucket, AWS_ENDPOINT_URL and AWS_REGION, and the credentials in the"
                 " environment"
             )
-        raise DatabaseError(f"cannot {verb} the store: {words} — {url}", hint) from error
+        raise DatabaseError(f"cannot {verb} the store: {words} — {place}", hint) from error

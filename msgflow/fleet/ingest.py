@@ -5,6 +5,7 @@ from __future__ import annotations
 import heapq
 import itertools
 import json
+import os
 import random
 import secrets
 import time
@@ -329,7 +330,7 @@ class _Ingest:
             options.database,
             options.timeout,
             options.memory,
-            options.scratch,
+            options.scratch and os.path.abspath(options.scratch),
             memory=min(memory, options.memory or memory),
             disk=disk,
             edition=self._edition,

@@ -28,6 +28,7 @@ from msgflow.fleet.layout import (
     run_schema,
 )
 from msgflow.fleet.parquet import read_parquet
+from msgflow.text_file import MOST_BYTES
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -42,6 +43,8 @@ _TOGETHER = "together-"
 _WORTH_IT = 8
 _MANY = 10_000
 _READ_AT_ONCE = 16
+_MOST = 2**63 - 1
+_PARTS = ("part", "view_part", "database_part")
 _VISIBLE = """
 FROM known
 WINDOW latest AS (PARTITION BY run ORDER BY generation DESC, committed_ns DESC, part DESC)
@@ -70,8 +73,8 @@ class Lake:
             DatabaseError: there is no lake, it is newer than this msgflow, or cannot be read.
             UsageError: no such kind of address.
         """
-        store = Store(url)
-        content = store.read(ABOUT)
+        store = Store(url, follows_links=False)
+        content = store.read(ABOUT, MOST_BYTES)
         if content is None:
             raise DatabaseError(
                 f"no lake — {store.url}", "msgflow fleet ingest SOURCE --lake makes one"
@@ -88,8 +91,8 @@ class Lake:
                 read and written.
             UsageError: no such kind of address.
         """
-        store = Store(url)
-        content = store.read(ABOUT)
+        store = Store(url, follows_links=False)
+        content = store.read(ABOUT, MOST_BYTES)
         if content is None:
             if store.entries(recursive=False) or store.folders():
                 raise DatabaseError(
@@ -136,7 +139,7 @@ class Lake:
         except FileNotFoundError:
             # Compaction has deleted files since they were listed: another one replaces them.
             return self.rows_by_file()
-        except (pa.ArrowInvalid, OSError) as error:
+        except (pa.ArrowException, OSError) as error:
             raise DatabaseError(
                 f"cannot read the runs of the lake: {_line(error)} — {self.store.url}",
                 "check that nobody else than msgflow has written there",
@@ -152,7 +155,9 @@ class Lake:
             if content is None:
                 raise FileNotFoundError(path)
             covered = _covered(content) if _is_together(path) else []
-            self._known[path] = (read_parquet(content, schema), covered)
+            rows = read_parquet(content, schema)
+            _require_sound(rows, self.store.url_of(path))
+            self._known[path] = (rows, covered)
         return {path: self._known[path] for path in files}
 
     def put_together(self) -> int:
@@ -246,7 +251,7 @@ class Lake:
             dict.fromkeys(run_schema().names)
             | dict(row)
             # Later than the row that it replaces, even if the clocks of machines differ.
-            | {"committed_ns": max(now, (row.get("committed_ns") or 0) + 1)}
+            | {"committed_ns": min(max(now, (row.get("committed_ns") or 0) + 1), _MOST)}
             | {"lake_revision": LAKE_REVISION}
             for row in rows
         ]
@@ -278,7 +283,8 @@ class Lake:
                     f"msgflow fleet runs --lake {shlex.quote(self.store.url)}",
                 )
         self.commit(
-            known[key] | {"is_removed": True, "generation": known[key]["generation"] + 1}
+            known[key]
+            | {"is_removed": True, "generation": min(known[key]["generation"] + 1, _MOST)}
             for key in keys
         )
         return len(keys)
@@ -342,6 +348,26 @@ def visible(rows: pa.Table, con: duckdb.DuckDBPyConnection | None = None) -> pa.
     found = con.sql(_VISIBLE).to_arrow_table()
     con.unregister("known")
     return pa.Table.from_arrays(found.columns, schema=rows.schema)
+
+
+def _require_sound(rows: pa.Table, url: str) -> None:
+    """Raise unless rows of the table `run` have what their order and their files depend on.
+
+    Raises:
+        DatabaseError: they lack it; the message names the file.
+    """
+    lacking = [
+        name
+        for name in ("run", "generation", "is_removed", "committed_ns")
+        if rows[name].null_count
+    ]
+    parts = (name for key in _PARTS for name in rows[key].to_pylist() if name is not None)
+    if lacking or any("/" in name for name in parts):
+        what = f"a row without {lacking[0]}" if lacking else "a part that is no name"
+        raise DatabaseError(
+            f"cannot read the runs of the lake: {what} — {url}",
+            "delete this file; the recordings of its runs have to be ingested again",
+        )
 
 
 def _is_together(path: str) -> bool:

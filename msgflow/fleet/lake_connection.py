@@ -9,6 +9,7 @@ credentials.
 from __future__ import annotations
 
 import re
+import shlex
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -86,7 +87,7 @@ def choose(lake: Lake, where: str | None = None) -> Choice:
     if not len(chosen):
         raise UsageError(
             f"none of the {len(runs):,} runs of the lake fits — --where {where}",
-            f"msgflow fleet runs --lake {lake.store.url}",
+            f"msgflow fleet runs --lake {shlex.quote(lake.store.url)}",
         )
     return Choice(lake, chosen, labels, len(runs))
 

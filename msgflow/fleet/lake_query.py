@@ -226,12 +226,10 @@ def fleet_worst(
 def _command(lake: Lake, row: Mapping[str, Any]) -> str | None:
     if not row["has_database"]:
         return None
-    file = f"{row['run']}.duckdb"
-    option = f"--{row['root_kind'].replace('_', '-')} {row['root_id']}"
-    return (
-        f"msgflow fleet open {row['run']} --lake {shlex.quote(lake.store.url)}"
-        f" && msgflow flow --db {file} {option}"
-    )
+    option = f"--{row['root_kind'].replace('_', '-')}"
+    opening = ["msgflow", "fleet", "open", row["run"], "--lake", lake.store.url]
+    flow = ["msgflow", "flow", "--db", f"{row['run']}.duckdb", option, str(row["root_id"])]
+    return f"{shlex.join(opening)} && {shlex.join(flow)}"
 
 
 def _tables(header: Header) -> list[str]:

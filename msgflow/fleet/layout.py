@@ -6,6 +6,7 @@ Paths and names are an interface: users read them with DuckDB, Spark and others,
 from __future__ import annotations
 
 import json
+import re
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -24,6 +25,10 @@ DATABASE = "database"
 FILE_NAME = "data.parquet"
 DATABASE_NAME = "msgflow.duckdb.zst"
 _FORMAT = "msgflow lake"
+# A writer that was killed leaves a name with a dot before and .part behind.
+_OURS = re.compile(
+    r"[^/]+(/[^/]+)?/part=[^/]+/\.?(data\.parquet|msgflow\.duckdb\.zst)(\..+\.part)?"
+)
 
 
 def about() -> bytes:
@@ -42,7 +47,7 @@ def require_readable(content: bytes, url: str) -> None:
         read = json.loads(content)
         revision = read["revision"]
         is_ours = read["format"] == _FORMAT and isinstance(revision, int)
-    except (ValueError, TypeError, KeyError):
+    except (ValueError, TypeError, KeyError, RecursionError):
         is_ours, revision = False, 0
     if not is_ours:
         raise DatabaseError(f"its {ABOUT} is not that of a lake — {url}", "give another --lake")
@@ -67,6 +72,11 @@ def view_path(view: str, part: str) -> str:
 def database_path(part: str) -> str:
     """Return the path of the database of one run, compressed with Zstandard."""
     return f"{DATABASE}/part={part}/{DATABASE_NAME}"
+
+
+def is_file_of_part(path: str) -> bool:
+    """Tell whether msgflow writes files of such a path, other than those of the table `run`."""
+    return _OURS.fullmatch(path) is not None
 
 
 def metadata(table: str, schema_revision: str) -> dict[str, str]:

@@ -13,12 +13,15 @@ from msgflow.errors import UsageError
 from msgflow.fleet.file_store import Store, normal_url
 from msgflow.fleet.parquet import read_parquet
 from msgflow.fleet.recording import Recording
+from msgflow.text_file import MOST_BYTES
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
 SUFFIXES = (".csv", ".jsonl", ".parquet")
 PATH = "path"
+# A recording takes some hundred bytes: this is enough for any fleet.
+_MOST_BYTES = 100 * MOST_BYTES
 
 
 @dataclass(frozen=True)
@@ -46,7 +49,7 @@ def read_manifest(source: str) -> list[Recording]:
     """
     url = normal_url(source)
     folder, _, name = url.rpartition("/")
-    content = Store(folder or "/").read(name)
+    content = Store(folder or "/").read(name, _MOST_BYTES)
     if content is None:
         raise UsageError(f"no such manifest — {source}", "check the path")
     rows = list(_rows(content, source))
@@ -118,7 +121,7 @@ def _jsonl(text: str, source: str) -> Iterator[_Row]:
             continue
         try:
             values = json.loads(line)
-        except ValueError as error:
+        except (ValueError, RecursionError) as error:
             raise UsageError(
                 f"cannot read the manifest: {error}, in line {number} — {source}",
                 "one JSON object a line",
@@ -134,7 +137,7 @@ def _parquet(content: bytes, source: str) -> Iterator[_Row]:
 
     try:
         table = read_parquet(content)
-    except (pa.ArrowInvalid, OSError) as error:
+    except (pa.ArrowException, OSError) as error:
         raise UsageError(f"cannot read the manifest — {source}", "is it Parquet?") from error
     _require_columns(table.column_names, source)
     for number, values in enumerate(table.to_pylist(), 1):
@@ -160,6 +163,13 @@ def _require_columns(names: list[str], source: str) -> None:
 
 
 def _text(value: Any, key: str) -> str | None:
+    if isinstance(value, str):
+        try:
+            value.encode()
+        except UnicodeEncodeError as error:
+            raise UsageError(
+                f"a value that is no text: half of a character — {key}", "save it as UTF-8"
+            ) from error
     if value is None or isinstance(value, str):
         return value
     if isinstance(value, bool):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import secrets
+import shlex
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,6 +15,7 @@ from msgflow.db.migration import upgrade
 from msgflow.errors import DatabaseError, MsgflowError, UsageError
 from msgflow.fleet.layout import database_path
 from msgflow.fleet.part import run_key
+from msgflow.trace.extraction import LIMIT_VARIABLE, limit_of
 
 if TYPE_CHECKING:
     from msgflow.fleet.lake import Lake
@@ -66,7 +68,7 @@ def open_run(lake: Lake, run: str, path: Path | None = None) -> OpenedRun:
         raise UsageError(
             f"the lake has no database of this run, it was written with --no-database"
             f" — {row['run']}",
-            f"msgflow ingest {row['source']}",
+            f"msgflow ingest {shlex.quote(row['source'] or '')}",
         )
     aside = target.with_name(f".{target.name}.{secrets.token_hex(4)}.part")
     try:
@@ -98,7 +100,8 @@ def _row(lake: Lake, run: str) -> dict[str, Any]:
     ]
     if not found:
         raise UsageError(
-            f"the lake has no such run — {run}", f"msgflow fleet runs --lake {lake.store.url}"
+            f"the lake has no such run — {run}",
+            f"msgflow fleet runs --lake {shlex.quote(lake.store.url)}",
         )
     if len(found) > 1:
         keys = ", ".join(row["run"] for row in found[:3])
@@ -118,8 +121,17 @@ def _fetch(lake: Lake, row: dict[str, Any], target: Path) -> None:
     packed = target.with_name(f"{target.name}.zst")
     try:
         lake.store.fetch(path, packed)
+        limit, size = limit_of(packed), 0
         with pa.CompressedInputStream(str(packed), "zstd") as source, target.open("xb") as file:
             while chunk := source.read(_CHUNK):
+                size += len(chunk)
+                if size > limit:
+                    raise DatabaseError(
+                        f"the database has more than {limit:,} bytes unpacked,"
+                        f" {packed.stat().st_size:,} packed — {lake.store.url_of(path)}",
+                        f"{LIMIT_VARIABLE}=100GB msgflow fleet open … reads it, if you know who"
+                        " made it",
+                    )
                 file.write(chunk)
     except OSError as error:
         if error.errno is not None:

@@ -74,7 +74,8 @@ def _scratch(parent: str | None) -> Iterator[Path]:
 def _watched(task: Task, directory: Path, begin: float) -> Outcome:
     with (directory / _LOG).open("wb") as log:
         child = subprocess.Popen(
-            [sys.executable, "-m", "msgflow.fleet.child_process", str(directory)],
+            # -P: nothing is imported from the current folder.
+            [sys.executable, "-P", "-m", "msgflow.fleet.child_process", str(directory)],
             stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
             stderr=log,

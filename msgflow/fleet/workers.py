@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import os
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from msgflow.errors import UsageError
@@ -15,6 +17,7 @@ if TYPE_CHECKING:
 
 LOCAL = "local"
 _SCRATCH = "scratch"
+_FOLDER_WITHOUT_MODULES = Path(__file__).parent / "sql"
 # Tasks that wait for each worker, besides the one that it does.
 _WAITING = 1
 
@@ -94,12 +97,15 @@ class RayWorkers:
             if address == LOCAL:
                 more |= {"include_dashboard": False, "object_store_memory": 100_000_000}
             try:
-                ray.init(
-                    logging_level=logging.ERROR,
-                    log_to_driver=False,
-                    configure_logging=False,
-                    **more,
-                )
+                # Ray's workers import from this folder first. In a foreign one, a file could have
+                # the name of a module.
+                with contextlib.chdir(_FOLDER_WITHOUT_MODULES):
+                    ray.init(
+                        logging_level=logging.ERROR,
+                        log_to_driver=False,
+                        configure_logging=False,
+                        **more,
+                    )
             except Exception as error:
                 line = (str(error).strip().splitlines() or [type(error).__name__])[0]
                 raise UsageError(

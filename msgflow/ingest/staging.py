@@ -20,6 +20,7 @@ from __future__ import annotations
 import contextlib
 from typing import TYPE_CHECKING
 
+from msgflow.atomic_directory import replacing_entries
 from msgflow.ingest.catalogue import COMMON_COLUMNS, Origin, Predecessor, Tracepoint, load
 from msgflow.sql.quoting import literal
 
@@ -208,15 +209,22 @@ def _event_predecessors(tracepoint: Tracepoint) -> list[Predecessor]:
 
 
 def export(con: duckdb.DuckDBPyConnection, directory: Path) -> None:
-    """Write all staged tables and views with rows to `directory` as Parquet."""
-    directory.mkdir(parents=True, exist_ok=True)
-    names = con.execute(
+    """Write all staged tables and views with rows to `directory` as Parquet.
+
+    Raises:
+        UsageError: the directory cannot be written.
+    """
+    found = con.execute(
         "SELECT database_name || '.' || table_name FROM duckdb_tables() "
         "WHERE database_name IN ('raw', 'staging') "
         "UNION ALL SELECT database_name || '.' || view_name FROM duckdb_views() "
         "WHERE database_name IN ('raw', 'staging') AND NOT internal ORDER BY ALL"
     ).fetchall()
-    for (name,) in names:
-        if name not in OF_ALL_EVENTS and con.execute(f"SELECT 1 FROM {name} LIMIT 1").fetchall():
-            target = literal(str(directory / f"{name}.parquet"))
-            con.execute(f"COPY {name} TO {target} (FORMAT parquet)")
+    files = {
+        f"{name}.parquet": name
+        for (name,) in found
+        if name not in OF_ALL_EVENTS and con.execute(f"SELECT 1 FROM {name} LIMIT 1").fetchall()
+    }
+    with replacing_entries(directory, list(files), force=True) as aside:
+        for file, name in files.items():
+            con.execute(f"COPY {name} TO {literal(str(aside / file))} (FORMAT parquet)")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from typing import TYPE_CHECKING, Any
 
 from msgflow.errors import TraceError
@@ -41,7 +42,8 @@ def messages(bt2: Any, traces: Sequence[tuple[Path, int]]) -> Iterator[Any]:
         named = [match[1] for each in error for match in _QUOTED_PATH.finditer(each.message)]
         raise TraceError(
             f"the trace is damaged or incomplete: {cause} — {named[0] if named else path}",
-            hint=f"copy it again from where it was recorded; babeltrace2 {path} says more",
+            hint="copy it again from where it was recorded;"
+            f" babeltrace2 {shlex.quote(str(path))} says more",
         ) from error
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -88,7 +89,9 @@ def _check_exists(path: Path) -> None:
             hint=metadata_frame.DIRECTORY_HINT,
         )
     if not path.exists():
-        raise TraceError(f"no such file or directory — {path}", hint=f"ls {path.parent}")
+        raise TraceError(
+            f"no such file or directory — {path}", hint=f"ls {shlex.quote(str(path.parent))}"
+        )
     if path.is_file():
         if (
             path.name == metadata_frame.FILE_NAME
@@ -96,7 +99,7 @@ def _check_exists(path: Path) -> None:
         ):
             raise TraceError(
                 f"this is a file inside a trace, give the directory — {path}",
-                hint=f"msgflow ingest {path.parent}",
+                hint=f"msgflow ingest {shlex.quote(str(path.parent))}",
             )
         raise TraceError(
             f"not a trace but {_describe(path)} — {path}",
@@ -111,7 +114,7 @@ def _directories_with_metadata(root: Path, strays: list[Path]) -> Iterator[Path]
     def fail(error: OSError) -> None:
         raise TraceError(
             f"cannot read the directory ({error.strerror}) — {error.filename}",
-            hint=f"ls -ld {error.filename}",
+            hint=f"ls -ld {shlex.quote(str(error.filename))}",
         ) from error
 
     for directory, names, files in os.walk(root, onerror=fail, followlinks=True):
@@ -150,7 +153,7 @@ def _locate(directory: Path) -> TraceLocation:
         if not os.access(path, os.R_OK):
             raise TraceError(
                 f"cannot read the trace (Permission denied) — {path}",
-                hint=f"sudo chown -R $USER {directory}",
+                hint=f"sudo chown -R $USER {shlex.quote(str(directory))}",
             )
     return TraceLocation(directory, size)
 
@@ -160,7 +163,8 @@ def _no_trace_error(path: Path, strays: Sequence[Path]) -> TraceError:
         return TraceError(
             f"a stream of a trace without its `metadata`, which is missing or renamed — "
             f"{strays[0]}",
-            hint=f"ls {strays[0].parent}; copy the file `metadata` from where it was recorded",
+            hint=f"ls {shlex.quote(str(strays[0].parent))};"
+            " copy the file `metadata` from where it was recorded",
         )
     entries = sorted(path.iterdir())
     if not entries:
@@ -193,9 +197,9 @@ def _describe(path: Path) -> str:
 def _hint_for(path: Path) -> str:
     kind = _describe(path)
     if is_archive(path):
-        return f"msgflow ingest {path}"
+        return f"msgflow ingest {shlex.quote(str(path))}"
     if "archive" in kind or "compressed" in kind:
-        return f"tar xf {path}"
+        return f"tar xf {shlex.quote(str(path))}"
     if "tracetools_analysis" in kind:
         return "give the directory of the trace that it was converted from"
     if "recording" in kind:

@@ -265,8 +265,8 @@ def _unpack_tar(file: IO[bytes], target: Target) -> None:
             else:
                 raise target.refuse_special(member.name)
         # Checksums stand at the end of the compressed stream, behind the end of the tar.
-        while content.read(_CHUNK):
-            pass
+        while rest := content.read(_CHUNK):
+            target.take(len(rest))
 
 
 def _unpack_zip(file: IO[bytes], target: Target) -> None:

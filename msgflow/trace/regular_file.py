@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import errno
 import os
+import shlex
 import stat
 from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
 
 if TYPE_CHECKING:
+    from io import BufferedReader
     from pathlib import Path
 
 _KINDS = {
@@ -32,19 +34,31 @@ def read_regular(path: Path, most_bytes: int | None, size: int = -1) -> bytes:
         UnsuitableFileError: it is a pipe, a device or the like, or longer than `most_bytes`.
         OSError: it cannot be read.
     """
-    # A blocking `open` of a pipe without a writer would wait for ever.
-    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
-    with os.fdopen(descriptor, "rb") as file:
-        status = os.fstat(descriptor)
-        if not stat.S_ISREG(status.st_mode):
-            raise UnsuitableFileError(errno.EINVAL, f"{_kind(status.st_mode)}, no file", str(path))
-        if most_bytes is not None and status.st_size > most_bytes:
+    with open_regular(path) as file:
+        length = os.fstat(file.fileno()).st_size
+        if most_bytes is not None and length > most_bytes:
             raise UnsuitableFileError(
                 errno.EFBIG,
-                f"{status.st_size:,} bytes, more than the {most_bytes:,} that make sense",
+                f"{length:,} bytes, more than the {most_bytes:,} that make sense",
                 str(path),
             )
-        return file.read(status.st_size if size < 0 else size)
+        return file.read(length if size < 0 else size)
+
+
+def open_regular(path: Path) -> BufferedReader:
+    """Open a regular file for reading.
+
+    Raises:
+        UnsuitableFileError: it is a pipe, a device or the like.
+        OSError: it cannot be read.
+    """
+    # A blocking `open` of a pipe without a writer would wait for ever.
+    file = os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb")
+    mode = os.fstat(file.fileno()).st_mode
+    if not stat.S_ISREG(mode):
+        file.close()
+        raise UnsuitableFileError(errno.EINVAL, f"{_kind(mode)}, no file", str(path))
+    return file
 
 
 def irregular(path: Path) -> str | None:
@@ -61,7 +75,7 @@ def unreadable_error(error: OSError, directory: Path) -> TraceError:
     if isinstance(error, UnsuitableFileError):
         hint = "put the file there that was recorded: copy the trace again, with cp -rL"
     elif error.errno in {errno.EACCES, errno.EPERM}:
-        hint = f"sudo chown -R $USER {directory}"
+        hint = f"sudo chown -R $USER {shlex.quote(str(directory))}"
     elif error.errno in {errno.ELOOP, errno.ENOENT}:
         hint = "copy the trace again with cp -rL, which copies what links lead to"
     else:

@@ -104,9 +104,10 @@ def write_flow_page(
         "pages": ["timeline"],
         "address": f"#/timeline?flow={kind}:{number}",
     }
+    page = single_page(parts, head).encode()
     with replacing(path) as temporary:
-        temporary.write_text(single_page(parts, head), encoding="utf-8")
-    return path.stat().st_size
+        temporary.write_bytes(page)
+    return len(page)
 
 
 def _between(links: pa.Table, bars: pa.Table) -> pa.Table:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 import threading
 from collections import OrderedDict
 from dataclasses import asdict, dataclass, replace
@@ -205,7 +206,7 @@ class Pages:
                 "description": header.description,
                 "notes": result.notes,
                 "columns": {column.name: column.description for column in header.columns},
-                "command": f"msgflow query {name} --run {extent.run.name}",
+                "command": f"msgflow query {name} --run {shlex.quote(extent.run.name)}",
             },
             origin_ns=extent.origin_ns,
             units=result.units,
@@ -248,7 +249,9 @@ class Pages:
                     column.name: column.description
                     for column in (result.header.columns if result.header else ())
                 },
-                "command": f"msgflow compare {comparison.run_a.name} {comparison.run_b.name}",
+                "command": shlex.join(
+                    ["msgflow", "compare", comparison.run_a.name, comparison.run_b.name]
+                ),
             },
             units=result.units,
         )

@@ -59,6 +59,11 @@ export function pathText(path) {
     place % 2 && part === parts[place - 1] ? text : place ? `${text} → ${part}` : part, "");
 }
 
+// A word of a command for a shell.
+export function shellQuoted(text) {
+  return /^[\w@%+=:,./-]+$/.test(text) ? text : `'${String(text).replaceAll("'", `'"'"'`)}'`;
+}
+
 export function title(name) {
   if (name in TITLES) return TITLES[name];
   return name.replace(/_(ns|hz|percent)$/, "").replace(/^p(\d\d)$/, "p$1").replaceAll("_", " ");

@@ -2,7 +2,7 @@
 
 import { h, clear, breakable } from "./dom.js";
 import { current, replace } from "./address.js";
-import { PATH_HELP, count, duration, pathText } from "./labels.js";
+import { PATH_HELP, count, duration, pathText, shellQuoted } from "./labels.js";
 import { dataTable, besides } from "./table.js";
 import { command } from "./notice.js";
 import { chart, redrawCharts } from "./chart.js";
@@ -138,14 +138,14 @@ export class LakePage {
     const { worst } = this;
     const table = { ...worst, columns: [...worst.columns, { name: "labels", type: "json" }, { name: "to_open_it", type: "text" }] };
     table.to_open_it = worst.run.map((key, row) => (this.run.has_database[this.runs.get(key)]
-      ? `${this.opening(key)} && msgflow flow --db ${key}.duckdb --${worst.root_kind[row].replace("_", "-")} ${worst.root_id[row]}` : ""));
+      ? `${this.opening(key)} && msgflow flow --db ${shellQuoted(`${key}.duckdb`)} ${shellQuoted(`--${worst.root_kind[row].replace("_", "-")}`)} ${worst.root_id[row]}` : ""));
     table.labels = worst.run.map((key) => this.run.labels[this.runs.get(key)]);
     table.run = worst.run.map((key) => this.runName(key));
     return dataTable(table, { columns: ["latency_ns", "run", "labels", "at_ns", "to_open_it"], label: "slowest flows", only: (row) => worst.path[row] === path });
   }
 
   opening(key) {
-    return `msgflow fleet open ${key} ${this.app.source.head.open}`;
+    return `msgflow fleet open ${shellQuoted(key)} ${this.app.source.head.open}`;
   }
 
   // Names of runs come from their sources: two may have the same.

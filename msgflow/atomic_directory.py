@@ -1,7 +1,8 @@
-"""Directory of exported views: we write all of it aside, then it takes its place."""
+"""Entries of a directory, such as exported views: all are written aside, then take their places."""
 
 from __future__ import annotations
 
+import os
 import shutil
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
@@ -29,7 +30,7 @@ def replacing_entries(
     Args:
         directory: created if missing.
         names: files or directories directly in it.
-        force: replace existing ones; a directory only if an export has written it.
+        force: replace existing files, and directories that an export has written.
 
     Raises:
         UsageError: one exists already, or the directory cannot be written.
@@ -83,13 +84,18 @@ def _clean_up(directory: Path) -> None:
 
 
 def _refuse_existing(directory: Path, names: Sequence[str], force: bool) -> None:
-    existing = [directory / name for name in names if (directory / name).exists()]
+    existing = [directory / name for name in names if os.path.lexists(directory / name)]
     if existing and not force:
         raise UsageError(
             f"it exists already — {existing[0]}",
             "choose another directory, or replace what exists with --force",
         )
     for path in existing:
+        if path.is_symlink() or not (path.is_file() or path.is_dir()):
+            raise UsageError(
+                f"a link, pipe or device is in the place of a file — {path}",
+                "choose another directory",
+            )
         if path.is_dir() and not _is_exported(path):
             raise UsageError(
                 f"the directory holds more than an export — {path}", "choose another directory"
