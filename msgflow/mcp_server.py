@@ -1,26 +1,29 @@
 """A server of the Model Context Protocol: agents ask a database, and can change nothing.
 
 It talks over stdin and stdout. Every call opens the database for reading and closes it again: a
-waiting agent blocks no ingest. Answers are short, and say what they leave out.
+waiting agent blocks no ingest. Calls run in a child process with bounds on memory and time. Answers
+are short, and say what they leave out.
 """
 
 from __future__ import annotations
 
 import contextlib
+import functools
 import json
 import threading
 from dataclasses import asdict, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import duckdb
 
+from msgflow.confined import ConfinedProcess, bound_memory
 from msgflow.database import Database
 from msgflow.errors import MsgflowError, QueryError, UsageError
 from msgflow.version import __version__
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
-    from pathlib import Path
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from mcp.server.mcpserver import MCPServer
 
@@ -78,7 +81,8 @@ def make_server(path: Path, *, seconds: float = MOST_SECONDS) -> MCPServer[Any]:
     server = StrictServer(
         "msgflow", instructions=INSTRUCTIONS, version=__version__, log_level="ERROR"
     )
-    tools = _Tools(path, seconds)
+    tools = _Tools(path)
+    caller = _Caller(path, seconds)
     for tool in (
         tools.info,
         tools.check,
@@ -88,17 +92,47 @@ def make_server(path: Path, *, seconds: float = MOST_SECONDS) -> MCPServer[Any]:
         tools.sql,
         tools.flow,
     ):
-        server.tool(structured_output=False)(tool)
+        server.tool(structured_output=False)(caller.confined(tool))
     return server
+
+
+class _Caller:
+    """Calls tools in one child process, which stays for the next call."""
+
+    def __init__(self, path: Path, seconds: float) -> None:
+        self._path = path
+        self._process = ConfinedProcess(__name__, seconds=seconds)
+        self._lock = threading.Lock()
+
+    def confined(self, tool: Callable[..., str]) -> Callable[..., str]:
+        """Return a function with the signature of a tool that calls it in the child."""
+
+        @functools.wraps(tool)
+        def call(**given: Any) -> str:
+            arguments = {
+                "path": str(self._path),
+                "memory_limit": MEMORY_LIMIT,
+                "tool": tool.__name__,
+                "given": given,
+            }
+            with self._lock, _as_tool_errors():
+                return self._process.call("answer", arguments).decode()
+
+        return call
+
+
+def answer(path: str, memory_limit: str, tool: str, given: dict[str, Any]) -> bytes:
+    """Return what a tool answers: the child calls this."""
+    text: str = getattr(_Tools(Path(path), memory_limit), tool)(**given)
+    return text.encode(errors="replace")
 
 
 class _Tools:
     """What agents may call; the docstrings are what they read."""
 
-    def __init__(self, path: Path, seconds: float) -> None:
+    def __init__(self, path: Path, memory_limit: str = MEMORY_LIMIT) -> None:
         self._path = path
-        self._seconds = seconds
-        self._lock = threading.Lock()
+        self._memory_limit = memory_limit
 
     def info(self) -> str:
         """List the runs (recordings) in the database, oldest first: name, time, events, labels."""
@@ -116,13 +150,12 @@ class _Tools:
 
     def list_queries(self, name: str | None = None) -> str:
         """List the named queries; with a name, explain that query: parameters and columns."""
-        with _as_tool_errors():
-            from msgflow.query.catalogue import load_queries, load_query
+        from msgflow.query.catalogue import load_queries, load_query
 
-            if name is None:
-                titles = ({"name": query.name, "title": query.title} for query in load_queries())
-                return _answer({}, map(json.dumps, titles))
-            return json.dumps(_explained(load_query(name)), ensure_ascii=False)
+        if name is None:
+            titles = ({"name": query.name, "title": query.title} for query in load_queries())
+            return _answer({}, map(json.dumps, titles))
+        return json.dumps(_explained(load_query(name)), ensure_ascii=False)
 
     def run_query(
         self,
@@ -182,8 +215,7 @@ class _Tools:
             return _answer({}, map(json.dumps, dict.fromkeys(str(row[first]) for row in rows)))
         chosen = [row for row in rows if row[first] == view]
         if not chosen:
-            with _as_tool_errors():
-                raise UsageError(f"there is no such view — {view}", "schema without a name")
+            raise UsageError(f"there is no such view — {view}", "schema without a name")
         return _answer({}, (json.dumps(row, ensure_ascii=False) for row in chosen))
 
     def sql(self, query: str, limit: int = DEFAULT_ROWS) -> str:
@@ -229,40 +261,18 @@ class _Tools:
 
     @contextlib.contextmanager
     def _opened(self) -> Iterator[Database]:
-        """Open the database for one call, which is interrupted when it takes too long."""
-        with (
-            self._lock,
-            _as_tool_errors(),
-            Database(self._path, memory_limit=MEMORY_LIMIT) as database,
-        ):
-            is_done, is_late = threading.Event(), threading.Event()
-            connection = database.connection
-
-            def watch() -> None:
-                # Again and again: a call may be several statements.
-                while not is_done.wait(0.1 if is_late.is_set() else self._seconds):
-                    is_late.set()
-                    connection.interrupt()
-
-            watcher = threading.Thread(target=watch, daemon=True)
-            watcher.start()
+        """Open the database for one call."""
+        with Database(self._path, memory_limit=self._memory_limit) as database:
+            bound_memory(database.connection)
             try:
                 yield database
             except Exception as error:
                 if isinstance(error.__cause__ or error, duckdb.OutOfMemoryException):
                     raise QueryError(
-                        f"it takes more memory than {MEMORY_LIMIT}",
+                        f"it takes more memory than {self._memory_limit}",
                         "read one run, a shorter time (start, end), or fewer columns",
                     ) from error
-                if not is_late.is_set():
-                    raise
-                raise QueryError(
-                    f"it took longer than {self._seconds:g} s",
-                    "read one run, or a shorter time (start, end)",
-                ) from error
-            finally:
-                is_done.set()
-                watcher.join()
+                raise
 
 
 @contextlib.contextmanager

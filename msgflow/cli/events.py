@@ -107,12 +107,15 @@ def command(
             _write(selection, form or format_of(output), output)
         lost = selection.lost_event_count
         damages = list(opened.damages)
+        copies = opened.duplicate_packet_count + sum(opened.repeated_packet_counts.values())
     for damage in damages[:_DAMAGES_SHOWN]:
         print_note(
             f"{damage.message} — {damage.file}, packet {damage.position}, byte {damage.offset}"
         )
     if len(damages) > _DAMAGES_SHOWN:
         print_note(f"{counted(len(damages) - _DAMAGES_SHOWN, 'further damage')}")
+    if copies:
+        print_note(f"{counted(copies, 'packet')} left out: the traces hold the same once more")
     if lost:
         print_note(f"{counted(lost, 'event')} lost by the tracer while recording")
 

@@ -28,6 +28,7 @@ from msgflow.errors import UsageError
 from msgflow.query.selection import KINDS
 
 if TYPE_CHECKING:
+    from msgflow.query.result import QueryResult
     from msgflow.sql.header import Header
 
 # Options of every query, whose names no parameter of a query may have. Via, without and slowest are
@@ -131,7 +132,6 @@ def build_command(header: Header) -> Any:
 
 def _run(header: Header, own: dict[str, Any], given: dict[str, Any]) -> None:
     from msgflow.cli.output import print_result
-    from msgflow.database import Database
     from msgflow.export.formats import Format, format_of
 
     times = given["times"]
@@ -141,14 +141,16 @@ def _run(header: Header, own: dict[str, Any], given: dict[str, Any]) -> None:
             "tables for people have times with their units — --times",
             "--format csv, json, jsonl or parquet, or a file with such a suffix",
         )
-    with Database(given["database"], memory_limit=given["memory_limit"]) as database:
-        result = database.query(
-            header.name,
+    result = _result(
+        header.name,
+        given,
+        {
             **{name: given[name] for name in SLICE_OPTIONS},
-            internal=given["internal"],
+            "internal": given["internal"],
             **{word: given[word] for word in _SELECTING if given.get(word)},
             **own,
-        )
+        },
+    )
     if times is not None:
         result = result.with_times(times)
     print_result(
@@ -159,6 +161,18 @@ def _run(header: Header, own: dict[str, Any], given: dict[str, Any]) -> None:
         columns=given["columns"],
         most_rows=given.get("limit") or given.get("slowest") or MOST_ROWS,
     )
+
+
+def _result(name: str, given: dict[str, Any], asked: dict[str, Any]) -> QueryResult:
+    # A condition is SQL of the user.
+    if asked.get("where") is not None:
+        from msgflow.confined_query import confined_query
+
+        return confined_query(given["database"], name, asked, memory_limit=given["memory_limit"])
+    from msgflow.database import Database
+
+    with Database(given["database"], memory_limit=given["memory_limit"]) as database:
+        return database.query(name, **asked)
 
 
 def _command_class(header: Header) -> type[TyperCommand]:

@@ -51,11 +51,10 @@ def command(
     `msgflow db schema` lists the views.
     """
     from msgflow.cli.output import print_result
-    from msgflow.database import Database
+    from msgflow.confined_query import confined_sql
 
     query = sql_of(text, file, 'msgflow sql "SELECT * FROM run"')
-    with Database(database, memory_limit=memory_limit) as opened:
-        result = opened.sql(query, limit=limit or None)
+    result = confined_sql(database, query, limit=limit or None, memory_limit=memory_limit)
     print_result(result, form, output, wide=wide)
 
 

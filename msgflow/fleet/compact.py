@@ -93,7 +93,7 @@ def _groups(rows: pa.Table, sizes: Mapping[str, int]) -> list[list[dict[str, Any
         and (living[part] > _MOST_RUNS // 2 or sizes[part] > _MOST_BYTES // 2)
     }
     loose = [row for row in runs if row["part"] not in full]
-    loose.sort(key=lambda row: (row["schema_revision"], row["start_ns"] or 0, row["run"]))
+    loose.sort(key=lambda row: (row["schema_revision"] or "", row["start_ns"] or 0, row["run"]))
     groups: list[list[dict[str, Any]]] = [[]]
     size = 0.0
     for row in loose:
@@ -148,8 +148,11 @@ def _together(lake: Lake, table: str, rows: Sequence[Mapping[str, Any]]) -> pa.T
         return None
     schema = pa.schema([])
     for part, read in there.items():
-        with _usable(lake, table, part, wanted[part]):
+        try:
             schema = pa.unify_schemas([schema, read.schema], promote_options="permissive")
+        except pa.ArrowException as error:
+            first = lake.store.url_of(part_path(table, next(iter(there))))
+            raise _unusable(lake, table, part, wanted[part], f"it differs from {first}") from error
     whole = pa.concat_tables(there.values(), promote_options="permissive")
     # The sort is stable: the rows of a run keep their order.
     return whole.take(pc.sort_indices(whole["run"]))
@@ -177,12 +180,15 @@ def _usable(lake: Lake, table: str, part: str, runs: Sequence[str]) -> Iterator[
         yield
     except (pa.ArrowException, KeyError, OSError) as error:
         words = (str(error).strip().splitlines() or [type(error).__name__])[0]
-        raise DatabaseError(
-            f"a file of the lake cannot be used: {words}"
-            f" — {lake.store.url_of(part_path(table, part))}",
-            f"{shlex.join(['msgflow', 'fleet', 'remove', runs[0], '--lake', lake.store.url])};"
-            " ingest it again",
-        ) from error
+        raise _unusable(lake, table, part, runs, words) from error
+
+
+def _unusable(lake: Lake, table: str, part: str, runs: Sequence[str], why: str) -> DatabaseError:
+    return DatabaseError(
+        f"a file of the lake cannot be used: {why} — {lake.store.url_of(part_path(table, part))}",
+        f"{shlex.join(['msgflow', 'fleet', 'remove', runs[0], '--lake', lake.store.url])};"
+        " ingest it again",
+    )
 
 
 def _write(lake: Lake, name: str, part: str, table: pa.Table, revision: str) -> None:

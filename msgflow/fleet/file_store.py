@@ -46,7 +46,7 @@ _HOPELESS = re.compile(
 )
 _OF_THIS_MACHINE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES)
 # A name of a user or a password before the host; a password may have any character.
-_USERINFO = re.compile(r"//([^/@]*|[^/]*:.*)@")
+_USERINFO = re.compile(r"//([^/]*:.*|[^/@]*)@")
 
 
 @dataclass(frozen=True)

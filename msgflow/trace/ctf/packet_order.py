@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from enum import Enum, auto
 from typing import TYPE_CHECKING
 
 from msgflow.trace.ctf.losses import LossCounter, recording_of
@@ -154,7 +155,8 @@ def entries_of(
         if is_copy:
             copies += 1
             continue
-        if repetitions.has(stream, packet):
+        repetition = repetitions.of(stream, packet)
+        if repetition is Repetition.SAME:
             repeated[stream.trace_index] = repeated.get(stream.trace_index, 0) + 1
             continue
         position = positions.get(rank, 0)
@@ -163,10 +165,26 @@ def entries_of(
         entries.append(entry)
         if losses.problem is not None:
             report(entry, 0, losses.problem)
+        if repetition is Repetition.OTHER:
+            report(entry, 0, "another packet has its stream, number and begin: both were read")
     return Entries(entries, copies, repeated)
 
 
 _CHUNK = 1 << 20
+
+
+class Repetition(Enum):
+    """What a packet is to an earlier one of its trace.
+
+    Attributes:
+        NONE: there is none like it.
+        SAME: it is the same once more.
+        OTHER: another one with the same identity; one of them is damaged.
+    """
+
+    NONE = auto()
+    SAME = auto()
+    OTHER = auto()
 
 
 class Repetitions:
@@ -175,11 +193,11 @@ class Repetitions:
     def __init__(self) -> None:
         self._seen: dict[tuple[object, ...], Packet] = {}
 
-    def has(self, stream: Stream, packet: Packet) -> bool:
+    def of(self, stream: Stream, packet: Packet) -> Repetition:
         """Tell whether the packet was seen before, and remember it.
 
-        It was if one of the same stream has its number and begin. Where packets have no numbers,
-        or do not name their streams, it must be the same byte for byte.
+        It was if one with its stream, number and begin is the same byte for byte. Packets without
+        numbers, or without the names of their streams, may well begin at the same time.
         """
         header = packet.header
         key: tuple[object, ...] = (stream.trace_index, stream.class_id, header.begin)
@@ -192,11 +210,15 @@ class Repetitions:
             key = (*key, header.end, header.cpu, header.events_at, packet.content_bits)
         first = self._seen.setdefault(key, packet)
         if first is packet:
-            return False
-        return is_numbered or _are_equal(first, packet)
+            return Repetition.NONE
+        if _are_equal(first, packet):
+            return Repetition.SAME
+        return Repetition.OTHER if is_numbered else Repetition.NONE
 
 
 def _are_equal(one: Packet, other: Packet) -> bool:
+    if one.content_bits != other.content_bits:
+        return False
     left = (one.content_bits + 7) // 8
     try:
         with one.path.open("rb") as first, other.path.open("rb") as second:

@@ -1,0 +1,229 @@
+"""Confined processes: SQL of a person or an agent runs in a child with bounds on memory and time.
+
+DuckDB's memory limit does not count what functions of a query take, and an interrupt waits until
+such a function returns. The system's bounds hold always: an allocation beyond them fails, and a
+child that is late is killed. The connection in the child is in the sandbox of `msgflow.db.sandbox`
+as any other.
+
+The child is `python -P -m msgflow.confined MODULE`. It reads a request per line from stdin, calls
+a function of the module, and writes the answer: a line of JSON, then as many bytes as that says. It
+ends when its parent has ended.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import os
+import queue
+import resource
+import select
+import subprocess
+import sys
+import threading
+import time
+import traceback
+from typing import TYPE_CHECKING, Any
+
+from msgflow import errors
+from msgflow.errors import MsgflowError, QueryError
+
+if TYPE_CHECKING:
+    import duckdb
+
+_CHUNK = 1 << 20
+_ORPHAN = 1
+# What functions, results and heaps in pieces may take for each byte that DuckDB counts, and at
+# least. DuckDB's own limit is 80 % of the memory that there is.
+_SHARE_BESIDE = 0.25
+_LEAST_BESIDE = 1 << 28
+_CANNOT_START = (
+    "the process that runs queries cannot start",
+    "is msgflow installed where this Python finds it? pip show ros2-msgflow",
+)
+_ENDED = (
+    "the process that ran the query has ended: it took more memory than there is",
+    "read one run, a shorter time, or fewer columns",
+)
+_UNITS = ("bytes", "KiB", "MiB", "GiB", "TiB", "PiB")
+
+
+class LateError(QueryError):
+    """A call took longer than it may."""
+
+
+class ConfinedProcess:
+    """A child process that calls functions of one module, one call after the other.
+
+    It starts at once, and again when it had to be killed. Use it as a context manager, or call
+    `close`. It is not for several threads at a time.
+    """
+
+    def __init__(self, module: str, *, seconds: float | None = None) -> None:
+        """Start the child.
+
+        Args:
+            module: whose functions it calls; they take values that JSON has, and return bytes.
+            seconds: how long a call may take; as long as it likes when None.
+        """
+        self._module = module
+        self._seconds = seconds
+        self._child = self._start()
+
+    def __enter__(self) -> ConfinedProcess:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def call(self, function: str, arguments: dict[str, Any]) -> bytes:
+        """Return what a function of the module returns.
+
+        Raises:
+            MsgflowError: the one that the function raised.
+            LateError: it took longer than it may.
+            QueryError: the child has ended.
+            RuntimeError: the function raised another error.
+        """
+        if self._child.poll() is not None:
+            self.close()
+            self._child = self._start()
+        try:
+            self._answer(None, _CANNOT_START)  # the child is ready
+            request = json.dumps({"function": function, "arguments": arguments}, default=str)
+            assert self._child.stdin is not None
+            self._child.stdin.write(f"{request}\n".encode())
+            self._child.stdin.flush()
+            return self._answer(self._seconds, _ENDED)
+        except LateError:
+            # The next call finds the imports done.
+            self.close()
+            self._child = self._start()
+            raise
+        except MsgflowError:
+            raise
+        except BaseException:
+            # What the child still writes belongs to no later call.
+            self._child.kill()
+            raise
+
+    def close(self) -> None:
+        """End the child."""
+        self._child.kill()
+        self._child.wait()
+        for stream in (self._child.stdin, self._child.stdout):
+            assert stream is not None
+            stream.close()
+
+    def _start(self) -> subprocess.Popen[bytes]:
+        return subprocess.Popen(
+            # -P: nothing is imported from the current folder.
+            [sys.executable, "-P", "-m", __name__, self._module],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            bufsize=0,
+            # Other allocators reserve memory in large pieces, which would count.
+            env={**os.environ, "ARROW_DEFAULT_MEMORY_POOL": "system", "OPENBLAS_NUM_THREADS": "1"},
+            # Ctrl-C is for the parent, which then ends the child.
+            start_new_session=True,
+        )
+
+    def _answer(self, seconds: float | None, on_end: tuple[str, str]) -> bytes:
+        end = None if seconds is None else time.monotonic() + seconds
+        line = bytearray()
+        while not line.endswith(b"\n"):
+            line += self._read(1, end, on_end)
+        head = json.loads(line)
+        content = bytearray()
+        while len(content) < head["size"]:
+            content += self._read(min(_CHUNK, head["size"] - len(content)), end, on_end)
+        if head["error"] is None:
+            return bytes(content)
+        kind = getattr(errors, head["error"], None)
+        if isinstance(kind, type) and issubclass(kind, MsgflowError):
+            raise kind(head["message"], head["hint"])
+        raise RuntimeError(head["message"])
+
+    def _read(self, most: int, end: float | None, on_end: tuple[str, str]) -> bytes:
+        assert self._child.stdout is not None
+        left = None if end is None else max(0.0, end - time.monotonic())
+        if not select.select([self._child.stdout], [], [], left)[0]:
+            self._child.kill()
+            raise LateError(
+                f"it took longer than {self._seconds:g} s", "read one run, or a shorter time"
+            )
+        found = os.read(self._child.stdout.fileno(), most)
+        if not found:
+            self._child.kill()
+            raise QueryError(*on_end)
+        return found
+
+
+def bound_memory(connection: duckdb.DuckDBPyConnection) -> None:
+    """Bound the memory of this process by the memory limit of its connection.
+
+    It may take the limit besides what it has now, and a quarter of that, at least 256 MiB, for what
+    DuckDB does not count.
+    """
+    connection.execute("SELECT 1").fetchall()  # its threads have their stacks now
+    text = connection.execute("SELECT current_setting('memory_limit')").fetchall()[0][0]
+    number, unit = text.split()
+    limit = float(number) * 1024.0 ** _UNITS.index(unit)
+    used = _writable_bytes()
+    if used is not None:
+        most = used + round(limit + max(limit * _SHARE_BESIDE, _LEAST_BESIDE))
+        resource.setrlimit(resource.RLIMIT_DATA, (most, resource.RLIM_INFINITY))
+
+
+def _writable_bytes() -> int | None:
+    """Return the memory of this process that RLIMIT_DATA counts; None without /proc."""
+    try:
+        with open("/proc/self/statm", encoding="ascii") as file:
+            return int(file.read().split()[5]) * resource.getpagesize()
+    except OSError:
+        return None
+
+
+def main() -> None:
+    """Answer the requests on stdin."""
+    answers = os.dup(1)
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # nothing else writes among the answers
+    requests: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+    threading.Thread(target=_read_requests, args=[requests], daemon=True).start()
+    module = importlib.import_module(sys.argv[1])
+    while True:
+        _write(answers, b"")
+        request = json.loads(requests.get())
+        try:
+            content = getattr(module, request["function"])(**request["arguments"])
+        except MsgflowError as error:
+            _write(answers, b"", type(error).__name__, error.message, error.hint)
+        except Exception:
+            _write(answers, b"", "unexpected", traceback.format_exc())
+        else:
+            _write(answers, content)
+
+
+def _read_requests(requests: queue.SimpleQueue[bytes]) -> None:
+    for line in sys.stdin.buffer:
+        requests.put(line)
+    os._exit(_ORPHAN)
+
+
+def _write(
+    answers: int,
+    content: bytes,
+    error: str | None = None,
+    message: str | None = None,
+    hint: str | None = None,
+) -> None:
+    head = {"size": len(content), "error": error, "message": message, "hint": hint}
+    for part in (f"{json.dumps(head)}\n".encode(), content):
+        rest = memoryview(part)
+        while rest:
+            rest = rest[os.write(answers, rest) :]
+
+
+if __name__ == "__main__":
+    main()

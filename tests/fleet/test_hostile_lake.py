@@ -1,0 +1,242 @@
+"""Lakes, manifests and folders that somebody prepared: nothing outside is touched, all is said."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import re
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet
+import pytest
+from typer.testing import CliRunner
+
+from msgflow.cli.app import app
+from msgflow.errors import DatabaseError, UsageError
+from msgflow.fleet.compact import compact
+from msgflow.fleet.file_store import Store
+from msgflow.fleet.ingest import fleet_ingest
+from msgflow.fleet.lake import Lake
+from msgflow.fleet.layout import database_path, part_path, run_schema
+from msgflow.fleet.manifest import read_manifest
+from msgflow.fleet.run_database import open_run
+from msgflow.sim import simulate
+from msgflow.trace import extraction
+
+LARGEST = 2**63 - 1
+
+
+@pytest.fixture
+def lake(night: Lake, tmp_path: Path) -> Lake:
+    """A lake of one's own."""
+    return Lake.open(shutil.copytree(night.store.url, tmp_path / "lake"))
+
+
+def put_row(lake: Lake, **values: Any) -> str:
+    """Write a row of the table `run` and return the address of its file."""
+    row: dict[str, Any] = dict.fromkeys(run_schema().names)
+    row |= {"run": "feed", "generation": 1, "is_removed": False, "committed_ns": 1} | values
+    lake.put_table("run/feed.parquet", "run", pa.Table.from_pylist([row], run_schema()), "0001")
+    return lake.store.url_of("run/feed.parquet")
+
+
+def parquet(**columns: list[Any]) -> bytes:
+    sink = io.BytesIO()
+    pyarrow.parquet.write_table(pa.table(columns), sink)
+    return sink.getvalue()
+
+
+@pytest.mark.parametrize("ray", [None, pytest.param("local", marks=pytest.mark.thorough)])
+def test_no_module_of_the_current_folder_is_imported(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ray: str | None
+) -> None:
+    folder = tmp_path / "recordings"
+    simulate("pipeline", folder / "r0", factor=0.01)
+    for name in ("duckdb", "queue", "msgflow"):
+        (folder / f"{name}.py").write_text(f"open({str(tmp_path / 'run')!r}, 'a')\n")
+    monkeypatch.chdir(folder)
+    if ray is not None:
+        pytest.importorskip("ray", reason="ray is not installed")
+    done = fleet_ingest(["r0"], tmp_path / "lake", ray=ray)
+    assert done.added == 1
+    assert not (tmp_path / "run").exists()
+
+
+def test_compaction_deletes_nothing_behind_a_link(lake: Lake, tmp_path: Path) -> None:
+    victim = tmp_path / "victim"
+    (victim / "part=zz").mkdir(parents=True)
+    kept = [victim / "data.parquet", victim / "part=zz" / "data.parquet", victim / "precious"]
+    root = Path(lake.store.url)
+    mine = root / "flow" / "part=gone" / "notes.txt"
+    unused = root / "flow" / "part=gone" / "data.parquet"
+    left = root / "flow" / "part=gone" / ".data.parquet.x.part"
+    mine.parent.mkdir()
+    for file in (*kept, mine, unused, left):
+        file.write_text("x")
+        os.utime(file, (1, 1))
+    (root / "flow" / "part=zy").symlink_to(victim)
+    (root / "view" / "more").symlink_to(victim)
+    (root / "flow" / "part=zx").mkdir()
+    (root / "flow" / "part=zx" / "data.parquet").symlink_to(victim / "precious")
+    compact(lake)
+    assert all(file.exists() for file in (*kept, mine))
+    assert not unused.exists()
+    assert not left.exists()
+    assert (root / "flow" / "part=zy").is_symlink()
+
+
+def test_files_behind_links_are_none_of_a_lake(lake: Lake, tmp_path: Path) -> None:
+    (tmp_path / "secret").write_text("secret")
+    link = Path(lake.store.url) / "run" / "linked"
+    link.symlink_to(tmp_path / "secret")
+    store = lake.store
+    assert store.read("run/linked") is None
+    assert store.entry("run/linked") is None
+    assert "run/linked" not in [entry.path for entry in store.entries("run")]
+    store.delete("run/linked")
+    assert link.is_symlink()
+    # The lake itself may be reached through one, and so may recordings.
+    (tmp_path / "here").symlink_to(store.url)
+    assert len(Lake.open(tmp_path / "here").runs()) == 3
+    assert Store(store.url).read("run/linked") == b"secret"
+
+
+def test_a_part_cannot_lead_out_of_the_lake(lake: Lake) -> None:
+    url = put_row(lake, part="../../../outside")
+    with pytest.raises(DatabaseError, match=f"a part that is no name — {url}"):
+        lake.runs()
+
+
+@pytest.mark.parametrize("column", ["run", "generation", "is_removed", "committed_ns"])
+def test_a_row_without_what_counts_names_its_file(lake: Lake, column: str) -> None:
+    url = put_row(lake, **{column: None})
+    with pytest.raises(DatabaseError, match=f"a row without {column} — {url}"):
+        lake.runs()
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"part": None},
+        {"part": "p", "generation": LARGEST},
+        {"part": "p", "generation": LARGEST, "committed_ns": 5, "view_part": None},
+    ],
+)
+def test_a_strange_run_can_be_removed(lake: Lake, values: dict[str, Any]) -> None:
+    put_row(lake, **values)
+    assert "feed" in lake.runs()["run"].to_pylist()
+    assert lake.remove(["feed"]) == 1
+    assert "feed" not in Lake.open(lake.store.url).runs()["run"].to_pylist()
+    compact(lake, older_than=0)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"no parquet",
+        parquet(x=[1]),
+        parquet(run=["feed"], part=[{"a": 1}], latency_ns=[["text"]], path=[{"b": 2}]),
+        parquet(run=[1]),
+    ],
+)
+def test_a_file_that_is_none_of_ours_is_named(lake: Lake, content: bytes) -> None:
+    put_row(lake, part="strange")
+    path = part_path("flow", "strange")
+    lake.store.put(path, content)
+    with pytest.raises(DatabaseError, match="cannot be used") as raised:
+        compact(lake, older_than=0)
+    assert lake.store.url_of(path) in raised.value.message
+    assert "fleet remove " in (raised.value.hint or "")
+    lake.remove(["feed"])
+    compact(lake, older_than=0)
+
+
+DEEP = "[" * 200_000
+
+
+def test_deep_json_is_no_lake(tmp_path: Path) -> None:
+    (tmp_path / "lake.json").write_text(DEEP)
+    with pytest.raises(DatabaseError, match="not that of a lake"):
+        Lake.open(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("m.jsonl", DEEP, "cannot read the manifest"),
+        ("m.jsonl", json.dumps({"path": "r0", "robot": "\ud800"}), "half of a character"),
+        ("m.jsonl", json.dumps({"path": "\udfff"}), "half of a character"),
+        ("m.jsonl", json.dumps({"path": "r0", "x": {}}), "a label is a text or a number"),
+        ("m.parquet", "PAR1", "is it Parquet"),
+    ],
+)
+def test_manifests_that_are_none(tmp_path: Path, name: str, text: str, words: str) -> None:
+    (tmp_path / name).write_text(text)
+    with pytest.raises(UsageError, match=words):
+        read_manifest(str(tmp_path / name))
+
+
+@pytest.mark.parametrize("place", ["m.csv", "lake.json"])
+@pytest.mark.parametrize("kind", ["pipe", "device", "huge"])
+def test_only_small_regular_files_are_read(tmp_path: Path, place: str, kind: str) -> None:
+    path = tmp_path / place
+    if kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "device":
+        path.symlink_to("/dev/zero")
+    else:
+        with path.open("wb") as file:
+            file.truncate(10**10)
+    if place == "lake.json" and kind == "device":
+        words, found = "no lake", (DatabaseError, UsageError)  # a link below a lake
+    else:
+        words = {"pipe": "a pipe, no file", "device": "a device, no file", "huge": "more than"}[
+            kind
+        ]
+        found = (DatabaseError, UsageError)
+    with pytest.raises(found, match=words):
+        Lake.open(tmp_path) if place == "lake.json" else read_manifest(str(path))
+
+
+def test_a_database_that_is_larger_than_it_may_be_is_not_unpacked(
+    lake: Lake, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    row = next(row for row in lake.runs().to_pylist() if row["name"] == "first")
+    sink = pa.BufferOutputStream()
+    with pa.CompressedOutputStream(sink, "zstd") as packing:
+        packing.write(bytes(3 << 20))
+    lake.store.put(database_path(row["database_part"]), sink.getvalue().to_pybytes())
+    monkeypatch.setattr(extraction, "MOST_UNPACKED", 1 << 20)
+    with pytest.raises(DatabaseError, match="more than 1,048,576 bytes unpacked") as raised:
+        open_run(lake, row["run"], tmp_path / "x.duckdb")
+    assert "MSGFLOW_UNPACK_LIMIT" in (raised.value.hint or "")
+    assert not list(tmp_path.glob("*x.duckdb*"))
+
+
+@pytest.mark.parametrize(
+    "url", ["s3://key:sec/ret@bucket/lake", "s3://key:se@cret@bucket/x", "http://u:secret@h/x"]
+)
+def test_passwords_in_addresses_are_not_printed(url: str) -> None:
+    with pytest.raises(UsageError, match="no credentials") as raised:
+        Store(url)
+    assert not re.search("ret(?!s)|cret|sec", raised.value.message)
+
+
+def test_passwords_in_endpoints_are_not_printed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("AWS_ENDPOINT_URL", "ftp://user:pa/ss@host")
+    with pytest.raises(UsageError, match="no address of a store") as raised:
+        Store("s3://bucket/lake").read("x")
+    assert "pa/ss" not in str(raised.value)
+
+
+def test_commands_are_quoted(lake: Lake) -> None:
+    put_row(lake, run="x; touch PWN", part=None, name="$(touch PWN)")
+    listed = CliRunner().invoke(app, ["fleet", "open", "no such", "--lake", f"{lake.store.url}/."])
+    assert listed.exit_code == 2
+    with pytest.raises(UsageError) as raised:
+        open_run(lake, "x; touch PWN")
+    assert raised.value.hint == "msgflow ingest ''"

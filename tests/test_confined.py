@@ -1,0 +1,142 @@
+"""Queries of users in a child process: its bounds, and its end."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from msgflow.confined import ConfinedProcess, LateError
+from msgflow.confined_query import confined_query, confined_sql
+from msgflow.errors import DatabaseError, QueryError, UsageError
+
+SLOW = "SELECT levenshtein(repeat('a', 400000), repeat('b', 400000))"
+LARGE = "SELECT list_sum(range(700000000))"
+
+
+def children(pid: int) -> list[int]:
+    found = []
+    for status in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = status.read_text().rpartition(")")[2].split()
+        except OSError:
+            continue
+        if int(fields[1]) == pid and fields[0] != "Z":
+            found.append(int(status.parent.name))
+    return found
+
+
+def has_ended(pid: int) -> bool:
+    end = time.monotonic() + 20
+    while time.monotonic() < end:
+        try:
+            if Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z":
+                return True
+        except OSError:
+            return True
+        time.sleep(0.05)
+    return False
+
+
+def test_rows_runs_and_notes_come_back(small_database: Path) -> None:
+    found = confined_sql(
+        small_database, "SELECT run_id FROM run ORDER BY ALL", limit=1, memory_limit=None
+    )
+    assert found.table.to_pylist() == [{"run_id": 1}]
+    assert found.notes == ["only the first 1 rows are shown; --limit raises that"]
+    topics = confined_query(
+        small_database, "info-topics", {"run": "morning", "where": "true"}, memory_limit=None
+    )
+    assert [run.title for run in topics.runs] == ["morning (1)"]
+    assert topics.header is not None
+    assert topics.header.name == "info-topics"
+    assert len(topics) == 1
+
+
+@pytest.mark.parametrize(
+    ("kind", "text"), [(QueryError, "DELETE FROM run"), (UsageError, ""), (QueryError, "SELECT x")]
+)
+def test_errors_come_back(small_database: Path, kind: type[Exception], text: str) -> None:
+    with pytest.raises(kind) as raised:
+        confined_sql(small_database, text, limit=None, memory_limit=None)
+    assert type(raised.value) is kind
+
+
+def test_a_missing_database(tmp_path: Path) -> None:
+    with pytest.raises(DatabaseError, match="no database"):
+        confined_sql(tmp_path / "x.duckdb", "SELECT 1", limit=None, memory_limit=None)
+
+
+def test_functions_of_duckdb_keep_to_the_memory(small_database: Path) -> None:
+    with pytest.raises(QueryError, match="more memory is needed"):
+        confined_sql(small_database, LARGE, limit=None, memory_limit="200MB")
+    with pytest.raises(QueryError, match="more memory is needed"):
+        confined_query(
+            small_database,
+            "info-runs",
+            {"where": "list_sum(range(700000000)) > 0"},
+            memory_limit="200MB",
+        )
+
+
+def test_a_late_call_is_killed_and_the_next_one_works(small_database: Path) -> None:
+    given = {"method": "sql", "path": str(small_database), "memory_limit": None, "names": {}}
+    with ConfinedProcess("msgflow.confined_query", seconds=4) as process:
+        begin = time.monotonic()
+        with pytest.raises(LateError, match="longer than 4 s"):
+            process.call("answer", given | {"places": [SLOW]})
+        assert time.monotonic() - begin < 60
+        assert b"one" in process.call("answer", given | {"places": ["SELECT 1 AS one"]})
+
+
+def test_a_mistake_in_the_child_is_no_error_of_the_user() -> None:
+    with (
+        ConfinedProcess("msgflow.confined_query") as process,
+        pytest.raises(RuntimeError, match="no attribute 'nothing'"),
+    ):
+        process.call("nothing", {})
+
+
+def test_a_child_that_ends_says_so() -> None:
+    with ConfinedProcess("os") as process:
+        with pytest.raises(QueryError, match="the process that ran the query has ended"):
+            process.call("abort", {})
+        with pytest.raises(RuntimeError, match="no keyword arguments"):
+            process.call("getcwd", {"x": 1})
+    with (
+        ConfinedProcess("no_such_module") as process,
+        pytest.raises(QueryError, match="cannot start"),
+    ):
+        process.call("x", {})
+
+
+def test_the_child_ends_with_its_parent(small_database: Path) -> None:
+    parent = subprocess.Popen(
+        [sys.executable, "-m", "msgflow", "sql", SLOW, "--db", str(small_database)],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    end = time.monotonic() + 30
+    while not (found := children(parent.pid)) and time.monotonic() < end:
+        time.sleep(0.05)
+    time.sleep(1)
+    parent.kill()
+    parent.wait()
+    assert found
+    assert has_ended(found[0])
+
+
+def test_nothing_is_imported_from_the_current_folder(
+    small_database: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    for name in ("duckdb", "queue", "msgflow"):
+        (folder / f"{name}.py").write_text(f"open({str(tmp_path / 'run')!r}, 'a')\n")
+    monkeypatch.chdir(folder)
+    assert len(confined_sql(small_database, "SELECT 1", limit=None, memory_limit=None)) == 1
+    assert not os.path.exists(tmp_path / "run")
