@@ -23,6 +23,7 @@ import sys
 import threading
 import time
 import traceback
+import weakref
 from typing import TYPE_CHECKING, Any
 
 from msgflow import errors
@@ -109,14 +110,10 @@ class ConfinedProcess:
 
     def close(self) -> None:
         """End the child."""
-        self._child.kill()
-        self._child.wait()
-        for stream in (self._child.stdin, self._child.stdout):
-            assert stream is not None
-            stream.close()
+        _end(self._child)
 
     def _start(self) -> subprocess.Popen[bytes]:
-        return subprocess.Popen(
+        child = subprocess.Popen(
             # -P: nothing is imported from the current folder.
             [sys.executable, "-P", "-m", __name__, self._module],
             stdin=subprocess.PIPE,
@@ -128,6 +125,8 @@ class ConfinedProcess:
             # Ctrl-C is for the parent, which then ends the child.
             start_new_session=True,
         )
+        weakref.finalize(self, _end, child)
+        return child
 
     def _answer(self, seconds: float | None, on_end: tuple[str, str]) -> bytes:
         end = None if seconds is None else time.monotonic() + seconds
@@ -158,6 +157,14 @@ class ConfinedProcess:
             self._child.kill()
             raise QueryError(*on_end)
         return found
+
+
+def _end(child: subprocess.Popen[bytes]) -> None:
+    child.kill()
+    child.wait()
+    for stream in (child.stdin, child.stdout):
+        assert stream is not None
+        stream.close()
 
 
 def bound_memory(connection: duckdb.DuckDBPyConnection) -> None:

@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
+from processes import children_of, has_ended
 
 from msgflow.confined import ConfinedProcess, LateError
 from msgflow.confined_query import confined_query, confined_sql
@@ -16,30 +17,6 @@ from msgflow.errors import DatabaseError, QueryError, UsageError
 
 SLOW = "SELECT levenshtein(repeat('a', 400000), repeat('b', 400000))"
 LARGE = "SELECT list_sum(range(700000000))"
-
-
-def children(pid: int) -> list[int]:
-    found = []
-    for status in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            fields = status.read_text().rpartition(")")[2].split()
-        except OSError:
-            continue
-        if int(fields[1]) == pid and fields[0] != "Z":
-            found.append(int(status.parent.name))
-    return found
-
-
-def has_ended(pid: int) -> bool:
-    end = time.monotonic() + 20
-    while time.monotonic() < end:
-        try:
-            if Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z":
-                return True
-        except OSError:
-            return True
-        time.sleep(0.05)
-    return False
 
 
 def test_rows_runs_and_notes_come_back(small_database: Path) -> None:
@@ -121,7 +98,7 @@ def test_the_child_ends_with_its_parent(small_database: Path) -> None:
         stderr=subprocess.DEVNULL,
     )
     end = time.monotonic() + 30
-    while not (found := children(parent.pid)) and time.monotonic() < end:
+    while not (found := children_of(parent.pid)) and time.monotonic() < end:
         time.sleep(0.05)
     time.sleep(1)
     parent.kill()

@@ -136,7 +136,7 @@ def label_runs(
 
     def change(con: duckdb.DuckDBPyConnection, runs: tuple[Run, ...]) -> tuple[Run, ...]:
         for one in runs:
-            now = dict(label.split("=", 1) for label in one.labels)
+            now = dict(label.partition("=")[::2] for label in one.labels)
             for key, value in labels.items():
                 if value is not None:
                     now[key] = value

@@ -22,10 +22,15 @@ Form = TypeVar("Form")
 
 
 class Format(StrEnum):
-    """A format of results; all but table and markdown are exact."""
+    """A format of results; all but table, markdown and csv-safe are exact.
+
+    Spreadsheets take text that begins with =, +, -, @, a tab or a carriage return for a formula.
+    With csv-safe, an apostrophe precedes such text.
+    """
 
     TABLE = "table"
     CSV = "csv"
+    CSV_SAFE = "csv-safe"
     JSON = "json"
     JSONL = "jsonl"
     PARQUET = "parquet"
@@ -70,8 +75,8 @@ def by_suffix(path: Path, known: Mapping[str, Form], more: str = "") -> Form:
 
 def write_result(result: QueryResult, form: Format, stream: IO[bytes]) -> None:
     """Write `result` to a binary stream, text as UTF-8."""
-    if form is Format.CSV:
-        _write_csv(result.table, stream)
+    if form in (Format.CSV, Format.CSV_SAFE):
+        _write_csv(result.table, stream, is_safe=form is Format.CSV_SAFE)
     elif form is Format.PARQUET:
         import pyarrow.parquet
 
@@ -126,14 +131,28 @@ def csv_batch(batch: pa.RecordBatch) -> pa.RecordBatch:
     return pyarrow.RecordBatch.from_arrays(columns, names=batch.schema.names)
 
 
-def _write_csv(table: pa.Table, stream: IO[bytes]) -> None:
+def _write_csv(table: pa.Table, stream: IO[bytes], *, is_safe: bool) -> None:
     import pyarrow.csv
 
     from msgflow.trace.numpy_arrow import empty_batch
 
     with pyarrow.csv.CSVWriter(stream, csv_batch(empty_batch(table.schema)).schema) as writer:
         for batch in table.to_batches(max_chunksize=_ROWS_AT_ONCE):
-            writer.write_batch(csv_batch(batch))
+            rows = csv_batch(batch)
+            writer.write_batch(_without_formulas(rows) if is_safe else rows)
+
+
+def _without_formulas(batch: pa.RecordBatch) -> pa.RecordBatch:
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    columns = [
+        pc.replace_substring_regex(column, r"^([=+\-@\t\r])", r"'\1")
+        if pa.types.is_string(column.type)
+        else column
+        for column in batch.columns
+    ]
+    return pa.RecordBatch.from_arrays(columns, names=batch.schema.names)
 
 
 def _csv_column(column: pa.Array) -> pa.Array:

@@ -18,12 +18,12 @@ def break_with(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:
     def fail(*_: object, **__: object) -> None:
         raise error
 
-    monkeypatch.setattr(Database, "sql", fail)
+    monkeypatch.setattr(Database, "findings", fail)
 
 
 def test_the_unexpected_is_one_line(msgflow: Msgflow, monkeypatch: pytest.MonkeyPatch) -> None:
     break_with(monkeypatch, ValueError("first\nsecond"))
-    result = msgflow("sql", "SELECT 1")
+    result = msgflow("check")
     assert result.exit_code == ExitCode.FAILED
     assert result.stdout == ""
     error, _, hint = result.stderr.partition("\n\n")
@@ -35,7 +35,7 @@ def test_the_unexpected_is_one_line(msgflow: Msgflow, monkeypatch: pytest.Monkey
 def test_the_unexpected_can_be_traced(msgflow: Msgflow, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MSGFLOW_DEBUG", "1")
     break_with(monkeypatch, ValueError("first"))
-    result = msgflow("sql", "SELECT 1")
+    result = msgflow("check")
     assert result.exit_code == ExitCode.FAILED
     assert "Traceback" in result.stderr
     assert "report it" in result.stderr
@@ -43,7 +43,7 @@ def test_the_unexpected_can_be_traced(msgflow: Msgflow, monkeypatch: pytest.Monk
 
 def test_an_interrupt_has_code_130(msgflow: Msgflow, monkeypatch: pytest.MonkeyPatch) -> None:
     break_with(monkeypatch, KeyboardInterrupt())
-    result = msgflow("sql", "SELECT 1")
+    result = msgflow("check")
     assert result.exit_code == ExitCode.INTERRUPTED
     assert result.stderr == "error: interrupted\n"
 

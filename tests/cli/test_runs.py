@@ -204,6 +204,13 @@ def test_labels(msgflow: Msgflow, database: Path) -> None:
         assert opened.sql(sql).to_arrow().to_pylist() == [{"name": "before"}]
 
 
+def test_a_label_without_a_value_is_kept(msgflow: Msgflow, database: Path) -> None:
+    with duckdb.connect(str(database)) as con:
+        con.execute("UPDATE store.run SET labels = ['plain'] WHERE run_id = 1")
+    assert msgflow("runs", "label", "before", "robot=r1", "--db", database).exit_code == 0
+    assert labels(msgflow, database)[0] == ["plain=", "robot=r1"]
+
+
 def test_a_label_chooses_runs(msgflow: Msgflow, database: Path) -> None:
     for run in ("before", "after"):
         assert (

@@ -33,6 +33,8 @@ CHANGES = {
     ),
     "macro main.sum": "CREATE MACRO main.sum(x) AS 42",
     "view main.mine": "CREATE VIEW main.mine AS SELECT 1",
+    "view store.mine": "CREATE VIEW store.mine AS SELECT 1",
+    "table main.mine": "CREATE TABLE main.mine (x BIGINT)",
     "table store.host": (
         "ALTER TABLE store.host ADD COLUMN more VARCHAR DEFAULT getvariable('secret')"
     ),

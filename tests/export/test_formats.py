@@ -72,6 +72,16 @@ def test_csv_tells_null_from_empty_text_and_is_exact(result: QueryResult) -> Non
     )
 
 
+def test_csv_for_a_spreadsheet_holds_no_formulas() -> None:
+    texts = ["=cmd|'x'!A1", "+1+1", "-2", "@SUM(A1)", "\t=1", "\r=1", "a=b", "/topic", None]
+    table = QueryResult(pa.table({"name": texts, "ns": [-1] * len(texts)}))
+    plain = written(table, Format.CSV).decode()
+    safe = written(table, Format.CSV_SAFE).decode()
+    assert "\"'=cmd" in safe
+    assert safe.replace("\"'", '"') == plain
+    assert safe.count("\"'") == 6
+
+
 def test_json_is_exact(result: QueryResult) -> None:
     rows = result.table.to_pylist()
     assert json.loads(written(result, Format.JSON)) == rows

@@ -221,7 +221,9 @@ def test_what_others_write_is_read_once(place: Path, monkeypatch: pytest.MonkeyP
     ingest(*(record(f"r{number}", f"run{number}") for number in range(5)))
     read: list[str] = []
     before = Store.read
-    monkeypatch.setattr(Store, "read", lambda self, path: read.append(path) or before(self, path))
+    monkeypatch.setattr(
+        Store, "read", lambda self, path, most=None: read.append(path) or before(self, path, most)
+    )
     row = Lake.open("lake").runs().to_pylist()[0]
 
     def write(progress: FleetProgress) -> None:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import gzip
 import io
 import os
 import stat
@@ -276,6 +277,24 @@ def test_a_bomb_does_not_fill_the_disk(
     with pytest.raises(TraceError, match=f"not enough free disk space .* — {archive}") as caught:
         msgflow.trace.open([archive])
     assert "TMPDIR=" in str(caught.value.hint)
+
+
+@pytest.mark.parametrize("kind", [".tar", ".tar.gz", ".tar.zst"])
+def test_what_follows_the_archive_is_counted(
+    session: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str
+) -> None:
+    content = pack(session, tmp_path / "a.tar").read_bytes()
+    archive = tmp_path / f"b{kind}"
+    packed = content + bytes(3 << 20)
+    if kind == ".tar.gz":
+        packed = gzip.compress(packed)
+    elif kind == ".tar.zst":
+        packed = pa.Codec("zstd").compress(packed, asbytes=True)
+    archive.write_bytes(packed)
+    monkeypatch.setattr(extraction, "MOST_UNPACKED", 2 << 20)
+    monkeypatch.setattr(extraction, "_MOST_RATIO", 0)
+    with pytest.raises(TraceError, match="bytes unpacked"):
+        msgflow.trace.open([archive])
 
 
 def test_many_small_files_need_room_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

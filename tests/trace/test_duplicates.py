@@ -87,6 +87,20 @@ def test_empty_packets(tmp_path: Path, open_traces: Open) -> None:
     assert packets == [0, 0, 0]
 
 
+def test_packets_of_one_identity_but_other_content_are_read_both(tmp_path: Path) -> None:
+    first, same = packet(0, sequence=1), packet(0, sequence=1)
+    other = Packet([Event(t, "ros2:x", (t + 1,)) for t in (0, 3, 6)], end=10, sequence=1)
+    content = TraceContent({"ros2:x": {"n": "u64"}}, {0: [first, same, other]})
+    trace = write_trace(tmp_path / "a", content)
+    # Babeltrace ends at such a packet.
+    with msgflow.trace.open([trace], reader="msgflow") as traces:
+        events, _ = read(traces)
+        damages = [damage.message for damage in traces.damages]
+        assert dict(traces.repeated_packet_counts) == {0: 1}
+    assert sorted(n for _, _, n in events) == [0, 1, 3, 4, 6, 7]
+    assert damages == ["another packet has its stream, number and begin: both were read"]
+
+
 def test_losses_of_a_skipped_packet_do_not_count(tmp_path: Path, open_traces: Open) -> None:
     for name in "ab":
         streams = {0: [packet(0), packet(10, discarded=5, sequence=3)]}

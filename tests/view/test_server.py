@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import http.client
 import json
 import os
 import shutil
@@ -68,6 +69,25 @@ def test_strangers_get_nothing(demo: Path, serve: Serve) -> None:
         server.get("/api/run", Host="localhost:9999", Cookie=f"msgflow_9999={server.token}")[0]
         == 200
     )
+
+
+def test_a_request_that_does_not_arrive_ends(
+    demo: Path, serve: Serve, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("msgflow.view.server.SECONDS_FOR_A_REQUEST", 0.5)
+    server = serve(demo)
+    for sent in (b"", b"GET / HTTP/1.1\r\nHost: x\r\n"):
+        with socket.create_connection(("127.0.0.1", server.port), timeout=20) as silent:
+            silent.sendall(sent)
+            assert silent.recv(1) == b""
+    kept = http.client.HTTPConnection("127.0.0.1", server.port, timeout=20)
+    cookie = {"Cookie": f"msgflow_{server.port}={server.token}"}
+    for _ in range(2):
+        kept.request("GET", "/", headers=cookie)
+        assert kept.getresponse().read()
+    kept.sock.sendall(b"GET")
+    assert kept.sock.recv(1) == b""
+    kept.close()
 
 
 def test_every_answer_is_strict(demo: Path, serve: Serve) -> None:
