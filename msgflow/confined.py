@@ -155,6 +155,7 @@ class ConfinedProcess:
         found = os.read(self._child.stdout.fileno(), most)
         if not found:
             self._child.kill()
+            self._child.wait()
             raise QueryError(*on_end)
         return found
 
