@@ -8,11 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 from msgflow.confined import ConfinedProcess, bound_memory
 from msgflow.database import Database
+from msgflow.db.sandbox import open_memory
 from msgflow.query.result import QueryResult
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
+
+_SIZE = 8
 
 
 def confined_sql(
@@ -30,7 +33,7 @@ def confined_sql(
     Raises:
         MsgflowError: as `Database.sql`, or the process took too much memory.
     """
-    return _ask("sql", path, memory_limit, [text], {"limit": limit})
+    return _ask("answer", _asked(path, memory_limit, "sql", [text], {"limit": limit}))
 
 
 def confined_query(
@@ -47,53 +50,83 @@ def confined_query(
     Raises:
         MsgflowError: as `Database.query`, or the process took too much memory.
     """
-    return _ask("query", path, memory_limit, [name], given)
+    return _ask("answer", _asked(path, memory_limit, "query", [name], given))
 
 
-def _ask(
-    method: str,
+def confined_fleet_sql(
+    lake: str, text: str, *, where: str | None, limit: int | None
+) -> QueryResult:
+    """Return the rows of `msgflow.fleet.lake_query.fleet_sql`, which a child process computes.
+
+    Args:
+        lake: its address.
+        text: one query, or EXPLAIN of one.
+        where: a condition on runs and their labels; all runs when None.
+        limit: most rows returned; all when None.
+
+    Raises:
+        MsgflowError: as `fleet_sql`, or the process took too much memory.
+    """
+    return _ask("answer_of_lake", {"lake": lake, "text": text, "where": where, "limit": limit})
+
+
+def answer(
+    method: str, path: str, memory_limit: str | None, given: Sequence[Any], named: Mapping[str, Any]
+) -> bytes:
+    """Return a result of a method of `Database`, in the child."""
+    with Database(path, memory_limit=memory_limit) as database:
+        bound_memory(database.connection)
+        return _packed(getattr(database, method)(*given, **named))
+
+
+def answer_of_lake(lake: str, text: str, where: str | None, limit: int | None) -> bytes:
+    """Return a result of `fleet_sql`, in the child."""
+    from msgflow.fleet.lake import Lake
+    from msgflow.fleet.lake_query import fleet_sql
+
+    with open_memory() as con:
+        bound_memory(con)
+    return _packed(fleet_sql(Lake.open(lake), text, where=where, limit=limit))
+
+
+def _asked(
     path: Path,
     memory_limit: str | None,
-    places: Sequence[str],
-    names: Mapping[str, Any],
-) -> QueryResult:
-    arguments = {
+    method: str,
+    given: Sequence[Any],
+    named: Mapping[str, Any],
+) -> dict[str, Any]:
+    return {
         "method": method,
         "path": str(path),
         "memory_limit": memory_limit,
-        "places": places,
-        "names": names,
+        "given": given,
+        "named": named,
     }
+
+
+def _ask(function: str, arguments: dict[str, Any]) -> QueryResult:
     with ConfinedProcess(__name__) as process:
         # Meanwhile the child imports as well.
         import pyarrow as pa
 
-        content = process.call("answer", arguments)
-    size = int.from_bytes(content[:8], "big")
-    said = json.loads(content[8 : 8 + size])
+        content = process.call(function, arguments)
     from msgflow.query.catalogue import load_query
     from msgflow.run.choice import Run
 
-    with pa.ipc.open_stream(pa.py_buffer(content)[8 + size :]) as reader:
+    size = int.from_bytes(content[:_SIZE], "big")
+    said = json.loads(content[_SIZE : _SIZE + size])
+    with pa.ipc.open_stream(pa.py_buffer(content)[_SIZE + size :]) as reader:
         table = reader.read_all()
     runs = tuple(Run(**{**run, "labels": tuple(run["labels"])}) for run in said["runs"])
     header = None if said["header"] is None else load_query(said["header"])
     return QueryResult(table, header, runs, said["notes"], said["when_empty"])
 
 
-def answer(
-    method: str,
-    path: str,
-    memory_limit: str | None,
-    places: Sequence[str],
-    names: Mapping[str, Any],
-) -> bytes:
-    """Return a result of a method of `Database` as bytes: the child calls this."""
+def _packed(result: QueryResult) -> bytes:
+    """Return the size of what a result says as JSON, that JSON, and the rows as an Arrow stream."""
     import pyarrow as pa
 
-    with Database(path, memory_limit=memory_limit) as database:
-        bound_memory(database.connection)
-        result: QueryResult = getattr(database, method)(*places, **names)
     said = json.dumps(
         {
             "header": None if result.header is None else result.header.name,
@@ -106,4 +139,4 @@ def answer(
     with pa.ipc.new_stream(sink, result.table.schema) as writer:
         writer.write_table(result.table)
     rows: bytes = sink.getvalue().to_pybytes()
-    return len(said).to_bytes(8, "big") + said + rows
+    return len(said).to_bytes(_SIZE, "big") + said + rows

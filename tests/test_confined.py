@@ -61,13 +61,13 @@ def test_functions_of_duckdb_keep_to_the_memory(small_database: Path) -> None:
 
 
 def test_a_late_call_is_killed_and_the_next_one_works(small_database: Path) -> None:
-    given = {"method": "sql", "path": str(small_database), "memory_limit": None, "names": {}}
+    asked = {"method": "sql", "path": str(small_database), "memory_limit": None, "named": {}}
     with ConfinedProcess("msgflow.confined_query", seconds=4) as process:
         begin = time.monotonic()
         with pytest.raises(LateError, match="longer than 4 s"):
-            process.call("answer", given | {"places": [SLOW]})
+            process.call("answer", asked | {"given": [SLOW]})
         assert time.monotonic() - begin < 60
-        assert b"one" in process.call("answer", given | {"places": ["SELECT 1 AS one"]})
+        assert b"one" in process.call("answer", asked | {"given": ["SELECT 1 AS one"]})
 
 
 def test_a_mistake_in_the_child_is_no_error_of_the_user() -> None:
