@@ -3,15 +3,16 @@
     python benchmarks/fuzz.py [--cases 10000] [--first 0] [--seed 1] [--jobs N] [--kind KIND]…
         [--case N]…
 
-Each case changes a small recording, an archive of one, a database, or a file of links or clocks,
-and runs the whole of msgflow on it in a process with limits: ingest, check, and three queries. The
-process is forked from one that has done all that with a recording as it was, so that no case pays
-for imports and for what is kept of `schema/`.
+Each case changes a small recording, an archive of one, a database, a file of links or clocks, a
+manifest, or a lake, and runs the whole of msgflow on it in a process with limits: ingest, check, and
+three queries, or what `fleet` does with a lake. The process is forked from one that has done all
+that with a recording as it was, so that no case pays for imports and for what is kept of `schema/`.
 Counted are, by kind of input:
 
 - traceback: one is printed; mistake: an error says "mistake of msgflow"; crash: the process ends by
   a signal; hang: it takes longer, or more output, than it may;
-- damage: a failed ingest changed the database, or a stored run does not pass `db check`;
+- damage: a failed ingest changed the database, a stored run does not pass `db check`, or a file
+  outside of a lake changed;
 - unreported: a query answers otherwise than without the change, and no finding, warning or error
   says that anything was wrong.
 
@@ -85,6 +86,10 @@ CLOCKS_TOML = """[{host}]
 offset_ns = 1_000
 drift_ppb = 3
 """
+MANIFESTS = {
+    "m.csv": "path,robot,version\nr0,r1,1.0\n../r1,r2,\n",
+    "m.jsonl": '{"path": "r0", "robot": "r1", "year": 2025}\n{"path": "../r1", "robot": null}\n',
+}
 # Name of the file, its content, and the option that takes it.
 FILES = {
     "links": ("links.yaml", LINKS, "--links"),
@@ -109,6 +114,7 @@ class Base:
         directory: its traces.
         database: the same, ingested.
         archives: the same, packed.
+        lake: the same, in a lake.
         hosts: names of its hosts.
         answers: what is said of it unchanged.
     """
@@ -116,6 +122,7 @@ class Base:
     directory: Path
     database: Path
     archives: tuple[Path, ...]
+    lake: Path
     hosts: tuple[str, ...]
     answers: Answers
 
@@ -170,10 +177,13 @@ def _base(directory: Path, system: str, layout: str) -> Base:
     ending, made, said = run(make, place)
     if ending == "ended":
         ending, found, said = run(lambda: commands(database, [traces], []), place)
+    lake = place / "lake"
+    if ending == "ended":
+        ending, _, said = run(lambda: ingest_into_lake(traces, lake), place)
     if ending != "ended" or not found.get("results"):
         raise SystemExit(f"cannot prepare {system}: {said}")
     archives = tuple(map(Path, made["archives"]))
-    return Base(traces, database, archives, tuple(made["hosts"]), answers_of(found, place))
+    return Base(traces, database, archives, lake, tuple(made["hosts"]), answers_of(found, place))
 
 
 def commands(database: Path, traces: Sequence[Path], options: Sequence[str]) -> dict[str, Any]:
@@ -211,6 +221,67 @@ def commands(database: Path, traces: Sequence[Path], options: Sequence[str]) -> 
     if not traces:
         found["damaged"] = database.read_bytes() != before
     return found
+
+
+def ingest_into_lake(traces: Path, lake: Path) -> dict[str, Any]:
+    """Make a lake of a recording; runs in a process of its own."""
+    code, _ = msgflow("fleet", "ingest", str(traces), "--lake", str(lake))
+    if code:
+        raise SystemExit(code)
+    return {"codes": [code]}
+
+
+def lake_commands(lake: Path, outside: Path) -> dict[str, Any]:
+    """Do with a lake all that `fleet` can do; nothing outside may change."""
+
+    def state() -> list[tuple[str, bytes | None]]:
+        return [
+            (str(path), path.read_bytes() if path.is_file() else None)
+            for path in sorted(outside.rglob("*"))
+        ]
+
+    before, place = state(), ("--lake", str(lake))
+    codes = [
+        msgflow("fleet", *words, *place)[0]
+        for words in (
+            ("runs",),
+            ("failures",),
+            ("query", "e2e-latency"),
+            ("sql", "FROM run"),
+            ("worst", "*"),
+            ("open", "copy", "-o", str(lake.with_name("opened.duckdb"))),
+            ("compact", "--older-than", "0s"),
+            ("runs",),
+        )
+    ]
+    return {"codes": [max(codes)], "damaged": state() != before}
+
+
+def damage_lake(lake: Path, outside: Path, random: Random) -> str:
+    """Change a file of a lake, or put something else in its place."""
+    file = random.choice(sorted(path for path in lake.rglob("*") if path.is_file()))
+    name = file.relative_to(lake)
+    kind = random.choice(("damage", "damage", "damage", "pipe", "link", "folder", "gone", "other"))
+    if kind == "damage":
+        return f"{name}: {damage_file(file, random)}"
+    if kind == "other":
+        other = random.choice(sorted(path for path in lake.rglob("*") if path.is_file()))
+        shutil.copyfile(other, file.with_name(f"{random.randrange(9)}{file.name}"))
+        file.write_bytes(other.read_bytes())
+        return f"{name}: the content of {other.relative_to(lake)}"
+    if kind == "folder":
+        # The folder of a part leads to another place.
+        folder = file.parent if file.parent != lake else lake / "flow"
+        moved = outside / folder.name
+        shutil.move(folder, moved)
+        folder.symlink_to(moved)
+        return f"{folder.relative_to(lake)}: a link to a folder outside"
+    file.unlink()
+    if kind == "pipe":
+        os.mkfifo(file)
+    elif kind == "link":
+        file.symlink_to(outside / "file")
+    return f"{name}: {kind}"
 
 
 def written(database: Database, query: str) -> str:
@@ -338,6 +409,8 @@ def case(
         protected = archive.suffix != ".tar"
     elif kind == "database":
         change, traces, protected = damage_file(database, random), [], False
+    elif kind in ("lake", "manifest"):
+        return case_of_fleet(number, kind, base, place, random)
     else:
         name, text, option = FILES[kind]
         content, change = damage_text(text.replace("{host}", random.choice(base.hosts)), random)
@@ -346,23 +419,53 @@ def case(
         options = [option, str(file)]
         protected = False
     ending, found, said = run(lambda: commands(database, traces, options), place)
-    bad = []
-    if "Traceback (most recent call last)" in said:
-        bad.append("traceback")
-    if "mistake of msgflow" in said:
-        bad.append("mistake")
-    if ending == "hang":
-        bad.append("hang")
-    if ending.startswith("crash"):
-        bad.append("crash")
-    if found.get("damaged"):
-        bad.append("damage")
+    bad = faults(ending, found, said)
     if protected and "results" in found:
         answers, usual = answers_of(found, place), base.answers
         if answers.results != usual.results and answers.reports == usual.reports:
             bad.append("unreported")
     refused = bool(found.get("codes")) and found["codes"][0] != 0 and "results" not in found
     return Outcome(number, kind, change, tuple(bad), said, "refused" if refused else ending)
+
+
+def case_of_fleet(number: int, kind: str, base: Base, place: Path, random: Random) -> Outcome:
+    """Run one case with a changed lake, or a changed manifest."""
+    outside, lake = place / "outside", place / "lake"
+    outside.mkdir()
+    (outside / "file").write_text("mine")
+    if kind == "lake":
+        shutil.copytree(base.lake, lake)
+        change = damage_lake(lake, outside, random)
+
+        def work() -> dict[str, Any]:
+            return lake_commands(lake, outside)
+
+    else:
+        name, text = random.choice(sorted(MANIFESTS.items()))
+        content, change = damage_text(text, random)
+        change = f"{name}: {change}"
+        (place / name).write_bytes(content)
+
+        def work() -> dict[str, Any]:
+            code, _ = msgflow("fleet", "ingest", str(place / name), "--lake", str(lake))
+            return {"codes": [code]}
+
+    ending, found, said = run(work, place)
+    refused = bool(found.get("codes")) and found["codes"][0] != 0
+    bad = tuple(faults(ending, found, said))
+    return Outcome(number, kind, change, bad, said, "refused" if refused else ending)
+
+
+def faults(ending: str, found: dict[str, Any], said: str) -> list[str]:
+    """Return what of `BAD` a process shows."""
+    is_so = {
+        "traceback": "Traceback (most recent call last)" in said,
+        "mistake": "mistake of msgflow" in said,
+        "hang": ending == "hang",
+        "crash": ending.startswith("crash"),
+        "damage": bool(found.get("damaged")),
+    }
+    return [name for name in BAD if is_so.get(name)]
 
 
 def warm_up(bases: Sequence[Base]) -> None:
@@ -436,7 +539,14 @@ def outcomes(
                 yield Outcome(**{**row, "bad": tuple(row["bad"])})
 
 
-KINDS = ("trace",) * 12 + ("archive",) * 3 + ("database",) * 2 + tuple(FILES)
+KINDS = (
+    *("trace",) * 12,
+    *("archive",) * 3,
+    *("database",) * 2,
+    *FILES,
+    *("lake",) * 2,
+    "manifest",
+)
 
 
 def campaign(
