@@ -4,7 +4,7 @@
         [--case N]…
 
 Each case changes a small recording, an archive of one, a database, a file of links or clocks, a
-manifest, or a lake, and runs the whole of msgflow on it in a process with limits: ingest, check, and
+manifest, or a lake, and runs all of msgflow on it in a process with limits: ingest, check, and
 three queries, or what `fleet` does with a lake. The process is forked from one that has done all
 that with a recording as it was, so that no case pays for imports and for what is kept of `schema/`.
 Counted are, by kind of input:
