@@ -25,7 +25,8 @@ WITH indirect AS (
     SELECT b.publisher_id, string_agg(DISTINCT l.kind, ', ' ORDER BY l.kind) AS kinds
     FROM main.link_causal AS l
     JOIN main.publication AS b ON l.publication_id = b.publication_id
-    WHERE list_contains($runs, l.run_id) AND l.annotation_id IS NOT NULL
+    WHERE list_contains($runs, l.run_id)
+        AND l.kind IN ('periodic_async', 'partial_sync', 'approximate_sync')
     GROUP BY b.publisher_id
 ),
 answer AS (

@@ -71,7 +71,7 @@ def test_enough_messages_of_a_stretch_of_every_publisher(rules: duckdb.DuckDBPyC
             [topic, publisher],
         )
         rules.execute(
-            "INSERT INTO message SELECT 1, ?, ? + n * 10, 1, 2000 FROM range(100) AS r(n)",
+            "INSERT INTO message SELECT 1, ?, ? + n * 10, 0, 1, 2000 FROM range(100) AS r(n)",
             [topic, publisher],
         )
     publishers = [publisher for (publisher, _) in pairs(rules, "publisher_id, greatest_ns")]
@@ -85,7 +85,9 @@ def test_two_dozen_publications_of_a_message(
     """Before it was taken; of messages taken elsewhere, on either side of the stamp."""
     publish(rules, *((n, n * MILLISECOND, n * MILLISECOND + 1_000) for n in range(100)))
     taken_ns = 50 * MILLISECOND + 100
-    rules.execute("INSERT INTO message VALUES (1, '/a', ?, ?, ?)", [taken_ns, clock_id, taken_ns])
+    rules.execute(
+        "INSERT INTO message VALUES (1, '/a', ?, 0, ?, ?)", [taken_ns, clock_id, taken_ns]
+    )
     found = pairs(rules, "written_ns // 1000000, is_latest, is_taken_here")
     assert [number for number, _, _ in found] == [*range(50 - 24, 50 + behind + 1)]
     assert {number for number, is_latest, _ in found if is_latest} == {50}
@@ -102,7 +104,7 @@ def test_the_time_that_a_publication_has(rules: duckdb.DuckDBPyConnection) -> No
         (4, 20 * MILLISECOND, None),
     )
     stamp = 30 * MILLISECOND
-    rules.execute("INSERT INTO message VALUES (1, '/a', ?, 1, ?)", [stamp, stamp])
+    rules.execute("INSERT INTO message VALUES (1, '/a', ?, 0, 1, ?)", [stamp, stamp])
     assert pairs(rules, "written_ns, greatest_ns, least_ns") == [
         (0, stamp, stamp - 1_000),
         (5_000, stamp - 5_000, stamp - 7_000),
@@ -114,7 +116,7 @@ def test_the_time_that_a_publication_has(rules: duckdb.DuckDBPyConnection) -> No
 def test_publications_of_one_moment_are_one(rules: duckdb.DuckDBPyConnection) -> None:
     """Which of them a message is of the difference of the clocks does not depend on."""
     publish(rules, (1, 0, 1_000), (2, 0, 1_000), (3, 2_000, 3_000))
-    rules.execute("INSERT INTO message VALUES (1, '/a', 500, 1, 4_000)")
+    rules.execute("INSERT INTO message VALUES (1, '/a', 500, 0, 1, 4_000)")
     assert pairs(rules, "written_ns, greatest_ns, least_ns") == [
         (0, 500, -500),
         (2_000, -1_500, -2_500),
@@ -123,5 +125,5 @@ def test_publications_of_one_moment_are_one(rules: duckdb.DuckDBPyConnection) ->
 
 def test_the_middle_of_a_stretch(rules: duckdb.DuckDBPyConnection) -> None:
     publish(rules, (1, 0, 1_000), (2, 999, 1_500))
-    rules.execute("INSERT INTO message VALUES (1, '/a', 400, 1, 500)")
+    rules.execute("INSERT INTO message VALUES (1, '/a', 400, 0, 1, 500)")
     assert pairs(rules, "stretch, stretch_ns, beyond_middle_ns") == [(0, 1_000, -500)]
