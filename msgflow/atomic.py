@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import shutil
 import stat
-import sys
 import tempfile
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -19,6 +18,7 @@ if TYPE_CHECKING:
 
 
 _SUFFIX = ".part"
+_STDOUT = 1
 
 
 @contextmanager
@@ -31,16 +31,18 @@ def replacing(path: Path) -> Iterator[Path]:
     Raises:
         UsageError: the file cannot be written there.
     """
+    hint: str | None = "give a file in a directory that exists and can be written"
     try:
-        way = _into_stream(path) if _is_stream(path) else _in_place_of(path)
+        if _is_stream(path):
+            hint = None
+            way = _into_stream(path)
+        else:
+            way = _in_place_of(path)
         with way as temporary:
             yield temporary
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
-        raise UsageError(
-            f"cannot write the file: {reason} — {path}",
-            "give a file in a directory that exists and can be written",
-        ) from error
+        raise UsageError(f"cannot write the file: {reason} — {path}", hint) from error
 
 
 @contextmanager
@@ -50,6 +52,8 @@ def _in_place_of(path: Path) -> Iterator[Path]:
     temporary = target.with_name(f".{target.name}.{mark()}{_SUFFIX}")
     try:
         yield temporary
+        if target.is_file():
+            shutil.copymode(target, temporary)
         temporary.replace(target)
     finally:
         temporary.unlink(missing_ok=True)
@@ -64,7 +68,7 @@ def _into_stream(path: Path) -> Iterator[Path]:
         is_stdout = _is_stdout(path)
         with (
             temporary.open("rb") as source,
-            open(os.dup(sys.stdout.fileno()) if is_stdout else path, "wb") as stream,
+            open(os.dup(_STDOUT) if is_stdout else path, "wb") as stream,
         ):
             shutil.copyfileobj(source, stream)
 
@@ -79,8 +83,8 @@ def _is_stream(path: Path) -> bool:
 
 
 def _is_stdout(path: Path) -> bool:
-    with suppress(OSError, ValueError):  # a closed stdout
-        return os.path.samestat(path.stat(), os.fstat(sys.stdout.fileno()))
+    with suppress(OSError):  # a closed stdout
+        return os.path.samestat(path.stat(), os.fstat(_STDOUT))
     return False
 
 

@@ -6,18 +6,20 @@ child that is late is killed. The connection in the child is in the sandbox of `
 as any other.
 
 The child is `python -P -m msgflow.confined MODULE`. It reads a request per line from stdin, calls
-a function of the module, and writes the answer: a line of JSON, then as many bytes as that says. It
-ends when its parent has ended.
+a function of the module, and writes the answer: parts, each with its size in front; a size of 0; a
+part of JSON that says what went wrong, or null. It ends when its parent has ended.
 """
 
 from __future__ import annotations
 
+import functools
 import importlib
 import json
 import os
 import queue
 import resource
 import select
+import signal
 import subprocess
 import sys
 import threading
@@ -33,6 +35,7 @@ if TYPE_CHECKING:
     import duckdb
 
 _CHUNK = 1 << 20
+_SIZE = 8
 _ORPHAN = 1
 # What functions, results and heaps in pieces may take for each byte that DuckDB counts, and at
 # least. DuckDB's own limit is 80 % of the memory that there is.
@@ -43,8 +46,8 @@ _CANNOT_START = (
     "is msgflow installed where this Python finds it? pip show ros2-msgflow",
 )
 _ENDED = (
-    "the process that ran the query has ended: it took more memory than there is",
-    "read one run, a shorter time, or fewer columns",
+    "the process that ran the query has ended",
+    "did it take more memory than there is? read one run, a shorter time, or fewer columns",
 )
 _UNITS = ("bytes", "KiB", "MiB", "GiB", "TiB", "PiB")
 
@@ -64,7 +67,8 @@ class ConfinedProcess:
         """Start the child.
 
         Args:
-            module: whose functions it calls; they take values that JSON has, and return bytes.
+            module: whose functions it calls. They take a function that writes bytes of the answer,
+                and by name values that JSON has.
             seconds: how long a call may take; as long as it likes when None.
         """
         self._module = module
@@ -77,8 +81,8 @@ class ConfinedProcess:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def call(self, function: str, arguments: dict[str, Any]) -> bytes:
-        """Return what a function of the module returns.
+    def call(self, function: str, arguments: dict[str, Any]) -> bytearray:
+        """Return what a function of the module writes.
 
         Raises:
             MsgflowError: the one that the function raised.
@@ -128,36 +132,37 @@ class ConfinedProcess:
         weakref.finalize(self, _end, child)
         return child
 
-    def _answer(self, seconds: float | None, on_end: tuple[str, str]) -> bytes:
+    def _answer(self, seconds: float | None, on_end: tuple[str, str]) -> bytearray:
         end = None if seconds is None else time.monotonic() + seconds
-        line = bytearray()
-        while not line.endswith(b"\n"):
-            line += self._read(1, end, on_end)
-        head = json.loads(line)
         content = bytearray()
-        while len(content) < head["size"]:
-            content += self._read(min(_CHUNK, head["size"] - len(content)), end, on_end)
-        if head["error"] is None:
-            return bytes(content)
-        kind = getattr(errors, head["error"], None)
+        while size := int.from_bytes(self._read(_SIZE, end, on_end), "big"):
+            content += self._read(size, end, on_end)
+        said = json.loads(self._read(int.from_bytes(self._read(_SIZE, end, on_end)), end, on_end))
+        if said is None:
+            return content
+        kind = getattr(errors, said["error"], None)
         if isinstance(kind, type) and issubclass(kind, MsgflowError):
-            raise kind(head["message"], head["hint"])
-        raise RuntimeError(head["message"])
+            raise kind(said["message"], said["hint"])
+        raise RuntimeError(said["message"])
 
-    def _read(self, most: int, end: float | None, on_end: tuple[str, str]) -> bytes:
+    def _read(self, size: int, end: float | None, on_end: tuple[str, str]) -> bytearray:
         assert self._child.stdout is not None
-        left = None if end is None else max(0.0, end - time.monotonic())
-        if not select.select([self._child.stdout], [], [], left)[0]:
-            self._child.kill()
-            raise LateError(
-                f"it took longer than {self._seconds:g} s", "read one run, or a shorter time"
-            )
-        found = os.read(self._child.stdout.fileno(), most)
-        if not found:
-            self._child.kill()
-            self._child.wait()
-            raise QueryError(*on_end)
-        return found
+        content = bytearray()
+        while len(content) < size:
+            left = None if end is None else max(0.0, end - time.monotonic())
+            if not select.select([self._child.stdout], [], [], left)[0]:
+                self._child.kill()
+                raise LateError(
+                    f"it took longer than {self._seconds:g} s", "read one run, or a shorter time"
+                )
+            found = os.read(self._child.stdout.fileno(), min(_CHUNK, size - len(content)))
+            if not found:
+                self._child.kill()
+                code = self._child.wait()
+                how = signal.Signals(-code).name if code < 0 else f"exit code {code}"
+                raise QueryError(f"{on_end[0]} ({how})", on_end[1])
+            content += found
+        return content
 
 
 def _end(child: subprocess.Popen[bytes]) -> None:
@@ -201,16 +206,24 @@ def main() -> None:
     threading.Thread(target=_read_requests, args=[requests], daemon=True).start()
     module = importlib.import_module(sys.argv[1])
     while True:
-        _write(answers, b"")
+        _end_answer(answers, None)
         request = json.loads(requests.get())
         try:
-            content = getattr(module, request["function"])(**request["arguments"])
+            function = getattr(module, request["function"])
+            function(functools.partial(_write, answers), **request["arguments"])
         except MsgflowError as error:
-            _write(answers, b"", type(error).__name__, error.message, error.hint)
-        except Exception:
-            _write(answers, b"", "unexpected", traceback.format_exc())
+            _end_answer(
+                answers,
+                {"error": type(error).__name__, "message": error.message, "hint": error.hint},
+            )
+        except MemoryError:
+            message, hint = _ENDED
+            _end_answer(answers, {"error": "QueryError", "message": message, "hint": hint})
+        except Exception as error:
+            message = f"{type(error).__name__}: {error}\n{traceback.format_exc()}"
+            _end_answer(answers, {"error": "unexpected", "message": message})
         else:
-            _write(answers, content)
+            _end_answer(answers, None)
 
 
 def _read_requests(requests: queue.SimpleQueue[bytes]) -> None:
@@ -219,18 +232,20 @@ def _read_requests(requests: queue.SimpleQueue[bytes]) -> None:
     os._exit(_ORPHAN)
 
 
-def _write(
-    answers: int,
-    content: bytes,
-    error: str | None = None,
-    message: str | None = None,
-    hint: str | None = None,
-) -> None:
-    head = {"size": len(content), "error": error, "message": message, "hint": hint}
-    for part in (f"{json.dumps(head)}\n".encode(), content):
-        rest = memoryview(part)
-        while rest:
-            rest = rest[os.write(answers, rest) :]
+def _write(answers: int, content: Any) -> int:
+    """Write a part of an answer, its size first; return its size."""
+    view = memoryview(content).cast("B")
+    if size := len(view):
+        for part in (memoryview(size.to_bytes(_SIZE, "big")), view):
+            rest = part
+            while rest:
+                rest = rest[os.write(answers, rest) :]
+    return size
+
+
+def _end_answer(answers: int, error: dict[str, Any] | None) -> None:
+    os.write(answers, bytes(_SIZE))
+    _write(answers, json.dumps(error).encode())
 
 
 if __name__ == "__main__":

@@ -12,10 +12,13 @@ from msgflow.db.sandbox import open_memory
 from msgflow.query.result import QueryResult
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
+    Write = Callable[[Any], int]
+
 _SIZE = 8
+_ROWS_AT_ONCE = 100_000
 
 
 def confined_sql(
@@ -71,22 +74,30 @@ def confined_fleet_sql(
 
 
 def answer(
-    method: str, path: str, memory_limit: str | None, given: Sequence[Any], named: Mapping[str, Any]
-) -> bytes:
-    """Return a result of a method of `Database`, in the child."""
+    write: Write,
+    *,
+    method: str,
+    path: str,
+    memory_limit: str | None,
+    given: Sequence[Any],
+    named: Mapping[str, Any],
+) -> None:
+    """Write a result of a method of `Database`, in the child."""
     with Database(path, memory_limit=memory_limit) as database:
         bound_memory(database.connection)
-        return _packed(getattr(database, method)(*given, **named))
+        _pack(getattr(database, method)(*given, **named), write)
 
 
-def answer_of_lake(lake: str, text: str, where: str | None, limit: int | None) -> bytes:
-    """Return a result of `fleet_sql`, in the child."""
+def answer_of_lake(
+    write: Write, *, lake: str, text: str, where: str | None, limit: int | None
+) -> None:
+    """Write a result of `fleet_sql`, in the child."""
     from msgflow.fleet.lake import Lake
     from msgflow.fleet.lake_query import fleet_sql
 
     with open_memory() as con:
         bound_memory(con)
-    return _packed(fleet_sql(Lake.open(lake), text, where=where, limit=limit))
+    _pack(fleet_sql(Lake.open(lake), text, where=where, limit=limit), write)
 
 
 def _asked(
@@ -123,8 +134,8 @@ def _ask(function: str, arguments: dict[str, Any]) -> QueryResult:
     return QueryResult(table, header, runs, said["notes"], said["when_empty"])
 
 
-def _packed(result: QueryResult) -> bytes:
-    """Return the size of what a result says as JSON, that JSON, and the rows as an Arrow stream."""
+def _pack(result: QueryResult, write: Write) -> None:
+    """Write the size of what a result says as JSON, that JSON, and the rows as an Arrow stream."""
     import pyarrow as pa
 
     said = json.dumps(
@@ -135,8 +146,25 @@ def _packed(result: QueryResult) -> bytes:
             "when_empty": result.when_empty,
         }
     ).encode()
-    sink = pa.BufferOutputStream()
-    with pa.ipc.new_stream(sink, result.table.schema) as writer:
-        writer.write_table(result.table)
-    rows: bytes = sink.getvalue().to_pybytes()
-    return len(said).to_bytes(_SIZE, "big") + said + rows
+    write(len(said).to_bytes(_SIZE, "big") + said)
+    with (
+        pa.PythonFile(_Stream(write), "w") as stream,
+        pa.ipc.new_stream(stream, result.table.schema) as writer,
+    ):
+        writer.write_table(result.table, max_chunksize=_ROWS_AT_ONCE)
+
+
+class _Stream:
+    """A file that Arrow writes to."""
+
+    closed = False
+
+    def __init__(self, write: Write) -> None:
+        self.write = write
+
+    def flush(self) -> None:
+        """Do nothing: what was written is on its way."""
+
+    def close(self) -> None:
+        """End the file."""
+        self.closed = True

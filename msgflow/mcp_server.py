@@ -121,10 +121,12 @@ class _Caller:
         return call
 
 
-def answer(path: str, memory_limit: str, tool: str, given: dict[str, Any]) -> bytes:
-    """Return what a tool answers: the child calls this."""
+def answer(
+    write: Callable[[Any], int], *, path: str, memory_limit: str, tool: str, given: dict[str, Any]
+) -> None:
+    """Write what a tool answers, in the child."""
     text: str = getattr(_Tools(Path(path), memory_limit), tool)(**given)
-    return text.encode(errors="replace")
+    write(text.encode(errors="replace"))
 
 
 class _Tools:

@@ -106,3 +106,17 @@ def test_entries_of_a_directory_replace_no_link(tmp_path: Path) -> None:
             (aside / "a.csv").write_text("new")
     assert (tmp_path / "a.csv").is_symlink()
     assert (tmp_path / "mine").read_text() == "mine"
+
+
+def test_a_file_is_replaced_with_stdout_closed_and_keeps_its_mode(
+    small_database: Path, tmp_path: Path
+) -> None:
+    file = tmp_path / "rows.csv"
+    file.write_text("old")
+    file.chmod(0o640)
+    command = [sys.executable, "-m", "msgflow", "sql", "SELECT 7 AS x"]
+    command += ["--db", str(small_database), "-o", str(file)]
+    closing = ["sh", "-c", 'exec "$@" >&-', "sh"]
+    subprocess.run([*closing, *command], check=True)
+    assert file.read_text() == '"x"\n7\n'
+    assert stat.S_IMODE(file.stat().st_mode) == 0o640

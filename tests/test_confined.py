@@ -78,12 +78,18 @@ def test_a_mistake_in_the_child_is_no_error_of_the_user() -> None:
         process.call("nothing", {})
 
 
-def test_a_child_that_ends_says_so() -> None:
-    with ConfinedProcess("os") as process:
-        with pytest.raises(QueryError, match="the process that ran the query has ended"):
-            process.call("abort", {})
-        with pytest.raises(RuntimeError, match="no keyword arguments"):
-            process.call("getcwd", {"x": 1})
+def test_a_child_that_ends_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "ending.py").write_text(
+        "import os\ndef end(write): os._exit(3)\ndef stop(write): os.abort()\n"
+    )
+    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}{os.pathsep}{os.environ.get('PYTHONPATH', '')}")
+    with ConfinedProcess("ending") as process:
+        with pytest.raises(QueryError, match=r"has ended \(exit code 3\)"):
+            process.call("end", {})
+        with pytest.raises(QueryError, match=r"has ended \(SIGABRT\)"):
+            process.call("stop", {})
+        with pytest.raises(RuntimeError, match=r"^TypeError: .*argument"):
+            process.call("end", {"x": 1})
     with (
         ConfinedProcess("no_such_module") as process,
         pytest.raises(QueryError, match="cannot start"),

@@ -136,23 +136,23 @@ def _write_csv(table: pa.Table, stream: IO[bytes], *, is_safe: bool) -> None:
 
     from msgflow.trace.numpy_arrow import empty_batch
 
-    with pyarrow.csv.CSVWriter(stream, csv_batch(empty_batch(table.schema)).schema) as writer:
+    prepared = _without_formulas if is_safe else csv_batch
+    with pyarrow.csv.CSVWriter(stream, prepared(empty_batch(table.schema)).schema) as writer:
         for batch in table.to_batches(max_chunksize=_ROWS_AT_ONCE):
-            rows = csv_batch(batch)
-            writer.write_batch(_without_formulas(rows) if is_safe else rows)
+            writer.write_batch(prepared(batch))
 
 
 def _without_formulas(batch: pa.RecordBatch) -> pa.RecordBatch:
     import pyarrow as pa
     import pyarrow.compute as pc
 
-    columns = [
-        pc.replace_substring_regex(column, r"^([=+\-@\t\r])", r"'\1")
-        if pa.types.is_string(column.type)
-        else column
-        for column in batch.columns
-    ]
-    return pa.RecordBatch.from_arrays(columns, names=batch.schema.names)
+    def safe(texts: pa.Array) -> pa.Array:
+        return pc.replace_substring_regex(texts, r"^([=+\-@\t\r])", r"'\1")
+
+    batch = csv_batch(batch)
+    columns = [safe(each) if pa.types.is_string(each.type) else each for each in batch.columns]
+    names = safe(pa.array(batch.schema.names, pa.string())).to_pylist()
+    return pa.RecordBatch.from_arrays(columns, names=names)
 
 
 def _csv_column(column: pa.Array) -> pa.Array:

@@ -17,6 +17,7 @@ from msgflow.fleet.answers import answers
 from msgflow.fleet.lake import Lake, visible
 from msgflow.fleet.layout import DATABASE, RUN, VIEWS, is_file_of_part, metadata, part_path
 from msgflow.fleet.parquet import read_parquet
+from msgflow.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -135,6 +136,7 @@ def _together(lake: Lake, table: str, rows: Sequence[Mapping[str, Any]]) -> pa.T
     wanted: dict[str, list[str]] = {}
     for row in rows:
         wanted.setdefault(row["part"], []).append(row["run"])
+    ours = {row["part"] for row in rows if row["msgflow_version"] == __version__}
     with ThreadPoolExecutor(_READ_AT_ONCE) as pool:
         found = dict(
             zip(
@@ -144,6 +146,9 @@ def _together(lake: Lake, table: str, rows: Sequence[Mapping[str, Any]]) -> pa.T
             )
         )
     there = {part: read for part, read in found.items() if read is not None}
+    # A part of an earlier msgflow may lack the table.
+    for part in sorted(ours - set(there)):
+        raise _unusable(lake, table, part, wanted[part], "it is missing")
     if not there:
         return None
     schema = pa.schema([])
@@ -163,7 +168,6 @@ def _read(lake: Lake, table: str, part: str, runs: Sequence[str]) -> pa.Table | 
     import pyarrow.compute as pc
 
     content = lake.store.read(part_path(table, part))
-    # A part of an earlier msgflow may lack the table.
     if content is None:
         return None
     with _usable(lake, table, part, runs):

@@ -105,8 +105,19 @@ class Store:
         """Return the address of a file, for DuckDB, Spark and people."""
         return f"{self.url}/{path}"
 
+    def _require_here(self, path: str) -> None:
+        """Raise if a symbolic link below the root leads to a path.
+
+        Raises:
+            DatabaseError: always then.
+        """
+        if self._is_elsewhere(path):
+            raise DatabaseError(
+                f"msgflow follows no symbolic link below a lake — {self.url_of(path)}",
+                "put the file or folder there that the link leads to",
+            )
+
     def _is_elsewhere(self, path: str) -> bool:
-        """Tell whether a symbolic link below the root, which counts for nothing, leads there."""
         if self._follows_links or not self.is_local:
             return False
         root = os.path.realpath(self._root)
@@ -114,8 +125,6 @@ class Store:
 
     def _reading(self, path: str) -> Any:
         if self.is_local:
-            if self._is_elsewhere(path):
-                raise FileNotFoundError(errno.ENOENT, "a symbolic link", self.full(path))
             return open_regular(Path(self.full(path)))
         # Otherwise pyarrow unpacks files called .gz or .zst, and packs them again when it writes.
         return self.filesystem.open_input_stream(self.full(path), compression=None)
@@ -166,9 +175,10 @@ class Store:
         """
         from pyarrow.fs import FileType
 
+        self._require_here(path)
         with _reaching(self.url):
             info = self._patiently(lambda: self.filesystem.get_file_info(self.full(path)))
-        if info.type != FileType.File or self._is_elsewhere(path):
+        if info.type != FileType.File:
             return None
         return Entry(path, info.size, info.mtime_ns or 0)
 
@@ -182,6 +192,8 @@ class Store:
         Raises:
             DatabaseError: the store cannot be reached or read, or the file is larger.
         """
+
+        self._require_here(path)
 
         def read() -> bytes | None:
             try:
@@ -206,6 +218,8 @@ class Store:
             DatabaseError: the store cannot be reached or read.
             OSError: the new file cannot be written.
         """
+
+        self._require_here(path)
 
         def copy() -> None:
             with self._reading(path) as stream, target.open("wb") as file:
@@ -244,6 +258,7 @@ class Store:
         Raises:
             DatabaseError: the store cannot be reached or written.
         """
+        self._require_here(path)
         with _reaching(self.url, writing=True):
             if self.is_local:
                 self._put_locally(Path(self.full(path)), content)
@@ -281,10 +296,9 @@ class Store:
         Raises:
             DatabaseError: the store cannot be reached or written.
         """
+        self._require_here(path)
         with _reaching(self.url, writing=True):
             if self.is_local:
-                if self._is_elsewhere(path):
-                    return
                 file = Path(self.full(path))
                 file.unlink(missing_ok=True)
                 # A bucket has no folders that could be left empty.
@@ -343,10 +357,12 @@ def _s3() -> Any:
     options: dict[str, Any] = {}
     if (url := endpoint()) is not None:
         parts = urlsplit(url)
-        if parts.scheme not in ("http", "https") or not parts.netloc:
+        if parts.scheme not in ("http", "https") or not parts.netloc or "@" in parts.netloc:
+            # It may hold a password, also one without `//` in front of it.
             raise UsageError(
-                f"no address of a store — {_USERINFO.sub('//…@', url)}",
-                "AWS_ENDPOINT_URL=http://HOST:PORT, or https://",
+                "AWS_ENDPOINT_URL is no address of a store",
+                "AWS_ENDPOINT_URL=http://HOST:PORT, or https://; credentials have variables of"
+                " their own",
             )
         options = {"endpoint_override": parts.netloc, "scheme": parts.scheme}
     region = os.environ.get("AWS_REGION") or os.environ.get("AWS_DEFAULT_REGION")

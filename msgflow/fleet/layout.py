@@ -27,7 +27,8 @@ DATABASE_NAME = "msgflow.duckdb.zst"
 _FORMAT = "msgflow lake"
 # A writer that was killed leaves a name with a dot before and .part behind.
 _OURS = re.compile(
-    r"[^/]+(/[^/]+)?/part=[^/]+/\.?(data\.parquet|msgflow\.duckdb\.zst)(\..+\.part)?"
+    r"[^/]+(/[^/]+)?/part=[^/]+/"
+    r"((data\.parquet|msgflow\.duckdb\.zst)|\.(data\.parquet|msgflow\.duckdb\.zst)\..+\.part)"
 )
 
 

@@ -74,12 +74,12 @@ def test_csv_tells_null_from_empty_text_and_is_exact(result: QueryResult) -> Non
 
 def test_csv_for_a_spreadsheet_holds_no_formulas() -> None:
     texts = ["=cmd|'x'!A1", "+1+1", "-2", "@SUM(A1)", "\t=1", "\r=1", "a=b", "/topic", None]
-    table = QueryResult(pa.table({"name": texts, "ns": [-1] * len(texts)}))
+    table = QueryResult(pa.table({"=name": texts, "ns": [-1] * len(texts)}))
     plain = written(table, Format.CSV).decode()
     safe = written(table, Format.CSV_SAFE).decode()
     assert "\"'=cmd" in safe
     assert safe.replace("\"'", '"') == plain
-    assert safe.count("\"'") == 6
+    assert safe.count("\"'") == 7
 
 
 def test_json_is_exact(result: QueryResult) -> None:

@@ -89,16 +89,23 @@ def test_compaction_deletes_nothing_behind_a_link(lake: Lake, tmp_path: Path) ->
     assert (root / "flow" / "part=zy").is_symlink()
 
 
-def test_files_behind_links_are_none_of_a_lake(lake: Lake, tmp_path: Path) -> None:
+def test_files_behind_links_are_errors(lake: Lake, tmp_path: Path) -> None:
     (tmp_path / "secret").write_text("secret")
     link = Path(lake.store.url) / "run" / "linked"
     link.symlink_to(tmp_path / "secret")
     store = lake.store
-    assert store.read("run/linked") is None
-    assert store.entry("run/linked") is None
     assert "run/linked" not in [entry.path for entry in store.entries("run")]
-    store.delete("run/linked")
+    for use in (
+        lambda: store.read("run/linked"),
+        lambda: store.entry("run/linked"),
+        lambda: store.fetch("run/linked", tmp_path / "copy"),
+        lambda: store.put("run/linked", b"new"),
+        lambda: store.delete("run/linked"),
+    ):
+        with pytest.raises(DatabaseError, match=f"no symbolic link below a lake — {link}"):
+            use()
     assert link.is_symlink()
+    assert (tmp_path / "secret").read_text() == "secret"
     # The lake itself may be reached through one, and so may recordings.
     (tmp_path / "here").symlink_to(store.url)
     assert len(Lake.open(tmp_path / "here").runs()) == 3
@@ -192,7 +199,7 @@ def test_only_small_regular_files_are_read(tmp_path: Path, place: str, kind: str
         with path.open("wb") as file:
             file.truncate(10**10)
     if place == "lake.json" and kind == "device":
-        words, found = "no lake", (DatabaseError, UsageError)  # a link below a lake
+        words, found = "no symbolic link", (DatabaseError, UsageError)
     else:
         words = {"pipe": "a pipe, no file", "device": "a device, no file", "huge": "more than"}[
             kind
@@ -226,11 +233,27 @@ def test_passwords_in_addresses_are_not_printed(url: str) -> None:
     assert not re.search("ret(?!s)|cret|sec", raised.value.message)
 
 
-def test_passwords_in_endpoints_are_not_printed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("AWS_ENDPOINT_URL", "ftp://user:pa/ss@host")
-    with pytest.raises(UsageError, match="no address of a store") as raised:
+@pytest.mark.parametrize("url", ["ftp://u:pa/ss@host", "u:pa/ss@host:9", "http://u:pa%2fss@h"])
+def test_passwords_in_endpoints_are_not_printed(url: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("AWS_ENDPOINT_URL", url)
+    with pytest.raises(UsageError, match="AWS_ENDPOINT_URL is no address of a store") as raised:
         Store("s3://bucket/lake").read("x")
-    assert "pa/ss" not in str(raised.value)
+    assert "ss@" not in str(raised.value)
+
+
+@pytest.mark.parametrize("is_linked", [True, False])
+def test_compaction_loses_no_answers_that_are_elsewhere(lake: Lake, is_linked: bool) -> None:
+    row = lake.runs().to_pylist()[0]
+    file = Path(lake.store.url) / part_path("flow", row["part"])
+    moved = file.replace(file.parents[3] / "moved.parquet")
+    if is_linked:
+        file.symlink_to(moved)
+    with pytest.raises(DatabaseError, match=rf"(missing|symbolic link).* — {file}"):
+        compact(lake, older_than=0)
+    file.unlink(missing_ok=True)
+    moved.rename(file)
+    compact(lake, older_than=0)
+    assert len(lake.runs()) == 3
 
 
 def test_commands_are_quoted(lake: Lake) -> None:

@@ -243,7 +243,7 @@ def test_addresses_that_are_none(url: str, words: str) -> None:
 
 def test_the_address_of_a_store_has_a_scheme(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("AWS_ENDPOINT_URL", "127.0.0.1:9")
-    with pytest.raises(UsageError, match=r"no address of a store — 127\.0\.0\.1:9"):
+    with pytest.raises(UsageError, match="AWS_ENDPOINT_URL is no address of a store"):
         Store("s3://bucket/lake").read("x")
 
 
