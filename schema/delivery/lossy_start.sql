@@ -1,7 +1,7 @@
 -- name: derive.lossy_start
 -- description: Processes that may have lost events while they were created: a gap other than a
---     pause lies before the first callback instance, or before the process was seen at all; or
---     anywhere, if its first node was seen to be created before that callback instance.
+--     pause lies before the first callback instance, or before the process was seen at all. If its
+--     first node was seen to be created before its first callback instance, any gap counts.
 -- grain: one row per process
 WITH loss AS (
     SELECT r.recording_id, min(l.start_ns) AS start_ns

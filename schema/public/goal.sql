@@ -24,10 +24,10 @@
 -- column: result_taken_ns BIGINT [epoch ns]  The client took the result
 -- column: result_request_id BIGINT  Request for the result
 -- column: result_candidate_count BIGINT  0: nobody asked for the result; 1: its request is known;
---     more: so many goals that the requests of the client may be for, and what is about the result
---     is NULL; NULL: not accepted, or the client got no answer
+--     2 or more: the number of goals that the request may be for; then the columns of the result
+--     are NULL; NULL: not accepted, or the client got no answer
 -- column: feedback_count BIGINT  Feedback messages published while the server was concerned with
---     no other goal; NULL: it was at no time known to be
+--     no other goal; NULL: the trace shows no such time
 -- column: first_feedback_ns BIGINT [epoch ns]  The first of them; NULL: none, or another goal was
 --     open meanwhile
 -- column: last_feedback_ns BIGINT [epoch ns]  The last of them, likewise

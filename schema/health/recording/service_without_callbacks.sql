@@ -1,5 +1,5 @@
 -- name: finding.service_without_callbacks
--- title: Services whose callbacks have no events
+-- title: Services of actions whose callbacks have no events
 -- description: The process took requests of these services and ran none of its callbacks with them,
 --     as far as the trace shows. So these callbacks have no duration and no wait, and do not count
 --     as use of the executor. What they publish and send is known all the same (link_call).
@@ -32,4 +32,5 @@ JOIN store.service AS s ON v.service_id = s.service_id
 JOIN main.process AS p ON v.process_id = p.process_id
 JOIN main.host AS h ON p.host_id = h.host_id
 WHERE v.process_id IN (SELECT process_id FROM store.callback)
+    AND contains(s.service_name, '/_action/')
 GROUP BY p.run_id, p.process_id, p.name, p.pid, h.hostname

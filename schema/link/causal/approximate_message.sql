@@ -4,7 +4,9 @@
 --     the stamps in their headers, which are not in the trace: `stamp_ns`, when they were
 --     published, stands for them. A header may be older, by up to `age_ns`: its node may have
 --     stamped it when the publishing callback began, or copied the stamp of the message that the
---     callback got, and so on. Chains end where a publisher comes again.
+--     callback got, and so on. Chains end where a publisher comes again. `age_ns` is NULL where a
+--     header may come from a message that no callback was called with: an annotation leads to the
+--     publication, or its callback, or its thread outside of callbacks, took messages itself.
 -- grain: one row per annotation and callback instance of one of its inputs
 -- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.approximate_message(only_run) AS TABLE
@@ -18,17 +20,40 @@ WITH RECURSIVE input AS MATERIALIZED (
     JOIN store.callback_instance AS c ON r.callback_instance_id = c.callback_instance_id
     WHERE a.run_id = only_run AND a.kind = 'approximate_sync' AND c.run_id = only_run
 ),
+-- Takes that no callback was called with.
+by_hand AS MATERIALIZED (
+    SELECT t.thread_id, t.taken_ns
+    FROM store.take AS t
+    ANTI JOIN store.callback_instance AS i ON t.take_id = i.take_id
+    WHERE t.run_id = only_run AND EXISTS (SELECT annotation_id FROM input)
+),
+taking AS MATERIALIZED (
+    SELECT DISTINCT i.callback_instance_id
+    FROM by_hand AS t
+    JOIN store.callback_instance AS i
+        ON t.thread_id = i.thread_id AND t.taken_ns BETWEEN i.start_ns AND i.end_ns
+    WHERE i.run_id = only_run
+),
 sent AS MATERIALIZED (
     SELECT
         t.take_id, b.publisher_id, i.take_id AS cause_id,
         coalesce(nullif(t.source_timestamp_ns, 0), b.start_ns) AS stamp_ns,
-        b.start_ns - coalesce(i.start_ns, b.start_ns) AS working_ns
+        CASE
+            WHEN
+                o.publisher_id IS NULL AND g.callback_instance_id IS NULL
+                AND (i.callback_instance_id IS NOT NULL OR h.thread_id IS NULL)
+                THEN b.start_ns - coalesce(i.start_ns, b.start_ns)
+        END AS working_ns
     FROM store.take AS t
     JOIN store.link_transport AS l ON t.take_id = l.take_id
     JOIN store.publication AS b ON l.publication_id = b.publication_id
     LEFT JOIN derive.link_causal_direct(only_run) AS d ON b.publication_id = d.publication_id
     LEFT JOIN store.callback_instance AS i
         ON d.callback_instance_id = i.callback_instance_id AND i.run_id = only_run
+    LEFT JOIN (SELECT DISTINCT publisher_id FROM store.annotation_output) AS o
+        ON b.publisher_id = o.publisher_id
+    LEFT JOIN (SELECT DISTINCT thread_id FROM by_hand) AS h ON b.thread_id = h.thread_id
+    LEFT JOIN taking AS g ON i.callback_instance_id = g.callback_instance_id
     WHERE t.run_id = only_run AND l.run_id = only_run AND b.run_id = only_run
         AND EXISTS (SELECT annotation_id FROM input)
 ),
@@ -45,7 +70,7 @@ origin (take_id, cause_id, publisher_ids, made_ns) AS (
     WHERE NOT list_contains(o.publisher_ids, s.publisher_id)
 ),
 made AS (
-    SELECT take_id, min(made_ns) AS made_ns
+    SELECT take_id, CASE WHEN count(*) = count(made_ns) THEN min(made_ns) END AS made_ns
     FROM origin
     GROUP BY take_id
 )

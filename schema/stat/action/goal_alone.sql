@@ -1,8 +1,7 @@
 -- name: derive.goal_alone
 -- kind: macro
 -- description: When an action server was concerned with one goal and no other: then what it
---     publishes is of that goal. Goals whose results cannot be told
---     apart have no such times.
+--     publishes is of that goal. Goals whose results cannot be told apart have no such times.
 -- grain: one row per server and moment at which that changes
 -- column: goal_id BIGINT  The only goal from then on; NULL: none, several, or not known which
 -- param: spans VARCHAR  Name of the rows of derive.goal_span
