@@ -19,7 +19,7 @@ ABOUT_PROCESSES = (
 # Scenarios, and who has what.
 EXPECTED = {
     "busy_waiting": [("busy_waiting", "crowded 1201 on alpha")],
-    "calls": [("service_without_callbacks", "acting 1101 on alpha")],
+    "calls": [],
     "multi_threaded": [],
     "polled": [("polled_executor", "relay 1201 on alpha")],
     # The others that ended were shut down.

@@ -4,12 +4,12 @@
 --     message that may be the pivot of a set: the latest of the first messages of the inputs that
 --     are still unused. A set is the first message of every input from some moment on, up to the
 --     pivot. The moment counts at which the set is narrowest; a later end counts a tenth more than
---     a later start, which is the age penalty of message_filters (0.1). The filter hands a set over once no set with the same pivot can be better:
---     then `proof_event_id`, the callback instance of an input begins that showed it. It looks only
---     when the input has come that it waits for, the one with the oldest of the messages before the
---     pivot. `is_close`: another set is better if the stamps in the headers are older, as
---     derive.approximate_message says, or the stamps of an input are not in the order in which its
---     messages came.
+--     a later start, which is the age penalty of message_filters (0.1). The filter hands a set
+--     over once no set with the same pivot can be better: then `proof_event_id`, the callback
+--     instance of an input begins that showed it. It looks only when the input has come that it
+--     waits for, the one with the oldest of the messages before the pivot. `is_close`: another set
+--     is better if the stamps in the headers are older, as derive.approximate_message says, or the
+--     stamps of an input are not in the order in which its messages came.
 -- grain: one row per annotation, pivot of a set that was proven, and input
 -- param: only_run BIGINT  Run to look at
 -- param: messages VARCHAR  Name of the rows of derive.approximate_message
