@@ -1,9 +1,9 @@
 """Confined processes: SQL of a person or an agent runs in a child with bounds on memory and time.
 
 DuckDB's memory limit does not count what functions of a query take, and an interrupt waits until
-such a function returns. The system's bounds hold always: an allocation beyond them fails, and a
-child that is late is killed. The connection in the child is in the sandbox of `msgflow.db.sandbox`
-as any other.
+such a function returns. The system's bounds hold always: an allocation beyond them fails
+(`msgflow.db.memory.bound_process`), and a child that is late is killed. The connection in the child
+is in the sandbox of `msgflow.db.sandbox` as any other.
 
 The child is `python -P -m msgflow.confined MODULE`. It reads a request per line from stdin, calls
 a function of the module, and writes the answer: parts, each with its size in front; a size of 0; a
@@ -17,7 +17,6 @@ import importlib
 import json
 import os
 import queue
-import resource
 import select
 import signal
 import subprocess
@@ -26,21 +25,15 @@ import threading
 import time
 import traceback
 import weakref
-from typing import TYPE_CHECKING, Any
+from contextlib import suppress
+from typing import Any
 
 from msgflow import errors
 from msgflow.errors import MsgflowError, QueryError
 
-if TYPE_CHECKING:
-    import duckdb
-
 _CHUNK = 1 << 20
 _SIZE = 8
 _ORPHAN = 1
-# What functions, results and heaps in pieces may take for each byte that DuckDB counts, and at
-# least. DuckDB's own limit is 80 % of the memory that there is.
-_SHARE_BESIDE = 0.25
-_LEAST_BESIDE = 1 << 28
 _CANNOT_START = (
     "the process that runs queries cannot start",
     "is msgflow installed where this Python finds it? pip show ros2-msgflow",
@@ -49,7 +42,6 @@ _ENDED = (
     "the process that ran the query has ended",
     "did it take more memory than there is? read one run, a shorter time, or fewer columns",
 )
-_UNITS = ("bytes", "KiB", "MiB", "GiB", "TiB", "PiB")
 
 
 class LateError(QueryError):
@@ -97,8 +89,8 @@ class ConfinedProcess:
             self._answer(None, _CANNOT_START)  # the child is ready
             request = json.dumps({"function": function, "arguments": arguments}, default=str)
             assert self._child.stdin is not None
-            self._child.stdin.write(f"{request}\n".encode())
-            self._child.stdin.flush()
+            with suppress(BrokenPipeError):  # the answer says that the child has ended
+                self._child.stdin.write(f"{request}\n".encode())
             return self._answer(self._seconds, _ENDED)
         except LateError:
             # The next call finds the imports done.
@@ -135,7 +127,7 @@ class ConfinedProcess:
     def _answer(self, seconds: float | None, on_end: tuple[str, str]) -> bytearray:
         end = None if seconds is None else time.monotonic() + seconds
         content = bytearray()
-        while size := int.from_bytes(self._read(_SIZE, end, on_end), "big"):
+        while size := int.from_bytes(self._read(_SIZE, end, on_end)):
             content += self._read(size, end, on_end)
         said = json.loads(self._read(int.from_bytes(self._read(_SIZE, end, on_end)), end, on_end))
         if said is None:
@@ -171,31 +163,6 @@ def _end(child: subprocess.Popen[bytes]) -> None:
     for stream in (child.stdin, child.stdout):
         assert stream is not None
         stream.close()
-
-
-def bound_memory(connection: duckdb.DuckDBPyConnection) -> None:
-    """Bound the memory of this process by the memory limit of its connection.
-
-    It may take the limit besides what it has now, and a quarter of that, at least 256 MiB, for what
-    DuckDB does not count.
-    """
-    connection.execute("SELECT 1").fetchall()  # its threads have their stacks now
-    text = connection.execute("SELECT current_setting('memory_limit')").fetchall()[0][0]
-    number, unit = text.split()
-    limit = float(number) * 1024.0 ** _UNITS.index(unit)
-    used = _writable_bytes()
-    if used is not None:
-        most = used + round(limit + max(limit * _SHARE_BESIDE, _LEAST_BESIDE))
-        resource.setrlimit(resource.RLIMIT_DATA, (most, resource.RLIM_INFINITY))
-
-
-def _writable_bytes() -> int | None:
-    """Return the memory of this process that RLIMIT_DATA counts; None without /proc."""
-    try:
-        with open("/proc/self/statm", encoding="ascii") as file:
-            return int(file.read().split()[5]) * resource.getpagesize()
-    except OSError:
-        return None
 
 
 def main() -> None:
@@ -236,7 +203,7 @@ def _write(answers: int, content: Any) -> int:
     """Write a part of an answer, its size first; return its size."""
     view = memoryview(content).cast("B")
     if size := len(view):
-        for part in (memoryview(size.to_bytes(_SIZE, "big")), view):
+        for part in (memoryview(size.to_bytes(_SIZE)), view):
             rest = part
             while rest:
                 rest = rest[os.write(answers, rest) :]

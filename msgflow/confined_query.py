@@ -6,8 +6,9 @@ import json
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from msgflow.confined import ConfinedProcess, bound_memory
+from msgflow.confined import ConfinedProcess
 from msgflow.database import Database
+from msgflow.db.memory import bound_process
 from msgflow.db.sandbox import open_memory
 from msgflow.query.result import QueryResult
 
@@ -30,13 +31,13 @@ def confined_sql(
         path: the database.
         text: one query, or EXPLAIN of one.
         limit: most rows returned; all when None.
-        memory_limit: most memory that DuckDB takes; its default when None. The process takes at
-            most half as much besides.
+        memory_limit: most memory that DuckDB takes; its default when None. The process takes a
+            quarter more at most, but may take 256 MiB.
 
     Raises:
         MsgflowError: as `Database.sql`, or the process took too much memory.
     """
-    return _ask("answer", _asked(path, memory_limit, "sql", [text], {"limit": limit}))
+    return _ask_database(path, memory_limit, "sql", [text], {"limit": limit})
 
 
 def confined_query(
@@ -53,7 +54,7 @@ def confined_query(
     Raises:
         MsgflowError: as `Database.query`, or the process took too much memory.
     """
-    return _ask("answer", _asked(path, memory_limit, "query", [name], given))
+    return _ask_database(path, memory_limit, "query", [name], given)
 
 
 def confined_fleet_sql(
@@ -84,7 +85,7 @@ def answer(
 ) -> None:
     """Write a result of a method of `Database`, in the child."""
     with Database(path, memory_limit=memory_limit) as database:
-        bound_memory(database.connection)
+        bound_process(database.connection)
         _pack(getattr(database, method)(*given, **named), write)
 
 
@@ -96,24 +97,19 @@ def answer_of_lake(
     from msgflow.fleet.lake_query import fleet_sql
 
     with open_memory() as con:
-        bound_memory(con)
+        bound_process(con)
     _pack(fleet_sql(Lake.open(lake), text, where=where, limit=limit), write)
 
 
-def _asked(
+def _ask_database(
     path: Path,
     memory_limit: str | None,
     method: str,
     given: Sequence[Any],
     named: Mapping[str, Any],
-) -> dict[str, Any]:
-    return {
-        "method": method,
-        "path": str(path),
-        "memory_limit": memory_limit,
-        "given": given,
-        "named": named,
-    }
+) -> QueryResult:
+    arguments = {"method": method, "path": str(path), "memory_limit": memory_limit}
+    return _ask("answer", {**arguments, "given": given, "named": named})
 
 
 def _ask(function: str, arguments: dict[str, Any]) -> QueryResult:
@@ -125,7 +121,7 @@ def _ask(function: str, arguments: dict[str, Any]) -> QueryResult:
     from msgflow.query.catalogue import load_query
     from msgflow.run.choice import Run
 
-    size = int.from_bytes(content[:_SIZE], "big")
+    size = int.from_bytes(content[:_SIZE])
     said = json.loads(content[_SIZE : _SIZE + size])
     with pa.ipc.open_stream(pa.py_buffer(content)[_SIZE + size :]) as reader:
         table = reader.read_all()
@@ -146,7 +142,7 @@ def _pack(result: QueryResult, write: Write) -> None:
             "when_empty": result.when_empty,
         }
     ).encode()
-    write(len(said).to_bytes(_SIZE, "big") + said)
+    write(len(said).to_bytes(_SIZE) + said)
     with (
         pa.PythonFile(_Stream(write), "w") as stream,
         pa.ipc.new_stream(stream, result.table.schema) as writer,

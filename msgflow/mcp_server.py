@@ -17,8 +17,9 @@ from typing import TYPE_CHECKING, Any
 
 import duckdb
 
-from msgflow.confined import ConfinedProcess, bound_memory
+from msgflow.confined import ConfinedProcess
 from msgflow.database import Database
+from msgflow.db.memory import bound_process
 from msgflow.errors import MsgflowError, QueryError, UsageError
 from msgflow.version import __version__
 
@@ -265,7 +266,7 @@ class _Tools:
     def _opened(self) -> Iterator[Database]:
         """Open the database for one call."""
         with Database(self._path, memory_limit=self._memory_limit) as database:
-            bound_memory(database.connection)
+            bound_process(database.connection)
             try:
                 yield database
             except Exception as error:

@@ -1,8 +1,9 @@
-"""Memory limits of DuckDB, and the number of threads that they are enough for."""
+"""Memory limits of DuckDB, the threads that they are enough for, and bounds of a process."""
 
 from __future__ import annotations
 
 import contextlib
+import resource
 from typing import TYPE_CHECKING
 
 import duckdb
@@ -22,6 +23,10 @@ _MOST_DEFAULT_BYTES = 4_000_000_000
 _LEAST_BYTES = 15_000_000
 # DuckDB advises this. With less for each, threads spill more than fewer threads would.
 _BYTES_PER_THREAD = 125_000_000
+# What functions, results and heaps in pieces may take for each byte that DuckDB counts, and at
+# least. DuckDB's own limit is 80 % of the memory that there is.
+_SHARE_BESIDE = 0.25
+_LEAST_BESIDE = 1 << 28
 _EXAMPLE = "--memory-limit 2GB"
 
 
@@ -62,6 +67,20 @@ def limit_threads(con: duckdb.DuckDBPyConnection) -> None:
     most = max(1, round(_limit_bytes(con) / _BYTES_PER_THREAD))
     if most < con.execute("SELECT current_setting('threads')").fetchall()[0][0]:
         con.execute(f"SET threads = {most}")
+
+
+def bound_process(con: duckdb.DuckDBPyConnection) -> None:
+    """Bound the memory of this process by the memory limit of its connection.
+
+    It may take the limit besides what it has now, and a quarter of that, at least 256 MiB, for what
+    DuckDB does not count. A system without /proc knows no such bound.
+    """
+    con.execute("SELECT 1").fetchall()  # its threads have their stacks now
+    limit = _limit_bytes(con)
+    with contextlib.suppress(OSError), open("/proc/self/statm", encoding="ascii") as file:
+        used = int(file.read().split()[5]) * resource.getpagesize()
+        most = used + limit + max(round(limit * _SHARE_BESIDE), _LEAST_BESIDE)
+        resource.setrlimit(resource.RLIMIT_DATA, (most, resource.RLIM_INFINITY))
 
 
 @contextlib.contextmanager

@@ -21,12 +21,17 @@ sent AS (
     GROUP BY client_id
 )
 SELECT
-    a.run_id, a.action_client_id, a.process_id, a.node_id, a.action_name, a.cancel_client_id,
-    a.result_client_id, a.feedback_subscription_id, a.status_subscription_id,
+    a.run_id,
+    a.goal_object_id AS action_client_id,
+    a.process_id, a.node_id, a.action_name,
+    a.cancel_object_id AS cancel_client_id,
+    a.result_object_id AS result_client_id,
+    a.feedback_object_id AS feedback_subscription_id,
+    a.status_object_id AS status_subscription_id,
     c.created_ns,
     CASE
         WHEN a.run_id IN (SELECT run_id FROM store.request) THEN coalesce(q.number, 0)
     END AS goal_count
-FROM derive.action_client('endpoint') AS a
-JOIN main.client AS c ON a.action_client_id = c.client_id
-LEFT JOIN sent AS q ON a.action_client_id = q.client_id
+FROM derive.action_object('endpoint', 'client', 'subscription') AS a
+JOIN main.client AS c ON a.goal_object_id = c.client_id
+LEFT JOIN sent AS q ON a.goal_object_id = q.client_id

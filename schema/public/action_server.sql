@@ -32,16 +32,21 @@ published AS (
     GROUP BY publisher_id
 )
 SELECT
-    a.run_id, a.action_server_id, a.process_id, a.node_id, a.action_name, a.cancel_service_id,
-    a.result_service_id, a.feedback_publisher_id, a.status_publisher_id,
+    a.run_id,
+    a.goal_object_id AS action_server_id,
+    a.process_id, a.node_id, a.action_name,
+    a.cancel_object_id AS cancel_service_id,
+    a.result_object_id AS result_service_id,
+    a.feedback_object_id AS feedback_publisher_id,
+    a.status_object_id AS status_publisher_id,
     s.created_ns,
     CASE
         WHEN a.run_id IN (SELECT run_id FROM store.request) THEN coalesce(q.number, 0)
     END AS goal_count,
     coalesce(f.number, 0) AS feedback_count,
     coalesce(t.number, 0) AS status_count
-FROM derive.action_server('endpoint') AS a
-JOIN main.service AS s ON a.action_server_id = s.service_id
-LEFT JOIN taken AS q ON a.action_server_id = q.service_id
-LEFT JOIN published AS f ON a.feedback_publisher_id = f.publisher_id
-LEFT JOIN published AS t ON a.status_publisher_id = t.publisher_id
+FROM derive.action_object('endpoint', 'service', 'publisher') AS a
+JOIN main.service AS s ON a.goal_object_id = s.service_id
+LEFT JOIN taken AS q ON a.goal_object_id = q.service_id
+LEFT JOIN published AS f ON a.feedback_object_id = f.publisher_id
+LEFT JOIN published AS t ON a.status_object_id = t.publisher_id

@@ -1,7 +1,7 @@
 -- name: main.end_to_end
 -- kind: macro
 -- description: Roots of paths, and what became of them. A root that reached the sink has one row
---     per take there; a root that did not has a single row with the reason. Roots are callback
+--     per take there. Any other root has a single row with the reason. Roots are callback
 --     instances of timers that published, or publications (always with from_event 'publish'). The
 --     time window applies to roots. A message that stopped a root is lost if others passed the same
 --     step later, and earlier too if nobody took it; else it is cut by the recording. One that was

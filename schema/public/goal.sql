@@ -24,8 +24,8 @@
 -- column: result_taken_ns BIGINT [epoch ns]  The client took the result
 -- column: result_request_id BIGINT  Request for the result
 -- column: result_candidate_count BIGINT  0: nobody asked for the result; 1: its request is known;
---     2 or more: the number of goals that the request may be for; then the columns of the result
---     are NULL; NULL: not accepted, or the client got no answer
+--     2 or more: so many goals compete for the request, and the columns of the result are NULL;
+--     NULL: not accepted, or the client got no answer
 -- column: feedback_count BIGINT  Feedback messages published while the server was concerned with
 --     no other goal; NULL: the trace shows no such time
 -- column: first_feedback_ns BIGINT [epoch ns]  The first of them; NULL: none, or another goal was
@@ -46,8 +46,17 @@
 -- column: is_loss_affected BOOLEAN  A gap of a trace lies between the first and the last of these
 --     moments: what is missing may have happened
 WITH endpoint AS MATERIALIZED (FROM derive.action_endpoint),
-server AS MATERIALIZED (FROM derive.action_server('endpoint')),
-client AS MATERIALIZED (FROM derive.action_client('endpoint')),
+server AS MATERIALIZED (
+    SELECT
+        *, goal_object_id AS action_server_id, cancel_object_id AS cancel_service_id,
+        result_object_id AS result_service_id, feedback_object_id AS feedback_publisher_id,
+        status_object_id AS status_publisher_id
+    FROM derive.action_object('endpoint', 'service', 'publisher')
+),
+client AS MATERIALIZED (
+    SELECT *, goal_object_id AS action_client_id, result_object_id AS result_client_id
+    FROM derive.action_object('endpoint', 'client', 'subscription')
+),
 answered AS MATERIALIZED (FROM derive.goal_answer('server')),
 request AS MATERIALIZED (FROM derive.goal_request('server', 'client', 'answered')),
 paired AS MATERIALIZED (FROM derive.goal_result('server', 'client', 'request')),

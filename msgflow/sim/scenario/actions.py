@@ -7,7 +7,7 @@ from msgflow.sim.system import Executor, Host, Node, Process, Scenario
 
 
 def actions() -> Scenario:
-    """Two action servers on another host, of which one executes goals side by side."""
+    """Two action servers on another host. One executes goals side by side."""
     acting = Node(
         "acting",
         action_servers=(

@@ -1,7 +1,7 @@
 -- name: finding.repeated_initialisation
 -- title: Objects that were initialised again
--- description: Publishers and subscriptions were initialised on the handle of another one of the
---     same topic. The later one counts from then on. Not counted: publishers of /rosout, all of
+-- description: A publisher or subscription got the handle of an earlier one of the same topic.
+--     The later one counts from then on. Not counted: publishers of /rosout, all of
 --     which rcl initialises at one address.
 -- cause: The object was destroyed and created again, or its creation was traced twice.
 -- cure: None needed.

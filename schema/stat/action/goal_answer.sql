@@ -8,7 +8,7 @@
 --     events may be missing between the two, where the thread does nothing more, and in processes
 --     that are several, it is not known.
 -- grain: one row per response to a goal that an action server sent
--- param: servers VARCHAR  Name of the rows of derive.action_server
+-- param: servers VARCHAR  Name of the rows of action servers, see main.goal
 CREATE OR REPLACE MACRO derive.goal_answer(servers) AS TABLE
 WITH answer AS MATERIALIZED (
     SELECT

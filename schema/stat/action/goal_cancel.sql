@@ -4,7 +4,7 @@
 --     its response, the server publishes the status of its goals if it cancels one. Which goal that
 --     is is known if there is only one.
 -- grain: one row per request to cancel that was accepted
--- param: servers VARCHAR  Name of the rows of derive.action_server
+-- param: servers VARCHAR  Name of the rows of action servers, see main.goal
 -- param: alone VARCHAR  Name of the rows of derive.goal_alone
 CREATE OR REPLACE MACRO derive.goal_cancel(servers, alone) AS TABLE
 WITH asked AS MATERIALIZED (

@@ -2,8 +2,8 @@
 -- kind: macro
 -- description: Goals that were sent to an action server, and what it answered.
 -- grain: one row per goal and action server that took it; one per goal that none took
--- param: servers VARCHAR  Name of the rows of derive.action_server
--- param: clients VARCHAR  Name of the rows of derive.action_client
+-- param: servers VARCHAR  Name of the rows of action servers, see main.goal
+-- param: clients VARCHAR  Name of the rows of action clients, see main.goal
 -- param: answers VARCHAR  Name of the rows of derive.goal_answer
 CREATE OR REPLACE MACRO derive.goal_request(servers, clients, answers) AS TABLE
 WITH answer AS (

@@ -8,8 +8,8 @@
 --     these goals are one block. In it, the order pairs goals and requests, so that the number of
 --     goals that are still worked on is right, but not which.
 -- grain: one row per goal that may have been accepted; one per request beyond these
--- param: servers VARCHAR  Name of the rows of derive.action_server
--- param: clients VARCHAR  Name of the rows of derive.action_client
+-- param: servers VARCHAR  Name of the rows of action servers, see main.goal
+-- param: clients VARCHAR  Name of the rows of action clients, see main.goal
 -- param: goals VARCHAR  Name of the rows of derive.goal_request
 CREATE OR REPLACE MACRO derive.goal_result(servers, clients, goals) AS TABLE
 WITH goal AS (

@@ -7,7 +7,7 @@
 --     began in the gap before, or before the recording.
 -- grain: one row per goal that a server took and is not known to have rejected; one without a goal
 --     per result of an unknown goal
--- param: servers VARCHAR  Name of the rows of derive.action_server
+-- param: servers VARCHAR  Name of the rows of action servers, see main.goal
 -- param: goals VARCHAR  Name of the rows of derive.goal_request
 -- param: results VARCHAR  Name of the rows of derive.goal_result
 CREATE OR REPLACE MACRO derive.goal_span(servers, goals, results) AS TABLE
