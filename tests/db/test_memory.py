@@ -107,5 +107,5 @@ def test_a_process_may_take_a_quarter_more_than_its_limit(limit: int, beside: in
         "print(resource.getrlimit(resource.RLIMIT_DATA)[0] - used)\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    # DuckDB rounds its limit; the process goes on taking a little.
-    assert int(done.stdout) == pytest.approx(limit + beside, rel=0.02)
+    # DuckDB says its limit with one decimal; the process goes on taking a little.
+    assert int(done.stdout) == pytest.approx(limit + beside, rel=0.05)
