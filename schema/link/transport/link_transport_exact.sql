@@ -5,8 +5,9 @@
 --     `exact_stamp`). If the topic of a side is not known, the pair counts only if the stamp has
 --     a single candidate in the run, and if the pair does not put one publication on two topics.
 --     If several publications have the same topic and stamp, the k-th belongs to the k-th such
---     take of a subscription, so that none is received twice. Equal values need no clocks: a take
---     may seem to come before its publication.
+--     take of a subscription, so that none is received twice. If there are more such takes than
+--     publications, some publications were lost, and each take may be of one of those. Equal
+--     values need no clocks: a take may seem to come before its publication.
 -- grain: one row per take whose publication is known by its stamp
 -- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.link_transport_exact(only_run) AS TABLE
@@ -100,7 +101,10 @@ ordered AS (
         ) AS publication_position,
         dense_rank() OVER (
             PARTITION BY run_id, subscription_id, source_timestamp_ns ORDER BY take_event_id
-        ) AS take_position
+        ) AS take_position,
+        count(DISTINCT take_id) OVER (
+            PARTITION BY run_id, subscription_id, source_timestamp_ns
+        ) AS take_count
     FROM counted
     WHERE is_topic_known
 )
@@ -110,7 +114,9 @@ SELECT
 FROM candidate
 WHERE is_topic_known AND NOT is_repeated
 UNION ALL
-SELECT run_id, publication_id, take_id, publisher_id, subscription_id, method, known_count
+SELECT
+    run_id, publication_id, take_id, publisher_id, subscription_id, method,
+    greatest(known_count, take_count)
 FROM ordered
 WHERE publication_position = take_position
 UNION ALL
