@@ -123,6 +123,26 @@ def test_publications_of_one_moment_are_one(rules: duckdb.DuckDBPyConnection) ->
     ]
 
 
+def test_a_publication_counts_once_at_a_difference(rules: duckdb.DuckDBPyConnection) -> None:
+    """For the first of the messages that might be its own; one of another publisher is none."""
+    for publisher, topic in ((1, "/a"), (2, "/b")):
+        rules.execute(
+            "INSERT INTO published (topic_name, publisher_id, publication_id, written_ns, "
+            "next_event_ns) VALUES (?, ?, ?, 0, 1_000)",
+            [topic, publisher, publisher],
+        )
+    rules.execute(
+        "INSERT INTO message VALUES (1, '/a', 500, 0, 1, 9_000), (1, '/b', 600, 0, 1, 9_000), "
+        "(1, '/a', 900, 0, 1, 9_000), (1, '/a', 5_000, 0, 1, 9_000)"
+    )
+    assert pairs(rules, "publisher_id, greatest_ns, least_ns") == [
+        (1, 500, -500),
+        (1, 900, 500),
+        (1, 5_000, 4_000),
+        (2, 600, -400),
+    ]
+
+
 def test_the_middle_of_a_stretch(rules: duckdb.DuckDBPyConnection) -> None:
     publish(rules, (1, 0, 1_000), (2, 999, 1_500))
     rules.execute("INSERT INTO message VALUES (1, '/a', 400, 0, 1, 500)")

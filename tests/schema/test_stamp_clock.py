@@ -203,6 +203,19 @@ def test_bursts_are_told_at_any_drift(rules: duckdb.DuckDBPyConnection, ppm: int
         assert is_sharp
 
 
+@pytest.mark.parametrize("apart_ns", [2_000, 3_000, 4_000])
+def test_a_publication_has_one_message(rules: duckdb.DuckDBPyConnection, apart_ns: int) -> None:
+    """A thread that goes on late behind its burst could as well be writing the one before, too."""
+    record(rules, width_ns=apart_ns, delay_ns=1_000, ppm=0, per_burst=3)
+    rules.execute(
+        "UPDATE published SET next_event_ns = next_event_ns + 20000 WHERE publication_id % 3 = 2"
+    )
+    rows = rules.execute("SELECT difference_ns, is_sharp FROM derive.stamp_clock(1)").fetchall()
+    assert [(2 * abs(difference) < apart_ns, is_sharp) for difference, is_sharp in rows] == [
+        (True, True)
+    ] * 8
+
+
 def test_three_stretches_on_either_side_vote_together(rules: duckdb.DuckDBPyConnection) -> None:
     """Threads that go on late say little; the first stretch has others."""
     record(rules, width_ns=2_000, delay_ns=1_000, ppm=20)

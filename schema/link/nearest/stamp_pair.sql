@@ -3,10 +3,11 @@
 -- description: Messages beside publications that may be theirs. A stamp is made after the message
 --     was written and before the publishing thread went on, so each pair allows an interval of
 --     differences between the clock of stamps and that of the trace. If several publications
---     follow each other before the thread goes on, each has the time until the next. Some
---     messages per stretch of time are enough, of every publisher in turn. Those of topics with
---     one publisher come first: a message of another topic may be of none of a publisher's
---     publications.
+--     follow each other before the thread goes on, each has the time until the next. A publication
+--     has one message: where several could be its own, only the first one counts. Else a burst
+--     could as well be one publication later, if its last one takes long. Some messages per
+--     stretch of time are enough, of every publisher in turn. Those of topics with one publisher
+--     come first: a message of another topic may be of none of a publisher's publications.
 -- grain: one row per clock, message in the sample and publication that it may be of
 -- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.stamp_pair(only_run) AS TABLE
@@ -151,7 +152,10 @@ paired AS (
         (p.written_ns - w.start_ns) // w.stretch_ns AS stretch,
         w.source_timestamp_ns - p.written_ns AS greatest_ns,
         w.source_timestamp_ns - p.closes_ns AS least_ns,
-        w.source_timestamp_ns - p.next_written_ns AS later_ns
+        w.source_timestamp_ns - p.next_written_ns AS later_ns,
+        lag(w.source_timestamp_ns) OVER (
+            PARTITION BY w.publisher_id, w.position ORDER BY w.source_timestamp_ns
+        ) - p.written_ns AS earlier_ns
     FROM wanted AS w
     JOIN published AS p ON w.publisher_id = p.publisher_id AND w.position = p.position
 )
@@ -166,7 +170,7 @@ SELECT
     written_ns - start_ns - stretch * stretch_ns - stretch_ns // 2 AS beyond_middle_ns,
     is_taken_here,
     is_latest,
-    greatest(least_ns, later_ns) AS least_ns,
+    greatest(least_ns, later_ns, earlier_ns) AS least_ns,
     greatest_ns
 FROM paired
 WHERE coalesce(later_ns < greatest_ns, true)
