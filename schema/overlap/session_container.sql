@@ -1,17 +1,33 @@
 -- name: overlap.session_container
 -- kind: inline
--- description: Sessions whose threads are not those that an earlier session of their host recorded
---     under the same ids: they are of another container. Sessions of the same threads are of one.
--- grain: one row per such session, with the first session of its container
-WITH other AS (
-    SELECT DISTINCT right_session AS session FROM session_pair WHERE NOT is_same
+-- description: Containers of a host but the first one. Two sessions of the same threads are of one
+--     container, and so are two that a third one joins. Sessions of other threads under the same
+--     ids are of two containers: the later one is another than the first.
+-- grain: one row per session of such a container, with the first session of the container
+WITH RECURSIVE twin AS (
+    SELECT left_session AS session, right_session AS other FROM session_pair WHERE is_same
+    UNION ALL
+    SELECT right_session, left_session FROM session_pair WHERE is_same
+),
+reached (session, member) AS (
+    SELECT DISTINCT session, session
+    FROM (SELECT unnest([left_session, right_session]) AS session FROM session_pair)
+    UNION
+    SELECT r.session, t.other
+    FROM reached AS r
+    JOIN twin AS t ON r.member = t.session
 ),
 grouped AS (
-    SELECT o.session, coalesce(min(t.left_session), o.session) AS container
-    FROM other AS o
-    LEFT JOIN session_pair AS t ON o.session = t.right_session AND t.is_same
-    GROUP BY o.session
+    SELECT session, min(member) AS container
+    FROM reached
+    GROUP BY session
 )
 SELECT session, container
 FROM grouped
-WHERE container IN (SELECT session FROM other)
+WHERE container IN (
+    SELECT greatest(l.container, r.container)
+    FROM session_pair AS p
+    JOIN grouped AS l ON p.left_session = l.session
+    JOIN grouped AS r ON p.right_session = r.session
+    WHERE l.container <> r.container
+)
