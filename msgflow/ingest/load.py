@@ -149,11 +149,9 @@ def load_traces(
                 damage.message,
             ],
         )
-    for match in matches(ignore, traces.event_counts):
-        con.execute("INSERT INTO staging.ignored VALUES (?, ?, ?)", match)
-    for place, pattern, name in matches(events, traces.event_counts):
-        asked = [place, pattern, name, name in user_names]
-        con.execute("INSERT INTO staging.asked VALUES (?, ?, ?, ?)", asked)
+    for table, patterns in (("ignored", ignore), ("asked", events)):
+        for match in matches(patterns, traces.event_counts):
+            con.execute(f"INSERT INTO staging.{table} VALUES (?, ?, ?)", match)
     for left_out in implausible.rows():
         con.execute("INSERT INTO staging.implausible VALUES (?, ?, ?, ?)", left_out)
     if traces.duplicate_packet_count:

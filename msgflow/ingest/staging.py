@@ -80,7 +80,7 @@ CREATE TABLE staging.ignored (place INTEGER, pattern VARCHAR, event VARCHAR)
 """
 
 _ASKED_TABLE = """
-CREATE TABLE staging.asked (place INTEGER, pattern VARCHAR, event VARCHAR, is_loaded BOOLEAN)
+CREATE TABLE staging.asked (place INTEGER, pattern VARCHAR, event VARCHAR)
 """
 
 _PACKET_READ_ONCE_TABLE = """

@@ -81,7 +81,7 @@ def test_none_is_loaded_unless_asked_for(make_trace: Make, new_database: Path) -
 
 
 def test_patterns_that_load_nothing_are_told(make_trace: Make, new_database: Path) -> None:
-    """With what the trace has; what a pattern loads besides is loaded."""
+    """With what the trace has. Events that are read in any case are not missing."""
     report = ingest(
         [make_trace(FIELDS, EVENTS)],
         new_database,
@@ -91,9 +91,9 @@ def test_patterns_that_load_nothing_are_told(make_trace: Make, new_database: Pat
     assert findings(report, "user_event_not_loaded") == [
         (
             "warning",
-            2,
-            "patterns that load no event: my_pgk:*, ros2:* (read in any case); the traces have"
-            " my_pkg:started (1), other:thing (1)",
+            1,
+            "patterns that load no event: my_pgk:*; the traces have my_pkg:started (1),"
+            " other:thing (1)",
         )
     ]
 
@@ -114,7 +114,7 @@ def test_all_that_msgflow_does_not_read_is_loaded_by_a_star(
 def test_nothing_else_to_load_is_told(make_trace: Make, new_database: Path) -> None:
     report = ingest([make_trace(ROS, EVENTS[:1])], new_database, events=["my_pkg:*"])
     ((_, _, detail),) = findings(report, "user_event_not_loaded")
-    assert detail.endswith("no others than those that are read in any case")
+    assert detail.endswith("the traces have no others to load")
 
 
 def test_what_is_ignored_is_not_loaded(make_trace: Make, new_database: Path) -> None:
@@ -123,6 +123,19 @@ def test_what_is_ignored_is_not_loaded(make_trace: Make, new_database: Path) -> 
     )
     assert {name for name, *_ in rows(new_database, LOADED)} == {"my_pkg:done"}
     assert findings(report, "user_event_not_loaded") == []
+
+
+def test_a_pattern_of_which_all_is_ignored_is_told(make_trace: Make, new_database: Path) -> None:
+    report = ingest(
+        [make_trace(FIELDS, EVENTS)], new_database, events=["my_pkg:*"], ignore=["my_pkg:*"]
+    )
+    assert rows(new_database, LOADED) == []
+    ((_, count, detail),) = findings(report, "user_event_not_loaded")
+    assert count == 1
+    assert detail == (
+        "patterns that load no event: my_pkg:* (left out on request); the traces have"
+        " other:thing (1)"
+    )
 
 
 def test_events_of_the_kernel_are_of_no_thread(make_trace: Make, new_database: Path) -> None:

@@ -1,9 +1,10 @@
 -- name: finding.user_event_not_loaded
 -- title: Patterns that load no event
 -- description: Patterns of --events load nothing. Events of the kernel belong to no thread of a
---     process, and what msgflow reads in any case is in tables of its own.
--- cause: The pattern is misspelt, such events were not recorded, or they are none of a program's
---     own.
+--     process, and --ignore leaves events out. Patterns of what msgflow reads in any case are not
+--     among these: such events are in tables of their own.
+-- cause: The pattern is misspelt, such events were not recorded, they are none of a program's own,
+--     or --ignore leaves them out.
 -- cure: Compare it with the names that msgflow events TRACE --count lists. Record the events:
 --     lttng enable-event -u 'my_pkg:*', or ros2 trace -u 'ros2:*' 'my_pkg:*'.
 -- grain: one row, if there are any
@@ -13,17 +14,19 @@ WITH pattern AS (
         a.place,
         any_value(a.pattern) AS pattern,
         count(a.event) AS event_count,
-        bool_or(e.is_known) AS is_known
+        bool_or(i.event IS NOT NULL) AS is_left_out
     FROM staging.asked AS a
     LEFT JOIN staging.event_count AS e ON a.event = e.name
+    LEFT JOIN staging.ignored AS i ON a.event = i.event
     GROUP BY a.place
-    HAVING NOT bool_or(a.is_loaded)
+    HAVING NOT coalesce(bool_or(e.is_known AND i.event IS NULL), false)
 ),
 -- What the trace has instead.
 other AS (
     SELECT e.name, sum(e.event_count)::BIGINT AS event_count
     FROM staging.event_count AS e
     JOIN staging.source AS s ON e.trace_index = s.trace_index
+    ANTI JOIN staging.ignored AS i ON e.name = i.event
     WHERE NOT e.is_known AND s.domain IS DISTINCT FROM 'kernel'
     GROUP BY e.name
 ),
@@ -38,13 +41,11 @@ SELECT
         pattern
         || CASE
             WHEN event_count = 0 THEN ''
-            WHEN is_known THEN ' (read in any case)'
+            WHEN is_left_out THEN ' (left out on request)'
             ELSE ' (of no thread)'
         END,
         ', ' ORDER BY place
     )
-    || '; the traces have '
-    || coalesce((SELECT names FROM listed), 'no others than those that are read in any case')
-    AS detail
+    || '; the traces have ' || coalesce((SELECT names FROM listed), 'no others to load') AS detail
 FROM pattern
 HAVING count(*) > 0
