@@ -43,8 +43,8 @@
 -- column: first_feedback_latency_ns BIGINT [ns]  From the answer to the first feedback, on the
 --     server's clock
 -- column: latency_ns BIGINT [ns]  From sending it to the take of its result, on the client's clock
--- column: is_loss_affected BOOLEAN  A gap of a trace lies between the first and the last of these
---     moments: what is missing may have happened
+-- column: is_loss_affected BOOLEAN  A gap of the client's host or the server's lies between the
+--     first and the last of these moments: what is missing may have happened
 WITH endpoint AS MATERIALIZED (FROM derive.action_endpoint),
 server AS MATERIALIZED (
     SELECT
@@ -116,11 +116,23 @@ timed AS (
     LEFT JOIN told AS t ON g.goal_id = t.goal_id
     LEFT JOIN cancelled AS c ON g.goal_id = c.goal_id
 ),
+-- Where the client or the server of a goal is not known, each one of the action may be it.
+party AS (
+    SELECT run_id, action_name, action_client_id, NULL AS action_server_id, process_id FROM client
+    UNION ALL
+    SELECT run_id, action_name, NULL, action_server_id, process_id FROM server
+),
 torn AS (
     SELECT DISTINCT t.goal_id
     FROM timed AS t
-    JOIN main.gap AS l ON t.run_id = l.run_id
-    JOIN store.trace AS x ON l.trace_id = x.trace_id
+    JOIN party AS y
+        ON t.run_id = y.run_id
+        AND t.action_name = y.action_name
+        AND coalesce(t.action_client_id = y.action_client_id, true)
+        AND coalesce(t.action_server_id = y.action_server_id, true)
+    JOIN store.process AS p ON y.process_id = p.process_id
+    JOIN store.trace AS x ON p.host_id = x.host_id
+    JOIN main.gap AS l ON x.trace_id = l.trace_id
     WHERE x.domain IS DISTINCT FROM 'kernel'
         AND l.end_ns >= least(t.sent_ns, t.taken_ns)
         AND l.start_ns <= greatest(

@@ -12,9 +12,15 @@
 -- param: clients VARCHAR  Name of the rows of action clients, see main.goal
 -- param: goals VARCHAR  Name of the rows of derive.goal_request
 CREATE OR REPLACE MACRO derive.goal_result(servers, clients, goals) AS TABLE
-WITH goal AS (
+WITH lossy_client AS (
+    SELECT c.action_client_id
+    FROM query_table(clients) AS c
+    JOIN store.process AS p ON c.process_id = p.process_id
+    JOIN derive.host_gap AS l ON p.host_id = l.host_id
+),
+goal AS (
     SELECT
-        run_id, goal_id, action_client_id, action_server_id, is_accepted,
+        goal_id, action_client_id, action_server_id, is_accepted,
         -- Clients that were not traced have their goals at the server only.
         coalesce(action_client_id, -action_server_id) AS party,
         CASE
@@ -27,7 +33,7 @@ WITH goal AS (
         AND (
             answer_taken_ns IS NOT NULL
             OR action_client_id IS NULL
-            OR run_id IN (SELECT run_id FROM store.gap)
+            OR action_client_id IN (FROM lossy_client)
         )
 ),
 asked AS (

@@ -4,7 +4,7 @@
 --     may have: from its answer until it sent the result; without an end if nobody asked for that.
 --     Clients that ask late get it late. Of goals whose results cannot be told apart, the ends are
 --     those of all, in some order. A result of which nothing else is in the trace is of a goal that
---     began in the gap before, or before the recording.
+--     began in the gap before, one of the server's host, or before the recording.
 -- grain: one row per goal that a server took and is not known to have rejected; one without a goal
 --     per result of an unknown goal
 -- param: servers VARCHAR  Name of the rows of action servers, see main.goal
@@ -28,7 +28,8 @@ WITH span AS (
     SELECT r.run_id, NULL, s.action_server_id, coalesce(l.start_ns, 0), r.sent_ns, false
     FROM store.response AS r
     JOIN query_table(servers) AS s ON r.service_id = s.result_service_id
-    ASOF LEFT JOIN store.gap AS l ON r.run_id = l.run_id AND r.sent_ns >= l.start_ns
+    JOIN store.process AS p ON s.process_id = p.process_id
+    ASOF LEFT JOIN derive.host_gap AS l ON p.host_id = l.host_id AND r.sent_ns >= l.start_ns
     WHERE r.request_id IS NULL
 )
 SELECT
