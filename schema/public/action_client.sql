@@ -12,8 +12,8 @@
 --     clients
 -- column: status_subscription_id BIGINT  Its subscription to the states of all goals
 -- column: created_ns BIGINT [epoch ns]  When it was created
--- column: goal_count BIGINT  Goals that it sent; NULL: the run has no events of requests (before
---     Kilted)
+-- column: goal_count BIGINT  Goals that it sent; NULL: requests have no events in the traces of its
+--     host (before Kilted)
 WITH endpoint AS MATERIALIZED (FROM derive.action_endpoint),
 sent AS (
     SELECT client_id, count(DISTINCT sequence_number) AS number
@@ -29,9 +29,8 @@ SELECT
     a.feedback_object_id AS feedback_subscription_id,
     a.status_object_id AS status_subscription_id,
     c.created_ns,
-    CASE
-        WHEN a.run_id IN (SELECT run_id FROM store.request) THEN coalesce(q.number, 0)
-    END AS goal_count
+    coalesce(q.number, CASE WHEN a.process_id IN (FROM derive.call_traced) THEN 0 END)
+        AS goal_count
 FROM derive.action_object('endpoint', 'client', 'subscription') AS a
 JOIN main.client AS c ON a.goal_object_id = c.client_id
 LEFT JOIN sent AS q ON a.goal_object_id = q.client_id

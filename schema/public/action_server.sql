@@ -12,8 +12,8 @@
 -- column: feedback_publisher_id BIGINT  Its publisher of feedback
 -- column: status_publisher_id BIGINT  Its publisher of the states of its goals
 -- column: created_ns BIGINT [epoch ns]  When it was created
--- column: goal_count BIGINT  Goals that it took; NULL: the run has no events of requests (before
---     Kilted)
+-- column: goal_count BIGINT  Goals that it took; NULL: requests have no events in the traces of its
+--     host (before Kilted)
 -- column: feedback_count BIGINT  Feedback messages that it published, of all goals
 -- column: status_count BIGINT  Status messages that it published
 WITH endpoint AS MATERIALIZED (FROM derive.action_endpoint),
@@ -40,9 +40,8 @@ SELECT
     a.feedback_object_id AS feedback_publisher_id,
     a.status_object_id AS status_publisher_id,
     s.created_ns,
-    CASE
-        WHEN a.run_id IN (SELECT run_id FROM store.request) THEN coalesce(q.number, 0)
-    END AS goal_count,
+    coalesce(q.number, CASE WHEN a.process_id IN (FROM derive.call_traced) THEN 0 END)
+        AS goal_count,
     coalesce(f.number, 0) AS feedback_count,
     coalesce(t.number, 0) AS status_count
 FROM derive.action_object('endpoint', 'service', 'publisher') AS a

@@ -161,6 +161,7 @@ def older(path: Path) -> dict[int, str]:
     with duckdb.connect(str(path)) as con:
         objects.drop(con)
         con.execute("ALTER TABLE store.run DROP COLUMN clock_sync")
+        con.execute("ALTER TABLE store.trace DROP COLUMN has_request_events")
         con.execute("ALTER TABLE store.process DROP COLUMN is_ambiguous")
         con.execute("DROP TABLE store.user_event")
         con.execute("DROP TABLE store.link_call")
@@ -183,11 +184,15 @@ def older(path: Path) -> dict[int, str]:
             "INSERT INTO store.finding (run_id, name) "
             "VALUES (2, 'empty_trace'), (6, 'clock_not_synchronised'), (7, 'clock_uneven')"
         )
+        con.execute("INSERT INTO store.request (request_id, run_id) VALUES (1, 2)")
     return {1: "none", 2: "none", 3: "file", **dict.fromkeys((4, 5, 6, 7), "messages")}
 
 
 def test_an_older_file_keeps_its_runs(small_database: Path, tmp_path: Path) -> None:
-    """And the migration tells from clocks and findings how clocks were brought together."""
+    """And the migration tells from clocks and findings how clocks were brought together.
+
+    Of a run with a request it tells that requests have events; of others that is not known.
+    """
     synchronised = older(small_database)
     kept = "SELECT run_id, name, created_at, start_ns, end_ns, event_count, labels FROM store.run"
     with duckdb.connect(str(small_database)) as con:
@@ -212,7 +217,9 @@ def test_an_older_file_keeps_its_runs(small_database: Path, tmp_path: Path) -> N
         assert con.execute(f"{kept} ORDER BY run_id").fetchall() == runs
         assert con.execute("SELECT count(*) FROM main.publication").fetchall() == counted
         found = con.execute("SELECT run_id, clock_sync FROM store.run").fetchall()
+        calls = con.execute("SELECT run_id, has_request_events FROM store.trace").fetchall()
     assert dict(found) == synchronised
+    assert dict(calls) == {1: None, 2: True}
 
 
 def test_a_failing_view_leaves_the_tables_of_an_older_file(

@@ -54,6 +54,28 @@ def test_events_may_be_ignored(
     assert "my_app:started (1), ros2:from_the_future (2)" in unknown.detail
 
 
+@pytest.mark.parametrize(
+    ("calls", "ignore", "has_both"),
+    [
+        (("send_request", "take_request"), (), True),
+        (("send_request",), (), False),
+        (("take_request",), (), False),
+        (("send_request", "take_request"), ("*:rmw_send_request",), False),
+    ],
+)
+def test_a_trace_says_whether_it_would_show_requests(
+    make_trace: Make,
+    new_database: Path,
+    calls: tuple[str, ...],
+    ignore: tuple[str, ...],
+    has_both: bool,
+) -> None:
+    """At both ends, and also if there were none."""
+    fields = {f"ros2:rmw_{call}": {"sequence_number": "i64"} for call in calls}
+    ingest([make_trace(FIELDS | fields, EVENTS)], new_database, ignore=ignore)
+    assert rows(new_database, "SELECT has_request_events FROM trace") == [(has_both,)]
+
+
 def test_what_was_ignored_is_told(make_trace: Make, new_database: Path) -> None:
     """And what is ignored in vain, as a mistyped name is."""
     report = ingest(

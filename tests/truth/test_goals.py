@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
 from ingested import ingest_one
 from scoring import Score, compare_real, compare_simulated
 
@@ -44,4 +45,17 @@ def test_what_is_known_of_goals_before_kilted(tmp_path: Path) -> None:
     ) == [("/dock", None, True, True), ("/move", None, True, True)]
     assert ingested.rows("SELECT DISTINCT goal_count FROM action_client") == [(None,)]
     assert ingested.rows("SELECT subject FROM finding WHERE name = 'missing_layer'") == [("goals",)]
+    ingested.connection.close()
+
+
+@pytest.mark.parametrize(("layout", "count"), [("rolling", 0), ("kilted", 0), ("jazzy", None)])
+def test_no_goal_is_known_where_the_trace_would_show_it(
+    tmp_path: Path, layout: str, count: int | None
+) -> None:
+    """All is over before the first goal is sent."""
+    simulation = simulate("actions", tmp_path / "trace", factor=0.025, layout=layout)
+    ingested = ingest_one(simulation.directory, tmp_path / "run.duckdb")
+    assert ingested.rows("SELECT count(*) FROM request") == [(0,)]
+    for kind in ("server", "client"):
+        assert ingested.rows(f"SELECT DISTINCT goal_count FROM action_{kind}") == [(count,)]
     ingested.connection.close()

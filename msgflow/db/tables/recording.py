@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sqlalchemy import ARRAY, INTEGER, TIMESTAMP, VARCHAR, Column, Table
+from sqlalchemy import ARRAY, BOOLEAN, INTEGER, TIMESTAMP, VARCHAR, Column, Table
 
 from msgflow.db.tables.column import STORE, key, moment, number, reference, run_id, text, trace_id
 
@@ -49,6 +49,11 @@ Table(
     moment("end_ns", "Last event or end of a packet", clock="host_id"),
     number("event_count", "Events read"),
     number("discarded_event_count", "Events that the tracer counted as discarded"),
+    Column(
+        "has_request_events",
+        BOOLEAN,
+        comment="Requests would have events in it, if there were any (Kilted and later)",
+    ),
     comment="One row per CTF trace read",
     info={"view": "CTF traces that were read."},
 )

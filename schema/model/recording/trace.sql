@@ -12,6 +12,14 @@ WITH extent AS (
             AS discarded_event_count
     FROM staging.packet
     GROUP BY trace_index
+),
+-- Tracepoints count that were enabled, even if they never occurred.
+with_requests AS (
+    SELECT trace_index
+    FROM staging.declared
+    WHERE name IN ('ros2:rmw_send_request', 'ros2:rmw_take_request')
+    GROUP BY trace_index
+    HAVING count(*) = 2
 )
 SELECT
     s.trace_index + 1 AS trace_id,
@@ -23,7 +31,8 @@ SELECT
     coalesce(e.start_ns, s.begin_ns) AS start_ns,
     coalesce(e.end_ns, s.end_ns) AS end_ns,
     coalesce(e.event_count, 0) AS event_count,
-    coalesce(e.discarded_event_count, 0) AS discarded_event_count
+    coalesce(e.discarded_event_count, 0) AS discarded_event_count,
+    s.trace_index IN (FROM with_requests) AS has_request_events
 FROM staging.source AS s
 JOIN staging.clock AS c ON s.clock_key = c.clock_key
 JOIN staging.host AS h ON c.clock_id = h.clock_id AND s.hostname = h.hostname
