@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import duckdb
 import pyarrow as pa
 
-from msgflow.events.values import printable, readable
-from msgflow.sql.json_fields import column_name, json_fields
+from msgflow.events.values import printable, readable, readable_text
+from msgflow.sql.json_fields import column_name, json_fields, label_of
 from msgflow.sql.quoting import literal
 from msgflow.trace import COMMON_SCHEMA
 from msgflow.trace.columns import BASE
@@ -101,8 +101,7 @@ def text_line(name: str, payload: pa.Schema) -> str:
     """Render an event as a line: time, host, process and thread, CPU, name, fields."""
     # No chain of ||, which goes as deep as there are fields.
     fields = "".join(
-        f", {literal(f' {field.name}=')}, "
-        + readable(column_name(position), field.type, is_hexadecimal=_is_hexadecimal(field))
+        f", {literal(f' {field.name}=')}, {_readable(column_name(position), field)}"
         for position, field in enumerate(payload)
     )
     process = printable("nullif(procname, '')")
@@ -141,5 +140,8 @@ def _common(column: str, name: str) -> str:
     return literal(name) if column == "name" else column
 
 
-def _is_hexadecimal(field: pa.Field) -> bool:
-    return (field.metadata or {}).get(BASE) == b"16"
+def _readable(expression: str, field: pa.Field) -> str:
+    is_hexadecimal = (field.metadata or {}).get(BASE) == b"16"
+    value = readable(expression, field.type, is_hexadecimal=is_hexadecimal)
+    label = label_of(expression, field)
+    return value if label is None else f"coalesce({readable_text(label)}, {value})"

@@ -20,6 +20,11 @@ def printable(expression: str) -> str:
     return f"regexp_replace({expression}, '{_UNPRINTABLE}', '{_REPLACEMENT}', 'g')"
 
 
+def readable_text(expression: str) -> str:
+    """Return the SQL of a text or of JSON as people read it: quoted as in JSON."""
+    return printable(f"CAST(to_json({expression}) AS VARCHAR)")
+
+
 def readable(
     expression: str, data_type: pa.DataType, *, is_hexadecimal: bool = False, lambdas: int = 0
 ) -> str:
@@ -37,7 +42,7 @@ def readable(
     types = pa.types
     is_deep = types.is_list(data_type) and lambdas == MOST_LAMBDAS
     if types.is_string(data_type) or is_deep:
-        text = printable(f"CAST(to_json({expression}) AS VARCHAR)")
+        text = readable_text(expression)
     elif types.is_list(data_type):
         inner = data_type.value_type
         element = readable("element", inner, is_hexadecimal=is_hexadecimal, lambdas=lambdas + 1)

@@ -5,9 +5,16 @@ Names of fields come from traces: they stand in SQL only as quoted literals.
 
 from __future__ import annotations
 
+from collections import Counter
+from typing import TYPE_CHECKING
+
 import pyarrow as pa
 
 from msgflow.sql.quoting import literal
+from msgflow.trace.columns import labels_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
 
 MOST_LAMBDAS = 2
 """DuckDB needs ten times as long to bind each further lambda inside a lambda."""
@@ -19,12 +26,29 @@ def column_name(position: int) -> str:
 
 
 def json_fields(payload: pa.Schema) -> str:
-    """Return the SQL of a JSON object with all fields, over the columns `column_name` names."""
+    """Return the SQL of a JSON object with all fields, over the columns `column_name` names.
+
+    An enumeration is its label, where exactly one belongs to the value.
+    """
     members = (
-        f"{literal(field.name)}, {exact(column_name(position), field.type)}"
+        f"{literal(field.name)}, {_labelled(column_name(position), field)}"
         for position, field in enumerate(payload)
     )
     return f"json_object({', '.join(members)})"
+
+
+def label_of(expression: str, field: pa.Field) -> str | None:
+    """Return the SQL of the only label of a value, NULL where none or several belong to it.
+
+    Args:
+        expression: SQL of the value.
+        field: that it is of; None is returned where it is no enumeration.
+    """
+    choices = " ".join(
+        f"WHEN {expression} BETWEEN {first} AND {last} THEN {literal(label)}"
+        for first, last, label in _single(labels_of(field))
+    )
+    return f"CASE {choices} END" if choices else None
 
 
 def exact(expression: str, data_type: pa.DataType, lambdas: int = 0) -> str:
@@ -52,6 +76,32 @@ def exact(expression: str, data_type: pa.DataType, lambdas: int = 0) -> str:
         for place, field in enumerate(data_type)
     )
     return f"CASE WHEN {expression} IS NOT NULL THEN json_object({members}) END"
+
+
+def _labelled(expression: str, field: pa.Field) -> str:
+    label = label_of(expression, field)
+    value = exact(expression, field.type)
+    return value if label is None else f"coalesce(to_json({label}), to_json({value}))"
+
+
+def _single(labels: Mapping[str, list[tuple[int, int]]]) -> Iterator[tuple[int, int, str]]:
+    """Yield (first, last, label) of the stretches of values with exactly one label."""
+    changes = sorted(
+        change
+        for label, ranges in labels.items()
+        for first, last in ranges
+        if first <= last
+        for change in ((first, label, 1), (last + 1, label, -1))
+    )
+    open_labels: Counter[str] = Counter()
+    begin = 0
+    for value, label, change in changes:
+        if len(open_labels) == 1:
+            yield begin, value - 1, next(iter(open_labels))
+        open_labels[label] += change
+        if not open_labels[label]:
+            del open_labels[label]
+        begin = value
 
 
 def member(expression: str, place: int) -> str:

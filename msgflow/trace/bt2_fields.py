@@ -6,7 +6,7 @@ from typing import Any
 
 import pyarrow as pa
 
-from msgflow.trace.columns import BASE
+from msgflow.trace.columns import field_metadata
 
 
 def schema_of(bt2: Any, structure: Any) -> pa.Schema:
@@ -16,8 +16,13 @@ def schema_of(bt2: Any, structure: Any) -> pa.Schema:
         field_class = element = structure[name].field_class
         while isinstance(element, bt2._ArrayFieldClassConst):
             element = element.element_field_class
-        is_hexadecimal = getattr(element, "preferred_display_base", None) == 16
-        metadata = {BASE: b"16"} if is_hexadecimal else None
+        labels = None
+        if isinstance(field_class, bt2._EnumerationFieldClassConst):
+            labels = {
+                label: [(part.lower, part.upper) for part in field_class[label].ranges]
+                for label in field_class
+            }
+        metadata = field_metadata(getattr(element, "preferred_display_base", None), labels)
         fields.append(pa.field(str(name), arrow_type(bt2, field_class), metadata=metadata))
     return pa.schema(fields)
 

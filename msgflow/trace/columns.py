@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
@@ -16,12 +17,38 @@ ALIASES = b"aliases"
 BASE = b"base"
 """Key of a field's metadata: the base in which to show an integer, or the elements of an array."""
 
+LABELS = b"labels"
+"""Key of a field's metadata: of an enumeration, each label with its ranges of values, as JSON."""
+
 
 def names_of(field: pa.Field) -> tuple[str, ...]:
     """Return the names under which a trace may have this field, the preferred one first."""
     metadata = field.metadata or {}
     aliases = metadata.get(ALIASES, b"").decode()
     return (field.name, *(alias for alias in aliases.split(",") if alias))
+
+
+def field_metadata(
+    base: int | None, labels: Mapping[str, Iterable[tuple[int, int]]] | None
+) -> dict[bytes, bytes]:
+    """Return the metadata of a field.
+
+    Args:
+        base: in which to show it, None if it is no integer.
+        labels: of an enumeration, label to ranges of values (both ends belong to it).
+    """
+    found = {BASE: b"16"} if base == 16 else {}
+    if labels:
+        found[LABELS] = json.dumps(
+            {label: list(ranges) for label, ranges in labels.items()}
+        ).encode()
+    return found
+
+
+def labels_of(field: pa.Field) -> dict[str, list[tuple[int, int]]]:
+    """Return the labels of an enumeration with their ranges of values, none of other fields."""
+    found = json.loads((field.metadata or {}).get(LABELS, b"{}"))
+    return {label: [(first, last) for first, last in ranges] for label, ranges in found.items()}
 
 
 def can_hold(wanted: pa.DataType, declared: pa.DataType) -> bool:
@@ -61,7 +88,7 @@ def merged_schemas(declared: Iterable[tuple[str, pa.Schema]]) -> dict[str, pa.Sc
     """Return event name to payload columns, from one or more declarations of each event.
 
     Integers of different types become int64; a field of types that do not go together keeps
-    the first one and is NULL where it is declared otherwise.
+    the first one and is NULL where it is declared otherwise. The labels of all count.
     """
     events: dict[str, dict[str, pa.Field]] = {}
     for event, schema in declared:
@@ -69,8 +96,7 @@ def merged_schemas(declared: Iterable[tuple[str, pa.Schema]]) -> dict[str, pa.Sc
         for field in schema:
             known = merged.setdefault(field.name, field)
             joint = union_type(known.type, field.type) or known.type
-            metadata = known.metadata or field.metadata
-            merged[field.name] = pa.field(field.name, joint, metadata=metadata)
+            merged[field.name] = pa.field(field.name, joint, metadata=_joined(known, field))
     return {event: pa.schema(list(merged.values())) for event, merged in events.items()}
 
 
@@ -132,6 +158,14 @@ def first_inner_value(fields: Any, paths: Iterable[Sequence[str]]) -> Any:
         if value is not None:
             return value
     return None
+
+
+def _joined(known: pa.Field, field: pa.Field) -> dict[bytes, bytes]:
+    """Return the metadata of a field that is declared in two ways."""
+    labels = labels_of(known)
+    for label, ranges in labels_of(field).items():
+        labels[label] = labels.get(label, []) + ranges
+    return {**(field.metadata or {}), **(known.metadata or {}), **field_metadata(None, labels)}
 
 
 def _member_type(declared: pa.DataType | None, name: str) -> pa.DataType | None:

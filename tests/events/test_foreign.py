@@ -67,13 +67,14 @@ class TestShapes:
         bits = "1, 0, 1" + ", 0" * 12 + ", 1"
         assert listing(odd) == (
             f"1970-01-01T00:00:00.000000005Z - -/-/- [-] odd bits=[{bits}] none=[] empty={{}} "
-            "empties=[{}, {}] side=0 chosen={left={}} last=9\n"
+            'empties=[{}, {}] side="left" chosen={left={}} last=9\n'
         )
 
     def test_json(self, listed: Listed, odd: Path) -> None:
         (event,) = listed(odd)
         assert event["fields"]["empty"] == {}
         assert event["fields"]["empties"] == [{}, {}]
+        assert event["fields"]["side"] == "left"
         assert event["fields"]["last"] == 9
 
     @pytest.mark.parametrize("form", [EventFormat.PARQUET, EventFormat.CSV])
@@ -87,6 +88,7 @@ class TestShapes:
             (row,) = csv.DictReader(path.open())
         assert json.loads(row["empty"]) == {}
         assert json.loads(row["empties"]) == [{}, {}]
+        assert int(row["side"]) == 0
         assert int(row["last"]) == 9
 
     def test_names_that_differ_in_case_alone(

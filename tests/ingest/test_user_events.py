@@ -212,6 +212,62 @@ def test_every_type_of_field_becomes_json(tmp_path: Path, reader: str) -> None:
     }  # fmt: skip
 
 
+LABELLED = {
+    "state": """u8{IDLE, "it's busy" = 5 ... 7, DONE = 7 ... 8, DONE = 7, LAST = 255}""",
+    "side": "i8{LEFT = -128 ... -1, RIGHT = 1 ... 127}",
+    "most": "u64{ALL = 18446744073709551615}",
+    "each": "u8{A, B}[2]",
+}
+
+
+@pytest.mark.parametrize("reader", READERS)
+def test_an_enumeration_is_its_label(make_trace: Make, new_database: Path, reader: str) -> None:
+    """The number where no label or several belong to it, and inside an array."""
+    made = [
+        ("my_pkg:labelled", (0, -128, (1 << 64) - 1, (0, 1))),
+        ("my_pkg:labelled", (4, -1, 0, (0, 1))),
+        ("my_pkg:labelled", (5, 0, 0, (0, 1))),
+        ("my_pkg:labelled", (6, 1, 0, (0, 1))),
+        ("my_pkg:labelled", (7, 127, 0, (0, 1))),
+        ("my_pkg:labelled", (8, 0, 0, (0, 1))),
+        ("my_pkg:labelled", (255, 0, 0, (0, 1))),
+    ]
+    trace = make_trace({**ROS, "my_pkg:labelled": LABELLED}, [EVENTS[0], *made])
+    ingest([trace], new_database, events=["my_pkg:*"], reader=reader)
+    found = fields_of(new_database)
+    assert [fields["state"] for fields in found] == [
+        "IDLE", 4, "it's busy", "it's busy", 7, "DONE", "LAST"
+    ]  # fmt: skip
+    assert [fields["side"] for fields in found] == [
+        "LEFT", "LEFT", 0, "RIGHT", "RIGHT", 0, 0
+    ]  # fmt: skip
+    assert [fields["most"] for fields in found] == ["ALL", 0, 0, 0, 0, 0, 0]
+    assert [fields["each"] for fields in found] == [[0, 1]] * len(made)
+
+
+@pytest.mark.parametrize("reader", READERS)
+def test_labels_of_several_programs_count_together(
+    make_trace: Make, new_database: Path, reader: str
+) -> None:
+    """A number to which they give different labels has none."""
+    kinds = ("u8{OFF, ON, BOTH, MORE}", "u8{OFF, BROKEN, NEW = 4, MORE = 5 ... 6}", "i16")
+    traces = [
+        make_trace(
+            {**ROS, "my_pkg:state": {"state": kind}},
+            [EVENTS[0], *[("my_pkg:state", (value,)) for value in range(7)]],
+            name=f"trace{number}",
+            trace_uuid=UUID(int=number + 1),
+            clock_uuid=UUID(int=number + 1),
+        )
+        for number, kind in enumerate(kinds)
+    ]
+    ingest(traces, new_database, events=["my_pkg:*"], reader=reader)
+    found = [fields["state"] for fields in fields_of(new_database)]
+    assert sorted(map(str, found)) == sorted(
+        3 * ["OFF", "1", "BOTH", "MORE", "NEW", "MORE", "MORE"]
+    )
+
+
 def test_both_readers_give_the_same(tmp_path: Path) -> None:
     trace = simulate("own_events", tmp_path / "trace", factor=0.05).directory
     tables = []

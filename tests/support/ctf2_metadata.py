@@ -110,7 +110,7 @@ def _field_class(declared: Type, scope: Scope) -> dict[str, Any]:
                 "length": declared.size,
                 "alignment": declared.align,
                 "byte-order": "big-endian" if declared.big_endian else "little-endian",
-                "preferred-display-base": 16,
+                "preferred-display-base": declared.base,
                 "roles": sorted(r for r in declared.roles if not r.startswith("clock.")),
             }
             if declared.labels is not None:

@@ -53,7 +53,8 @@ class TraceContent:
     """A trace: field types per event, and packets per stream instance.
 
     Types: u8 … u64, i8 … i64, x64 (u64 to be shown in base 16), f32, f64, str, text[N], TYPE[N],
-    TYPE[] (its length is an extra u32 member `NAME_length` before it).
+    TYPE[] (its length is an extra u32 member `NAME_length` before it), and of an enumeration its
+    integer and labels, u8{A, B = 2 ... 4}.
     """
 
     events: Mapping[str, Mapping[str, str]]
@@ -137,6 +138,9 @@ def _values(types: Mapping[str, str], values: Sequence[Any]) -> bytes:
 
 
 def _value(kind: str, value: Any) -> bytes:
+    before, brace, behind = kind.partition("{")
+    if brace:
+        kind = before + behind.rpartition("}")[2]
     if kind in _NUMBERS:
         return struct.pack("<" + _NUMBERS[kind], value)
     if kind == "str":
@@ -218,6 +222,9 @@ def _field(name: str, kind: str) -> str:
 
 
 def _number(kind: str) -> str:
+    integer, brace, labels = kind.partition("{")
+    if brace:
+        return f"enum : {_number(integer)} {{{labels}"
     if kind == "text":
         return "integer { size = 8; align = 8; signed = true; encoding = UTF8; }"
     if kind in {"f32", "f64"}:

@@ -66,6 +66,11 @@ def differences(ours: Content, theirs: Content) -> list[str]:
         one, other = getattr(ours, what), getattr(theirs, what)
         if one != other:
             found.append(f"{what}: {one} and {other}")
+    for name in ours.schemas.keys() & theirs.schemas.keys():
+        # Two schemas are equal also where their metadata are not.
+        one, other = ([field.metadata for field in c.schemas[name]] for c in (ours, theirs))
+        if one != other:
+            found.append(f"metadata of {name}: {one} and {other}")
     for name in sorted({*ours.rows, *theirs.rows}):
         one, other = ours.rows.get(name, []), theirs.rows.get(name, [])
         if len(one) != len(other):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-from msgflow.trace.columns import BASE
+from msgflow.trace.columns import field_metadata
 from msgflow.trace.ctf.field_types import (
     Array,
     Integer,
@@ -56,23 +56,23 @@ def arrow_type(declared: Type) -> pa.DataType:
 
 
 def declared_schema(structure: Structure) -> pa.Schema:
-    """Return the columns of a payload, one for each field; integers of base 16 are marked."""
+    """Return the columns of a payload, one for each field, with their bases and labels."""
     return pa.schema(
         [
             pa.field(
                 member.name,
                 arrow_type(member.type),
-                metadata={BASE: b"16"} if _is_hexadecimal(member.type) else None,
+                metadata=field_metadata(_base(member.type), getattr(member.type, "labels", None)),
             )
             for member in structure.members
         ]
     )
 
 
-def _is_hexadecimal(declared: Type) -> bool:
+def _base(declared: Type) -> int | None:
     if isinstance(declared, Array | Sequence):
-        return _is_hexadecimal(declared.element)
-    return isinstance(declared, Integer) and declared.base == 16
+        return _base(declared.element)
+    return declared.base if isinstance(declared, Integer) else None
 
 
 def number_array(values: NDArray[Any], data_type: pa.DataType) -> pa.Array:
