@@ -628,7 +628,7 @@ class Database:
             QueryError: the database could not run a query.
             DatabaseError: the file cannot be opened.
         """
-        from msgflow.verify.suggestion import suggest_targets
+        from msgflow.verify.suggestion import QUERIES, suggest_targets
 
         if not margin >= 0:
             raise UsageError(f"a margin is 0 or more — {margin}", "0.2 allows a fifth more")
@@ -636,7 +636,7 @@ class Database:
         one = self._ask(lambda: Slice(run).one_run(connection, "a file of requirements"))
         results = {
             name: self.query(name, run=one.run_id, skip_first=skip_first).to_arrow().to_pylist()
-            for name in ("e2e-latency", "timers", "publication-rate", "service-latency")
+            for name in QUERIES
         }
         return suggest_targets(one, results, margin)
 

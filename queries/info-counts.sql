@@ -10,10 +10,11 @@ WITH object AS (
     SELECT
         unnest([
             'host', 'process', 'thread', 'node', 'publisher', 'subscription', 'timer',
-            'service', 'client', 'callback', 'executor', 'publication', 'take',
-            'callback_instance', 'request', 'response', 'link_transport', 'link_causal'
+            'service', 'client', 'action_server', 'action_client', 'callback', 'executor',
+            'publication', 'take', 'callback_instance', 'request', 'response', 'goal',
+            'link_transport', 'link_causal'
         ]) AS object,
-        unnest(range(18)) AS position
+        unnest(range(21)) AS position
 ),
 
 counted AS (
@@ -35,6 +36,10 @@ counted AS (
     UNION ALL
     SELECT 'client' AS object, run_id FROM main.client
     UNION ALL
+    SELECT 'action_server' AS object, run_id FROM main.action_server
+    UNION ALL
+    SELECT 'action_client' AS object, run_id FROM main.action_client
+    UNION ALL
     SELECT 'callback' AS object, run_id FROM main.callback
     UNION ALL
     SELECT 'executor' AS object, run_id FROM main.executor
@@ -48,6 +53,8 @@ counted AS (
     SELECT 'request' AS object, run_id FROM main.request
     UNION ALL
     SELECT 'response' AS object, run_id FROM main.response
+    UNION ALL
+    SELECT 'goal' AS object, run_id FROM main.goal
     UNION ALL
     SELECT 'link_transport' AS object, run_id FROM main.link_transport
     UNION ALL

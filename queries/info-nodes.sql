@@ -1,7 +1,8 @@
 -- name: info-nodes
 -- title: ROS nodes
--- description: The nodes of a run, and how many publishers, subscriptions, timers, services and
---     clients each has. What ROS adds to every node (parameter services, /rosout,
+-- description: The nodes of a run, and how many publishers, subscriptions, timers, services,
+--     clients, action servers and action clients each has. An action server has three of the
+--     services, an action client three of the clients. What ROS adds to every node (parameter services, /rosout,
 --     /parameter_events) is not counted.
 -- grain: one row per node
 -- column: run_id BIGINT               Run
@@ -13,8 +14,10 @@
 -- column: timer_count BIGINT          Timers
 -- column: service_count BIGINT        Services
 -- column: client_count BIGINT         Service clients
+-- column: action_server_count BIGINT  Action servers
+-- column: action_client_count BIGINT  Action clients
 -- brief: node, process_name, publisher_count, subscription_count, timer_count, service_count,
---     client_count, pid
+--     client_count, action_server_count, action_client_count, pid
 SELECT
     node.run_id,
     node.full_name AS node,
@@ -41,7 +44,13 @@ SELECT
         SELECT count(*)
         FROM main.client
         WHERE client.node_id = node.node_id AND NOT client.is_internal
-    ) AS client_count
+    ) AS client_count,
+    (
+        SELECT count(*) FROM main.action_server WHERE action_server.node_id = node.node_id
+    ) AS action_server_count,
+    (
+        SELECT count(*) FROM main.action_client WHERE action_client.node_id = node.node_id
+    ) AS action_client_count
 FROM main.node
 JOIN main.process ON process.process_id = node.process_id
 WHERE list_contains($runs, node.run_id)

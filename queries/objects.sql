@@ -1,24 +1,28 @@
 -- name: objects
 -- title: ROS objects
--- description: Every publisher, subscription, timer, service and client with its node and process.
---     Timers with neither node nor callback are counted: rclpy makes one whenever it waits.
+-- description: Every publisher, subscription, timer, service and client with its node and process,
+--     and every action server and client, which are made of these. Timers with neither node nor
+--     callback are counted: rclpy makes one whenever it waits.
 -- grain: one row per object; one per process for all its timers with neither node nor callback
--- param: kind VARCHAR {publisher|subscription|timer|service|client} = NULL  Kind of object
---     (default: all)
+-- param: kind VARCHAR {publisher|subscription|timer|service|client|action_server|action_client} =
+--     NULL  Kind of object (default: all)
 -- column: run_id BIGINT             Run
 -- column: host VARCHAR [host]  Host
 -- column: process VARCHAR           Process name
 -- column: pid INTEGER               Process id
 -- column: node VARCHAR [node]  Full name of the node; empty: not known
 -- column: kind VARCHAR              Kind of object
--- column: name VARCHAR [topic]  Topic, service, or period of the timer; number of those timers
+-- column: name VARCHAR [topic]  Topic, service, action, or period of the timer; number of those
+--     timers
 -- column: queue_depth BIGINT        History depth asked for
+-- column: goals BIGINT              Goals that an action server took, or an action client sent;
+--     empty for both: the trace would not show goals
 -- column: created_ns BIGINT [epoch ns]  First initialisation event
 -- column: symbols VARCHAR           Functions registered for its callbacks
 -- column: object_id BIGINT          Identity within its kind; of those timers, the first one's
 -- column: is_inferred BOOLEAN       Its initialisation was not recorded
 -- column: is_internal BOOLEAN       Infrastructure of ROS
--- brief: kind, name, node, process, pid, host, queue_depth, created_ns, symbols
+-- brief: kind, name, node, process, pid, host, queue_depth, goals, created_ns, symbols
 WITH nameless_timer AS (
     SELECT t.run_id, t.process_id, t.timer_id, t.created_ns
     FROM main.timer AS t
@@ -28,35 +32,47 @@ WITH nameless_timer AS (
 object AS (
     SELECT
         run_id, process_id, node_id, 'publisher' AS kind, topic_name AS name, queue_depth,
-        created_ns, publisher_id AS object_id, is_inferred, is_internal
+        NULL::BIGINT AS goals, created_ns, publisher_id AS object_id, is_inferred, is_internal
     FROM main.publisher
     UNION ALL
     SELECT
-        run_id, process_id, node_id, 'subscription', topic_name, queue_depth, created_ns,
+        run_id, process_id, node_id, 'subscription', topic_name, queue_depth, NULL, created_ns,
         subscription_id, is_inferred, is_internal
     FROM main.subscription
     UNION ALL
     SELECT
         run_id, process_id, node_id, 'timer', printf('%.10g ms', period_ns / 1e6), NULL,
-        created_ns, timer_id, is_inferred, false
+        NULL, created_ns, timer_id, is_inferred, false
     FROM main.timer
     ANTI JOIN nameless_timer USING (timer_id)
     UNION ALL
     SELECT
         run_id, process_id, NULL, 'timer', printf('%d without node and callback', count(*)), NULL,
-        min(created_ns), min(timer_id), count(created_ns) = 0, false
+        NULL, min(created_ns), min(timer_id), count(created_ns) = 0, false
     FROM nameless_timer
     GROUP BY run_id, process_id
     UNION ALL
     SELECT
-        run_id, process_id, node_id, 'service', service_name, NULL, created_ns, service_id,
+        run_id, process_id, node_id, 'service', service_name, NULL, NULL, created_ns, service_id,
         is_inferred, is_internal
     FROM main.service
     UNION ALL
     SELECT
-        run_id, process_id, node_id, 'client', service_name, NULL, created_ns, client_id,
+        run_id, process_id, node_id, 'client', service_name, NULL, NULL, created_ns, client_id,
         is_inferred, is_internal
     FROM main.client
+    UNION ALL
+    SELECT
+        a.run_id, a.process_id, a.node_id, 'action_server', a.action_name, NULL, a.goal_count,
+        a.created_ns, a.action_server_id, s.is_inferred, s.is_internal
+    FROM main.action_server AS a
+    JOIN main.service AS s ON a.action_server_id = s.service_id
+    UNION ALL
+    SELECT
+        a.run_id, a.process_id, a.node_id, 'action_client', a.action_name, NULL, a.goal_count,
+        a.created_ns, a.action_client_id, c.is_inferred, c.is_internal
+    FROM main.action_client AS a
+    JOIN main.client AS c ON a.action_client_id = c.client_id
 ),
 symbol AS (
     SELECT
@@ -76,6 +92,7 @@ SELECT
     o.kind,
     o.name,
     o.queue_depth,
+    o.goals,
     o.created_ns,
     s.symbols,
     o.object_id,

@@ -29,7 +29,7 @@ def suggest(
 ) -> None:
     """Write requirements that a good run meets, as a file to review.
 
-    It covers paths, timers, topics and services with at least 20 values.
+    It covers paths, timers, topics, services and actions with at least 20 values.
     """
     from msgflow.cli.output import print_text
     from msgflow.database import Database

@@ -30,6 +30,7 @@ QUERIES = (
     "publication-rate",
     "timers",
     "service-latency",
+    "action-latency",
     "data-quality",
 )
 

@@ -71,6 +71,10 @@ _SERVICES = """
 SELECT service_name FROM main.service WHERE run_id = $run_id
 UNION SELECT service_name FROM main.client WHERE run_id = $run_id
 """
+_ACTIONS = """
+SELECT action_name FROM main.action_server WHERE run_id = $run_id
+UNION SELECT action_name FROM main.action_client WHERE run_id = $run_id
+"""
 _NODES = "SELECT DISTINCT node FROM main.callback_label WHERE run_id = $run_id"
 _TIMERS = """
 SELECT DISTINCT l.node
@@ -196,6 +200,22 @@ SUBJECTS: dict[str, Subject] = {
             "service": Filter({"service-latency": ("service_name",)}, _SERVICES, "service"),
             "node": Filter(
                 {"service-latency": ("client",)},
+                "SELECT DISTINCT full_name FROM main.node WHERE run_id = $run_id", "node",
+            ),
+        },
+    ),
+    "action": Subject(
+        {
+            "goal": Metric(
+                "action-latency", "result_{}_ns", Dimension.TIME, _ALL, "finished", "goal",
+                "no goal is known with its result in the time window",
+            ),
+        },
+        {"action-latency": "coalesce(client, '?') || ' → ' || action_name"},
+        {
+            "action": Filter({"action-latency": ("action_name",)}, _ACTIONS, "action"),
+            "node": Filter(
+                {"action-latency": ("client",)},
                 "SELECT DISTINCT full_name FROM main.node WHERE run_id = $run_id", "node",
             ),
         },

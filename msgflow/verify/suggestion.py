@@ -7,6 +7,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from msgflow.verify.condition import UNITS, Dimension
+from msgflow.verify.metrics import SUBJECTS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from msgflow.run.choice import Run
 
 Row = dict[str, Any]
+QUERIES = ("e2e-latency", "timers", "publication-rate", "service-latency", "action-latency")
 # With fewer values, a percentile is only their largest.
 LEAST_VALUES = 20
 # A topic that pauses or comes in bursts has no rate: the deviation of its period is larger.
@@ -28,15 +30,15 @@ def suggest_targets(run: Run, results: Mapping[str, Sequence[Row]], margin: floa
 
     Args:
         run: the measured run.
-        results: rows of the named queries `e2e-latency`, `timers`, `publication-rate` and
-            `service-latency`, by name.
+        results: rows of the named queries `QUERIES`, by name.
         margin: how much more than measured is allowed, as a share.
     """
     entries = [
         *_paths(results["e2e-latency"], margin),
         *_timers(results["timers"], margin),
         *_topics(results["publication-rate"]),
-        *_services(results["service-latency"], margin),
+        *_calls(results["service-latency"], "service", "round_trip", "round_trip", margin),
+        *_calls(results["action-latency"], "action", "goal", "result", margin),
     ]
     lines = [
         f"# What run {json.dumps(run.name)} met, and {100 * margin:.4g} % more: review it, keep"
@@ -106,13 +108,17 @@ def _topics(rows: Sequence[Row]) -> Iterator[Entry]:
             yield "topic", f"{name}\n    node: {publisher}", {"rate": _around([row["rate_hz"]])}
 
 
-def _services(rows: Sequence[Row], margin: float) -> Iterator[Entry]:
-    for (service,), group in _grouped(rows, "service_name"):
-        if service is None or any(row["answered"] < LEAST_VALUES for row in group):
+def _calls(
+    rows: Sequence[Row], kind: str, metric: str, column: str, margin: float
+) -> Iterator[Entry]:
+    """Yield a target per service or action, which all its clients have to meet."""
+    samples = SUBJECTS[kind].metrics[metric].samples
+    for (called,), group in _grouped(rows, f"{kind}_name"):
+        if called is None or any(row[samples] < LEAST_VALUES for row in group):
             continue
-        slow = max(row["round_trip_p99_ns"] for row in group)
-        name = json.dumps(_literal(service), ensure_ascii=False)
-        yield "service", name, {"round_trip": f"p99 < {_time(slow, margin)}"}
+        slow = max(row[f"{column}_p99_ns"] for row in group)
+        name = json.dumps(_literal(called), ensure_ascii=False)
+        yield kind, name, {metric: f"p99 < {_time(slow, margin)}"}
 
 
 def _grouped(rows: Sequence[Row], *keys: str) -> list[tuple[tuple[Any, ...], list[Row]]]:

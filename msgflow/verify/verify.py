@@ -125,7 +125,7 @@ def verify(
             'to', 'via' and 'without'.
 
     Raises:
-        UsageError: no such run, time, topic, node, callback, service or process.
+        UsageError: no such run, time, topic, node, callback, service, action or process.
         QueryError: the database could not run a query.
     """
     one = part.one_run(connection, "a verification")

@@ -1,4 +1,4 @@
-"""Worst case of a failed requirement: the flow, call or message, and the command that shows it."""
+"""Worst case of a failed requirement: the flow, call, message or goal, and how to see it."""
 
 from __future__ import annotations
 
@@ -40,6 +40,7 @@ KEYS = {
     "late_call": "callback_id",
     "message": "subscription_id",
     "request": "[service_id, client_id]",
+    "goal": "[action_server_id, action_client_id]",
 }
 FLOWS = {
     "flow": """

@@ -19,7 +19,10 @@ from msgflow.errors import QueryError, UsageError
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.lake_connection import Reading, choose
 from msgflow.fleet.lake_query import fleet_query, fleet_sql, fleet_worst, names, statements
+from msgflow.fleet.part import Content, write_part
+from msgflow.ingest import ingest
 from msgflow.query.catalogue import query_names
+from msgflow.sim import simulate
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "fleet.md").read_text(encoding="utf-8")
 
@@ -156,6 +159,37 @@ def test_reasons_and_shares_are_of_sums(night: Lake) -> None:
         assert re.findall(r"\d+", twice["reasons"] or "") == [str(2 * int(n)) for n in numbers]
 
 
+def test_goals_of_several_runs_are_added_up(tmp_path: Path) -> None:
+    """Quantiles are the largest of any run; the goals themselves are in the views of each run."""
+    lake, commits, alone = Lake.open_or_create(tmp_path / "lake"), [], []
+    for seed in (0, 1):
+        recording, path = tmp_path / f"r{seed}", tmp_path / f"{seed}.duckdb"
+        simulate("actions", recording, factor=0.2, seed=seed)
+        ingest([recording], path)
+        with Database(path) as database:
+            part = write_part(
+                database.connection, path, lake.store, tmp_path,
+                source=str(recording), options={}, content=Content(database=False),
+            )  # fmt: skip
+            alone += database.query("action-latency").to_arrow().to_pylist()
+        commits.append({**part.values, "generation": 1, "labels": {}, "source": str(seed)})
+    lake.commit(commits)
+    found = fleet_query(lake, "action-latency").table.to_pylist()
+    assert [(row["action_name"], row["runs"]) for row in found] == [
+        ("/dock", 2), ("/move", 2), ("/move", 2)
+    ]  # fmt: skip
+    for row in found:
+        same = ("action_name", "server", "client")
+        of_run = [each for each in alone if all(each[name] == row[name] for name in same)]
+        for name in row.keys() - {*same, "runs"}:
+            values = [each[name.replace("_most", "")] for each in of_run]
+            added = max(values) if name.endswith("_ns") else sum(values)
+            assert row[name] == (min(values) if name == "result_min_ns" else added), name
+    counted = fleet_sql(lake, "SELECT count(*) AS goals FROM view.goal").table.to_pylist()
+    assert counted == [{"goals": sum(row["goals"] for row in found)}]
+    assert sum(row["finished"] for row in found) > 10
+
+
 def test_groups_are_of_labels_and_of_columns(night: Lake) -> None:
     found = fleet_query(night, "e2e-latency", group_by=["robot", "soft-ware", "name"])
     assert found.columns[:4] == ("robot", "soft-ware", "name", "runs")
@@ -189,7 +223,7 @@ def test_rows_are_chosen(night: Lake) -> None:
 
 def test_what_a_lake_cannot_answer(night: Lake) -> None:
     for name, words in (
-        ("flows", r"does not hold what this query needs — flows\n\nhint: it answers callback-"),
+        ("flows", r"does not hold what this query needs — flows\n\nhint: it answers action-"),
         ("e2e", "no such query — e2e\n\nhint: did you mean e2e-latency"),
     ):
         with pytest.raises(UsageError, match=words):

@@ -17,8 +17,7 @@ from msgflow.verify import Verification
 
 @pytest.fixture(scope="session")
 def _system(empty_database: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("system") / "msgflow.duckdb"
-    shutil.copyfile(empty_database, path)
+    path = Path(shutil.copy(empty_database, tmp_path_factory.mktemp("system") / "msgflow.duckdb"))
     with duckdb.connect(str(path)) as connection:
         fill(connection)
         connection.execute((SYSTEMS / "many_messages.sql").read_text())
@@ -35,13 +34,23 @@ def system(_system: Path, tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def check(system: Path, tmp_path: Path) -> Callable[[str], Verification]:
-    """Verifies the text of a file of requirements."""
+def goals(empty_database: Path, tmp_path: Path) -> Path:
+    """A database with goals of an action."""
+    path = Path(shutil.copy(empty_database, tmp_path / "goals.duckdb"))
+    with duckdb.connect(str(path)) as connection:
+        fill(connection)
+        connection.execute((SYSTEMS / "many_goals.sql").read_text())
+    return path
 
-    def verify(text: str) -> Verification:
+
+@pytest.fixture
+def check(system: Path, tmp_path: Path) -> Callable[..., Verification]:
+    """Verifies the text of a file of requirements, on `system` or another database."""
+
+    def verify(text: str, path: Path = system) -> Verification:
         targets = tmp_path / "targets.yaml"
         targets.write_text(text, encoding="utf-8")
-        with Database(system) as database:
+        with Database(path) as database:
             return database.verify(targets)
 
     return verify

@@ -68,6 +68,7 @@ def test_a_file_that_is_none(tmp_path: Path) -> None:
         ("targets:\n  - topic: /a\n    node: /sorce\n    rate: < 1 Hz", 3, "node", "/source"),
         ("targets:\n  - timer: /relay\n    rate: < 1 Hz", 2, "node with timers", "/source"),
         ("targets:\n  - service: /ad\n    completeness: < 1 %", 2, "service — /ad", "/add"),
+        ("targets:\n  - action: /dock\n    goal: max < 1 s", 2, "action — /dock", "no action"),
         ("targets:\n  - process: x\n    utilisation: < 1 %", 2, "process — x", "process"),
         ("targets:\n  - callback: X\n    duration: p99 < 1 s", 2, "callback — X", "Timer"),
     ],

@@ -18,7 +18,7 @@ from msgflow.verify import Verification
 from msgflow.verify.metrics import SUBJECTS
 from msgflow.verify.worst_case import KEYS
 
-Check = Callable[[str], Verification]
+Check = Callable[..., Verification]
 # What the golden cases of the queries say of the same system.
 VALUES = """
 targets:
@@ -107,6 +107,30 @@ targets:
     assert kinds == {"take_id", "callback_instance_id", "request_id"}
 
 
+def test_goals_of_actions(check: Check, goals: Path) -> None:
+    """What the golden case of action-latency says of the same system."""
+    text = """
+targets:
+  - action: /dock
+    node: /asking
+    goal: [p99 < 1921101 ns, max < 1927850 ns]
+  - action: "/d*"
+    node: /acting
+    goal: min > 0 s
+"""
+    failed, missing, passed = rows(check(text, goals))
+    assert (failed["verdict"], failed["subject"], failed["value"], failed["samples"]) == (
+        "failed", "/asking → /dock", 1_927_850, 157
+    )  # fmt: skip
+    assert (failed["worst_ns"], passed["verdict"], passed["value"]) == (
+        1_927_850, "passed", 1_921_100
+    )  # fmt: skip
+    assert failed["see"].startswith("msgflow flow --request 1")
+    assert missing["reason"] == "nothing of this action was measured in the time window"
+    with Database(goals) as database:
+        assert str(database.flow(request_id=int(failed["see"].split()[-1])))
+
+
 def test_what_was_not_measured_says_why(check: Check) -> None:
     verification = check(
         "targets:\n  - path: [/b, /c]\n    latency: p99 < 1 s\n"
@@ -132,11 +156,11 @@ def test_a_path_passes_every_topic_that_is_named(check: Check) -> None:
     assert [row["verdict"] for row in rows(check(text))] == ["not measured"]
 
 
-def test_every_metric_reads_columns_that_its_query_has(check: Check) -> None:
+def test_every_metric_reads_columns_that_its_query_has(check: Check, goals: Path) -> None:
     """With a condition that nothing meets, so that worst cases are looked for, too."""
     units = {"ns": "1 ns", "Hz": "1 Hz", "share": "1 %", "count": "1"}
     names = {"path": "[/a, /b]", "timer": "/source", "callback": "Sub*", "topic": "/a"}
-    names |= {"service": "/add", "process": "process"}
+    names |= {"service": "/add", "action": "/dock", "process": "process"}
     for kind, subject in SUBJECTS.items():
         text, required = f"targets:\n  - {kind}: {names[kind]}\n", set()
         for name, metric in subject.metrics.items():
@@ -148,7 +172,7 @@ def test_every_metric_reads_columns_that_its_query_has(check: Check) -> None:
             ]
             text += f"    {name}: {json.dumps(conditions)}\n"
             required |= {(name, condition) for condition in conditions}
-        found = rows(check(text))
+        found = rows(check(text, goals) if kind == "action" else check(text))
         assert {(row["metric"], row["condition"]) for row in found} == required
         assert all(row["verdict"] in ("passed", "failed") for row in found), found
 
@@ -173,7 +197,7 @@ def test_lost_messages_are_a_share_of_those_connected(tmp_path: Path) -> None:
     assert any(row["value"] < 1 for row in found if row["metric"] == "completeness")
 
 
-@pytest.mark.parametrize("name", few(["demo", "services"], "services"))
+@pytest.mark.parametrize("name", few(["demo", "services", "actions"], "services", "actions"))
 def test_a_run_meets_what_is_suggested_from_it(name: str, tmp_path: Path) -> None:
     simulation = simulate(name, tmp_path / "trace", factor=0.5)
     targets = tmp_path / "targets.yaml"
@@ -188,7 +212,9 @@ def test_a_run_meets_what_is_suggested_from_it(name: str, tmp_path: Path) -> Non
     assert closest.count("passed") == len(closest.result)
     kinds = {row["metric"] for row in rows(verification)}
     assert "rate" in kinds
-    assert ({"latency", "completeness"} if name == "demo" else {"round_trip"}) <= kinds
+    assert {
+        "demo": {"latency", "completeness"}, "services": {"round_trip"}, "actions": {"goal"},
+    }[name] <= kinds  # fmt: skip
 
 
 def test_a_negative_margin_is_refused(system: Path) -> None:
