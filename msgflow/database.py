@@ -478,7 +478,7 @@ class Database:
         skip_first: float | None = None,
         internal: bool = False,
     ) -> Graph:
-        """Return the graph of nodes, topics and services, for DOT, Mermaid, SVG or JSON.
+        """Return the graph of nodes, topics, services and actions, for DOT, Mermaid, SVG or JSON.
 
         Args:
             run, start, end, skip_first: what to read, see `msgflow.Slice`; one run.

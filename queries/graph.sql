@@ -1,19 +1,22 @@
 -- name: graph
 -- title: Which node sends what to which, how often and how fast
--- description: The computation graph: nodes, and the topics and services between them, with rates
---     and latencies. `msgflow graph` draws it.
--- grain: one row per node, topic or service, and what the node does with it
+-- description: The computation graph: nodes, and the topics, services and actions between them,
+--     with rates and latencies. The services of an action are no rows of their own. `msgflow graph`
+--     draws it.
+-- grain: one row per node, topic, service or action, and what the node does with it
 -- column: run_id BIGINT            Run
--- column: kind VARCHAR             What the node does: 'publish', 'receive', 'call' or 'serve'
+-- column: kind VARCHAR             What the node does: 'publish', 'receive', 'call', 'serve', or
+--     with goals of an action 'send', 'execute'
 -- column: node VARCHAR [node]  Node
--- column: name VARCHAR [topic]  Topic or service
+-- column: name VARCHAR [topic]  Topic, service or action
 -- column: indirect VARCHAR         How messages wait in the node for what is published:
 --     'periodic_async', 'partial_sync', 'approximate_sync', or several; empty: no indirect link
 --     leads to it
--- column: count BIGINT             Messages, or requests, in the time window
+-- column: count BIGINT             Messages, requests or goals in the time window
 -- column: rate_hz DOUBLE [Hz]      Rate from the first to the last
 -- column: median_ns BIGINT [ns]    Median latency: for 'receive' from publication to take, for
---     'call' from sending the request to taking the response
+--     'call' from sending the request to taking the response, for 'send' from sending the goal to
+--     taking its result
 -- column: p95_ns BIGINT [ns]       95 % of these are at most this
 -- column: executor VARCHAR         Executor of the node: process, host, kind and threads; empty:
 --     not known, or several
@@ -57,12 +60,26 @@ event AS (
     FROM main.request AS q
     JOIN main.client AS c ON q.client_id = c.client_id
     LEFT JOIN answer AS r ON q.request_id = r.request_id
+    WHERE NOT coalesce(contains(c.service_name, '/_action/'), false)
     UNION ALL
     SELECT
         q.run_id, 'serve', s.node_id, s.process_id, s.service_name, s.is_internal,
         coalesce(q.sent_ns, q.taken_ns), NULL, NULL
     FROM main.request AS q
     JOIN main.service AS s ON q.service_id = s.service_id
+    WHERE NOT coalesce(contains(s.service_name, '/_action/'), false)
+    UNION ALL
+    SELECT
+        g.run_id, 'send', c.node_id, c.process_id, g.action_name, c.is_internal,
+        coalesce(g.sent_ns, g.taken_ns), g.latency_ns, NULL
+    FROM main.goal AS g
+    JOIN main.client AS c ON g.action_client_id = c.client_id
+    UNION ALL
+    SELECT
+        g.run_id, 'execute', s.node_id, s.process_id, g.action_name, s.is_internal,
+        coalesce(g.sent_ns, g.taken_ns), NULL, NULL
+    FROM main.goal AS g
+    JOIN main.service AS s ON g.action_server_id = s.service_id
 ),
 edge AS (
     SELECT

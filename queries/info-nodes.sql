@@ -2,8 +2,8 @@
 -- title: ROS nodes
 -- description: The nodes of a run, and how many publishers, subscriptions, timers, services,
 --     clients, action servers and action clients each has. An action server has three of the
---     services, an action client three of the clients. What ROS adds to every node (parameter services, /rosout,
---     /parameter_events) is not counted.
+--     services, an action client three of the clients. What ROS adds to every node (parameter
+--     services, /rosout, /parameter_events) is not counted.
 -- grain: one row per node
 -- column: run_id BIGINT               Run
 -- column: node VARCHAR [node]  Namespace and name

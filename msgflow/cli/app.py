@@ -21,7 +21,7 @@ COMMANDS = {
     "ingest": "Read LTTng traces of a ROS 2 system into a database, as one run.",
     "query": "Run a named query; `msgflow query NAME --help` explains it.",
     "flow": "Print the flow of one message: what caused it, and what it caused.",
-    "graph": "Write the graph of nodes, topics and services, with rates and latencies.",
+    "graph": "Write the graph of nodes, topics, services and actions, with rates and latencies.",
     "ui": "Show the database in the browser: timeline, paths, graph, executors, comparison.",
     "report": "Write the pages of a run to one file that any browser opens, without a server.",
     "compare": (

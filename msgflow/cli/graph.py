@@ -30,7 +30,7 @@ def command(
     output: OutputOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
-    """Write the graph of nodes, topics and services, with rates and latencies.
+    """Write the graph of nodes, topics, services and actions, with rates and latencies.
 
     Topics show their rate. Arrows to receivers show median and p95 from
     publication to take, arrows to services those of the round trip. Dashed

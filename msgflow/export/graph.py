@@ -1,4 +1,4 @@
-"""Graph of nodes, topics and services, in each format of `msgflow graph`."""
+"""Graph of nodes, topics, services and actions, in each format of `msgflow graph`."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def graph_format(path: Path | None) -> GraphFormat:
 
 @dataclass(frozen=True, repr=False)
 class Graph(GraphVertices):
-    """Nodes, topics and services of a run, and the messages between them.
+    """Nodes, topics, services and actions of a run, and the messages between them.
 
     Its attributes are those of `GraphVertices`.
     """
@@ -103,7 +103,8 @@ class Graph(GraphVertices):
         kinds = [vertex.kind for vertex in self.vertices.values()]
         return (
             f"graph of run {printable(self.run.name)}: {kinds.count('node')} nodes, "
-            f"{kinds.count('topic')} topics, {kinds.count('service')} services"
+            f"{kinds.count('topic')} topics, {kinds.count('service')} services, "
+            f"{kinds.count('action')} actions"
         )
 
     def _repr_html_(self) -> str:

@@ -27,9 +27,12 @@ _STYLE = """
 .msgflow-graph .lane { fill: #f4f6f8; stroke: #c9d1d9; }
 .msgflow-graph .node { fill: #ffffff; stroke: #3d4653; }
 .msgflow-graph .topic { fill: #e3eefb; stroke: #2f6fb0; }
-.msgflow-graph .service { fill: #fbf0dc; stroke: #a86b00; }
+.msgflow-graph .service, .msgflow-graph .action { fill: #fbf0dc; stroke: #a86b00; }
+.msgflow-graph .action { stroke-width: 2.4; }
 .msgflow-graph .edge { fill: none; stroke: #3d4653; stroke-width: 1.2; }
-.msgflow-graph .call, .msgflow-graph .serve { stroke: #a86b00; }
+.msgflow-graph .call, .msgflow-graph .serve, .msgflow-graph .send, .msgflow-graph .execute {
+  stroke: #a86b00;
+}
 .msgflow-graph .periodic_async { stroke: #aa4499; stroke-width: 1.8; stroke-dasharray: 8 4; }
 .msgflow-graph .partial_sync, .msgflow-graph .approximate_sync {
   stroke: #aa4499; stroke-width: 1.8; stroke-dasharray: 2 4;
@@ -42,9 +45,11 @@ _STYLE = """
   .msgflow-graph .lane { fill: #1c232b; stroke: #39434e; }
   .msgflow-graph .node { fill: #14191f; stroke: #c3ccd6; }
   .msgflow-graph .topic { fill: #1b2f47; stroke: #6fa8dc; }
-  .msgflow-graph .service { fill: #3a2d12; stroke: #dba53a; }
+  .msgflow-graph .service, .msgflow-graph .action { fill: #3a2d12; stroke: #dba53a; }
   .msgflow-graph .edge { stroke: #c3ccd6; }
-  .msgflow-graph .call, .msgflow-graph .serve { stroke: #dba53a; }
+  .msgflow-graph .call, .msgflow-graph .serve, .msgflow-graph .send, .msgflow-graph .execute {
+    stroke: #dba53a;
+  }
   .msgflow-graph .periodic_async, .msgflow-graph .partial_sync,
   .msgflow-graph .approximate_sync { stroke: #d991cf; }
 }
@@ -155,7 +160,7 @@ def _choose_lanes(boxes: dict[str, _Box], graph: GraphVertices) -> list[str | No
     for box in boxes.values():
         box.lane = numbers[box.vertex.executor]
     for edge in reversed(graph.edges):
-        if edge.kind in ("publish", "call"):
+        if edge.kind in ("publish", "call", "send"):
             boxes[edge.target].lane = boxes[edge.source].lane
     return [*(graph.executors[key] for key in executors), None]
 
@@ -245,11 +250,11 @@ def _edge(edge: Edge, source: _Box, target: _Box, height: float) -> str:
 
 def _shape(box: _Box) -> str:
     kind = box.vertex.kind
-    if kind == "service":
+    if kind in ("service", "action"):
         left, right = box.x, box.x + box.width
         top, bottom, middle = box.y, box.y + box.height, box.y + box.height / 2
         shape = (
-            f'<path class="service" d="M{left + 10:.1f},{top:.1f} L{right - 10:.1f},{top:.1f}'
+            f'<path class="{kind}" d="M{left + 10:.1f},{top:.1f} L{right - 10:.1f},{top:.1f}'
             f" L{right:.1f},{middle:.1f} L{right - 10:.1f},{bottom:.1f}"
             f' L{left + 10:.1f},{bottom:.1f} L{left:.1f},{middle:.1f} z"/>'
         )

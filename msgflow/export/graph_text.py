@@ -15,13 +15,19 @@ _SHAPES = {
     "node": "shape=box",
     "topic": "shape=box, style=rounded",
     "service": "shape=hexagon",
+    "action": "shape=octagon",
 }
 _STYLES = {
     "periodic_async": 'style=dashed, color="#aa4499"',
     "partial_sync": 'style=dotted, color="#aa4499"',
     "approximate_sync": 'style=dotted, color="#aa4499"',
 }
-_BOXES = {"node": ("[", "]"), "topic": ("([", "])"), "service": ("{{", "}}")}
+_BOXES = {
+    "node": ("[", "]"),
+    "topic": ("([", "])"),
+    "service": ("{{", "}}"),
+    "action": ("[[", "]]"),
+}
 # Characters that a Mermaid label may hold; all others are written as their number.
 _PLAIN = set(" /_.,:-·%()→+*")
 
@@ -48,7 +54,7 @@ def dot(graph: GraphVertices) -> str:
         attributes.append(f"tooltip={_quoted(f'{edge.kind}: {edge.count}')}")
         if edge.indirect:
             attributes.append(_STYLES[edge.indirect.split(",")[0]])
-        elif edge.is_service:
+        elif edge.is_call:
             attributes.append("arrowhead=empty, color=gray40")
         lines.append(f"  {edge.source} -> {edge.target} [{', '.join(attributes)}];")
     return "\n".join([*lines, "}"])
@@ -75,7 +81,7 @@ def mermaid(graph: GraphVertices) -> str:
 def _arrow(edge: Edge) -> str:
     if edge.indirect:
         return "-.->"
-    return "==>" if edge.is_service else "-->"
+    return "==>" if edge.is_call else "-->"
 
 
 def _groups(graph: GraphVertices) -> Iterator[tuple[str | None, list[Vertex]]]:

@@ -17,11 +17,11 @@ Row = dict[str, Any]
 
 @dataclass(frozen=True)
 class Vertex:
-    """A node, topic or service.
+    """A node, topic, service or action.
 
     Attributes:
         id: its name in edges, of letters and digits only.
-        kind: 'node', 'topic' or 'service'.
+        kind: 'node', 'topic', 'service' or 'action'.
         name: in the trace.
         rate_hz: messages of a topic per second; None: not known.
         executor: number of the executor that runs the node, in `Graph.executors`.
@@ -42,14 +42,14 @@ class Vertex:
 
 @dataclass(frozen=True)
 class Edge:
-    """An arrow between a node and a topic or service.
+    """An arrow between a node and a topic, service or action.
 
     Attributes:
         source: id of its first vertex.
         target: id of its last vertex.
-        kind: 'publish', 'receive', 'call' or 'serve'.
+        kind: 'publish', 'receive', 'call', 'serve', 'send' or 'execute'.
         indirect: kind of the indirect links through which messages wait in the node; None: none.
-        count: messages or requests.
+        count: messages, requests or goals.
         rate_hz: messages per second; None: not known.
         median_ns: median latency; None: not known.
         p95_ns: 95 % are at most this.
@@ -72,9 +72,15 @@ class Edge:
         return f"{_brief(self.median_ns)} · {_brief(self.p95_ns)}"
 
     @property
-    def is_service(self) -> bool:
-        """Whether it belongs to a service."""
-        return self.kind in ("call", "serve")
+    def is_call(self) -> bool:
+        """Whether it belongs to a service or an action."""
+        return _far(self.kind) != "topic"
+
+
+def _far(kind: str) -> str:
+    """Return what is at the other end of an edge of this kind than the node."""
+    far = {"call": "service", "serve": "service", "send": "action", "execute": "action"}
+    return far.get(kind, "topic")
 
 
 def _brief(duration_ns: int) -> str:
@@ -87,7 +93,7 @@ def _brief(duration_ns: int) -> str:
 
 @dataclass(frozen=True, repr=False)
 class GraphVertices:
-    """Nodes, topics and services of a run, and the messages between them.
+    """Nodes, topics, services and actions of a run, and the messages between them.
 
     Attributes:
         run: the run.
@@ -124,7 +130,7 @@ class GraphVertices:
                 rates[row["name"]] = rates.get(row["name"], 0) + row["rate_hz"]
         found: dict[tuple[str, str], Vertex] = {}
         for row in self.rows:
-            far = "service" if row["kind"] in ("call", "serve") else "topic"
+            far = _far(row["kind"])
             for kind, name in (("node", row["node"]), (far, row["name"])):
                 if (kind, name) not in found:
                     found[kind, name] = Vertex(
@@ -141,10 +147,10 @@ class GraphVertices:
         """Edges, from sender to receiver."""
         found = []
         for row in self.rows:
-            far = "service" if row["kind"] in ("call", "serve") else "topic"
+            far = _far(row["kind"])
             source = self.vertices["node", row["node"]].id
             target = self.vertices[far, row["name"]].id
-            if row["kind"] in ("receive", "serve"):
+            if row["kind"] in ("receive", "serve", "execute"):
                 source, target = target, source
             same = ("kind", "indirect", "count", "rate_hz", "median_ns", "p95_ns")
             found.append(Edge(source, target, **{name: row[name] for name in same}))

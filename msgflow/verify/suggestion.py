@@ -21,6 +21,7 @@ LEAST_VALUES = 20
 # A topic that pauses or comes in bursts has no rate: the deviation of its period is larger.
 _STEADY = 0.25
 _RATE_PERCENT = 5
+_OF_ACTION = "/_action/"
 # The time that an operating system may need to wake a thread.
 _LEAST_LATENESS_NS = 1_000_000
 
@@ -114,7 +115,10 @@ def _calls(
     """Yield a target per service or action, which all its clients have to meet."""
     samples = SUBJECTS[kind].metrics[metric].samples
     for (called,), group in _grouped(rows, f"{kind}_name"):
-        if called is None or any(row[samples] < LEAST_VALUES for row in group):
+        # The services of an action say no more than the action.
+        if called is None or _OF_ACTION in called:
+            continue
+        if any(row[samples] < LEAST_VALUES for row in group):
             continue
         slow = max(row[f"{column}_p99_ns"] for row in group)
         name = json.dumps(_literal(called), ensure_ascii=False)

@@ -35,7 +35,8 @@ Params = dict[str, Any]
 NAMED = (
     "e2e-latency", "path-breakdown", "reaction-time", "data-age", "executor-usage",
     "executor-wait", "interference", "publication-rate", "transport-latency", "service-latency",
-    "indirect-links", "delivery", "info-hosts", "info-processes", "info-topics", "clocks",
+    "action-latency", "indirect-links", "delivery", "info-hosts", "info-processes", "info-topics",
+    "clocks",
 )  # fmt: skip
 # A window with more bars than this is drawn in bins, in so many at the most.
 MOST_BARS = 40_000

@@ -16,8 +16,10 @@ from golden import fill_case
 
 from msgflow import Database, UsageError
 from msgflow.export.graph import GraphFormat, graph_format
+from msgflow.sim import simulate
 
 CASES = Path(__file__).resolve().parents[1] / "query" / "cases" / "path-breakdown"
+GRAPHS = CASES.with_name("graph")
 # Each would be more than text where a name is not made inert.
 HOSTILE = [
     '</text></svg><script>document.title = "owned"</script>',
@@ -46,11 +48,11 @@ MERMAID_LINE = re.compile(
 )
 
 
-def database_of(case: str, empty_database: Path, directory: Path) -> Database:
+def database_of(case: str, empty_database: Path, directory: Path, cases: Path = CASES) -> Database:
     path = directory / f"{case}.duckdb"
     shutil.copyfile(empty_database, path)
     with duckdb.connect(str(path)) as connection:
-        fill_case(connection, CASES / f"{case}.case")
+        fill_case(connection, cases / f"{case}.case")
     return Database(path)
 
 
@@ -104,7 +106,7 @@ def test_the_formats_hold_the_same_graph(empty_database: Path, tmp_path: Path) -
         assert "276 ns · 276 ns" in text
     assert "style=dashed" in graph.to_dot()
     assert graph.to_mermaid().count("-.->") == 1
-    assert str(graph) == "graph of run case: 3 nodes, 2 topics, 0 services"
+    assert str(graph) == "graph of run case: 3 nodes, 2 topics, 0 services, 0 actions"
 
 
 def test_services_are_drawn_differently(empty_database: Path, tmp_path: Path) -> None:
@@ -115,6 +117,45 @@ def test_services_are_drawn_differently(empty_database: Path, tmp_path: Path) ->
     assert graph.to_mermaid().count("{{") == 2
     assert graph.to_mermaid().count(" ==> ") == 4
     assert graph.to_svg().count('class="service"') == 2
+
+
+def test_actions_are_drawn_differently(empty_database: Path, tmp_path: Path) -> None:
+    with database_of("actions", empty_database, tmp_path, GRAPHS) as database:
+        graph = database.graph()
+    assert [vertex.name for vertex in graph.vertices.values() if vertex.kind == "action"] == [
+        "/dock"
+    ]
+    ends = {edge.kind: (edge.source, edge.target) for edge in graph.edges}
+    action, sender, server = (
+        graph.vertices[key].id
+        for key in (("action", "/dock"), ("node", "/asking"), ("node", "/acting"))
+    )
+    assert (ends["send"], ends["execute"]) == ((sender, action), (action, server))
+    assert graph.to_dot().count("shape=octagon") == 1
+    assert graph.to_dot().count("arrowhead=empty") == 2
+    assert graph.to_mermaid().count("[[") == 1
+    assert graph.to_mermaid().count(" ==>") == 2
+    assert graph.to_svg().count('path class="action"') == 1
+    assert graph.to_svg().count('class="edge send"') == 1
+    assert str(graph).endswith("2 topics, 0 services, 1 actions")
+
+
+def test_an_action_lies_in_the_lane_of_its_sender(tmp_path: Path) -> None:
+    simulate("actions", tmp_path / "trace", factor=0.1)
+    with Database(tmp_path / "run.duckdb") as database:
+        database.ingest(tmp_path / "trace")
+        picture = ElementTree.fromstring(database.graph().to_svg())
+    lanes = {
+        float(lane.get("y", 0)): float(lane.get("height", 0))
+        for lane in picture.findall(f".//{SVG}rect[@class='lane']")
+    }
+    tops = [
+        float(re.findall(r"[\d.]+", path.get("d", ""))[1])
+        for path in picture.findall(f".//{SVG}path[@class='action']")
+    ]
+    assert len(lanes) == 3
+    assert len(tops) == 2
+    assert all(any(y <= top <= y + height for y, height in lanes.items()) for top in tops)
 
 
 def test_loops_and_nothing_at_all_are_drawn(empty_database: Path, tmp_path: Path) -> None:

@@ -12,6 +12,8 @@ from served import Page, Served, shown
 from thorough import few
 
 from msgflow.database import open_db
+from msgflow.ingest import ingest
+from msgflow.sim import simulate
 
 Read = Callable[[Path], duckdb.DuckDBPyConnection]
 Report = Callable[..., str]
@@ -130,6 +132,27 @@ def test_services_in_the_graph(systems: Path, serve: Serve, page: Page) -> None:
     )
     text = page.page.locator(".graph").text_content() or ""
     assert all(shown(row["round_trip_median_ns"]) in text for row in services if row["answered"])
+
+
+def test_actions_in_the_graph(tmp_path: Path, report: Report, page: Page) -> None:
+    """In place of their services; their topics are topics."""
+    path = tmp_path / "run.duckdb"
+    simulate("actions", tmp_path / "trace", factor=0.2)
+    ingest([tmp_path / "trace"], path)
+    with open_db(path) as opened:
+        actions = opened.query("action-latency").to_arrow().to_pylist()
+    page.open(report(path))
+    page.go("#/graph")
+    assert page.page.locator(".graph .action-shape").count() == 2
+    assert page.page.locator(".graph .service-shape").count() == 0
+    text = page.page.locator(".graph").text_content() or ""
+    titles = page.page.locator(".graph .edge title").all_text_contents()
+    for row in actions:
+        goals = f"{row['action_name']}: {row['goals']} goals, to the result"
+        for verb, node in (("sent to", row["client"]), ("executes", row["server"])):
+            assert any(f"{node} {verb} {goals}" in title for title in titles), row
+    assert "/dock/_action/feedback" in text
+    assert any(shown(row["result_median_ns"]) in text for row in actions)
 
 
 @pytest.mark.parametrize("way", few(["served", "file"], "served"))

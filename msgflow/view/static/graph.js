@@ -1,4 +1,4 @@
-// The graph of nodes, topics and services, with rates on topics and latencies on edges.
+// The graph of nodes, topics, services and actions, with rates on topics and latencies on edges.
 
 import { h, svg, clear, color } from "./dom.js";
 import { address, current, replace } from "./address.js";
@@ -14,6 +14,8 @@ const SLOW = 10;
 const LEAST_SCALE = 0.8;
 // Hosts have a colour each, as far as there are some in the style sheet.
 const HOSTS = 5;
+// The services of an action are one vertex: the action.
+const OF_ACTION = "/_action/";
 const INDIRECT = { periodic_async: "8 4", partial_sync: "2 4", approximate_sync: "2 4" };
 
 export class GraphPage {
@@ -27,12 +29,12 @@ export class GraphPage {
   async build() {
     clear(this.root, waiting());
     const { app } = this;
-    const [rates, transports, services, indirect, executors, rows] = await Promise.all([
-      app.query("publication-rate"), app.query("transport-latency"), app.query("service-latency"),
+    const [rates, transports, services, actions, indirect, executors, rows] = await Promise.all([
+      app.query("publication-rate"), app.query("transport-latency"), app.query("service-latency"), app.query("action-latency"),
       app.query("indirect-links"), app.fetch("executor_node"), app.fetch("row"),
     ]);
-    this.tables = { rates, transports, services };
-    this.model = model({ rates, transports, services, indirect, executors, rows });
+    this.tables = { rates, transports, services, actions };
+    this.model = model({ rates, transports, services, actions, indirect, executors, rows });
     this.search = h("input", { type: "search", placeholder: "node or topic …", value: current().q ?? "", "aria-label": "only what is beside nodes and topics with this text",
       on: { change: () => this.filter(this.search.value) } });
     const group = h("input", { type: "checkbox", checked: true, on: { change: () => { this.grouped = group.checked; this.draw(); } } });
@@ -42,14 +44,15 @@ export class GraphPage {
       h("div", { className: "tools" }, this.search, h("button", { type: "button", on: { click: () => this.filter("") } }, "all"), h("label", {}, group, "group by executor")),
       this.said, this.picture,
       h("div", { className: "legend" },
-        item("box", "node"), item("pill", "topic, with its rate"), item("diamond", "service, with its round trip"),
+        item("box", "node"), item("pill", "topic, with its rate"), item("diamond", "service, with its round trip"), actions.rows && item("action", "action, with the time from a goal to its result"),
         h("span", { className: "legend-item" }, h("span", { className: "stroke color-transport" }), "published, received: median · p95 from publication to take"),
         h("span", { className: "legend-item" }, h("span", { className: "stroke dashed color-indirect" }), "published by an indirect link"),
         this.model.edges.some((edge) => edge.median >= this.model.slow) && h("span", { className: "legend-item" }, h("span", { className: "stroke color-critical" }), `slow: a median of ${brief(this.model.slow)} or more, ${SLOW} times that of the middle one`),
         this.model.hosts.length > 1 && this.model.hosts.map((host, place) => h("span", { className: "legend-item" }, h("span", { className: `swatch host-mark host-${place % HOSTS}` }), `on ${host}`))),
       besides("topics and their publishers as a table", dataTable(rates, { label: "publication rates" }), command(rates.meta.command)),
       besides("receivers and their latencies as a table", dataTable(transports, { label: "latencies from publication to take" }), notes(transports.meta.notes), command(transports.meta.command)),
-      services.rows ? besides("services as a table", dataTable(services, { label: "services" }), command(services.meta.command)) : null);
+      services.rows ? besides("services as a table", dataTable(services, { label: "services" }), command(services.meta.command)) : null,
+      actions.rows ? besides("actions as a table", dataTable(actions, { label: "actions" }), command(actions.meta.command)) : null);
     this.draw();
   }
 
@@ -70,12 +73,12 @@ export class GraphPage {
       for (const edge of edges) if (hit.includes(edge.from) || hit.includes(edge.to)) { chosen.add(edge.from); chosen.add(edge.to); }
     }
     const all = chosen.size;
-    let note = text ? `${all} of ${vertices.size} nodes, topics and services: those with “${text}” and what is beside them.` : `${all} nodes, topics and services. Click one to see what is beside it.`;
+    let note = text ? `${all} of ${vertices.size} nodes, topics, services and actions: those with “${text}” and what is beside them.` : `${all} nodes, topics, services and actions. Click one to see what is beside it.`;
     if (all > MOST_VERTICES && !this.everything) {
       const weight = new Map();
       for (const edge of edges) for (const end of [edge.from, edge.to]) weight.set(end, (weight.get(end) ?? 0) + edge.count);
       chosen = new Set([...chosen].sort((a, b) => (weight.get(b) ?? 0) - (weight.get(a) ?? 0)).slice(0, MOST_VERTICES));
-      note = `${MOST_VERTICES} of ${all} nodes, topics and services, those with the most messages: search for others. `;
+      note = `${MOST_VERTICES} of ${all} nodes, topics, services and actions, those with the most messages: search for others. `;
     }
     clear(this.said, note, all > MOST_VERTICES && !this.everything && h("button", { type: "button", on: { click: () => { this.everything = true; this.draw(); } } }, "draw all of them, which takes long"));
     if (!chosen.size) { clear(this.picture, h("p", { className: "nothing" }, vertices.size ? "Nothing has this in its name." : "There are no nodes that publish, receive, or call.")); return; }
@@ -148,8 +151,8 @@ export class GraphPage {
       const vertex = vertices.get(key);
       const box = graph.node(key);
       const [left, top] = [box.x - box.width / 2, box.y - box.height / 2];
-      const shape = vertex.kind === "service"
-        ? svg("path", { d: `M${left + 12},${top} L${left + box.width - 12},${top} L${left + box.width},${box.y} L${left + box.width - 12},${top + box.height} L${left + 12},${top + box.height} L${left},${box.y} z`, class: "vertex service-shape" })
+      const shape = vertex.kind === "service" || vertex.kind === "action"
+        ? svg("path", { d: `M${left + 12},${top} L${left + box.width - 12},${top} L${left + box.width},${box.y} L${left + box.width - 12},${top + box.height} L${left + 12},${top + box.height} L${left},${box.y} z`, class: `vertex ${vertex.kind}-shape` })
         : svg("rect", { x: left, y: top, width: box.width, height: box.height, rx: vertex.kind === "topic" ? box.height / 2 : 5, class: `vertex ${vertex.kind}-shape` });
       const pick = () => this.filter(vertex.label);
       root.append(svg("g", { class: "can-pick", tabindex: 0, role: "button", "aria-label": vertex.label, on: { click: pick, keydown: (event) => { if (event.key === "Enter") pick(); } } },
@@ -185,7 +188,7 @@ function cut(text, room) {
   return text.length <= room ? text : `…${text.slice(text.length - room + 1)}`;
 }
 
-function model({ rates, transports, services, indirect, executors, rows }) {
+function model({ rates, transports, services, actions, indirect, executors, rows }) {
   const vertices = new Map();
   const groups = new Map();
   const edges = [];
@@ -230,11 +233,20 @@ function model({ rates, transports, services, indirect, executors, rows }) {
   }
   for (let row = 0; row < services.rows; row++) {
     const name = services.service_name[row] ?? "?";
+    if (name.includes(OF_ACTION)) continue;
     const under = Number.isNaN(services.round_trip_median_ns[row]) ? null : `${duration(services.round_trip_median_ns[row])} median`;
     const service = add("service", name, under);
     const said = `${count(services.requests[row], "request")}${under ? `, round trip ${under}, ${duration(services.round_trip_p95_ns[row])} p95` : ""}`;
     if (services.client[row]) edges.push({ from: add("node", services.client[row]), to: service, kind: "service", count: services.requests[row], label: "", title: `${services.client[row]} called ${name}: ${said}` });
     if (services.server[row]) edges.push({ from: service, to: add("node", services.server[row]), kind: "service", count: services.requests[row], label: "", title: `${services.server[row]} serves ${name}: ${said}` });
+  }
+  for (let row = 0; row < actions.rows; row++) {
+    const name = actions.action_name[row];
+    const under = Number.isNaN(actions.result_median_ns[row]) ? null : `${duration(actions.result_median_ns[row])} median`;
+    const action = add("action", name, under);
+    const said = `${count(actions.goals[row], "goal")}${under ? `, to the result ${under}, ${duration(actions.result_p95_ns[row])} p95` : ""}`;
+    if (actions.client[row]) edges.push({ from: add("node", actions.client[row]), to: action, kind: "service", count: actions.goals[row], label: "", title: `${actions.client[row]} sent to ${name}: ${said}` });
+    if (actions.server[row]) edges.push({ from: action, to: add("node", actions.server[row]), kind: "service", count: actions.goals[row], label: "", title: `${actions.server[row]} executes ${name}: ${said}` });
   }
   const medians = edges.map((edge) => edge.median).filter((median) => median > 0).sort((a, b) => a - b);
   return { vertices, edges: merged(edges), groups, slow: medians.length ? SLOW * medians[medians.length >> 1] : Infinity,
