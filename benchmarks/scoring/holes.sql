@@ -42,3 +42,9 @@ SELECT
     coalesce(begin_ns, -9223372036854775807) AS begin_ns,
     coalesce(end_ns, 9223372036854775807) AS end_ns
 FROM (FROM on_cpu UNION FROM of_process);
+
+-- CPUs without a whole packet in the trace: it does not show that there is more to them.
+CREATE OR REPLACE TEMP TABLE truth_unseen_cpu AS
+SELECT DISTINCT host, cpu
+FROM truth_hole
+WHERE cpu IS NOT NULL AND begin_ns = -9223372036854775807 AND end_ns = 9223372036854775807;

@@ -20,8 +20,6 @@ WITH accepted AS (
         ('taken, loss', 'receiver_gap'),
         ('taken, packets', 'receiver_gap'),
         ('taken, truncation', 'receiver_gap'),
-        ('taken or sent, truncation', 'receiver_gap'),
-        ('taken or sent, truncation', 'publisher_gap'),
         -- The message was kept for subscriptions that come late, or nothing of it is traced.
         ('kept', 'no_stamp'),
         ('no event', 'no_stamp'),
@@ -63,9 +61,10 @@ SELECT
             THEN 'events are missing'
         WHEN m.is_undecided AND m.reason = 'publisher_gap' AND m.is_beside_hole
             THEN 'events are missing'
-        WHEN m.is_twin AND m.reason IN ('ambiguous', 'publisher_not_traced')
+        WHEN m.is_twin AND m.reason IN ('ambiguous', 'publisher_not_traced', 'unknown')
             THEN 'another message has its stamp'
-        WHEN m.is_unseen AND m.reason = 'publisher_not_traced' THEN 'a stream is missing'
+        WHEN m.is_unseen AND m.reason IN ('ambiguous', 'publisher_not_traced', 'unknown')
+            THEN 'a stream is missing'
         WHEN m.truth = 'sent, no event' AND m.reason = 'receiver_gap' AND m.is_torn
             THEN 'events are missing'
         WHEN m.truth = 'sent, no event'

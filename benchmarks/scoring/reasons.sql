@@ -14,6 +14,15 @@ SELECT publication_id
 FROM simulated_publication
 QUALIFY count(*) OVER (PARTITION BY topic_name, source_timestamp_ns) > 1;
 
+-- What the middleware brought to subscriptions that got the message from a ring buffer as well.
+CREATE OR REPLACE TEMP TABLE truth_copy AS
+SELECT take_id
+FROM simulated_take
+WHERE method = 'rmw'
+    AND (publication_id, subscription_id) IN (
+        SELECT (publication_id, subscription_id) FROM simulated_take WHERE method = 'ring_buffer'
+    );
+
 -- Each message and subscription of its topic, on the clock of the subscription: when it could be
 -- taken at the earliest (NULL: the trace does not tell how far the clocks are apart); since when
 -- nothing of its publisher was; and when a later message of its publisher was, as the trace tells.
@@ -37,7 +46,8 @@ pair AS (
     UNION
     SELECT publication_id, subscription_id FROM simulated_take WHERE publication_id IS NOT NULL
 ),
--- What was taken, as far as the trace tells which message it was.
+-- What was taken, as far as the trace tells which message it was; a copy of a message in a buffer
+-- does not count.
 taken AS (
     SELECT
         t.subscription_id, s.host, s.pid, s.publisher_handle, s.sent_ns,
@@ -46,6 +56,7 @@ taken AS (
     JOIN simulated_take AS t ON l.to_id = t.take_id::VARCHAR
     JOIN sent AS s ON l.from_id = s.publication_id::VARCHAR
     WHERE l.kind = 'transport' AND l.is_decided
+        AND t.take_id NOT IN (FROM truth_copy)
     GROUP BY ALL
 ),
 earliest AS (
@@ -58,7 +69,7 @@ earliest AS (
 way AS (
     SELECT
         t.publication_host, t.take_host,
-        median(t.take_rmw_ns - t.publication_rmw_ns - t.latency_ns) AS apart_ns,
+        quantile_disc(t.take_rmw_ns - t.publication_rmw_ns - t.latency_ns, 0.5) AS apart_ns,
         max(t.latency_ns) AS longest_ns
     FROM truth_link AS l
     JOIN simulated_transport AS t
@@ -195,8 +206,7 @@ SELECT
         WHEN u.reason = 'before_subscription' THEN CASE
             WHEN s.has_two_clocks AND (s.arrival_ns + s.longest_ns >= s.created_ns) IS NOT FALSE
                 THEN 'clocks are apart'
-            -- Its own events are some microseconds apart.
-            WHEN NOT s.has_two_clocks AND w.ts_ns + 10_000 >= s.created_ns THEN 'created meanwhile'
+            WHEN NOT s.has_two_clocks AND w.ts_ns >= s.created_ns THEN 'created meanwhile'
         END
         WHEN u.reason = 'overwritten' THEN CASE
             WHEN (u.subscription_id, p.host, p.pid, p.publisher_handle) IN (FROM buffered)
@@ -243,12 +253,6 @@ SEMI JOIN (
 GROUP BY host, pid, subscription_handle
 HAVING count(*) > 1;
 
--- CPUs without a whole packet in the trace: it does not show that there is more to them.
-CREATE OR REPLACE TEMP TABLE truth_unseen_cpu AS
-SELECT DISTINCT host, cpu
-FROM truth_hole
-WHERE cpu IS NOT NULL AND begin_ns = -9223372036854775807 AND end_ns = 9223372036854775807;
-
 -- Messages that a subscription did take, and why the event of that is not in the trace, if it is
 -- not. Copies of messages that come through a ring buffer as well are no deliveries.
 CREATE OR REPLACE TEMP TABLE truth_delivery AS
@@ -274,10 +278,7 @@ LEFT JOIN truth_link AS l ON l.kind = 'transport' AND t.take_id::VARCHAR = l.to_
 LEFT JOIN simulated_unrecorded AS u
     ON t.host = u.host AND t.pid = u.pid AND t.tid = u.tid
     AND u.ts_ns = coalesce(t.dequeue_ns, t.rmw_ns)
-WHERE t.method <> 'rmw'
-    OR (t.publication_id, t.subscription_id) NOT IN (
-        SELECT (publication_id, subscription_id) FROM simulated_take WHERE method = 'ring_buffer'
-    )
+WHERE t.take_id NOT IN (FROM truth_copy)
 GROUP BY ALL;
 
 -- What became of the events that would tell each take its publication. Where some process that
@@ -339,7 +340,7 @@ absent AS (
 apart AS (
     SELECT
         publication_host, take_host,
-        median(take_rmw_ns - publication_rmw_ns - latency_ns) AS apart_ns
+        quantile_disc(take_rmw_ns - publication_rmw_ns - latency_ns, 0.5) AS apart_ns
     FROM simulated_transport
     WHERE publication_host <> take_host
     GROUP BY ALL
@@ -406,8 +407,6 @@ SELECT
             THEN 'no event'
         WHEN s.has_no_event THEN 'sent, no event'
         WHEN x.is_replay AND t.method = 'ring_buffer' THEN 'kept'
-        -- What there is of a packet that is cut may have been read.
-        WHEN k.cause = 'truncation' AND u.cause IS NOT NULL THEN concat('taken or sent, ', u.cause)
         WHEN k.cause IS NOT NULL THEN concat('taken, ', k.cause)
         WHEN u.cause IS NOT NULL THEN concat('sent, ', u.cause)
         ELSE 'recorded'

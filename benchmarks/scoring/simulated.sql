@@ -1,6 +1,10 @@
 -- What is true of a simulation, from its truth tables (the views simulated_…): which events each
 -- instance has, which links there are, and which of them the recorded trace decides.
 
+-- On which CPU what happened.
+CREATE OR REPLACE TEMP TABLE truth_emitted AS
+SELECT host, pid, tid, ts_ns, any_value(cpu) AS cpu FROM simulated_emitted GROUP BY ALL;
+
 -- Events of instances, with what became of them.
 CREATE OR REPLACE TEMP TABLE truth_event AS
 WITH happened AS (
@@ -53,9 +57,6 @@ WITH happened AS (
 ),
 declared AS (
     SELECT DISTINCT event FROM simulated_declared
-),
-emitted AS (
-    SELECT host, pid, tid, ts_ns, any_value(cpu) AS cpu FROM simulated_emitted GROUP BY ALL
 )
 SELECT
     h.kind, h.id::VARCHAR AS id, h.host, h.pid, h.tid, e.cpu, h.event, h.ts_ns,
@@ -63,7 +64,7 @@ SELECT
     d.event IS NOT NULL AND u.ts_ns IS NULL AS is_recorded
 FROM happened AS h
 LEFT JOIN declared AS d ON h.event = d.event
-LEFT JOIN emitted AS e
+LEFT JOIN truth_emitted AS e
     ON h.host = e.host AND h.pid = e.pid AND h.tid = e.tid AND h.ts_ns = e.ts_ns
 LEFT JOIN simulated_unrecorded AS u
     ON h.host = u.host AND h.pid = u.pid AND h.tid = u.tid AND h.event = u.event
@@ -175,26 +176,44 @@ far_host AS (
     HAVING abs(min_by(source_timestamp_ns - rmw_ns, rmw_ns)) > 5_000_000
         OR count(DISTINCT source_timestamp_ns) < 0.99 * count(*)
 ),
--- Stamped while events of the host were missing, later than nearly all are after they were written:
--- another message may have been written in between.
-torn_stamp AS (
-    SELECT DISTINCT p.publication_id
+-- When each message was stamped after it was written, and whether events of the host were missing
+-- until its thread went on, as far as the trace shows: it may have written another message meanwhile.
+stamped AS (
+    SELECT
+        p.publication_id, p.host, p.pid, p.publisher_handle, p.delay_ns, e.ts_ns AS next_ns,
+        count(h.host) > 0 AS is_torn
     FROM (
         SELECT
-            publication_id, host, pid, rmw_ns, stamped_ns,
-            quantile_disc(stamped_ns - rmw_ns, 0.99) OVER (PARTITION BY host) AS usual_ns
-        FROM (
-            SELECT
-                publication_id, host, pid, rmw_ns,
-                source_timestamp_ns - min(source_timestamp_ns - rmw_ns) OVER (PARTITION BY host)
-                    AS stamped_ns
-            FROM simulated_publication
-        )
+            publication_id, host, pid, tid, publisher_handle, rmw_ns,
+            source_timestamp_ns - rmw_ns - min(source_timestamp_ns - rmw_ns) OVER (
+                PARTITION BY host
+            ) AS delay_ns
+        FROM simulated_publication
+        WHERE publication_id IN (SELECT publication_id FROM simulated_transport)
     ) AS p
-    JOIN truth_hole AS h
+    ASOF LEFT JOIN truth_recorded AS e
+        ON p.host = e.host AND p.pid = e.pid AND p.tid = e.tid AND p.rmw_ns < e.ts_ns
+    LEFT JOIN (FROM truth_hole ANTI JOIN truth_unseen_cpu USING (host, cpu)) AS h
         ON p.host = h.host AND coalesce(p.pid = h.pid, true)
-        AND p.rmw_ns < h.end_ns AND p.stamped_ns > h.begin_ns
-    WHERE p.stamped_ns - p.rmw_ns > p.usual_ns
+        AND p.rmw_ns < h.end_ns AND greatest(e.ts_ns, p.rmw_ns + p.delay_ns) > h.begin_ns
+    GROUP BY ALL
+),
+-- Then only what is usual tells which one a message is of: of the publisher where that is known, else
+-- of the host.
+torn_stamp AS (
+    SELECT publication_id
+    FROM (
+        SELECT
+            publication_id, delay_ns, is_torn,
+            quantile_disc(delay_ns, 0.99) FILTER (next_ns IS NOT NULL AND NOT is_torn) OVER (
+                PARTITION BY host, pid, publisher_handle
+            ) AS own_ns,
+            quantile_disc(delay_ns, 0.99) FILTER (next_ns IS NOT NULL AND NOT is_torn) OVER (
+                PARTITION BY host
+            ) AS usual_ns
+        FROM stamped
+    )
+    WHERE is_torn AND delay_ns > coalesce(own_ns, usual_ns, 5_000_000)
 ),
 -- Messages that another one of the topic resembles: by an equal stamp, or from another publisher or
 -- thread at nearly the same time.
@@ -325,6 +344,18 @@ doubtful AS (
         AND coalesce(o.end_ns > i.start_ns, true) AND o.start_ns < b.rcl_ns
     WHERE c.kind IN ('periodic_async', 'partial_sync')
         AND (o.callback_instance_id IS NOT NULL OR coalesce(i.end_ns > r.start_ns, true))
+    UNION
+    -- What came while another run emptied the caches may have been used by that one.
+    SELECT c.callback_instance_id, c.publication_id
+    FROM simulated_causal AS c
+    JOIN simulated_callback_instance AS i ON c.callback_instance_id = i.callback_instance_id
+    JOIN simulated_publication AS b ON c.publication_id = b.publication_id
+    JOIN simulated_publication AS e
+        ON b.host = e.host AND b.pid = e.pid AND b.topic_name = e.topic_name
+        AND b.callback_instance_id <> e.callback_instance_id
+        AND e.rcl_ns BETWEEN i.start_ns AND b.rcl_ns
+    JOIN simulated_callback_instance AS r ON e.callback_instance_id = r.callback_instance_id
+    WHERE c.kind = 'partial_sync' AND r.start_ns < i.end_ns
 ),
 -- A message that is missing may change a set, and the set after it.
 doubtful_set AS (
@@ -414,6 +445,17 @@ goal_message AS (
     FROM simulated_goal_message AS m
     JOIN simulated_publication AS b ON m.publication_id = b.publication_id
 ),
+-- Ends of states, with the CPU.
+ended_state AS (
+    SELECT s.host, s.pid, s.tid, s.start_ns, s.end_ns, e.cpu
+    FROM simulated_executor_state AS s
+    JOIN truth_emitted AS e
+        ON s.host = e.host AND s.pid = e.pid AND s.tid = e.tid AND s.end_ns = e.ts_ns
+),
+moved_state AS (
+    FROM ended_state
+    QUALIFY cpu IS DISTINCT FROM lag(cpu) OVER (PARTITION BY host, pid, tid ORDER BY start_ns)
+),
 -- Who is annotated says so once, by handles.
 untold_process AS (
     FROM unknown_process
@@ -463,6 +505,15 @@ SELECT
     concat_ws('/', host, pid, tid, start_ns), false, NULL
 FROM simulated_executor_state
 WHERE end_ns IS NOT NULL
+UNION ALL
+-- A state on a CPU that the trace does not show lasts until the thread is seen elsewhere.
+SELECT
+    'executor_state', 'state_start', concat_ws('/', s.host, s.pid, s.tid, s.start_ns), 'state_end',
+    concat_ws('/', m.host, m.pid, m.tid, m.start_ns), false, NULL
+FROM ended_state AS s
+SEMI JOIN truth_unseen_cpu AS u ON s.host = u.host AND s.cpu = u.cpu
+ASOF JOIN moved_state AS m
+    ON s.host = m.host AND s.pid = m.pid AND s.tid = m.tid AND s.end_ns < m.end_ns
 UNION ALL
 SELECT
     'transport', 'publication', publication_id::VARCHAR, 'take', take_id::VARCHAR, is_decided, needs

@@ -178,6 +178,7 @@ class Creator:
         subscription, callback = memory.allocate(), memory.allocate()
         group, executor = node.groups[description.group]
         self._reader(rmw_handle, f"rt{topic}")
+        begin = self.time
         self.announce()
         self.emit(
             "rcl_subscription_init", handle, node.handle, rmw_handle, topic, description.depth
@@ -189,14 +190,13 @@ class Creator:
             node.description.full_name, handle, rmw_handle, callback, memory.allocate(), code,
             self._process.is_rclcpp and description.kind != "serialized",
             topic in INTERNAL_TOPICS,
-            not code.publishers and not (code.links and code.links.inputs), self.time,
+            not code.publishers and not (code.links and code.links.inputs), begin,
         )  # fmt: skip
         if description.intra_process:
             created.intra = self._buffer(created, symbol)
         self._emit_of_rclcpp("rclcpp_subscription_init", handle, subscription)
         self._emit_of_rclcpp("rclcpp_subscription_callback_added", subscription, callback)
         self._emit_of_rclcpp("rclcpp_callback_register", callback, symbol)
-        created.created = self.time
         # Nothing tells of a loan; of serialised messages nothing did in old releases.
         is_hidden = description.kind == "serialized" and not self._is_every_kind_traced
         created.is_silent = description.kind == "loaned" or is_hidden

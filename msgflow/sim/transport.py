@@ -235,14 +235,14 @@ class Middleware:
             kept = intra.kept.messages if intra.kept is not None else ()
             for message in publisher.sent:
                 if message not in kept:
-                    self.lose(message, subscription, "before_subscription")
+                    self.lose(message, subscription, _early(message, subscription))
         keeps = publisher.history is not None and subscription.description.transient_local
         if keeps and subscription.ended is None:
             match.missed = list(publisher.sent)
             self._scheduler.at(since, self._replay, match)
         else:
             for message in publisher.sent:
-                self.drop(message, subscription, "before_subscription")
+                self.drop(message, subscription, _early(message, subscription))
         if not self._expected[publisher.topic]:
             publisher.sent.clear()
 

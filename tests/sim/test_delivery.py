@@ -73,6 +73,26 @@ def test_an_address_is_used_again(recordings):
     assert again == [(1,)]
 
 
+def test_a_subscription_is_there_once_the_middleware_has_it(tmp_path, read):
+    """What is sent before the rest of it is created comes before discovery."""
+    recording = read(
+        simulate("container_multi_threaded", tmp_path, layout="humble-cyclonedds", factor=0.1)
+    )
+    created = recording.truth("SELECT pid, rmw_subscription_handle, created_ns FROM subscription")
+    initialised = {
+        (e.pid, e.fields["rmw_subscription_handle"]): e.ts_ns
+        for e in recording.events
+        if e.name == "ros2:rmw_subscription_init"
+    }
+    assert all(initialised[pid, handle] == ts_ns for pid, handle, ts_ns in created)
+    meanwhile = recording.truth(
+        "SELECT u.reason FROM undelivered AS u JOIN publication AS p USING (publication_id) "
+        "JOIN subscription AS s USING (subscription_id) "
+        "WHERE p.rmw_ns BETWEEN s.created_ns AND s.created_ns + 30_000"
+    )
+    assert {reason for (reason,) in meanwhile} == {"before_discovery"}
+
+
 def test_who_comes_late_gets_what_was_kept(tmp_path, read):
     keeper = Node(
         "keeper",

@@ -66,6 +66,11 @@ def test_timers_are_registered_then_linked(recordings):
     assert registered.fields["symbol"] == "std::_Bind<void (SourceNode::*(SourceNode*))()>"
 
 
+def _process(callback):
+    host, pid, _ = callback
+    return host, pid
+
+
 def test_every_callback_has_one_symbol(recording):
     registered = [
         (e.host, e.pid, e.fields["callback"])
@@ -77,7 +82,8 @@ def test_every_callback_has_one_symbol(recording):
         for e in recording.events
         if _short(e).endswith("_callback_added")
     ]
-    assert registered == added
+    # In the order of each process: several start at once.
+    assert sorted(registered, key=_process) == sorted(added, key=_process)
     if recording.meta["scenario"] not in _REUSING:
         assert len(set(registered)) == len(registered)
     started = {

@@ -241,6 +241,52 @@ def test_excuses_where_nothing_is_missing_are_wrong(losses, monkeypatch):
     assert excused.wrong == sum(drop.messages for drop in drops if drop.undecided is None) > 0
 
 
+TRUNCATED = Recording(cut_streams=1, unfinished_streams=1)
+
+
+@pytest.mark.parametrize(
+    ("system", "layout"),
+    few(
+        [
+            ("rivals", "jazzy"),
+            ("nested", "humble"),
+            ("layers", "humble"),
+            ("rtabmap", "humble"),
+            ("equal_stamps", "humble"),
+            ("mixed_intra_process", "humble"),
+        ],
+        ("rivals", "jazzy"),
+    ),
+)
+def test_streams_that_end_early_are_judged(tmp_path, system, layout):
+    """One stream ends within a packet, the other has lost its last one, which may be all it had."""
+    simulation = simulate(
+        system,
+        tmp_path / "trace",
+        layout=layout,
+        factor=0.1,
+        recording=TRUNCATED,
+        clock_offset_ns=350_000_000,
+    )
+    database = tmp_path / "run.duckdb"
+    ingest_one(simulation.directory, database).connection.close()
+    with duckdb.connect(str(database), read_only=True) as connection:
+        ((count,),) = connection.execute("SELECT sum(event_count) FROM trace").fetchall()
+    assert count == simulation.event_count
+    scores, drops = compare_simulated(database, simulation.truth)
+    assert [score for score in scores if score.wrong or score.missing] == []
+    assert [drop for drop in drops if not drop.undecided and not drop.is_right] == []
+    found = {score.kind: score for score in scores}
+    assert found["callback_instance"].decided > 100
+    # A state that does not last until the thread is seen again is wrong all the same.
+    _change(
+        database,
+        "UPDATE store.executor_state AS s SET end_ns = s.end_ns + 1 "
+        "WHERE s.start_event_id = (SELECT min(start_event_id) FROM store.executor_state)",
+    )
+    assert _scores(simulation, database)["executor_state"].wrong == 1
+
+
 @pytest.fixture(scope="module")
 def caches(tmp_path_factory):
     directory = tmp_path_factory.mktemp("caches")
@@ -258,6 +304,16 @@ def test_a_decided_link_is_the_only_candidate(caches, tmp_path):
     _change(changed, "UPDATE store.link_causal SET candidate_count = 2")
     score = _scores(simulation, changed)["partial_sync"]
     assert 0 < score.doubted <= score.decided
+
+
+def test_a_message_that_another_firing_may_have_used_is_not_decided(tmp_path):
+    """On several threads, caches are emptied while messages come."""
+    simulation = simulate("reentrant", tmp_path / "trace", factor=0.1, clock_offset_ns=350_000_000)
+    database = tmp_path / "run.duckdb"
+    ingest_one(simulation.directory, database).connection.close()
+    score = _scores(simulation, database)["partial_sync"]
+    assert (score.doubted, score.missing, score.wrong) == (0, 0, 0)
+    assert 10 < score.decided < score.happened / 2
 
 
 def test_an_indirect_link_stored_twice_is_repeated(caches, tmp_path):

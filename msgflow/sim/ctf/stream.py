@@ -298,8 +298,7 @@ class StreamWriter:
         if kept is None:
             self._withdraw(self._entries, "packets" if ending is None else "truncation")
         elif ending is not None and ending.is_last_packet_cut:
-            # A packet that is not whole cannot be relied on, even what there is of it.
-            self._withdraw(self._entries, "truncation")
+            self._withdraw(self._entries[kept:], "truncation")
             self._file.write(header)
             self._file.writelines(self._records[:kept])
             self._file.writelines(record[:-1] for record in self._records[kept : kept + 1])
