@@ -456,8 +456,7 @@ class Database:
         from msgflow.view.flow_page import write_flow_page
 
         connection = self.connection
-        return interruptible(
-            connection,
+        return self._ask(
             lambda: write_flow_page(
                 connection,
                 Path(path),
@@ -669,8 +668,7 @@ class Database:
 
         connection = self.connection
         part = Slice(run, start, end)
-        return interruptible(
-            connection,
+        return self._ask(
             lambda: write_report(
                 connection,
                 Path(path),
@@ -735,6 +733,24 @@ class Database:
         connection = self.connection
         return self._ask(
             lambda: read_findings(connection, [one.run_id for one in Slice(run).runs(connection)])
+        )
+
+    def clock_verdicts(
+        self, *, run: str | int | None = None, only_several: bool = False
+    ) -> list[str]:
+        """Return a sentence per run: whether the times of its hosts can be compared.
+
+        Args:
+            run: 'all', a name or an id; the latest run when None.
+            only_several: leave out runs with one clock, where nothing can be wrong.
+        """
+        from msgflow.query.clock_notes import clock_verdicts
+
+        connection = self.connection
+        return self._ask(
+            lambda: clock_verdicts(
+                connection, Slice(run).runs(connection), only_several=only_several
+            )
         )
 
     def export_parquet(

@@ -46,13 +46,12 @@ def command(
     knowing, but not wrong, is in the query info-findings.
     """
     from msgflow.database import Database
-    from msgflow.query.clock_notes import clock_verdicts
     from msgflow.run.choice import choose_runs
 
     with Database(database, memory_limit=memory_limit) as opened:
         findings = opened.findings(run=run)
         runs = choose_runs(opened.runs(), run)
-        verdicts = clock_verdicts(opened.connection, runs, only_several=True)
+        verdicts = opened.clock_verdicts(run=run, only_several=True)
     labels = {one.run_id: one.title for one in runs} if len(runs) > 1 else {}
     report(findings, form, output, run_labels=labels, notes=verdicts, of="recording")
 

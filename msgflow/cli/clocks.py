@@ -69,11 +69,10 @@ def show(
     """List the clocks and their corrections (the query clocks), and say whether times compare."""
     from msgflow.cli.output import print_result, print_status
     from msgflow.database import Database
-    from msgflow.query.clock_notes import clock_verdicts
 
     with Database(database) as opened:
         result = opened.query("clocks", run=run)
-        verdicts = clock_verdicts(opened.connection, result.runs)
+        verdicts = opened.clock_verdicts(run=run)
     print_result(result, form, output, wide=wide)
     for verdict in verdicts:
         print_status(verdict)

@@ -16,6 +16,7 @@ import msgflow
 from msgflow.db import migration
 from msgflow.db.sandbox import open_file
 from msgflow.errors import DatabaseError, ExitCode
+from msgflow.export.flow import Flow
 from msgflow.ingest import ingest
 from msgflow.sql.failure import in_words
 
@@ -121,6 +122,30 @@ def test_damage_is_said_by_all_that_meet_it(ingested: Path, tmp_path: Path) -> N
             continue
         messages[-1] = "said"
     assert messages.count("said") >= 4
+
+
+@pytest.mark.parametrize(
+    ("place", "ask"),
+    [
+        ("query.clock_notes.clock_verdicts", lambda database, _: database.clock_verdicts()),
+        ("view.report.write_report", lambda database, _: database.report("x.html")),
+        ("view.flow_page.write_flow_page", lambda database, flow: database.flow_page(flow, "x")),
+    ],
+)
+def test_damage_is_said_wherever_it_is_met(
+    ingested: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    place: str,
+    ask: Callable[[msgflow.Database, Flow], object],
+) -> None:
+    def meet(*_: object, **__: object) -> None:
+        raise duckdb.Error("Corrupt database file: computed checksum 1")
+
+    monkeypatch.setattr(f"msgflow.{place}", meet)
+    with msgflow.open_db(ingested) as database:
+        flow = database.flow(publication_id=1)
+        with pytest.raises(DatabaseError, match="the database is damaged"):
+            ask(database, flow)
 
 
 @pytest.mark.parametrize(
