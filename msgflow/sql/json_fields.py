@@ -42,7 +42,7 @@ def label_of(expression: str, field: pa.Field) -> str | None:
 
     Args:
         expression: SQL of the value.
-        field: that it is of; None is returned where it is no enumeration.
+        field: the field of that value. If it is no enumeration, the result is None.
     """
     choices = " ".join(
         f"WHEN {expression} BETWEEN {first} AND {last} THEN {literal(label)}"

@@ -125,7 +125,9 @@ def test_what_is_ignored_is_not_loaded(make_trace: Make, new_database: Path) -> 
     assert findings(report, "user_event_not_loaded") == []
 
 
-def test_a_pattern_of_which_all_is_ignored_is_told(make_trace: Make, new_database: Path) -> None:
+def test_the_ingest_names_a_pattern_whose_events_are_ignored(
+    make_trace: Make, new_database: Path
+) -> None:
     report = ingest(
         [make_trace(FIELDS, EVENTS)], new_database, events=["my_pkg:*"], ignore=["my_pkg:*"]
     )

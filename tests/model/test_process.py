@@ -195,6 +195,53 @@ def test_initialising_again_is_no_new_life_while_an_old_object_goes_on(
     assert model.column("SELECT topic_name FROM publisher") == ["/a"]
 
 
+def lose(system: RosSystem, trace: int, *gaps: tuple[int, int]) -> None:
+    """Declare the gaps of a trace, all on a CPU without events."""
+    begin = 0
+    for last_event, end in gaps:
+        system.add_packet(begin, end, last_event=last_event, discarded=5, cpu=1, trace=trace)
+        begin = end
+    system.add_packet(begin, system.now, cpu=1, trace=trace)
+
+
+@pytest.mark.parametrize(
+    ("lost", "lives"), [("before", 1), ("init", 2), ("use", 1), ("elsewhere", 1)]
+)
+def test_an_old_object_used_behind_a_gap_may_have_been_made_again(
+    system: RosSystem, analyse: Analyse, lost: str, lives: int
+) -> None:
+    system.context(MAIN)
+    system.publisher(MAIN, 0x10, "/a")
+    system.wait(100)
+    again = system.context(MAIN)
+    used = system.publish(MAIN, 0x10, 2) + 10
+    system.wait(100)
+    end = system.publish(MAIN, 0x10, 3)
+    system.add_source(1, "beta", "boot-b")
+    gaps = {"before": (again - 50, again), "init": (again, again + 1), "use": (used, used + 50)}
+    lose(system, 0, gaps.get(lost, (end, end + 1)), (end + 1, end + 5))
+    lose(system, 1, (again - 1, again + 1))
+    model = analyse(system)
+    assert len(model.rows(LIVES)) == lives
+    assert set(
+        model.column("SELECT topic_name FROM publication JOIN publisher USING (publisher_id)")
+    ) == {"/a" if lives == 1 else None}
+
+
+@pytest.mark.parametrize(("lost", "lives"), [("before", 2), ("behind", 1)])
+def test_a_callback_that_ends_behind_a_gap_may_have_begun_again(
+    system: RosSystem, analyse: Analyse, lost: str, lives: int
+) -> None:
+    worker = Thread(100, 101, "worker")
+    system.context(MAIN)
+    system.start(worker, 0xC1)
+    again = system.context(MAIN)
+    ended = system.end(worker, 0xC1)
+    system.publish(MAIN, 0x10, 1)
+    lose(system, 0, (again, again + 1) if lost == "before" else (ended, ended + 1))
+    assert len(analyse(system).rows(LIVES)) == lives
+
+
 def test_a_pid_used_again_by_another_program(system: RosSystem, analyse: Analyse) -> None:
     """Or under another main thread, as in a container."""
     for name, tid, context in (("talker", 100, 1), ("listener", 100, 2), ("listener", 101, 3)):

@@ -124,7 +124,7 @@ def test_publications_of_one_moment_are_one(rules: duckdb.DuckDBPyConnection) ->
 
 
 def test_a_publication_counts_once_at_a_difference(rules: duckdb.DuckDBPyConnection) -> None:
-    """For the first of the messages that might be its own; one of another publisher is none."""
+    """Only the first message that it may have sent counts; another publisher has its own."""
     for publisher, topic in ((1, "/a"), (2, "/b")):
         rules.execute(
             "INSERT INTO published (topic_name, publisher_id, publication_id, written_ns, "

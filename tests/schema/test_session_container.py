@@ -1,4 +1,4 @@
-"""Which sessions of a host are of which container, as pairs of them say."""
+"""The container of each session, computed from compared pairs of sessions."""
 
 from __future__ import annotations
 

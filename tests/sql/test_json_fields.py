@@ -32,7 +32,7 @@ def labelled(labels: Labels, values: list[int], data_type: pa.DataType) -> list[
         # The inner one does not end the outer one.
         ({"a": [(0, 4)], "b": [(2, 2)]}, ["a", "a", None, "a", "a"]),
         ({"a": [(0, 2)], "b": [(2, 4)]}, ["a", "a", None, "b", "b"]),
-        # Of two labels of all values there is none; one that is there twice is one.
+        # Two labels for every value give no label. The same label twice gives that label.
         ({"a": [(0, 4)], "b": [(0, 4)]}, [None] * 5),
         ({"a": [(0, 2), (1, 3)]}, ["a", "a", "a", "a", None]),
         # From its end to its begin there is nothing.

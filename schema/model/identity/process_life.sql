@@ -3,7 +3,7 @@
 --     before, unless an object of the old life is used or a callback goes on after it; and at one
 --     from another main thread or process name, unless another thread of the pid goes on. (Threads
 --     that seem to go on prove nothing in the first case: containers number them alike in every
---     life.)
+--     life.) What is used behind a gap proves nothing: its object may have been made again in it.
 -- grain: one row per host, PID namespace, pid and life
 WITH initialisation AS (
     SELECT
@@ -13,6 +13,7 @@ WITH initialisation AS (
         p.vtid,
         i.event_id,
         i.ts_ns,
+        i.trace_index,
         lag(p.vtid) OVER process IS DISTINCT FROM p.vtid
         OR lag(p.procname) OVER process IS DISTINCT FROM p.procname AS is_other_main,
         row_number() OVER context > 1 AS is_same_context,
@@ -27,9 +28,15 @@ WITH initialisation AS (
         )
 ),
 candidate AS (
-    SELECT host_id, pid_ns, vpid, vtid, event_id, is_other_main, is_same_context
-    FROM initialisation
-    WHERE is_repeated AND (is_other_main OR is_same_context)
+    SELECT
+        i.host_id, i.pid_ns, i.vpid, i.vtid, i.event_id, i.is_other_main, i.is_same_context,
+        coalesce(min(g.start_ns), 9223372036854775807) AS gap_ns
+    FROM initialisation AS i
+    JOIN staging.recording AS r ON i.trace_index = r.trace_index
+    LEFT JOIN staging.recording_gap AS g
+        ON r.recording_index = g.recording_index AND i.ts_ns < g.covered_until_ns
+    WHERE i.is_repeated AND (i.is_other_main OR i.is_same_context)
+    GROUP BY ALL
 ),
 made AS (
     SELECT thread_index, event_id, publisher_handle AS handle
@@ -39,10 +46,10 @@ made AS (
     FROM raw.ros2_rclcpp_callback_register
 ),
 used AS (
-    SELECT thread_index, event_id, publisher_handle AS handle
+    SELECT thread_index, event_id, ts_ns, publisher_handle AS handle
     FROM raw.ros2_rcl_publish
     UNION ALL
-    SELECT thread_index, event_id, callback
+    SELECT thread_index, event_id, ts_ns, callback
     FROM raw.ros2_callback_start
 ),
 -- An object made before and used afterwards, without being made again, or a callback of
@@ -52,7 +59,8 @@ surviving AS (
     FROM candidate AS c
     JOIN staging.thread_seen AS s
         ON c.host_id = s.host_id AND c.pid_ns IS NOT DISTINCT FROM s.pid_ns AND c.vpid = s.vpid
-    JOIN used AS u ON s.thread_index = u.thread_index AND u.event_id > c.event_id
+    JOIN used AS u
+        ON s.thread_index = u.thread_index AND u.event_id > c.event_id AND u.ts_ns <= c.gap_ns
     ASOF JOIN (
         SELECT t.host_id, t.pid_ns, t.vpid, m.handle, m.event_id
         FROM made AS m
@@ -75,6 +83,7 @@ surviving AS (
     JOIN raw.ros2_callback_end AS e
         ON s.thread_index = e.thread_index
         AND e.event_id > c.event_id
+        AND e.ts_ns <= c.gap_ns
         AND e.previous_callback_event_id < c.event_id
     JOIN raw.ros2_callback_start AS b
         ON e.previous_callback_event_id = b.event_id AND e.callback = b.callback
