@@ -21,22 +21,20 @@ from typing import TYPE_CHECKING, Any
 import anyio
 import anyio.to_thread
 import duckdb
-import h11
 import uvicorn
 from starlette.applications import Starlette
 from starlette.responses import JSONResponse, PlainTextResponse, RedirectResponse, Response
 from starlette.routing import Route
-from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from msgflow.db.connection import connect
 from msgflow.db.memory import default_limit
 from msgflow.errors import DatabaseError, MsgflowError, QueryError, UsageError
 from msgflow.sql.failure import first_line
 from msgflow.view import assets
+from msgflow.view.connection import Connection, timed
 from msgflow.view.pages import Pages
 
 if TYPE_CHECKING:
-    import asyncio
     from collections.abc import Callable, Iterator
     from pathlib import Path
 
@@ -47,8 +45,6 @@ HOST = "127.0.0.1"
 DEFAULT_PORT = 8642
 # Questions that are answered at the same time; the others wait.
 MOST_AT_ONCE = 4
-# A browser that opens a connection ahead of its need opens another one later.
-SECONDS_FOR_A_REQUEST = 10.0
 _SECONDS_BETWEEN_LOOKS = 0.1
 _LOCAL_NAMES = ("localhost",)
 _POLICY = (
@@ -322,7 +318,7 @@ def serve_single(
     with listening(port, lambda token: single_application(make, token)) as (
         server, listener, address,
     ):  # fmt: skip
-        server.started_with = lambda: started(address)
+        started(address)
         server.run(sockets=[listener])
 
 
@@ -508,14 +504,14 @@ def serve(
         UsageError: the port is in use.
     """
     with running(path, port=port, memory_limit=memory_limit) as (server, listener, address):
-        server.started_with = lambda: started(address)
+        started(address)
         server.run(sockets=[listener])
 
 
 @contextmanager
 def running(
     path: Path, *, port: int | None, memory_limit: str | None
-) -> Iterator[tuple[_Server, socket.socket, str]]:
+) -> Iterator[tuple[uvicorn.Server, socket.socket, str]]:
     """Prepare a server; see `serve`."""
     shared = Shared(path, memory_limit)
     try:
@@ -528,55 +524,14 @@ def running(
 @contextmanager
 def listening(
     port: int | None, make: Callable[[str], ASGIApp]
-) -> Iterator[tuple[_Server, socket.socket, str]]:
+) -> Iterator[tuple[uvicorn.Server, socket.socket, str]]:
     """Prepare a server of the application that `make` returns for a token."""
     listener = listen(port)
     token = secrets.token_urlsafe(24)
     address = f"http://{HOST}:{listener.getsockname()[1]}/?token={token}"
     config = uvicorn.Config(
-        make(token), log_level="error", access_log=False, lifespan="off",
-        timeout_graceful_shutdown=1, ws="none", server_header=False, http=_Connection,
+        timed(make(token)), log_level="error", access_log=False, lifespan="off", ws="none",
+        timeout_graceful_shutdown=1, server_header=False, proxy_headers=False, http=Connection,
     )  # fmt: skip
     with listener:
-        yield _Server(config), listener, address
-
-
-class _Connection(H11Protocol):
-    """A connection that is closed if a request takes too long to arrive."""
-
-    _timer: asyncio.TimerHandle | None = None
-
-    def connection_made(self, transport: Any) -> None:
-        super().connection_made(transport)
-        self._watch()
-
-    def data_received(self, data: bytes) -> None:
-        super().data_received(data)
-        self._watch()
-
-    def connection_lost(self, exc: Exception | None) -> None:
-        super().connection_lost(exc)
-        self._stop()
-
-    def _watch(self) -> None:
-        # uvicorn itself closes a connection that stays silent after an answer.
-        if self.conn.their_state is not h11.IDLE:
-            self._stop()
-        elif self._timer is None:
-            self._timer = self.loop.call_later(SECONDS_FOR_A_REQUEST, self.transport.close)
-
-    def _stop(self) -> None:
-        if self._timer is not None:
-            self._timer.cancel()
-            self._timer = None
-
-
-class _Server(uvicorn.Server):
-    """A server that says when it can be reached."""
-
-    started_with: Callable[[], None] | None = None
-
-    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        await super().startup(sockets)
-        if self.started and self.started_with is not None:
-            self.started_with()
+        yield uvicorn.Server(config), listener, address

@@ -23,13 +23,10 @@ class Served:
     def __init__(self, path: Path) -> None:
         self._running = running(path, port=0, memory_limit=None)
         self.server, listener, self.address = self._running.__enter__()
-        self._ready = threading.Event()
-        self.server.started_with = self._ready.set
         self._thread = threading.Thread(
             target=lambda: self.server.run(sockets=[listener]), daemon=True
         )
         self._thread.start()
-        assert self._ready.wait(20)
         self.port = urlsplit(self.address).port
         self.token = self.address.partition("token=")[2]
 

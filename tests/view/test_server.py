@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import http.client
 import json
 import os
@@ -24,6 +25,8 @@ from tables import decoded
 
 from msgflow.errors import DatabaseError, QueryError, UsageError
 from msgflow.ingest import ingest
+from msgflow.view import pages
+from msgflow.view.connection import timed
 from msgflow.view.pages import Pages
 from msgflow.view.server import Ahead, Turns, is_local, listen, serve
 
@@ -74,7 +77,7 @@ def test_strangers_get_nothing(demo: Path, serve: Serve) -> None:
 def test_a_request_that_does_not_arrive_ends(
     demo: Path, serve: Serve, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("msgflow.view.server.SECONDS_FOR_A_REQUEST", 0.5)
+    monkeypatch.setattr("msgflow.view.connection.SECONDS_FOR_A_REQUEST", 0.5)
     server = serve(demo)
     for sent in (b"", b"GET / HTTP/1.1\r\nHost: x\r\n"):
         with socket.create_connection(("127.0.0.1", server.port), timeout=20) as silent:
@@ -88,6 +91,35 @@ def test_a_request_that_does_not_arrive_ends(
     kept.sock.sendall(b"GET")
     assert kept.sock.recv(1) == b""
     kept.close()
+    # The body of a refused request arrives in pieces.
+    with socket.create_connection(("127.0.0.1", server.port), timeout=20) as slow:
+        slow.sendall(b"POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9\r\n\r\n")
+        assert slow.recv(1)
+        slow.sendall(b"x")
+        while slow.recv(4096):
+            pass
+
+
+def test_an_answer_may_take_longer_than_a_request(
+    demo: Path, serve: Serve, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("msgflow.view.connection.SECONDS_FOR_A_REQUEST", 0.5)
+
+    def slow(*_: Any) -> bytes:
+        time.sleep(1.5)
+        return b"answer"
+
+    monkeypatch.setitem(pages.ANSWERS, "links", slow)
+    # The connection is still known if the request names another client.
+    assert serve(demo).get("/api/links", X_Forwarded_For="1.2.3.4")[2] == b"answer"
+
+
+def test_no_question_is_asked_for_a_connection_that_is_closed() -> None:
+    async def never(*_: Any) -> None:
+        raise AssertionError
+
+    scope = {"type": "http", "client": ("127.0.0.1", 1), "server": ("127.0.0.1", 2)}
+    asyncio.run(timed(never)(scope, never, never))  # type: ignore[arg-type]
 
 
 def test_every_answer_is_strict(demo: Path, serve: Serve) -> None:
@@ -235,8 +267,6 @@ def test_what_nobody_waits_for_ends(
         finally:
             ended.append(time.monotonic() - begin)
         return b""
-
-    from msgflow.view import pages
 
     monkeypatch.setitem(pages.ANSWERS, "flow", long)
     with socket.create_connection(("127.0.0.1", server.port)) as reader:

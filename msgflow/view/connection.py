@@ -1,0 +1,89 @@
+"""Connections to the server of `msgflow ui`: one whose request does not arrive is closed.
+
+uvicorn has no limit for the time in which a request arrives. It takes a protocol of asyncio in
+place of its own: ours passes everything on, and closes the connection if its time is over. The
+application tells it when a request has arrived, and when it is answered.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from uvicorn.protocols.http.h11_impl import H11Protocol
+
+if TYPE_CHECKING:
+    from starlette.types import ASGIApp, Receive, Scope, Send
+
+# A browser that opens a connection ahead of its need opens another one later.
+SECONDS_FOR_A_REQUEST = 10.0
+
+
+class Connection(asyncio.Protocol):
+    """A connection of uvicorn that is closed if a request takes too long to arrive."""
+
+    # By the addresses of both ends, which the application knows as well.
+    _open: ClassVar[dict[tuple[Any, Any], Connection]] = {}
+
+    def __init__(self, *given: Any, **named: Any) -> None:
+        self._http = H11Protocol(*given, **named)
+
+    @classmethod
+    def of(cls, scope: Scope) -> Connection | None:
+        """Return the connection that a request came by; None if it is closed already."""
+        return cls._open.get((scope["client"], scope["server"]))
+
+    def connection_made(self, transport: Any) -> None:
+        """Wait for the first request."""
+        self._transport = transport
+        self._ends = tuple(map(transport.get_extra_info, ("peername", "sockname")))
+        self._open[self._ends] = self
+        self.wait()
+        self._http.connection_made(transport)
+
+    def wait(self) -> None:
+        """Wait for a request, and no longer than it may take."""
+        loop = asyncio.get_running_loop()
+        self._timer = loop.call_later(SECONDS_FOR_A_REQUEST, self._transport.close)
+
+    def stop(self) -> None:
+        """Wait no more: the request has arrived."""
+        self._timer.cancel()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Forget the connection."""
+        self.stop()
+        del self._open[self._ends]
+        self._http.connection_lost(exc)
+
+    def data_received(self, data: bytes) -> None:
+        """Pass on what the client sends."""
+        self._http.data_received(data)
+
+    def eof_received(self) -> None:
+        """Pass on that the client sends no more; the transport then closes itself."""
+        self._http.eof_received()
+
+    def pause_writing(self) -> None:
+        """Pass on that the client reads too slowly."""
+        self._http.pause_writing()
+
+    def resume_writing(self) -> None:
+        """Pass on that the client has read."""
+        self._http.resume_writing()
+
+
+def timed(app: ASGIApp) -> ASGIApp:
+    """Return the application; it tells a connection when a request has arrived and is answered."""
+
+    async def tell(scope: Scope, receive: Receive, send: Send) -> None:
+        connection = Connection.of(scope)
+        if connection is None:
+            return
+        connection.stop()
+        try:
+            await app(scope, receive, send)
+        finally:
+            connection.wait()
+
+    return tell
