@@ -5,9 +5,10 @@ such a function returns. The system's bounds hold always: an allocation beyond t
 (`msgflow.db.memory.bound_process`), and a child that is late is killed. The connection in the child
 is in the sandbox of `msgflow.db.sandbox` as any other.
 
-The child is `python -P -m msgflow.confined MODULE`. It reads a request per line from stdin, calls
-a function of the module, and writes the answer: parts, each with its size in front; a size of 0; a
-part of JSON that says what went wrong, or null. It ends when its parent has ended.
+The child is `python -P -m msgflow.confined MODULE`. It reads a request per line from stdin, writes
+an empty answer (it has begun), calls a function of the module, and writes its answer: parts, each
+with its size in front; a size of 0; a part of JSON that says what went wrong, or null. It ends when
+its parent has ended.
 """
 
 from __future__ import annotations
@@ -82,31 +83,34 @@ class ConfinedProcess:
             QueryError: the child has ended.
             RuntimeError: the function raised another error.
         """
+        request = json.dumps({"function": function, "arguments": arguments}, default=str)
         if self._child.poll() is not None:
-            self.close()
-            self._child = self._start()
+            self._restart()
         try:
-            self._answer(None, _CANNOT_START)  # the child is ready
-            request = json.dumps({"function": function, "arguments": arguments}, default=str)
-            assert self._child.stdin is not None
-            with suppress(BrokenPipeError):  # the answer says that the child has ended
-                self._child.stdin.write(f"{request}\n".encode())
+            try:
+                self._begin(request)
+            except QueryError:  # it was killed before it began: nothing has run
+                self._restart()
+                self._begin(request)
             return self._answer(self._seconds, _ENDED)
         except LateError:
             # The next call finds the imports done.
-            self.close()
-            self._child = self._start()
+            self._restart()
             raise
         except MsgflowError:
             raise
         except BaseException:
             # What the child still writes belongs to no later call.
-            self._child.kill()
+            self.close()
             raise
 
     def close(self) -> None:
         """End the child."""
         _end(self._child)
+
+    def _restart(self) -> None:
+        self.close()
+        self._child = self._start()
 
     def _start(self) -> subprocess.Popen[bytes]:
         child = subprocess.Popen(
@@ -123,6 +127,13 @@ class ConfinedProcess:
         )
         weakref.finalize(self, _end, child)
         return child
+
+    def _begin(self, request: str) -> None:
+        """Send a request, and wait until the child has begun with it."""
+        assert self._child.stdin is not None
+        with suppress(BrokenPipeError):  # the answer says that the child has ended
+            self._child.stdin.write(f"{request}\n".encode())
+        self._answer(None, _CANNOT_START)
 
     def _answer(self, seconds: float | None, on_end: tuple[str, str]) -> bytearray:
         end = None if seconds is None else time.monotonic() + seconds
@@ -173,8 +184,8 @@ def main() -> None:
     threading.Thread(target=_read_requests, args=[requests], daemon=True).start()
     module = importlib.import_module(sys.argv[1])
     while True:
-        _end_answer(answers, None)
         request = json.loads(requests.get())
+        _end_answer(answers, None)
         try:
             function = getattr(module, request["function"])
             function(functools.partial(_write, answers), **request["arguments"])

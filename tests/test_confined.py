@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -68,6 +70,32 @@ def test_a_late_call_is_killed_and_the_next_one_works(small_database: Path) -> N
             process.call("answer", asked | {"given": [SLOW]})
         assert time.monotonic() - begin < 60
         assert b"one" in process.call("answer", asked | {"given": ["SELECT 1 AS one"]})
+
+
+def test_a_child_killed_before_it_begins_fails_no_call(small_database: Path) -> None:
+    asked = {"method": "sql", "path": str(small_database), "memory_limit": None, "named": {}}
+    before = set(children_of(os.getpid()))
+    with ConfinedProcess("msgflow.confined_query") as process, ThreadPoolExecutor(1) as pool:
+        process.call("answer", asked | {"given": ["SELECT 1 AS one"]})
+        (child,) = set(children_of(os.getpid())) - before
+        os.kill(child, signal.SIGSTOP)
+        answer = pool.submit(process.call, "answer", asked | {"given": ["SELECT 2 AS two"]})
+        time.sleep(0.5)  # the call waits
+        os.kill(child, signal.SIGKILL)
+        assert b"two" in answer.result(60)
+
+
+def test_a_call_that_begins_to_run_is_not_repeated(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "counting.py").write_text(
+        "import os\ndef end(write): open(os.environ['COUNT'], 'a').write('x'); os._exit(3)\n"
+    )
+    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}{os.pathsep}{os.environ.get('PYTHONPATH', '')}")
+    monkeypatch.setenv("COUNT", str(tmp_path / "count"))
+    with ConfinedProcess("counting") as process, pytest.raises(QueryError):
+        process.call("end", {})
+    assert (tmp_path / "count").read_text() == "x"
 
 
 def test_a_mistake_in_the_child_is_no_error_of_the_user() -> None:
