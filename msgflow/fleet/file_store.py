@@ -46,7 +46,9 @@ _HOPELESS = re.compile(
 )
 _OF_THIS_MACHINE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES)
 # A name of a user or a password before the host; a password may have any character.
-_USERINFO = re.compile(r"//([^/]*:.*|[^/@]*)@")
+_USERINFO = re.compile(r"(//)(?:[^/]*:.*|[^/@]*)@")
+# The same where `//` was forgotten: names of folders may have a colon as well.
+_USERINFO_ALONE = re.compile(r"^([a-z][\w+.-]*:)[^/:]*:.*@", re.I)
 
 
 @dataclass(frozen=True)
@@ -318,15 +320,16 @@ def normal_url(url: str | Path) -> str:
     """
     text = str(url)
     scheme, separator, rest = text.partition("://")
-    if not separator:
-        return os.path.abspath(text)
-    if scheme == "file":
-        return os.path.abspath(rest)
-    if _USERINFO.search(text):
+    is_local = not separator or scheme == "file"
+    userinfo = _USERINFO_ALONE if is_local else _USERINFO
+    if userinfo.search(text):
+        shown = userinfo.sub(r"\1…@", text)
         raise UsageError(
-            f"no credentials in an address — {_USERINFO.sub('//…@', text)}",
+            f"no credentials in an address — {shown}",
             "give them in the environment: AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY",
         )
+    if is_local:
+        return os.path.abspath(rest if separator else text)
     if scheme != "s3":
         raise UsageError(
             f"neither a folder nor a bucket — {text}", "give a path, or s3://BUCKET/PREFIX"

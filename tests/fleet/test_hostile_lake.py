@@ -225,12 +225,23 @@ def test_a_database_that_is_larger_than_it_may_be_is_not_unpacked(
 
 
 @pytest.mark.parametrize(
-    "url", ["s3://key:sec/ret@bucket/lake", "s3://key:se@cret@bucket/x", "http://u:secret@h/x"]
+    "url",
+    [
+        "s3://key:sec/ret@bucket/lake",
+        "s3://key:se@cret@bucket/x",
+        "http://u:secret@h/x",
+        "postgres:u:secret@h/x",
+    ],
 )
 def test_passwords_in_addresses_are_not_printed(url: str) -> None:
     with pytest.raises(UsageError, match="no credentials") as raised:
         Store(url)
     assert not re.search("ret(?!s)|cret|sec", raised.value.message)
+
+
+@pytest.mark.parametrize("name", ["./a:b:c@d", "2025-03-01T10:00:00@robot", "a:b@c", "/a//b@c"])
+def test_a_folder_may_have_a_name_like_an_address(name: str) -> None:
+    assert Store(name).url == os.path.abspath(name)
 
 
 @pytest.mark.parametrize("url", ["ftp://u:pa/ss@host", "u:pa/ss@host:9", "http://u:pa%2fss@h"])
