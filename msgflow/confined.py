@@ -37,7 +37,7 @@ _SIZE = 8
 _ORPHAN = 1
 _CANNOT_START = (
     "the process that runs queries cannot start",
-    "is msgflow installed where this Python finds it? pip show ros2-msgflow",
+    "is there memory for it (ulimit -v)? does this Python find msgflow (pip show ros2-msgflow)?",
 )
 _ENDED = (
     "the process that ran the query has ended",

@@ -13,6 +13,8 @@ from msgflow.errors import ExitCode, MsgflowError
 from msgflow.version import __version__
 
 _CANNOT_WRITE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)
+# What Python says of it, in a RuntimeError.
+_NO_THREAD = "can't start new thread"
 # Phrases of Typer and Pydantic, and ours for them.
 _PHRASES = (
     ("Value error, ", ""),
@@ -32,6 +34,12 @@ def print_exception(error: Exception) -> ExitCode:
         return ExitCode(error.exit_code)
     if isinstance(error, OSError) and _is_of_stdout(error):
         return _unwritable(error)
+    if isinstance(error, MemoryError) or str(error) == _NO_THREAD:
+        print_error(
+            "the system gives this process no more memory or threads",
+            "raise its limits (ulimit -v, ulimit -u, those of its container), or read less",
+        )
+        return ExitCode.FAILED
     return _unexpected(error)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+import pyarrow as pa
 import pytest
 from typer.testing import Result
 
@@ -30,6 +31,19 @@ def test_the_unexpected_is_one_line(msgflow: Msgflow, monkeypatch: pytest.Monkey
     assert error == "error: unexpected ValueError: first"
     assert "MSGFLOW_DEBUG=1" in hint
     assert "Traceback" not in result.stderr
+
+
+@pytest.mark.parametrize(
+    "error", [MemoryError(), pa.ArrowMemoryError("x"), RuntimeError("can't start new thread")]
+)
+def test_a_process_that_may_not_have_more_says_so(
+    msgflow: Msgflow, monkeypatch: pytest.MonkeyPatch, error: Exception
+) -> None:
+    break_with(monkeypatch, error)
+    result = msgflow("check")
+    assert result.exit_code == ExitCode.FAILED
+    assert "error: the system gives this process no more memory or threads" in result.stderr
+    assert "ulimit" in result.stderr
 
 
 def test_the_unexpected_can_be_traced(msgflow: Msgflow, monkeypatch: pytest.MonkeyPatch) -> None:
