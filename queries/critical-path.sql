@@ -101,9 +101,7 @@ WITH piece AS (
         c.hop,
         c.part,
         c.activity,
-        coalesce(
-            l.node, n.full_name, printf('[%s %d]', coalesce(r.name, '?'), r.pid)
-        ) AS node,
+        coalesce(l.node, main.node_label(n.full_name, r.name, r.pid)) AS node,
         CASE
             WHEN c.activity IN (
                 'callback', 'cache', 'take_to_callback', 'service', 'executor_busy', 'blocked',

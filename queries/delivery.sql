@@ -70,7 +70,7 @@ orphan AS (
 SELECT
     s.run_id,
     s.topic_name,
-    coalesce(n.full_name, printf('[%s %d]', coalesce(p.name, '?'), p.pid)) AS subscriber,
+    main.node_label(n.full_name, p.name, p.pid) AS subscriber,
     coalesce(d.published, 0) AS published,
     coalesce(d.delivered, 0) AS delivered,
     coalesce(d.skipped, 0) AS skipped,

@@ -85,7 +85,7 @@ edge AS (
     SELECT
         e.run_id,
         e.kind,
-        coalesce(n.full_name, printf('[%s %d]', coalesce(p.name, '?'), p.pid)) AS node,
+        main.node_label(n.full_name, p.name, p.pid) AS node,
         coalesce(e.name, '?') AS name,
         bool_and(coalesce(e.is_internal, false)) AS is_internal,
         string_agg(DISTINCT e.kinds, ', ' ORDER BY e.kinds) AS indirect,

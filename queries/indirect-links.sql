@@ -71,7 +71,7 @@ SELECT
     a.run_id,
     a.kind,
     a.source,
-    coalesce(n.full_name, printf('[%s %d]', coalesce(p.name, '?'), p.pid)) AS node,
+    main.node_label(n.full_name, p.name, p.pid) AS node,
     i.topics AS inputs,
     o.topics AS outputs,
     coalesce(f.publications, 0) AS publications,

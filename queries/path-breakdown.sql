@@ -132,9 +132,7 @@ SELECT
     m.path_id,
     m.hop,
     m.part,
-    coalesce(
-        l.node, n.full_name, printf('[%s %d]', coalesce(r.name, '?'), r.pid)
-    ) AS node,
+    coalesce(l.node, main.node_label(n.full_name, r.name, r.pid)) AS node,
     coalesce(l.label, h.topic_name) AS what,
     m.flows,
     m.overlaps,

@@ -47,7 +47,7 @@ measured AS (
 SELECT
     m.run_id,
     b.topic_name,
-    coalesce(n.full_name, printf('[%s %d]', coalesce(p.name, '?'), p.pid)) AS publisher,
+    main.node_label(n.full_name, p.name, p.pid) AS publisher,
     m.count,
     m.rate_hz,
     m.period_min_ns,

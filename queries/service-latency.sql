@@ -103,12 +103,8 @@ measured AS (
 SELECT
     m.run_id,
     coalesce(s.service_name, c.service_name) AS service_name,
-    CASE WHEN s.service_id IS NOT NULL
-        THEN coalesce(sn.full_name, printf('[%s %d]', coalesce(sp.name, '?'), sp.pid))
-    END AS server,
-    CASE WHEN c.client_id IS NOT NULL
-        THEN coalesce(cn.full_name, printf('[%s %d]', coalesce(cp.name, '?'), cp.pid))
-    END AS client,
+    main.node_label(sn.full_name, sp.name, sp.pid) AS server,
+    main.node_label(cn.full_name, cp.name, cp.pid) AS client,
     m.requests,
     m.answered,
     m.not_taken,

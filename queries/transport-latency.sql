@@ -66,7 +66,7 @@ measured AS (
 SELECT
     m.run_id,
     s.topic_name,
-    coalesce(n.full_name, printf('[%s %d]', coalesce(p.name, '?'), p.pid)) AS subscriber,
+    main.node_label(n.full_name, p.name, p.pid) AS subscriber,
     m.takes,
     m.linked,
     m.ambiguous,

@@ -40,20 +40,14 @@ WITH missing AS (
         t.process_id
     FROM main.stat_orphan AS o
     JOIN main.take AS t ON o.take_id = t.take_id
-),
-process_node AS (
-    SELECT
-        p.process_id,
-        printf('[%s %d]', coalesce(p.name, '?'), p.pid) AS label
-    FROM main.process AS p
 )
 SELECT
     m.run_id,
     m.at_ns,
     m.side,
     coalesce(s.topic_name, b.topic_name) AS topic_name,
-    CASE WHEN b.publisher_id IS NOT NULL THEN coalesce(bn.full_name, bp.label) END AS publisher,
-    coalesce(sn.full_name, sp.label) AS subscriber,
+    main.node_label(bn.full_name, bp.name, bp.pid) AS publisher,
+    main.node_label(sn.full_name, sp.name, sp.pid) AS subscriber,
     m.status,
     m.reason,
     m.source_timestamp_ns,
@@ -64,10 +58,10 @@ SELECT
 FROM missing AS m
 LEFT JOIN main.subscription AS s ON m.subscription_id = s.subscription_id
 LEFT JOIN main.node AS sn ON s.node_id = sn.node_id
-LEFT JOIN process_node AS sp ON m.process_id = sp.process_id
+LEFT JOIN main.process AS sp ON m.process_id = sp.process_id
 LEFT JOIN main.publisher AS b ON m.publisher_id = b.publisher_id
 LEFT JOIN main.node AS bn ON b.node_id = bn.node_id
-LEFT JOIN process_node AS bp ON b.process_id = bp.process_id
+LEFT JOIN main.process AS bp ON b.process_id = bp.process_id
 WHERE list_contains($runs, m.run_id)
     AND m.at_ns >= $start_ns
     AND m.at_ns < $end_ns

@@ -28,7 +28,7 @@ SELECT full_name AS name FROM main.node WHERE list_contains($runs, run_id)
 UNION
 SELECT node FROM main.callback_label WHERE list_contains($runs, run_id)
 UNION
-SELECT printf('[%s %d]', coalesce(name, '?'), pid) FROM main.process
+SELECT main.node_label(NULL, name, pid) FROM main.process
 WHERE list_contains($runs, run_id)
 """
 _CALLBACKS = "SELECT label AS name FROM main.callback_label WHERE list_contains($runs, run_id)"

@@ -11,7 +11,7 @@
 SELECT
     c.callback_id,
     c.run_id,
-    derive.node_label(n.full_name, p.name, p.pid) AS node,
+    main.node_label(n.full_name, p.name, p.pid) AS node,
     CASE c.kind
         WHEN 'timer' THEN coalesce(
             printf('Timer(%.10g ms)', t.period_ns / 1e6),

@@ -109,7 +109,7 @@ WITH thing AS (
     UNION ALL
     SELECT
         t.run_id,
-        coalesce(s.topic_name, '?') || ' → ' || derive.node_label(n.full_name, p.name, p.pid)
+        coalesce(s.topic_name, '?') || ' → ' || main.node_label(n.full_name, p.name, p.pid)
             AS subject,
         coalesce(s.is_internal, false) AS is_internal,
         t.taken_ns AS at_ns,

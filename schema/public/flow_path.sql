@@ -50,7 +50,7 @@ called AS (
             '(%s) → %s',
             coalesce(s.service_name, '?'),
             CASE WHEN p.process_id IS NULL THEN '?'
-                ELSE derive.node_label(n.full_name, p.name, p.pid) END
+                ELSE main.node_label(n.full_name, p.name, p.pid) END
         ) AS label,
         s.node_id
     FROM (
@@ -67,7 +67,7 @@ route AS (
         c.route,
         any_value(
             CASE WHEN p.process_id IS NULL THEN '?'
-                ELSE derive.node_label(n.full_name, p.name, p.pid) END
+                ELSE main.node_label(n.full_name, p.name, p.pid) END
         ) AS caller,
         string_agg(c.label, ' → ' ORDER BY c.position) AS services,
         arg_max_null(c.node_id, c.position) AS last_node_id
@@ -89,13 +89,13 @@ step AS (
         concat_ws(
             ' → ',
             CASE WHEN c.depth = 1
-                THEN coalesce(r.caller, derive.node_label(pn.full_name, pp.name, pp.pid)) END,
+                THEN coalesce(r.caller, main.node_label(pn.full_name, pp.name, pp.pid)) END,
             r.services,
             -- Who called publishes with the response that came back.
             CASE WHEN r.services IS NOT NULL AND r.last_node_id IS DISTINCT FROM p.node_id
-                THEN derive.node_label(pn.full_name, pp.name, pp.pid) END,
+                THEN main.node_label(pn.full_name, pp.name, pp.pid) END,
             coalesce(p.topic_name, '?'),
-            derive.node_label(sn.full_name, sp.name, sp.pid)
+            main.node_label(sn.full_name, sp.name, sp.pid)
         ) AS label
     FROM chain AS c
     LEFT JOIN route AS r ON c.route = r.route

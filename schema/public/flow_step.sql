@@ -225,7 +225,7 @@ SELECT
     x.subscription_id,
     NULL,
     NULL,
-    derive.node_label(n.full_name, o.name, o.pid),
+    main.node_label(n.full_name, o.name, o.pid),
     coalesce(s.topic_name, '?'),
     s.topic_name,
     NULL,

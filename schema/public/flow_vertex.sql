@@ -26,7 +26,7 @@ CREATE OR REPLACE MACRO main.flow_vertex(vertices) AS TABLE
 SELECT
     v.key, v.kind, v.id, v.depth, b.run_id, b.start_ns, b.end_ns, b.thread_id,
     b.process_id,
-    derive.node_label(n.full_name, o.name, o.pid) AS node,
+    main.node_label(n.full_name, o.name, o.pid) AS node,
     coalesce(p.topic_name, '?') AS label,
     p.topic_name,
     NULL::VARCHAR AS symbol,
@@ -42,7 +42,7 @@ UNION ALL
 SELECT
     v.key, v.kind, v.id, v.depth, t.run_id, t.taken_ns, t.taken_ns, t.thread_id,
     t.process_id,
-    derive.node_label(n.full_name, o.name, o.pid),
+    main.node_label(n.full_name, o.name, o.pid),
     coalesce(s.topic_name, '?'),
     s.topic_name,
     NULL,
@@ -92,7 +92,7 @@ SELECT
     v.key, v.kind, v.id, v.depth, q.run_id, coalesce(q.sent_ns, q.taken_ns), q.taken_ns,
     q.thread_id, h.process_id,
     CASE WHEN c.client_id IS NULL THEN '?'
-        ELSE derive.node_label(n.full_name, o.name, o.pid) END,
+        ELSE main.node_label(n.full_name, o.name, o.pid) END,
     coalesce(c.service_name, s.service_name, '?'),
     NULL,
     NULL,

@@ -20,7 +20,7 @@ taken AS (
 endpoint AS (
     SELECT
         e.run_id, e.topic_name, e.is_internal,
-        derive.node_label(n.full_name, p.name, p.pid) AS publisher, NULL AS subscriber,
+        main.node_label(n.full_name, p.name, p.pid) AS publisher, NULL AS subscriber,
         coalesce(m.number, 0) AS publications, 0 AS takes
     FROM store.publisher AS e
     JOIN store.process AS p ON e.process_id = p.process_id
@@ -29,7 +29,7 @@ endpoint AS (
     UNION ALL
     SELECT
         e.run_id, e.topic_name, e.is_internal, NULL,
-        derive.node_label(n.full_name, p.name, p.pid), 0, coalesce(m.number, 0)
+        main.node_label(n.full_name, p.name, p.pid), 0, coalesce(m.number, 0)
     FROM store.subscription AS e
     JOIN store.process AS p ON e.process_id = p.process_id
     LEFT JOIN store.node AS n ON e.node_id = n.node_id

@@ -175,6 +175,8 @@ def with_topics(connection: duckdb.DuckDBPyConnection) -> duckdb.DuckDBPyConnect
         " SELECT 1 AS run_id, '[main 812]' AS node, 'Timer(10 ms)' AS label"
     )
     connection.execute("CREATE TABLE host AS SELECT 1 AS run_id, 'robot' AS hostname")
+    (label,) = (one for one in objects.load("public") if one.name == "main.node_label")
+    connection.execute(objects.create_statement(label))
     return connection
 
 

@@ -25,7 +25,7 @@ WITH pair AS (
 )
 SELECT
     a.run_id,
-    derive.node_label(n.full_name, o.name, o.pid) AS subject,
+    main.node_label(n.full_name, o.name, o.pid) AS subject,
     sum(a.link_count)::BIGINT AS count,
     string_agg(
         printf(

@@ -44,7 +44,7 @@ measured AS (
     SELECT
         t.run_id,
         'transport_latency',
-        coalesce(n.full_name, printf('[%s %d]', coalesce(p.name, '?'), p.pid)),
+        main.node_label(n.full_name, p.name, p.pid),
         s.topic_name,
         coalesce(s.is_internal, false),
         k.latency_ns

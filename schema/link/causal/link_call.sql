@@ -24,14 +24,9 @@ WITH taken AS (
 ),
 -- Threads that take calls, with all that shows what they turn to.
 executing AS MATERIALIZED (
-    SELECT thread_id, start_ns AS at_ns
-    FROM store.executor_state AS e
-    SEMI JOIN taken AS k ON e.thread_id = k.thread_id
-    WHERE run_id = only_run
-    UNION ALL
-    SELECT thread_id, unnest([start_ns, end_ns])
-    FROM store.callback_instance AS i
-    SEMI JOIN taken AS k ON i.thread_id = k.thread_id
+    SELECT thread_id, at_ns
+    FROM derive.thread_turn AS t
+    SEMI JOIN taken AS k ON t.thread_id = k.thread_id
     WHERE run_id = only_run
 ),
 turn AS (
@@ -81,20 +76,13 @@ behind AS MATERIALIZED (
     ASOF JOIN turn AS t ON s.thread_id = t.thread_id AND s.sent_ns > t.at_ns
 ),
 -- Where something may be missing between the two, nothing is known.
-host_gap AS (
-    SELECT
-        x.host_id, l.start_ns,
-        max(l.end_ns) OVER (PARTITION BY x.host_id ORDER BY l.start_ns) AS covered_until_ns
-    FROM store.gap AS l
-    JOIN store.trace AS x ON l.trace_id = x.trace_id
-    WHERE l.run_id = only_run AND x.domain IS DISTINCT FROM 'kernel'
-),
 behind_gap AS (
     SELECT b.thread_id, b.sent_ns
     FROM behind AS b
     JOIN store.thread AS h ON b.thread_id = h.thread_id
     JOIN store.process AS p ON h.process_id = p.process_id
-    ASOF JOIN host_gap AS g ON p.host_id = g.host_id AND b.sent_ns > g.start_ns
+    ASOF JOIN (FROM derive.host_gap WHERE run_id = only_run) AS g
+        ON p.host_id = g.host_id AND b.sent_ns > g.start_ns
     WHERE g.start_ns >= b.at_ns OR g.covered_until_ns > b.at_ns
 ),
 known AS MATERIALIZED (

@@ -20,40 +20,25 @@ WITH answer AS MATERIALIZED (
     WHERE r.sent_ns IS NOT NULL
 ),
 executing AS MATERIALIZED (
-    SELECT thread_id, start_ns AS at_ns
-    FROM store.executor_state
-    WHERE thread_id IN (SELECT thread_id FROM answer)
-    UNION ALL
-    SELECT thread_id, start_ns
-    FROM store.callback_instance
+    SELECT thread_id, at_ns
+    FROM derive.thread_turn
     WHERE thread_id IN (SELECT thread_id FROM answer)
 ),
-deed AS MATERIALIZED (
+call AS (
+    SELECT sender_thread_id, sent_ns, receiver_thread_id, taken_ns FROM store.request
+    UNION ALL
+    SELECT sender_thread_id, sent_ns, receiver_thread_id, taken_ns FROM store.response
+),
+deed AS (
     SELECT thread_id, at_ns, NULL::BIGINT AS publisher_id FROM executing
     UNION ALL
-    SELECT thread_id, start_ns, publisher_id
-    FROM store.publication
-    WHERE thread_id IN (SELECT thread_id FROM answer)
+    SELECT thread_id, start_ns, publisher_id FROM store.publication
     UNION ALL
-    SELECT thread_id, taken_ns, NULL
-    FROM store.take
-    WHERE thread_id IN (SELECT thread_id FROM answer)
+    SELECT thread_id, taken_ns, NULL FROM store.take
     UNION ALL
-    SELECT sender_thread_id, sent_ns, NULL
-    FROM store.request
-    WHERE sender_thread_id IN (SELECT thread_id FROM answer)
+    SELECT sender_thread_id, sent_ns, NULL FROM call
     UNION ALL
-    SELECT receiver_thread_id, taken_ns, NULL
-    FROM store.request
-    WHERE receiver_thread_id IN (SELECT thread_id FROM answer)
-    UNION ALL
-    SELECT sender_thread_id, sent_ns, NULL
-    FROM store.response
-    WHERE sender_thread_id IN (SELECT thread_id FROM answer)
-    UNION ALL
-    SELECT receiver_thread_id, taken_ns, NULL
-    FROM store.response
-    WHERE receiver_thread_id IN (SELECT thread_id FROM answer)
+    SELECT receiver_thread_id, taken_ns, NULL FROM call
 ),
 followed AS (
     SELECT
@@ -64,7 +49,8 @@ followed AS (
                 THEN d.publisher_id IS NOT DISTINCT FROM a.status_publisher_id
         END AS is_followed_by_status
     FROM answer AS a
-    ASOF LEFT JOIN deed AS d ON a.thread_id = d.thread_id AND a.sent_ns < d.at_ns
+    ASOF LEFT JOIN (FROM deed WHERE thread_id IN (SELECT thread_id FROM answer)) AS d
+        ON a.thread_id = d.thread_id AND a.sent_ns < d.at_ns
     ASOF LEFT JOIN store.thread_break AS b
         ON a.thread_id = b.thread_id AND d.at_ns >= b.resumed_ns
 ),
