@@ -1,21 +1,38 @@
 -- Precision and recall by kind of link. A link that was found is right if it is true, whether or
 -- not the trace decides it; a true one that the trace decides and that was not found is missing.
 -- Which of several messages with one stamp was taken is a guess, and so is which of several runs
--- filled a cache: marked as such in the database (candidate_count > 1), and not judged.
+-- filled a cache: marked as such in the database (candidate_count > 1), and not judged. Nor is what
+-- is wrong inside a callback run that is marked (is_loss_affected) and has another one's end.
 CREATE OR REPLACE TEMP TABLE verdict AS
+WITH matched AS (
+    SELECT
+        f.number, f.kind, f.label, f.is_guess, f.from_id AS found_from_id, f.to_id AS found_to_id,
+        l.from_id, l.to_id
+    FROM found_link AS f
+    LEFT JOIN truth_time AS a
+        ON f.from_kind = a.kind AND f.from_host = a.host AND f.from_pid = a.pid
+        AND f.from_tid = a.tid AND f.from_ns = a.ts_ns
+    LEFT JOIN truth_time AS b
+        ON f.to_kind = b.kind AND f.to_host = b.host AND f.to_pid = b.pid AND f.to_tid = b.tid
+        AND f.to_ns = b.ts_ns
+    LEFT JOIN (SELECT DISTINCT kind, from_id, to_id FROM truth_link) AS l
+        ON f.kind = l.kind AND a.id = l.from_id AND b.id = l.to_id
+    QUALIFY row_number() OVER (PARTITION BY f.number ORDER BY l.from_id NULLS LAST, l.to_id) = 1
+),
+misguessed_run AS (
+    SELECT found_from_id
+    FROM matched
+    WHERE kind = 'callback_run' AND is_guess AND from_id IS NULL
+)
 SELECT
-    f.number, f.kind, f.label, f.is_guess, f.from_id AS found_from_id, f.to_id AS found_to_id,
-    l.from_id, l.to_id
-FROM found_link AS f
-LEFT JOIN truth_time AS a
-    ON f.from_kind = a.kind AND f.from_host = a.host AND f.from_pid = a.pid
-    AND f.from_tid = a.tid AND f.from_ns = a.ts_ns
-LEFT JOIN truth_time AS b
-    ON f.to_kind = b.kind AND f.to_host = b.host AND f.to_pid = b.pid AND f.to_tid = b.tid
-    AND f.to_ns = b.ts_ns
-LEFT JOIN (SELECT DISTINCT kind, from_id, to_id FROM truth_link) AS l
-    ON f.kind = l.kind AND a.id = l.from_id AND b.id = l.to_id
-QUALIFY row_number() OVER (PARTITION BY f.number ORDER BY l.from_id NULLS LAST, l.to_id) = 1;
+    * REPLACE (
+        is_guess OR (
+            from_id IS NULL
+            AND kind IN ('direct', 'recorded_in')
+            AND found_from_id IN (FROM misguessed_run)
+        ) AS is_guess
+    )
+FROM matched;
 
 CREATE OR REPLACE TEMP TABLE score AS
 WITH hit AS (

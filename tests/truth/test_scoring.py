@@ -136,6 +136,34 @@ def test_a_link_to_another_message_is_wrong(simulation, database):
     assert score.missing == 4
 
 
+@pytest.mark.parametrize(
+    ("end_shift_ns", "is_marked", "wrong"), [(1, True, 0), (1, False, 1), (0, True, 1)]
+)
+def test_what_is_wrong_in_a_run_with_a_doubtful_wrong_end_is_a_guess(
+    simulation, database, end_shift_ns, is_marked, wrong
+):
+    _change(
+        database,
+        f"""
+        UPDATE store.callback_instance
+        SET end_ns = end_ns + {end_shift_ns}, is_loss_affected = {is_marked}
+        WHERE callback_instance_id = (
+            SELECT min(callback_instance_id) FROM store.link_causal WHERE kind = 'direct'
+        )
+        """,
+    )
+    _change(
+        database,
+        """
+        UPDATE store.link_causal
+        SET publication_id = (SELECT max(publication_id) FROM store.link_causal)
+        WHERE callback_instance_id = (SELECT min(callback_instance_id) FROM store.link_causal)
+        """,
+    )
+    score = _scores(simulation, database)["direct"]
+    assert (score.wrong, score.misguessed) == (wrong, 1 - wrong)
+
+
 def test_a_row_at_another_time_is_wrong(simulation, database):
     _change(
         database,
