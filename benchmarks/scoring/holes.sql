@@ -29,6 +29,15 @@ on_cpu AS (
     ASOF LEFT JOIN truth_recorded AS a
         ON m.host = a.host AND m.trace_pid = a.trace_pid AND m.cpu = a.cpu AND m.ts_ns < a.ts_ns
 ),
+-- Packets are missing also where nothing was in them; a trace does not show that. Behind the last
+-- one of a stream, the others tell how long.
+of_packet AS (
+    SELECT
+        host, pid, cpu, since_ns AS begin_ns,
+        CASE WHEN cause <> 'truncation' THEN end_ns END AS end_ns,
+        cause
+    FROM simulated_missing_packet
+),
 of_process AS (
     SELECT m.host, m.pid, NULL::INTEGER AS cpu, b.ts_ns AS begin_ns, a.ts_ns AS end_ns, m.cause
     FROM (FROM missing WHERE cause IN ('late start', 'pause', 'stop')) AS m
@@ -41,7 +50,7 @@ SELECT
     host, pid, cpu, cause,
     coalesce(begin_ns, -9223372036854775807) AS begin_ns,
     coalesce(end_ns, 9223372036854775807) AS end_ns
-FROM (FROM on_cpu UNION FROM of_process);
+FROM (FROM on_cpu UNION FROM of_packet UNION FROM of_process);
 
 -- CPUs without a whole packet in the trace: it does not show that there is more to them.
 CREATE OR REPLACE TEMP TABLE truth_unseen_cpu AS

@@ -91,6 +91,9 @@ trace — one row per trace:
 unrecorded — one row per event of the layout that happened and is not in a trace:
     host, pid, tid, cpu, event, ts_ns, cause ('late start', 'pause', 'loss', 'packets',
     'truncation', 'stop')
+missing_packet — one row per packet without events that is not in a trace, but one before it is:
+    host, pid (NULL: of all processes), cpu, since_ns (the end of that one), end_ns, cause (as of
+    unrecorded)
 emitted — one row per event that came into the buffers of a trace, recorded or not, of recordings
 that are not perfect:
     host, pid, tid, cpu, ts_ns

@@ -108,6 +108,8 @@ class Recorder:
         self._random = Random(str(identity.uuid))
         self._snapshot: TraceWriter | None = None
         self._writers: dict[int, TraceWriter] = {}
+        # Of which process each trace is, by its uuid; None: of all.
+        self._pids: dict[bytes, int | None] = {}
         if recording.is_perfect:
             only = self._writer(0, "")
             self.emitters: tuple[Callable[..., None], ...] = tuple(
@@ -177,6 +179,14 @@ class Recorder:
         self._truth.unrecorded.add(
             identity.hostname, pid, tid, cpu, tracepoint.name, time + identity.epoch_ns, cause
         )
+
+    def missing_packet(self, trace: bytes, cpu: int, since: int, end: int, cause: str) -> None:
+        """Write down a packet without events that the trace shows to be missing."""
+        identity = self._identity
+        self._truth.missing_packet.add(
+            identity.hostname, self._pids[trace], cpu, since + identity.epoch_ns,
+            end + identity.epoch_ns, cause,
+        )  # fmt: skip
 
     def _on_clock(self, emit: Callable[..., None]) -> Callable[..., None]:
         """Return what emits events at the times that the clock of the host shows."""
@@ -295,13 +305,15 @@ class Recorder:
         if session or buffering[0] == "pid":
             digest = sha256(f"{identity.uuid}/{session}/{buffering}".encode()).digest()
             uuid = UUID(bytes=digest[:16], version=4)
+        of_pid = pid if buffering[0] == "pid" else None
+        self._pids[uuid.bytes] = of_pid
         base = self._directory / session
         paths = self._chunks(base, buffering)
         first = next(paths)
         if not is_faultless:
             self._truth.trace.add(
                 identity.hostname,
-                pid if buffering[0] == "pid" else None,
+                of_pid,
                 str(first.relative_to(self._directory.parent)),
                 error,
             )

@@ -114,6 +114,9 @@ _SCHEMAS: Mapping[str, pa.Schema] = {
     "unrecorded": _schema(
         host=_TEXT, pid=_NUMBER, tid=_NUMBER, cpu=_NUMBER, event=_TEXT, ts_ns=_TIME, cause=_TEXT
     ),
+    "missing_packet": _schema(
+        host=_TEXT, pid=_NUMBER, cpu=_NUMBER, since_ns=_TIME, end_ns=_TIME, cause=_TEXT
+    ),
     "emitted": _schema(host=_TEXT, pid=_NUMBER, tid=_NUMBER, cpu=_NUMBER, ts_ns=_TIME),
 }  # fmt: skip
 

@@ -22,7 +22,11 @@ CREATE TABLE store.timer (run_id BIGINT DEFAULT 1, process_id BIGINT, period_ns 
 CREATE TABLE store.take (run_id BIGINT DEFAULT 1, take_id BIGINT, subscription_id BIGINT,
     thread_id BIGINT, start_event_id BIGINT, taken_ns BIGINT);
 CREATE TABLE store.publication (run_id BIGINT DEFAULT 1, publication_id BIGINT,
-    publisher_id BIGINT, thread_id BIGINT, start_event_id BIGINT, start_ns BIGINT);
+    publisher_id BIGINT, thread_id BIGINT, start_event_id BIGINT, start_ns BIGINT,
+    trace_id BIGINT DEFAULT 1);
+CREATE TABLE derive.exposed_trace (trace_id BIGINT, recording_id BIGINT);
+CREATE TABLE derive.recording_gap (recording_id BIGINT, start_ns BIGINT, covered_until_ns BIGINT);
+INSERT INTO derive.exposed_trace VALUES (1, 1);
 CREATE VIEW link AS
 SELECT
     b.run_id, b.thread_id, t.take_id, t.subscription_id, t.taken_ns, b.publication_id,
@@ -31,7 +35,11 @@ FROM store.publication AS b
 ASOF JOIN store.take AS t
     ON b.thread_id = t.thread_id AND b.start_event_id > t.start_event_id
 """
-NAMES = ("timed_publisher", "answer_doubtful")
+NAMES = ("take_behind_gap", "timed_publisher", "answer_doubtful")
+NAMES_OF = {
+    False: ("run_id", "take_id", "subscription_id", "thread_id", "start_event_id", "taken_ns"),
+    True: ("run_id", "publication_id", "publisher_id", "thread_id", "start_event_id", "start_ns"),
+}
 FAR = 3_600_000
 ANSWER, TICK, TOCK = 1, 2, 3
 
@@ -44,12 +52,14 @@ class Process:
         takes: (time, subscription, thread).
         publications: (time, publisher, thread).
         timers: (period, time of initialisation, process).
+        gaps: (begin, end) of what is not recorded.
         is_new: it began after the recording.
     """
 
     takes: list[tuple[float, int, int]] = field(default_factory=list)
     publications: list[tuple[float, int, int]] = field(default_factory=list)
     timers: list[tuple[float, float, int]] = field(default_factory=list)
+    gaps: list[tuple[float, float]] = field(default_factory=list)
     is_new: bool = True
 
     def doubtful(self) -> list[tuple[int, float]]:
@@ -75,6 +85,11 @@ class Process:
                     "INSERT INTO store.timer (process_id, period_ns, created_ns) VALUES (?, ?, ?)",
                     [process, round(period * 1e6), round(start * 1e6)],
                 )
+            for begin, end in self.gaps:
+                con.execute(
+                    "INSERT INTO derive.recording_gap VALUES (1, ?, ?)",
+                    [round(begin * 1e6), round(end * 1e6)],
+                )
             for table, is_publication in (("take", False), ("publication", True)):
                 rows = [
                     (1, number, of, thread, number, round(at * 1e6))
@@ -83,7 +98,8 @@ class Process:
                 ]
                 columns = [list(column) for column in zip(*rows, strict=True)]
                 con.register("event", pa.table(columns, names=list("abcdef")))
-                con.execute(f"INSERT INTO store.{table} FROM event")
+                names = ", ".join(NAMES_OF[is_publication])
+                con.execute(f"INSERT INTO store.{table} ({names}) FROM event")
             found = con.execute(
                 "SELECT b.publisher_id, b.start_ns / 1e6 "
                 "FROM derive.answer_doubtful(1, 'link') AS d "
@@ -327,6 +343,32 @@ def test_own_intervals_are_steadier_by_a_fifth(spread: float, is_doubtful: bool)
         process.publications.append((at + (30 if number % 20 == 7 else 0), TICK, 1))
         delay = 40 if number % 2 else 40 - spread
         process.takes.append((at - delay - (20 if number % 20 == 9 else 0), 1, 1))
+    assert process.doubtful_publishers() == {TICK: float(is_doubtful)}
+
+
+def ticks(count: int, gaps: Iterable[int]) -> Process:
+    """Publications every 100 ms, but in these gaps of one each, after takes at any moment."""
+    process = Process(gaps=[(number * 100 - 20, number * 100 + 20) for number in gaps])
+    hidden = set(gaps)
+    for number in range(1, count + 1):
+        if number not in hidden:
+            process.takes.append((number * 100 - 20 - 7 * (number % 5), 1, 1))
+            process.publications.append((number * 100, TICK, 1))
+    return process
+
+
+def test_intervals_with_a_gap_do_not_count() -> None:
+    """A timer goes on in it, and what it publishes is lost."""
+    process = ticks(60, range(4, 60, 4))
+    assert process.doubtful_publishers() == {TICK: 1}
+    process.gaps = []
+    assert process.doubtful() == []
+
+
+@pytest.mark.parametrize(("rest", "is_doubtful"), [(4, False), (5, True)])
+def test_too_few_intervals_without_a_gap(rest: int, is_doubtful: bool) -> None:
+    """Where a gap lies in nearly all, all count."""
+    process = ticks(21 + rest, range(2, 21, 2))
     assert process.doubtful_publishers() == {TICK: float(is_doubtful)}
 
 

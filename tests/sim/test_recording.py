@@ -266,6 +266,32 @@ def test_each_process_has_a_trace_and_a_clock_offset_of_its_own(bt2, tmp_path):
     assert len(set(offsets.values())) == 3
 
 
+def test_the_truth_names_missing_packets_that_were_empty(tmp_path):
+    """Of processes that were never on that CPU: their traces show the packets before it."""
+    recording = Recording(
+        rotations=(SECOND // 8,), buffers=Buffers.PER_PROCESS, unfinished_streams=1
+    )
+    simulation = simulate("two_hosts", tmp_path / "out", factor=0.03, recording=recording)
+    found = duckdb.sql(
+        f"SELECT host, pid, cpu, cause, since_ns FROM '{simulation.truth['missing_packet']}'"
+    ).fetchall()
+    assert {(cpu, cause) for _, _, cpu, cause, _ in found} == {(0, "truncation")}
+    # Nothing of these processes is missing, and of the others something is.
+    torn = set(
+        duckdb.sql(f"SELECT DISTINCT host, pid FROM '{simulation.truth['unrecorded']}'").fetchall()
+    )
+    empty = {(host, pid) for host, pid, *_ in found}
+    every = set(duckdb.sql(f"SELECT host, pid FROM '{simulation.truth['trace']}'").fetchall())
+    assert empty | torn == every
+    assert not empty & torn
+    assert min(len(empty), len(torn)) > 0
+    # The one before it opened the second chunk.
+    hosts = json.loads((tmp_path / "out" / "truth" / "meta.json").read_text())["hosts"]
+    assert {since - hosts[host]["begin_of_tracing_ns"] for host, *_, since in found} == {
+        SECOND // 8
+    }
+
+
 def test_a_stream_may_end_within_a_packet(tmp_path):
     simulation = simulate(
         "pipeline", tmp_path / "out", factor=LENGTH, recording=Recording(cut_streams=1)

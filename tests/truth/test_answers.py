@@ -7,6 +7,9 @@ from pathlib import Path
 
 import pytest
 from ingested import Ingested, ingest_one
+from scoring import compare_simulated
+
+from msgflow.sim import Buffers, Recording, simulate
 
 PLACE = """
 CREATE TEMP VIEW IF NOT EXISTS place AS
@@ -114,3 +117,33 @@ def test_simulated_answers_are_certain_and_all_else_is_marked(
     assert simulated.rows(f"{TRUE} INTERSECT ({FOUND} = 2)") == []
     marked = len(simulated.rows(f"{FOUND} = 2"))
     assert (marked > 50) == (name == "python_timers")
+
+
+def test_a_timer_shows_between_gaps(tmp_path: Path) -> None:
+    """It is older than the recording, which stops, loses events and ends early on one CPU."""
+    third = 333_333_333
+    recording = Recording(
+        start_ns=50_000_000,
+        pauses=((third, 500_000_000),),
+        rotations=(2 * third,),
+        buffers=Buffers.PER_PROCESS,
+        lost_event_share=0.2,
+        lost_packet_share=0.05,
+        unfinished_streams=1,
+        slew_ppm=-20,
+    )
+    simulation = simulate(
+        "python_timers",
+        tmp_path / "trace",
+        layout="jazzy",
+        factor=0.1,
+        recording=recording,
+        clock_offset_ns=350_000_000,
+    )
+    database = tmp_path / "run.duckdb"
+    ingest_one(simulation.directory, database).connection.close()
+    scores, _ = compare_simulated(database, simulation.truth)
+    (score,) = (each for each in scores if each.kind == "take_adjacent")
+    assert (score.wrong, score.missing) == (0, 0)
+    assert score.decided > 100
+    assert score.misguessed > 50

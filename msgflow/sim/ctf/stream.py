@@ -73,6 +73,12 @@ class Faults(Protocol):
     ) -> None:
         """An event is not in the trace."""
 
+    def missing_packet(self, trace: bytes, cpu: int, since: int, end: int, cause: str) -> None:
+        """A packet without events is missing from the trace of this uuid.
+
+        The one before it, which ends at `since`, and the end of the others show it.
+        """
+
 
 @dataclass(frozen=True, slots=True)
 class Ending:
@@ -169,6 +175,7 @@ class StreamWriter:
         self._packet_bytes = packet_bytes
         # None: the packet begins with its first event.
         self._begin: int | None = begin + origin
+        self._ended = begin + origin
         self._breaks = deque(breaks)
         self._next_break = self._breaks[0].begin if self._breaks else _FOR_EVER
         self._silent_until = 0
@@ -296,7 +303,11 @@ class StreamWriter:
         header = _HEADER.pack(_MAGIC, self._uuid, _STREAM_ID, self._cpu, *numbers, self._cpu)
         kept = self._kept(ending, is_full=is_full)
         if kept is None:
-            self._withdraw(self._entries, "packets" if ending is None else "truncation")
+            cause = "packets" if ending is None else "truncation"
+            self._withdraw(self._entries, cause)
+            if self._faults is not None and self._sequence and not self._entries:
+                since = self._ended - self._origin
+                self._faults.missing_packet(self._uuid, self._cpu, since, end - self._origin, cause)
         elif ending is not None and ending.is_last_packet_cut:
             self._withdraw(self._entries[kept:], "truncation")
             self._file.write(header)
@@ -312,7 +323,7 @@ class StreamWriter:
         self._records.clear()
         self._entries.clear()
         self._size = _HEADER.size
-        self._begin = end
+        self._begin = self._ended = end
         self._sequence += 1
 
     def _kept(self, ending: Ending | None, *, is_full: bool) -> int | None:

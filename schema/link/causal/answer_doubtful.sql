@@ -5,10 +5,11 @@
 --     answer comes once per message, and soon. So whether a publisher answers the messages of a
 --     subscription is doubtful if a timer explains the publisher (derive.timed_publisher), if its
 --     own intervals are steadier than its delay after the takes, or if the number of publications
---     per message differs. Only messages count that the publisher published something after. If
---     these are fewer than five, they do not tell: then the publisher is doubtful if it or the
---     subscription is older than the recording, since timers may be, too. If the publisher answers,
---     what it publishes beyond the usual number per message is doubtful.
+--     per message differs. An interval with a gap in it does not count. Only messages count that
+--     the publisher published something after. If these are fewer than five, they do not tell: then
+--     the publisher is doubtful if it or the subscription is older than the recording, since timers
+--     may be, too. If the publisher answers, what it publishes beyond the usual number per message
+--     is doubtful.
 -- grain: one row per publication that is not surely an answer
 -- param: only_run BIGINT  Run to look at
 -- param: links VARCHAR  Name of the rows of derive.link_causal_take_adjacent
@@ -18,7 +19,7 @@
 CREATE OR REPLACE MACRO derive.answer_doubtful(only_run, links) AS TABLE
 WITH own AS MATERIALIZED (
     SELECT
-        b.publication_id, b.publisher_id,
+        b.publication_id, b.publisher_id, b.trace_id, b.start_ns,
         b.start_ns - lag(b.start_ns) OVER (
             PARTITION BY b.publisher_id ORDER BY b.start_event_id
         ) AS interval_ns
@@ -26,13 +27,27 @@ WITH own AS MATERIALIZED (
     SEMI JOIN query_table(links) AS l ON b.publisher_id = l.publisher_id
     WHERE b.run_id = only_run
 ),
+since AS MATERIALIZED (
+    SELECT
+        publication_id, NULL::BIGINT AS take_id, trace_id, start_ns,
+        start_ns - interval_ns AS taken_ns
+    FROM own
+),
+-- What was published in a gap is missing. Where that leaves fewer than five intervals, all count.
 rhythm AS MATERIALIZED (
     SELECT
-        publisher_id,
-        avg(interval_ns) AS mean_ns,
-        quantile_disc(interval_ns, 0.9) - quantile_disc(interval_ns, 0.1) AS spread_ns
-    FROM own
-    GROUP BY publisher_id
+        o.publisher_id,
+        avg(o.interval_ns) AS mean_ns,
+        CASE
+            WHEN count(CASE WHEN g.publication_id IS NULL THEN o.interval_ns END) < 5
+                THEN quantile_disc(o.interval_ns, 0.9) - quantile_disc(o.interval_ns, 0.1)
+            ELSE
+                quantile_disc(o.interval_ns, 0.9) FILTER (g.publication_id IS NULL)
+                - quantile_disc(o.interval_ns, 0.1) FILTER (g.publication_id IS NULL)
+        END AS spread_ns
+    FROM own AS o
+    LEFT JOIN derive.take_behind_gap('since') AS g ON o.publication_id = g.publication_id
+    GROUP BY o.publisher_id
 ),
 next_take AS (
     SELECT t.thread_id, t.start_event_id, t.taken_ns
