@@ -61,7 +61,8 @@ WITH slice AS MATERIALIZED (
 link AS (
     SELECT
         CASE l.from_kind WHEN 'callback_instance' THEN 0 WHEN 'publication' THEN 1
-            WHEN 'take' THEN 2 ELSE CASE WHEN q.taken_ns IS NULL THEN 3 ELSE 4 END
+            WHEN 'take' THEN 2 WHEN 'request' THEN CASE WHEN q.taken_ns IS NULL THEN 3 ELSE 4 END
+            ELSE 6
         END AS from_code,
         l.from_id,
         CASE l.to_kind WHEN 'callback_instance' THEN 0 WHEN 'publication' THEN 1
