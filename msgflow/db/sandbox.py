@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 import duckdb
 
+from msgflow.db.lock_holder import lock_holder
 from msgflow.db.memory import limit_threads, set_memory_limit
 from msgflow.db.workspace import remove_abandoned_workspaces
 from msgflow.errors import DatabaseError
@@ -169,7 +170,7 @@ def opening(path: Path) -> Iterator[None]:
         text = str(error)
         if "lock" in text.lower():
             raise DatabaseError(
-                f"database is in use by another process — {path}",
+                f"database is in use by another process{lock_holder(path)} — {path}",
                 "close the program that has it open, or give another file with --db",
             ) from error
         if (words := in_words(error, path)) is not None:

@@ -8,6 +8,7 @@ import shutil
 import uuid
 from typing import TYPE_CHECKING
 
+from msgflow.db.lock_holder import lock_holder
 from msgflow.errors import DatabaseError
 
 try:
@@ -70,7 +71,7 @@ def creating(database: Path) -> Iterator[None]:
             stack.enter_context(_locked(path, wait=False))
         except BlockingIOError as error:
             raise DatabaseError(
-                f"another process is creating the database — {database}",
+                f"another process{lock_holder(path)} is creating the database — {database}",
                 "wait for it, or give another file with --db",
             ) from error
         except OSError as error:

@@ -152,11 +152,13 @@ def _together(lake: Lake, table: str, rows: Sequence[Mapping[str, Any]]) -> pa.T
     if not there:
         return None
     schema = pa.schema([])
-    for part, read in there.items():
+    # What this msgflow wrote comes first: what differs from it is at fault.
+    order = sorted(there, key=lambda part: part not in ours)
+    for part in order:
         try:
-            schema = pa.unify_schemas([schema, read.schema], promote_options="permissive")
+            schema = pa.unify_schemas([schema, there[part].schema], promote_options="permissive")
         except pa.ArrowException as error:
-            first = lake.store.url_of(part_path(table, next(iter(there))))
+            first = lake.store.url_of(part_path(table, order[0]))
             raise _unusable(lake, table, part, wanted[part], f"it differs from {first}") from error
     whole = pa.concat_tables(there.values(), promote_options="permissive")
     # The sort is stable: the rows of a run keep their order.

@@ -68,6 +68,10 @@ class ReplacedError(DatabaseError):
     """The database is not the one that the page was made of."""
 
 
+class UnopenedError(DatabaseError):
+    """What took the place of the database cannot be opened, or not yet."""
+
+
 @dataclass(frozen=True)
 class Identity:
     """Tells a file from another of the same name."""
@@ -155,70 +159,153 @@ def _if_memory_suffices(question: Callable[[], bytes]) -> bytes | None:
     return None
 
 
+@dataclass
+class Opened:
+    """The database as it was opened once.
+
+    Attributes:
+        identity: of its file.
+        base: a connection, which those of questions are made of.
+        pages: answer questions.
+        turns: of questions.
+        ahead: the question that comes before those of pages.
+    """
+
+    identity: Identity
+    base: duckdb.DuckDBPyConnection
+    pages: Pages
+    turns: Turns
+    ahead: Ahead
+
+    def close(self) -> None:
+        """Close it; no question may run."""
+        self.ahead.stop()
+        self.base.close()
+        self.pages.close()
+
+
 class Shared:
     """The open database, which all requests share; it is opened anew when its file is replaced.
 
     Attributes:
         generation: counts how often that was.
-        turns: of questions.
     """
 
     def __init__(self, path: Path, memory_limit: str | None) -> None:
         self.path = path
         self.generation = 1
         self._memory_limit = memory_limit
-        self._lock = threading.Lock()
-        self._identity = _identity(path)
-        self._open()
+        self._changed = threading.Condition()
+        self._cursors: set[duckdb.DuckDBPyConnection] = set()
+        self._opened: Opened | None = self._open()
 
-    def _open(self) -> None:
-        # Each request gets a connection of its own, made of this one.
-        self._base = connect(
+    def _open(self) -> Opened:
+        # First: if the file is replaced meanwhile, the next request sees another identity.
+        identity = _identity(self.path)
+        base = connect(
             self.path, read_only=True, memory_limit=self._memory_limit or default_limit()
         )
-        self.turns = Turns()
-        self.pages = Pages()
-        self._ahead = Ahead(self.turns, self.pages, self._base.cursor())
+        pages, turns = Pages(), Turns()
+        return Opened(identity, base, pages, turns, Ahead(turns, pages, base.cursor()))
 
-    def require_same(self, generation: str | None) -> None:
-        """Raise if the file was replaced since the page was made.
+    def renew(self) -> None:
+        """Open the database anew if its file was replaced.
 
         Raises:
-            ReplacedError: it was; or the file is gone.
-            DatabaseError: what took its place cannot be opened.
+            ReplacedError: the file is gone.
+            UnopenedError: what took its place cannot be opened.
         """
-        with self._lock:
+        with self._changed:
+            self._current()
+
+    def answer(
+        self,
+        name: str,
+        params: dict[str, Any],
+        generation: str | None,
+        started: Callable[[duckdb.DuckDBPyConnection], None],
+    ) -> bytes:
+        """Return the answer to a question of a page.
+
+        Args:
+            name: of the answer.
+            params: as the page gives them.
+            generation: that of the page.
+            started: called with the connection that is asked, which can be interrupted.
+
+        Raises:
+            ReplacedError: the file was replaced since the page was made, or is gone.
+            UnopenedError: what took its place cannot be opened.
+            MsgflowError: as `Pages.answer` does.
+        """
+        with self._changed:
+            opened = self._current()
+            if generation is not None and generation != str(self.generation):
+                raise self._replaced()
+            cursor = opened.base.cursor()
+            self._cursors.add(cursor)
+        try:
+            started(cursor)
+            content = opened.turns.ask(lambda: opened.pages.answer(cursor, name, params))
+        except (MsgflowError, duckdb.Error):
+            if not self._is_same(opened):  # then it was interrupted, or read another file
+                raise self._replaced() from None
+            raise
+        finally:
+            with self._changed:
+                cursor.close()
+                self._cursors.discard(cursor)
+                self._changed.notify_all()
+        if not self._is_same(opened):  # written in its place, it can be a part of each
+            raise self._replaced()
+        return content
+
+    def _current(self) -> Opened:
+        # A process has a file of one name open once: the old one is closed before the new one.
+        while not self._is_same(self._opened):
+            if self._cursors:
+                self._end_questions()
+                continue
+            if self._opened is not None:
+                self._opened.close()
+                self._opened = None
             try:
-                identity = _identity(self.path)
-            except OSError:
+                self._opened = self._open()
+            except FileNotFoundError:
                 raise ReplacedError(
                     f"the database is no longer there — {self.path}", "msgflow ui --db FILE"
                 ) from None
-            if identity != self._identity:
-                self._close()
-                self._open()
-                self._identity = identity
-                self.generation += 1
-        if generation is not None and generation != str(self.generation):
-            raise ReplacedError(
-                f"the database was replaced while the page was open — {self.path}",
-                "reload the page to see the new one",
-            )
+            except DatabaseError as error:
+                raise UnopenedError(error.message, error.hint) from None
+            self.generation += 1
+        assert self._opened is not None
+        return self._opened
 
-    def cursor(self) -> duckdb.DuckDBPyConnection:
-        """Return a connection of its own to the database."""
-        with self._lock:
-            return self._base.cursor()
+    def _is_same(self, opened: Opened | None) -> bool:
+        try:
+            return opened is not None and opened.identity == _identity(self.path)
+        except OSError:
+            return False
 
-    def _close(self) -> None:
-        self._ahead.stop()
-        self._base.close()
-        self.pages.close()
+    def _end_questions(self) -> None:
+        for cursor in self._cursors:
+            cursor.interrupt()
+        self._changed.wait(_SECONDS_BETWEEN_LOOKS)
+
+    def _replaced(self) -> ReplacedError:
+        return ReplacedError(
+            f"the database was replaced while the page was open — {self.path}",
+            "reload the page to see the new one",
+        )
 
     def close(self) -> None:
         """Close the database."""
-        with self._lock:
-            self._close()
+        with self._changed:
+            while self._cursors:
+                self._end_questions()
+            if self._opened is not None:
+                self._opened.close()
+                self._opened = None
 
 
 def _identity(path: Path) -> Identity:
@@ -236,6 +323,8 @@ def application(shared: Shared, token: str) -> ASGIApp:
     limiter: list[anyio.CapacityLimiter] = []
 
     async def page(request: Request) -> Response:
+        with suppress(MsgflowError):  # the page asks too, and shows the error
+            await anyio.to_thread.run_sync(shared.renew)
         content = assets.page(
             head=_head(), attributes=f' data-generation="{html.escape(str(shared.generation))}"'
         )
@@ -257,10 +346,11 @@ def application(shared: Shared, token: str) -> ASGIApp:
         if not limiter:
             limiter.append(anyio.CapacityLimiter(MOST_AT_ONCE))
         try:
-            shared.require_same(request.headers.get("X-Generation"))
             return await _answered(shared, request, limiter[0])
         except ReplacedError as error:
             return _failure(error, 409, "replaced")
+        except UnopenedError as error:
+            return _failure(error, 503, "failed")
         except UsageError as error:
             return _failure(error, 400, "usage")
         except MsgflowError as error:
@@ -326,33 +416,32 @@ async def _answered(shared: Shared, request: Request, limiter: anyio.CapacityLim
     """Return the answer; interrupt the query when the browser no longer waits for it."""
     name = request.path_params["name"]
     params: dict[str, Any] = dict(request.query_params)
-    pages = shared.pages
-    cursor = shared.cursor()
+    generation = request.headers.get("X-Generation")
+    asked: list[duckdb.DuckDBPyConnection] = []
     content: list[bytes] = []
 
-    async def watch(scope: anyio.CancelScope) -> None:
+    async def watch() -> None:
         while not await request.is_disconnected():
             await anyio.sleep(_SECONDS_BETWEEN_LOOKS)
         # Repeatedly, since between two statements there is nothing to interrupt.
         while True:
-            cursor.interrupt()
+            for cursor in asked:
+                with suppress(duckdb.Error):  # it has just ended
+                    cursor.interrupt()
             await anyio.sleep(_SECONDS_BETWEEN_LOOKS)
 
     try:
         async with anyio.create_task_group() as group:
-            group.start_soon(watch, group.cancel_scope)
+            group.start_soon(watch)
             content.append(
                 await anyio.to_thread.run_sync(
-                    lambda: shared.turns.ask(lambda: pages.answer(cursor, name, params)),
-                    limiter=limiter,
+                    lambda: shared.answer(name, params, generation, asked.append), limiter=limiter
                 )
             )
             group.cancel_scope.cancel()
     except BaseExceptionGroup as errors:
         # A group of one: what the query raised.
         raise errors.exceptions[0] from None
-    finally:
-        cursor.close()
     return Response(content[0], media_type="application/octet-stream")
 
 

@@ -5,6 +5,8 @@ the other. Whole numbers are differences from row to row, folded to be positive,
 the largest takes; the first bytes of all rows come first, then the second ones, which compresses
 well. Text is a dictionary and numbers into it. A browser holds whole numbers up to 2^53 exactly:
 points in time are sent as offsets from the begin of the run, anything else beyond it as text.
+Control characters in text are escaped, as on a terminal: one that changes the direction of writing
+would turn round what stands behind it on the page.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ import numpy as np
 import pyarrow as pa
 from pyarrow import compute
 
+from msgflow.text.values import printable
 from msgflow.trace.numpy_arrow import is_valid, to_numpy
 
 if TYPE_CHECKING:
@@ -67,8 +70,18 @@ def _column(column: pa.Array, origin: int) -> tuple[dict[str, Any], bytes]:
         return {"type": "double"}, values.tobytes()
     if pa.types.is_string(kind) or pa.types.is_large_string(kind):
         return _text(column)
-    texts = json.dumps(column.to_pylist(), ensure_ascii=False, default=str)
+    texts = json.dumps(_shown(column.to_pylist()), ensure_ascii=False, default=str)
     return {"type": "json"}, texts.encode()
+
+
+def _shown(value: Any) -> Any:
+    if isinstance(value, str):
+        return printable(value, keep="\n")
+    if isinstance(value, list):
+        return [_shown(part) for part in value]
+    if isinstance(value, dict):
+        return {_shown(name): _shown(part) for name, part in value.items()}
+    return value
 
 
 def _integers(
@@ -93,7 +106,7 @@ def _integers(
 
 def _text(column: pa.Array) -> tuple[dict[str, Any], bytes]:
     encoded = column.dictionary_encode()
-    words = json.dumps(encoded.dictionary.to_pylist(), ensure_ascii=False).encode()
+    words = json.dumps(_shown(encoded.dictionary.to_pylist()), ensure_ascii=False).encode()
     # 0 means NULL.
     codes = np.where(is_valid(encoded.indices), to_numpy(encoded.indices).astype(np.int64) + 1, 0)
     head, body = _integers(codes, np.zeros(len(codes), np.bool_))

@@ -157,7 +157,7 @@ def test_a_file_that_is_none_of_ours_is_named(lake: Lake, content: bytes) -> Non
     with pytest.raises(DatabaseError, match="cannot be used") as raised:
         compact(lake, older_than=0)
     assert lake.store.url_of(path) in raised.value.message
-    assert "fleet remove " in (raised.value.hint or "")
+    assert "fleet remove feed " in (raised.value.hint or "")
     lake.remove(["feed"])
     compact(lake, older_than=0)
 

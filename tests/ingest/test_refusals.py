@@ -190,7 +190,10 @@ def test_a_database_in_use(trace: Path, database: Path) -> None:
         assert holder.stdout is not None
         with holder.stdout:
             assert holder.stdout.readline() == b"open\n"
-        assert "in use by another process" in database_refused(trace, database).message
+        holder_said = (
+            f"by another process (process {holder.pid}: {sys.executable} -c 'import duckdb"
+        )
+        assert holder_said in database_refused(trace, database).message
     finally:
         holder.kill()
         holder.wait()

@@ -191,6 +191,83 @@ def test_a_replaced_database_is_said(demo: Path, tmp_path: Path, systems: Path) 
         server.close()
 
 
+def test_a_database_is_replaced_during_questions(
+    demo: Path, systems: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    is_asked = threading.Event()
+
+    def wait(_: Pages, connection: duckdb.DuckDBPyConnection, params: dict[str, Any]) -> bytes:
+        is_asked.set()
+        return bytes(connection.execute("SELECT count(*) FROM range(1000000000000)").fetchone()[0])
+
+    path = shutil.copyfile(demo, tmp_path / "copy.duckdb")
+    monkeypatch.setitem(pages.ANSWERS, "wait", wait)
+    server = Served(path)
+    try:
+        with ThreadPoolExecutor(2) as pool:
+            waiting = [pool.submit(server.get, "/api/wait", X_Generation="1") for _ in range(2)]
+            assert is_asked.wait(30)
+            shutil.copyfile(systems, tmp_path / "other.duckdb").replace(path)
+            status, _, content = server.get("/api/run", X_Generation="1")
+            for answer in [(status, {}, content), *(one.result(60) for one in waiting)]:
+                assert answer[0] == 409, answer
+                assert json.loads(answer[2])["code"] == "replaced"
+        status, _, content = server.get("/api/run", X_Generation="2")
+        assert status == 200
+        assert len(decoded(content).rows) == 3
+    finally:
+        server.close()
+
+
+def test_a_page_that_is_loaded_is_that_of_the_new_database(
+    demo: Path, systems: Path, tmp_path: Path
+) -> None:
+    path = shutil.copyfile(demo, tmp_path / "copy.duckdb")
+    server = Served(path)
+    try:
+        shutil.copyfile(systems, tmp_path / "other.duckdb").replace(path)
+        assert b'data-generation="2"' in server.get("/")[2]
+        assert server.get("/api/run", X_Generation="2")[0] == 200
+    finally:
+        server.close()
+
+
+def test_what_cannot_be_opened_is_said_until_it_can(demo: Path, tmp_path: Path) -> None:
+    path = shutil.copyfile(demo, tmp_path / "copy.duckdb")
+    server = Served(path)
+    try:
+        aside = path.rename(tmp_path / "aside.duckdb")
+        path.write_text("no database")
+        for _ in range(2):
+            status, _, content = server.get("/api/run")
+            assert status == 503
+            assert "copy.duckdb" in json.loads(content)["error"]
+        assert server.get("/")[0] == 200
+        aside.rename(path)
+        status, _, content = server.get("/api/run", X_Generation="1")
+        assert status == 409
+        assert server.get("/api/run", X_Generation="2")[0] == 200
+    finally:
+        server.close()
+
+
+def test_an_answer_from_a_file_that_was_written_meanwhile_is_none(
+    demo: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = shutil.copyfile(demo, tmp_path / "copy.duckdb")
+
+    def write(_: Pages, connection: duckdb.DuckDBPyConnection, params: dict[str, Any]) -> bytes:
+        os.utime(path, ns=(1, 1))
+        return b"a part of each"
+
+    monkeypatch.setitem(pages.ANSWERS, "write", write)
+    server = Served(path)
+    try:
+        assert server.get("/api/write", X_Generation="1")[0] == 409
+    finally:
+        server.close()
+
+
 def test_an_ingest_meanwhile_is_refused(simulated: Callable[..., Path], tmp_path: Path) -> None:
     demo = simulated("pipeline", 0.1)
     path = tmp_path / "copy.duckdb"

@@ -12,6 +12,8 @@ from tables import decoded
 
 from msgflow.view.table_encoding import LARGEST_EXACT, encode
 
+# Text that no page escapes.
+TEXT = st.text().filter(lambda text: text.replace("\n", "").isprintable())
 WHOLE = st.integers(-LARGEST_EXACT, LARGEST_EXACT)
 
 
@@ -19,8 +21,8 @@ WHOLE = st.integers(-LARGEST_EXACT, LARGEST_EXACT)
 @given(
     st.lists(
         st.tuples(
-            st.none() | WHOLE, st.none() | st.text(), st.none() | st.booleans(),
-            st.none() | st.floats(allow_nan=False), st.none() | st.lists(st.text(), max_size=3),
+            st.none() | WHOLE, st.none() | TEXT, st.none() | st.booleans(),
+            st.none() | st.floats(allow_nan=False), st.none() | st.lists(TEXT, max_size=3),
         )
     )
 )  # fmt: skip
@@ -34,6 +36,14 @@ def test_what_goes_in_comes_out(rows: list[tuple[object, ...]]) -> None:
         }
     )
     assert decoded(encode(table)).rows == table.to_pylist()
+
+
+def test_control_characters_are_text() -> None:
+    name, shown = "a\u202e\x1b[31m\x9b\u2066\nb", "a\\u202e\\x1b[31m\\x9b\\u2066\nb"
+    table = pa.table({"name": [name], "several": [[name]], "pair": [{"name": name}]})
+    assert decoded(encode(table)).rows == [
+        {"name": shown, "several": [shown], "pair": {"name": shown}}
+    ]
 
 
 def test_what_a_browser_would_round_is_text() -> None:
