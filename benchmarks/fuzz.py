@@ -65,7 +65,7 @@ SECONDS = 900
 ADDRESS_SPACE = 8 << 30
 LARGEST_FILE = 400 << 20
 BAD = ("traceback", "mistake", "crash", "hang", "damage", "unreported")
-QUERIES = ("e2e-latency", "delivery", "transport-latency")
+QUERIES = ("e2e-latency", "topics-delivery", "topics-latency")
 BASES = (("pipeline", "jazzy"), ("two_hosts", "humble-fastdds"), ("services", "jazzy"))
 LENGTH = 0.004
 

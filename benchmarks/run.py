@@ -35,7 +35,7 @@ EVENTS_PER_FACTOR = 66_000
 PEER = "babeltrace2 -o dummy"
 NO_ROOM = "more memory is needed"  # What the command says where a query does not fit.
 # All rows go to a file of the fastest format: what is measured is the query, not its printing.
-QUERIES = ("e2e-latency", "flows", "path-breakdown", "critical-path", "executor-wait")
+QUERIES = ("e2e-latency", "flows", "path-breakdown", "critical-path", "waits")
 
 SIMULATE = """
 import sys; from pathlib import Path; from msgflow.sim import Recording, simulate

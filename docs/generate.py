@@ -76,8 +76,8 @@ A *finding* is something worth knowing before you trust a number, with its cause
 missing, `warning` where they may be, and `info`.
 
 - `msgflow check`, the page Overview and agents show the errors and warnings of a run.
-- `msgflow query info-findings`, `msgflow info` and the view [finding](data-model.md#finding) have
-  all.
+- `msgflow query info --section findings`, `msgflow info` and the view
+  [finding](data-model.md#finding) have all.
 - `msgflow ingest` prints the errors and warnings of a new run in short.
 - `msgflow db check` shows which rules of the phase database are broken now. One that a new run
   breaks is a finding of that run, too.
@@ -128,7 +128,7 @@ def queries() -> str:
 
 
 def _object(header: Header) -> str:
-    name = header.name.removeprefix("main.")
+    name = header.words.removeprefix("main.")
     # A macro of one value has no rows.
     rows = f" {_sentence(header.grain)}" if header.grain else ""
     lines = [f"\n### {name}\n", f"\n{header.description}{rows}\n"]

@@ -37,7 +37,7 @@ db.query("info-hosts")"""
     """## A query is a table
 
 The first rows show; `to_arrow`, `to_pandas` and `to_polars` have all of them, in nanoseconds.""",
-    ['db.query("transport-latency")'],
+    ['db.query("topics-latency")'],
     """## One message""",
     ['db.flow("/camera/image", at="0.3s")'],
     """## Who sends what to whom""",

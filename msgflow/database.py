@@ -13,7 +13,7 @@ from msgflow.db.objects import public_names
 from msgflow.db.sql_guard import guarded_query, require_condition
 from msgflow.default_files import DEFAULT_PATHS
 from msgflow.errors import QueryError, UsageError
-from msgflow.query.catalogue import load_queries, load_query, query_names
+from msgflow.query.catalogue import choose_query, load_queries, query_names
 from msgflow.query.result import QueryResult
 from msgflow.query.runner import run_query
 from msgflow.query.selection import make_selection
@@ -317,7 +317,7 @@ class Database:
             QueryError: the database could not run it.
             DatabaseError: the file cannot be opened.
         """
-        header = load_query(name, public_names)
+        header = choose_query(name, parameters, public_names)
         connection = self.connection
         part = Slice(run, start, end, skip_first)
         if path is not None:
@@ -359,7 +359,7 @@ class Database:
         from msgflow.paths import read_paths
 
         if not any(param.name == "from" for param in header.params):
-            raise UsageError(f"{header.name} has no paths — --path {name}", "leave it out")
+            raise UsageError(f"{header.words} has no paths — --path {name}", "leave it out")
         named = read_paths(file)
         path = named.named(name)
         named.require(self.connection, part.runs(self.connection), path)

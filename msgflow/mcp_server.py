@@ -140,7 +140,7 @@ class _Tools:
     def info(self) -> str:
         """List the runs (recordings) in the database, oldest first: name, time, events, labels."""
         with self._opened() as database:
-            return _rows(database.query("info-runs", run="all"))
+            return _rows(database.query("info", run="all"))
 
     def check(self, run: str | None = None) -> str:
         """Tell what is wrong with a recording, errors first, each with cause and cure.
@@ -156,7 +156,7 @@ class _Tools:
         from msgflow.query.catalogue import load_queries, load_query
 
         if name is None:
-            titles = ({"name": query.name, "title": query.title} for query in load_queries())
+            titles = ({"name": query.words, "title": query.title} for query in load_queries())
             return _answer({}, map(json.dumps, titles))
         return json.dumps(_explained(load_query(name)), ensure_ascii=False)
 

@@ -1,78 +1,76 @@
 -- name: callbacks
--- title: Callback instances, one by one, the longest first
--- description: Each execution of a callback: when it began, how long it ran and on which thread,
---     which message it was called with, and what it published meanwhile. Instances that never ended
---     come last.
--- grain: one row per callback instance
+-- title: Callback durations and periods
+-- description: How long callbacks ran, and how far apart their starts were. Instances without an
+--     end are counted separately.
+-- grain: one row per callback object that ran
+-- variant: each BOOLEAN = false  Each callback instance, the longest first
 -- column: run_id BIGINT             Run
--- column: start_ns BIGINT [epoch ns]  Start of the callback
--- column: duration_ns BIGINT [ns]   From its start to its end; empty: never seen to end
--- column: node VARCHAR [node]       Node of the callback
+-- column: node VARCHAR [node]  Node of the callback
 -- column: callback VARCHAR [callback]  What triggers it
--- column: published VARCHAR         Topics of the messages it published itself, and how many of
---     each if several
--- column: publications BIGINT       How many messages it published itself
--- column: process VARCHAR           Process, by its name and id
--- column: tid INTEGER               Thread
--- column: host VARCHAR [host]       Host
--- column: depth INTEGER             1; more: nested in that many callback instances less one
--- column: take_id BIGINT            Message it was called with: msgflow flow --take shows its flow
--- column: is_loss_affected BOOLEAN  A gap of the trace may hide its end or what it did
--- column: callback_instance_id BIGINT  Identity of the callback instance:
---     msgflow flow --callback-instance
+-- column: count BIGINT              Callback instances that began in the time window
+-- column: open BIGINT               Instances without an end
+-- column: period_min_ns BIGINT [ns]     Shortest time from one start to the next
+-- column: period_median_ns BIGINT [ns]  Median time from one start to the next
+-- column: period_max_ns BIGINT [ns]     Longest time from one start to the next
+-- column: min_ns BIGINT [ns]        Shortest duration
+-- column: median_ns BIGINT [ns]     Median duration
+-- column: mean_ns BIGINT [ns]       Mean duration
+-- column: p95_ns BIGINT [ns]        95 % of the durations are at most this
+-- column: p99_ns BIGINT [ns]        99 % of the durations are at most this
+-- column: max_ns BIGINT [ns]        Longest duration
+-- column: total_ns BIGINT [ns]      Sum of the durations
+-- column: symbol VARCHAR            Function registered for the callback
 -- column: callback_id BIGINT        Identity of the callback
 -- column: is_internal BOOLEAN       Infrastructure of ROS
--- slowest: duration_ns
--- brief: duration_ns, node, callback, start_ns, take_id, published, tid, callback_instance_id,
---     process, host
+-- brief: node, callback, median_ns, max_ns, p95_ns, count, period_median_ns, p99_ns, mean_ns
 WITH instance AS (
     SELECT
-        run_id, callback_instance_id, callback_id, process_id, thread_id, start_ns,
-        end_ns - start_ns AS duration_ns, depth, take_id, is_loss_affected
+        run_id,
+        callback_id,
+        end_ns - start_ns AS duration_ns,
+        start_ns - lag(start_ns) OVER (
+            PARTITION BY callback_id ORDER BY start_ns, callback_instance_id
+        ) AS period_ns
     FROM main.callback_instance
     WHERE list_contains($runs, run_id) AND start_ns >= $start_ns AND start_ns < $end_ns
 ),
-by_topic AS (
-    SELECT l.callback_instance_id, coalesce(p.topic_name, '?') AS topic_name, count(*) AS number
-    FROM main.link_causal AS l
-    JOIN instance AS i ON l.callback_instance_id = i.callback_instance_id
-    JOIN main.publication AS b ON l.publication_id = b.publication_id
-    JOIN main.publisher AS p ON b.publisher_id = p.publisher_id
-    WHERE l.kind = 'direct'
-    GROUP BY l.callback_instance_id, coalesce(p.topic_name, '?')
-),
-published AS (
+measured AS (
     SELECT
-        callback_instance_id,
-        string_agg(
-            topic_name || CASE WHEN number > 1 THEN ' ' || number ELSE '' END,
-            ', ' ORDER BY topic_name
-        ) AS topics,
-        sum(number)::BIGINT AS number
-    FROM by_topic
-    GROUP BY callback_instance_id
+        run_id,
+        callback_id,
+        count(*) AS count,
+        count(*) - count(duration_ns) AS open,
+        min(period_ns) AS period_min_ns,
+        quantile_disc(period_ns, 0.5) AS period_median_ns,
+        max(period_ns) AS period_max_ns,
+        min(duration_ns) AS min_ns,
+        quantile_disc(duration_ns, [0.5, 0.95, 0.99]) AS quantiles,
+        round(avg(duration_ns))::BIGINT AS mean_ns,
+        max(duration_ns) AS max_ns,
+        sum(duration_ns)::BIGINT AS total_ns
+    FROM instance
+    GROUP BY run_id, callback_id
 )
 SELECT
-    i.run_id,
-    i.start_ns,
-    i.duration_ns,
+    m.run_id,
     l.node,
     l.label AS callback,
-    p.topics AS published,
-    coalesce(p.number, 0) AS publications,
-    printf('%s %d', coalesce(r.name, '?'), r.pid) AS process,
-    t.tid,
-    h.hostname AS host,
-    i.depth,
-    i.take_id,
-    i.is_loss_affected,
-    i.callback_instance_id,
-    i.callback_id,
+    m.count,
+    m.open,
+    m.period_min_ns,
+    m.period_median_ns,
+    m.period_max_ns,
+    m.min_ns,
+    m.quantiles[1] AS median_ns,
+    m.mean_ns,
+    m.quantiles[2] AS p95_ns,
+    m.quantiles[3] AS p99_ns,
+    m.max_ns,
+    m.total_ns,
+    c.symbol,
+    m.callback_id,
     l.is_internal
-FROM instance AS i
-JOIN main.callback_label AS l ON i.callback_id = l.callback_id
-JOIN main.process AS r ON i.process_id = r.process_id
-JOIN main.host AS h ON r.host_id = h.host_id
-LEFT JOIN main.thread AS t ON i.thread_id = t.thread_id
-LEFT JOIN published AS p ON i.callback_instance_id = p.callback_instance_id
-ORDER BY i.run_id, i.duration_ns DESC NULLS LAST, i.start_ns, i.callback_instance_id
+FROM measured AS m
+JOIN main.callback_label AS l ON m.callback_id = l.callback_id
+JOIN main.callback AS c ON m.callback_id = c.callback_id
+ORDER BY m.run_id, l.node, l.label, m.callback_id

@@ -4,6 +4,8 @@
 --     Times of clocks with the same reference can be compared, to within the sum of their
 --     uncertainties. The uncertainty grows with the distance from the moment of reference.
 -- grain: one row per clock
+-- variant: by VARCHAR {clock|pair} = 'clock'  What a row is: a clock, or two of them with the
+--     messages and packets between them
 -- column: run_id BIGINT                       Run
 -- column: hosts VARCHAR [host]  Hosts that have it
 -- column: method VARCHAR                      'messages', 'packets' (those of kernel traces as

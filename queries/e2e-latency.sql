@@ -6,6 +6,9 @@
 --     superseded by a newer input before it was used, lost on the way, or cut by the recording (too
 --     close to its start or end to know).
 -- grain: one row per path
+-- variant: measure VARCHAR {latency|age|reaction|response} = 'latency'  What is measured: from
+--     the start of a flow to its end, how old the data behind an output are, how long at most
+--     until an event shows, or the response times of CARET
 -- param: from VARCHAR = NULL  Topics or nodes where flows start: names or globs, separated by
 --     commas (default: any)
 -- param: to VARCHAR = NULL  Topics or nodes where flows end, in the same form (default: any)

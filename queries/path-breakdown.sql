@@ -6,7 +6,7 @@
 --     services; publishing by layer, up to the last one; the time from there to the take; and the
 --     time from the take to the callback. Publishing goes on behind the event of its last layer: it
 --     is not known how long, and is part of the time up to the take. A trace does not say when a
---     message arrived either, so that time is three parts, with the bounds of executor-wait:
+--     message arrived either, so that time is three parts, with the bounds of waits:
 --     network_or_idle, executor_busy (with other callbacks), and undecided (one or the other).
 --     Executors were busy at least for executor_busy, at most for executor_busy and undecided
 --     together. A part is negative if the next one began before it ended (overlaps), for example

@@ -1,83 +1,121 @@
 -- name: waits
--- title: Waits of callbacks, one by one
--- description: For every callback instance: the time since the end of the publication of its
---     message (or since the timer was due, or the request was sent), for how much of it the
---     executor was busy with other callbacks, as bounds, and with which. Instances nested in others
---     are left out.
--- grain: one row per callback instance that is not nested in another
--- param: callback_id BIGINT = NULL  Only instances of this callback_id (query executor-wait lists
---     them)
--- param: min_busy_ns BIGINT {0..} = 0  Only waits in which the executor may have been busy for that
---     long [ns]
+-- title: How long callbacks waited, and what their executor ran meanwhile
+-- description: The time from the end of a publication (or from when a timer was due, or a request
+--     was sent) to the start of its callback, and how much of it the executor was busy with other
+--     callbacks. A trace does not say when a message arrived, so the busy time is given as bounds.
+--     At least: what ran after the executor had certainly found it ready. At most: what ran since
+--     the earliest moment at which it can have been there. The rest of the wait was the network, an
+--     idle executor or its overhead. Totals are over the callback instances in the time window. The
+--     callback that others kept waiting longest comes first. With --by instance, the waits are
+--     listed one by one, with --by pair, the callbacks that ran meanwhile.
+-- grain: one row per callback object that ran
+-- variant: by VARCHAR {callback|pair|instance} = 'callback'  What a row is: a callback that
+--     waited, with another that ran meanwhile, or one of its waits
 -- column: run_id BIGINT             Run
--- column: start_ns BIGINT [epoch ns]  Start of the callback
 -- column: node VARCHAR [node]  Node of the callback
 -- column: callback VARCHAR [callback]  What triggers it
--- column: since VARCHAR             Where the wait begins: 'publication', 'stamp', 'request' or
---     'timer'; empty: not known
--- column: wait_ns BIGINT [ns]       From there to the start of the callback
--- column: busy_min_ns BIGINT [ns]   Executor busy with others meanwhile, at least
--- column: busy_max_ns BIGINT [ns]   Executor busy with others meanwhile, at most
--- column: rest_min_ns BIGINT [ns]   Network, idle or overhead, at least
--- column: rest_max_ns BIGINT [ns]   Network, idle or overhead, at most
--- column: meanwhile VARCHAR         What ran meanwhile and for how long, the longest first, with
---     its node if it is another one
--- column: is_loss_affected BOOLEAN  A gap of the trace lies in it
--- column: callback_instance_id BIGINT  Identity of the callback instance
+-- column: count BIGINT              Callback instances that began in the time window
+-- column: delayed_min BIGINT        Of these, certainly kept waiting: ready while others ran
+-- column: delayed_max BIGINT        Of these, possibly kept waiting
+-- column: wait_median_ns BIGINT [ns]  Median wait, where its start is known
+-- column: wait_max_ns BIGINT [ns]   Longest wait
+-- column: busy_worst_ns BIGINT [ns]   Longest time for which the executor can have been busy during
+--     one wait
+-- column: busy_total_min_ns BIGINT [ns]  Executor busy with others during all waits, at least
+-- column: busy_total_max_ns BIGINT [ns]  Executor busy with others during all waits, at most
+-- column: rest_total_min_ns BIGINT [ns]  Network, idle or overhead, where known, at least
+-- column: rest_total_max_ns BIGINT [ns]  Network, idle or overhead, where known, at most
+-- column: meanwhile VARCHAR         What ran meanwhile: the three with the largest share, with
+--     their node if it is another one
+-- column: unknown BIGINT            Of these, with an unknown start of the wait
+-- column: loss_affected BIGINT      Of these, with a gap of the trace in their wait
 -- column: callback_id BIGINT        Identity of the callback
 -- column: is_internal BOOLEAN       Infrastructure of ROS
--- slowest: wait_ns
--- brief: start_ns, node, callback, wait_ns, busy_max_ns, meanwhile, busy_min_ns, since,
---     rest_max_ns, rest_min_ns, callback_instance_id
+-- brief: node, callback, wait_median_ns, wait_max_ns, busy_worst_ns, meanwhile, count,
+--     delayed_min, delayed_max, busy_total_min_ns, busy_total_max_ns
 -- note: clocks
 WITH waited AS MATERIALIZED (
     SELECT
-        run_id, callback_instance_id, callback_id, start_ns, since, wait_ns, busy_min_ns,
-        busy_max_ns, is_loss_affected, meanwhile_callback_ids, meanwhile_ns
+        run_id, callback_instance_id, callback_id, wait_ns, busy_min_ns, busy_max_ns,
+        is_loss_affected, meanwhile_callback_ids, meanwhile_ns
     FROM main.executor_wait_explained($runs)
-    WHERE start_ns >= $start_ns
-        AND start_ns < $end_ns
-        AND coalesce(callback_id = $callback_id, true)
-        AND coalesce(busy_max_ns, busy_min_ns) >= $min_busy_ns
+    WHERE start_ns >= $start_ns AND start_ns < $end_ns
 ),
-pair AS (
+measured AS (
     SELECT
-        callback_instance_id,
+        run_id,
         callback_id,
-        unnest(meanwhile_callback_ids) AS meanwhile_callback_id,
+        count(*) AS count,
+        count(*) FILTER (WHERE busy_min_ns > 0) AS delayed_min,
+        count(*) FILTER (WHERE coalesce(busy_max_ns, busy_min_ns) > 0) AS delayed_max,
+        quantile_disc(wait_ns, 0.5) AS wait_median_ns,
+        max(wait_ns) AS wait_max_ns,
+        max(busy_max_ns) AS busy_worst_ns,
+        sum(busy_min_ns)::BIGINT AS busy_total_min_ns,
+        sum(coalesce(busy_max_ns, busy_min_ns))::BIGINT AS busy_total_max_ns,
+        sum(wait_ns - busy_max_ns)::BIGINT AS rest_total_min_ns,
+        sum(wait_ns - busy_min_ns)::BIGINT AS rest_total_max_ns,
+        count(*) - count(wait_ns) AS unknown,
+        count(*) FILTER (WHERE is_loss_affected) AS loss_affected
+    FROM waited
+    GROUP BY run_id, callback_id
+),
+ran AS (
+    SELECT
+        callback_id,
+        unnest(meanwhile_callback_ids) AS meanwhile_id,
         unnest(meanwhile_ns) AS overlap_ns
     FROM waited
 ),
+pair AS (
+    SELECT callback_id, meanwhile_id, sum(overlap_ns) AS overlap_ns
+    FROM ran
+    GROUP BY callback_id, meanwhile_id
+),
+ranked AS (
+    SELECT
+        p.callback_id,
+        p.meanwhile_id,
+        p.overlap_ns / sum(p.overlap_ns) OVER (PARTITION BY p.callback_id) AS share,
+        row_number() OVER (
+            PARTITION BY p.callback_id ORDER BY p.overlap_ns DESC, p.meanwhile_id
+        ) AS place
+    FROM pair AS p
+),
 meanwhile AS (
     SELECT
-        p.callback_instance_id,
+        r.callback_id,
         string_agg(
             CASE WHEN o.node = l.node THEN '' ELSE o.node || ' ' END
-            || printf('%s %.3f ms', o.label, p.overlap_ns / 1e6),
-            ', ' ORDER BY p.overlap_ns DESC, p.meanwhile_callback_id
-        ) AS names
-    FROM pair AS p
-    JOIN main.callback_label AS l ON p.callback_id = l.callback_id
-    JOIN main.callback_label AS o ON p.meanwhile_callback_id = o.callback_id
-    GROUP BY p.callback_instance_id
+            || printf('%s %.0f %%', o.label, 100 * r.share),
+            ', ' ORDER BY r.place
+        ) AS shares
+    FROM ranked AS r
+    JOIN main.callback_label AS l ON r.callback_id = l.callback_id
+    JOIN main.callback_label AS o ON r.meanwhile_id = o.callback_id
+    WHERE r.place <= 3 AND r.share >= 0.005
+    GROUP BY r.callback_id
 )
 SELECT
-    w.run_id,
-    w.start_ns,
+    m.run_id,
     l.node,
     l.label AS callback,
-    w.since,
-    w.wait_ns,
-    w.busy_min_ns,
-    w.busy_max_ns,
-    w.wait_ns - w.busy_max_ns AS rest_min_ns,
-    w.wait_ns - w.busy_min_ns AS rest_max_ns,
-    m.names AS meanwhile,
-    w.is_loss_affected,
-    w.callback_instance_id,
-    w.callback_id,
+    m.count,
+    m.delayed_min,
+    m.delayed_max,
+    m.wait_median_ns,
+    m.wait_max_ns,
+    m.busy_worst_ns,
+    m.busy_total_min_ns,
+    m.busy_total_max_ns,
+    m.rest_total_min_ns,
+    m.rest_total_max_ns,
+    w.shares AS meanwhile,
+    m.unknown,
+    m.loss_affected,
+    m.callback_id,
     l.is_internal
-FROM waited AS w
-JOIN main.callback_label AS l ON w.callback_id = l.callback_id
-LEFT JOIN meanwhile AS m ON w.callback_instance_id = m.callback_instance_id
-ORDER BY w.run_id, w.start_ns, w.callback_instance_id
+FROM measured AS m
+JOIN main.callback_label AS l ON m.callback_id = l.callback_id
+LEFT JOIN meanwhile AS w ON m.callback_id = w.callback_id
+ORDER BY m.run_id, m.busy_total_max_ns DESC, l.node, l.label, m.callback_id

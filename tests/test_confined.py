@@ -28,11 +28,11 @@ def test_rows_runs_and_notes_come_back(small_database: Path) -> None:
     assert found.table.to_pylist() == [{"run_id": 1}]
     assert found.notes == ["only the first 1 rows are shown; --limit raises that"]
     topics = confined_query(
-        small_database, "info-topics", {"run": "morning", "where": "true"}, memory_limit=None
+        small_database, "topics", {"run": "morning", "where": "true"}, memory_limit=None
     )
     assert [run.title for run in topics.runs] == ["morning (1)"]
     assert topics.header is not None
-    assert topics.header.name == "info-topics"
+    assert topics.header.name == "topics"
     assert len(topics) == 1
 
 
@@ -56,7 +56,7 @@ def test_functions_of_duckdb_keep_to_the_memory(small_database: Path) -> None:
     with pytest.raises(QueryError, match="more memory is needed"):
         confined_query(
             small_database,
-            "info-runs",
+            "info",
             {"where": "list_sum(range(700000000)) > 0"},
             memory_limit="200MB",
         )

@@ -43,7 +43,7 @@ def command(
     With warnings only, the exit code is 0. A rule of the database that was broken
     when the run was ingested (msgflow db check) is shown too. If a run has several
     clocks, the last line says how far their times can be compared. What is worth
-    knowing, but not wrong, is in the query info-findings.
+    knowing, but not wrong, is in the query info --section findings.
     """
     from msgflow.database import Database
     from msgflow.run.choice import choose_runs

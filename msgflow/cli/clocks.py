@@ -43,7 +43,7 @@ def apply(
             clocks = opened.query("clocks", run=one.run_id).to_arrow().to_pylist()
             corrected = [clock for clock in clocks if clock["method"] not in ("none", "reference")]
             print_status(f"{len(corrected)} of {len(clocks)} clocks corrected: msgflow clocks show")
-            pairs = opened.query("clock-pairs", run=one.run_id).to_arrow().to_pylist()
+            pairs = opened.query("clocks-pair", run=one.run_id).to_arrow().to_pylist()
             if how == "messages" and pairs:
                 messages = sum(pair["message_count"] for pair in pairs)
                 packets = sum(pair["packet_count"] for pair in pairs)
@@ -86,10 +86,10 @@ def pairs(
     output: OutputOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
-    """Count the messages and packets that clocks are corrected by (the query clock-pairs)."""
+    """Count the messages and packets that clocks are corrected by (the query clocks --by pair)."""
     from msgflow.cli.output import print_result
     from msgflow.database import Database
 
     with Database(database) as opened:
-        result = opened.query("clock-pairs", run=run)
+        result = opened.query("clocks-pair", run=run)
     print_result(result, form, output, wide=wide)

@@ -45,6 +45,14 @@ def query(
             help="One row for each value of this label (or column of run); several between commas",
         ),
     ] = None,
+    measure: Annotated[
+        str | None,
+        typer.Option("--measure", metavar="WHAT", help="What topics measures: see msgflow query"),
+    ] = None,
+    section: Annotated[
+        str | None,
+        typer.Option("--section", metavar="WHAT", help="What info lists: findings or quality"),
+    ] = None,
     case: Annotated[
         str | None,
         typer.Option(
@@ -85,9 +93,12 @@ def query(
     from msgflow.query.selection import values_of
 
     if name is None:
-        print_list([(each, header_of(each).title) for each in names()], ("query", "title"))
+        listed = [(header_of(each).words, header_of(each).title) for each in names()]
+        print_list(listed, ("query", "title"))
         return
-    header_of(name)
+    words = {"case": case, "measure": measure, "section": section}
+    own = {word: value for word, value in words.items() if value is not None}
+    header_of(name, own)
     require_lake(lake)
     result = fleet_query(
         Lake.open(lake),
@@ -105,7 +116,7 @@ def query(
             "sort": sort,
             "limit": limit,
         },
-        **({} if case is None else {"case": case}),
+        **own,
     )
     print_result(result, form, output, wide=wide, columns=columns, most_rows=limit or MOST_ROWS)
 

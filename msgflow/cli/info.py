@@ -14,12 +14,11 @@ if TYPE_CHECKING:
 
     from msgflow.query.result import QueryResult
 
-_PREFIX = "info-"
 SECTIONS = ("runs", "hosts", "processes", "nodes", "topics", "counts", "findings")
 
 
 class InfoFormat(StrEnum):
-    """Formats of all tables together; the queries `info-…` write each table in any format."""
+    """Formats of all tables together; the queries write each table in any format."""
 
     TABLE = "table"
     JSON = "json"
@@ -35,16 +34,22 @@ def command(
 ) -> None:
     """Print what a database holds: runs, hosts, processes, nodes, topics, counts, data quality.
 
-    Each section is a named query, `msgflow query info-topics` for instance.
+    Each section is a named query: `msgflow query info --section nodes`, `msgflow query topics`.
     """
     from msgflow.cli.output import is_screen, print_lines, print_note
     from msgflow.cli.show.layout import screen_width
     from msgflow.database import Database
 
     with Database(database) as opened:
+        # Its topics are a query of their own.
         results = {
-            section: opened.query(
-                f"{_PREFIX}{section}", run="all" if section == "runs" else run, internal=internal
+            section: opened.query("topics", run=run, internal=internal)
+            if section == "topics"
+            else opened.query(
+                "info",
+                run="all" if section == "runs" else run,
+                internal=internal,
+                section=section,
             )
             for section in SECTIONS
         }

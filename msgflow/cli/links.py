@@ -56,10 +56,10 @@ def suggest(
     if run == "all":
         raise UsageError(
             "suggestions are a file for one run, which does not fit others — all",
-            "msgflow links suggest --run NAME for each of them; msgflow query info-runs names them",
+            "msgflow links suggest --run NAME for each of them; msgflow query info names them",
         )
     with Database(database) as opened:
-        result = opened.query("link-suggestions", run=run)
+        result = opened.query("links-suggested", run=run)
     print_runs(result.runs)
     words = ["msgflow", "links", "apply", str(output or "FILE")]
     words += ["--run", run] if run is not None else []
@@ -83,10 +83,10 @@ def list_links(
     output: OutputOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
-    """List the declared links and what they explain (the query indirect-links)."""
+    """List the declared links and what they explain (the query links)."""
     from msgflow.cli.output import print_result
     from msgflow.database import Database
 
     with Database(database) as opened:
-        result = opened.query("indirect-links", run=run)
+        result = opened.query("links", run=run)
     print_result(result, form, output, wide=wide)

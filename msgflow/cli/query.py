@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from itertools import pairwise
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer.core import TyperCommand, TyperGroup
 
 from msgflow.cli.query_command import build_command, refuse_list
-from msgflow.query.catalogue import load_queries, load_query, query_names
+from msgflow.query.catalogue import choose_query, load_queries, load_query, query_names
+
+if TYPE_CHECKING:
+    from msgflow.sql.header import Param
+    from msgflow.sql.value import Value
 
 
 def _view_names() -> tuple[str, ...]:
@@ -27,12 +32,26 @@ class QueryGroup(TyperGroup):
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return the command of a query without options; an unknown name is a UsageError."""
         header = load_query(cmd_name, _view_names)
-        return TyperCommand(header.name, short_help=header.title)
+        return TyperCommand(cmd_name, short_help=header.title)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Return the name, the command with the options of the query, and the words behind it."""
         name, found, rest = super().resolve_command(ctx, args)
-        return name, found and build_command(load_query(str(name))), rest
+        chosen = choose_query(str(name), _choice(load_query(str(name)).variant, rest))
+        return name, found and build_command(chosen), rest
+
+
+def _choice(variant: Param | None, words: list[str]) -> dict[str, Value]:
+    """Return the value of the option that chooses a variant: the command depends on it."""
+    found: dict[str, Value] = {}
+    if variant is not None:
+        option = f"--{variant.name}"
+        for word, following in pairwise([*words, ""]):
+            if word == option:
+                found[variant.name] = True if variant.type == "BOOLEAN" else following
+            elif word.startswith(f"{option}="):
+                found[variant.name] = word.removeprefix(f"{option}=")
+    return found
 
 
 app = typer.Typer(cls=QueryGroup, subcommand_metavar="[NAME] [OPTIONS]")
@@ -52,4 +71,4 @@ def group(
         return
     from msgflow.cli.output import print_list
 
-    print_list([(header.name, header.title) for header in load_queries()], ("query", "title"))
+    print_list([(header.words, header.title) for header in load_queries()], ("query", "title"))

@@ -125,7 +125,7 @@ def build_command(header: Header) -> Any:
         add_completion=False, context_settings={"help_option_names": ["-h", "--help"]}
     )
     single.command(
-        header.name, cls=_command_class(header), help=_help(header), short_help=header.title
+        header.words, cls=_command_class(header), help=_help(header), short_help=header.title
     )(command)
     return typer.main.get_command(single)
 

@@ -26,14 +26,14 @@ def list_runs(
     wide: WideOption = False,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
-    """List the runs of a database: the query info-runs."""
+    """List the runs of a database: the query info."""
     from dataclasses import replace
 
     from msgflow.cli.output import print_result
     from msgflow.database import Database
 
     with Database(database) as opened:
-        result = opened.query("info-runs", run="all")
+        result = opened.query("info", run="all")
     # The rows name the runs already.
     print_result(replace(result, runs=()), form, output, wide=wide)
 

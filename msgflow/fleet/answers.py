@@ -22,16 +22,16 @@ FINDING = "finding"
 # Named queries, run with their defaults and with internal rows; each gives a table of its name.
 QUERIES = (
     "e2e-latency",
-    "callback-duration",
-    "executor-wait",
+    "callbacks",
+    "waits",
     "executor-usage",
-    "transport-latency",
-    "delivery",
-    "publication-rate",
+    "topics-latency",
+    "topics-delivery",
+    "topics-rate",
     "timers",
     "service-latency",
     "action-latency",
-    "data-quality",
+    "info-quality",
 )
 
 

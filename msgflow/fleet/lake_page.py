@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from msgflow.atomic import replacing
 from msgflow.errors import UsageError
 from msgflow.fleet.lake_connection import Reading, choose, lake_errors
-from msgflow.fleet.lake_query import fleet_query, statements
+from msgflow.fleet.lake_query import fleet_query, header_of, statements
 from msgflow.fleet.listing import list_failures
 from msgflow.view.single_page import Parts, single_page
 from msgflow.view.table_encoding import encode
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 # Most labels with a table on the page; each takes a query over all flows.
 MOST_LABELS = 8
 _STATEMENTS = ("page_run", "page_point", "page_outlier", "page_worst")
-_LATENCY, _FINDINGS = "e2e-latency", "findings"
+_LATENCY, _FINDINGS = "e2e-latency", "info-findings"
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ def lake_page(lake: Lake, *, where: str | None = None) -> LakePage:
         )
     wrong = {"where": "severity <> 'info'"}
     result = fleet_query(lake, _FINDINGS, where=where, selection=wrong)
-    command = f"msgflow fleet query {_FINDINGS} {option}"
+    command = f"msgflow fleet query {header_of(_FINDINGS).words} {option}"
     parts.add("page_finding?", _encoded(result, command))
     failures = list_failures(lake).table
     failed = f"msgflow fleet failures --lake {shlex.quote(lake.store.url)}"

@@ -28,7 +28,7 @@ from msgflow.fleet.lake_connection import (
 )
 from msgflow.fleet.layout import VIEWS
 from msgflow.name_suggestions import did_you_mean
-from msgflow.query.catalogue import query_names
+from msgflow.query.catalogue import choose_query, load_query
 from msgflow.query.result import QueryResult
 from msgflow.query.runner import bind, shown_rows
 from msgflow.query.selection import make_selection, selected
@@ -72,24 +72,39 @@ def names() -> tuple[str, ...]:
     )
 
 
-def header_of(name: str) -> Header:
+def header_of(name: str, given: Mapping[str, Value] | None = None) -> Header:
     """Return the header of a query that a lake answers.
 
+    Args:
+        name: of the query.
+        given: parameters by name, one of which may choose a variant.
+
     Raises:
-        UsageError: there is no such query, or a lake cannot answer it.
+        UsageError: there is no such query or variant, or a lake cannot answer it.
     """
-    if name in names():
-        return statements().header(name.replace("-", "_"))
-    if name in query_names():
+    given = given or {}
+    known = [load_query(each).words for each in names()]
+    there_are = ", ".join(known)
+    try:
+        query = choose_query(name, given)
+    except UsageError:
         raise UsageError(
-            f"a lake does not hold what this query needs — {name}",
-            f"it answers {', '.join(names())}; for others: msgflow fleet open RUN, then"
-            f" msgflow query {name}",
+            f"there is no such query — {name}",
+            did_you_mean(name, known, f"a lake answers {there_are}"),
+        ) from None
+    variant = query.variant
+    if variant is not None and variant.name in given:
+        chosen = {variant.name: given[variant.name]}
+        bind(replace(query, params=(variant,)), chosen, f"msgflow fleet query {name}")
+    if query.name not in names():
+        raise UsageError(
+            f"a lake does not hold what this query needs — {query.words}",
+            f"it answers {there_are}; for others: msgflow fleet open RUN, then"
+            f" msgflow query {query.words}",
         )
-    raise UsageError(
-        f"there is no such query — {name}",
-        did_you_mean(name, names(), f"a lake answers {', '.join(names())}"),
-    )
+    header = statements().header(query.name.replace("-", "_"))
+    params = header.params if variant is None else (variant, *header.params)
+    return replace(header, words=query.words, params=params, variant=variant)
 
 
 def fleet_query(
@@ -106,22 +121,25 @@ def fleet_query(
 
     Args:
         lake: the lake.
-        name: one of `names`.
+        name: of a query.
         where: a condition on runs and their labels, see `choose`; all runs when None.
         group_by: labels, or columns of the table `run`. The result has one row for each of their
             values, and the values in its first columns.
         internal: show the rows of ROS's own topics and services too.
         selection: node, topic, callback, host, via, without, where, sort and limit of
             `Database.query`.
-        parameters: the query's own.
+        parameters: the query's own, and the one that chooses a variant.
 
     Raises:
         UsageError: no such query, label, parameter or column, or no run fits.
         DatabaseError: the lake cannot be read.
         QueryError: the query failed.
     """
-    header = header_of(name)
-    own = bind(header, parameters, f"msgflow fleet query {name}")
+    header = header_of(name, parameters)
+    own = bind(header, parameters, f"msgflow fleet query {header.words}")
+    if header.variant is not None:
+        # It has chosen the statement, which does not take it.
+        del own[header.variant.name]
     chosen = make_selection(dict(selection or {}))
     choice = choose(lake, where)
     with Reading(choice, _tables(header)) as reading:

@@ -121,7 +121,7 @@ def suggest_links(rows: Sequence[Mapping[str, Any]], command: str) -> str:
     """Return a file with the candidates, and the evidence of each as a comment.
 
     Args:
-        rows: of the query `link-suggestions`.
+        rows: of the query `links --suggested`.
         command: what applies the file.
     """
     lines = [*_comment(_HEAD), f"#   {command}"]

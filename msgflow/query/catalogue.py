@@ -1,65 +1,72 @@
-"""Catalogue of named queries: one file each below `queries/`, found without a database."""
+"""Catalogue of named queries: one file each below `queries/`, found without a database.
+
+A query may have variants, each in a file of its own: an option chooses one.
+"""
 
 from __future__ import annotations
 
+from contextlib import suppress
+from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
 from msgflow.name_suggestions import nearest
 from msgflow.resources import resource_directory
-from msgflow.sql.header import Header, read
+from msgflow.sql.header import Header, HeaderError, read
+from msgflow.sql.value import parse_text
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection
+    from collections.abc import Callable, Collection, Mapping
+
+    from msgflow.sql.value import Value
 
 
 QUERIES_BY_WORD = {
-    "jitter": ("timers", "publication-rate"),
-    "rate": ("publication-rate",),
-    "frequency": ("publication-rate",),
-    "hz": ("publication-rate",),
-    "period": ("timers", "publication-rate"),
+    "jitter": ("timers", "topics-rate"),
+    "rate": ("topics-rate",),
+    "frequency": ("topics-rate",),
+    "hz": ("topics-rate",),
+    "period": ("timers", "topics-rate"),
     "timer": ("timers",),
     "lateness": ("timers",),
-    "drop": ("delivery",),
-    "dropped": ("delivery",),
-    "los": ("delivery", "data-quality"),
-    "lost": ("delivery", "unmatched"),
-    "delivery": ("delivery",),
-    "blocking": ("interference",),
-    "blocked": ("interference", "waits"),
-    "preemption": ("interference",),
-    "latency": ("e2e-latency", "transport-latency", "service-latency", "action-latency"),
-    "latencie": ("e2e-latency", "transport-latency", "service-latency", "action-latency"),
+    "drop": ("topics-delivery",),
+    "dropped": ("topics-delivery",),
+    "los": ("topics-delivery", "info-quality"),
+    "lost": ("topics-delivery", "topics-unmatched"),
+    "delivery": ("topics-delivery",),
+    "blocking": ("waits-pair",),
+    "blocked": ("waits-pair", "waits"),
+    "interference": ("waits-pair",),
+    "preemption": ("waits-pair",),
+    "latency": ("e2e-latency", "topics-latency", "service-latency", "action-latency"),
+    "latencie": ("e2e-latency", "topics-latency", "service-latency", "action-latency"),
     "end-to-end": ("e2e-latency",),
     "path": ("e2e-latency", "path-breakdown"),
     "slow": ("critical-path", "flows"),
     "slowest": ("critical-path", "flows"),
     "bottleneck": ("critical-path", "path-breakdown"),
-    "dd": ("transport-latency", "path-breakdown"),
-    "network": ("transport-latency", "path-breakdown"),
-    "transport": ("transport-latency",),
+    "dd": ("topics-latency", "path-breakdown"),
+    "network": ("topics-latency", "path-breakdown"),
+    "transport": ("topics-latency",),
     "cpu": ("executor-usage",),
     "utilisation": ("executor-usage",),
     "utilization": ("executor-usage",),
     "load": ("executor-usage",),
-    "duration": ("callback-duration", "callbacks"),
-    "runtime": ("callback-duration",),
-    "callback": ("callbacks", "callback-duration"),
-    "wcet": ("callback-duration",),
-    "queue": ("executor-wait", "delivery"),
-    "waiting": ("executor-wait", "waits"),
-    "age": ("data-age",),
-    "freshnes": ("data-age",),
-    "reaction": ("reaction-time",),
+    "duration": ("callbacks",),
+    "runtime": ("callbacks",),
+    "wcet": ("callbacks",),
+    "queue": ("waits", "topics-delivery"),
+    "waiting": ("waits",),
+    "age": ("e2e-latency-age",),
+    "freshnes": ("e2e-latency-age",),
+    "reaction": ("e2e-latency-reaction",),
     "action": ("action-latency",),
     "goal": ("action-latency",),
     "service": ("service-latency",),
-    "topic": ("info-topics",),
     "node": ("info-nodes",),
     "host": ("info-hosts",),
-    "run": ("info-runs",),
+    "run": ("info",),
     "proces": ("info-processes",),
     "diagnostic": ("info-findings",),
 }
@@ -67,13 +74,23 @@ QUERIES_BY_WORD = {
 
 
 @cache
-def query_names() -> tuple[str, ...]:
-    """Return the names of all queries, sorted; reads no file."""
+def _files() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in resource_directory("queries").glob("*.sql")))
 
 
+@cache
+def query_names() -> tuple[str, ...]:
+    """Return the names of all queries, sorted, without their variants; reads no file."""
+    return tuple(name for name in _files() if _base(name) is None)
+
+
+def _base(name: str) -> str | None:
+    """Return the query of which this is a variant; None if it is none."""
+    return next((other for other in _files() if name.startswith(f"{other}-")), None)
+
+
 def load_query(name: str, views: Callable[[], Collection[str]] = tuple) -> Header:
-    """Return the query called `name`.
+    """Return the query, or the variant of a query, whose file is called `name`.
 
     Args:
         name: of the query.
@@ -82,14 +99,50 @@ def load_query(name: str, views: Callable[[], Collection[str]] = tuple) -> Heade
     Raises:
         UsageError: there is no such query; the message names similar ones.
     """
-    if name not in query_names():
+    if name not in _files():
         raise UsageError(f"there is no such query — {name}", _meant(name, views))
     return _header(name)
 
 
+def choose_query(
+    name: str, given: Mapping[str, Value], views: Callable[[], Collection[str]] = tuple
+) -> Header:
+    """Return the query called `name`, or that variant of it which its parameters choose.
+
+    Args:
+        name: of the query.
+        given: values of parameters by name; others than the one that chooses do not count.
+        views: as `load_query` takes them.
+
+    Raises:
+        UsageError: there is no such query; the message names similar ones.
+    """
+    header = load_query(name, views)
+    variant = header.variant
+    if variant is None or (value := given.get(variant.name)) is None:
+        return header
+    base = header.words.partition(" ")[0]
+    if variant.type == "BOOLEAN":
+        with suppress(ValueError):
+            value = variant.name if parse_text(str(value), variant.type) else variant.default
+    chosen = base if value == variant.default else f"{base}-{value}"
+    # The query refuses a value that it does not have.
+    return _header(chosen) if chosen in _files() else header
+
+
 @cache
 def _header(name: str) -> Header:
-    return read(resource_directory("queries") / f"{name}.sql")
+    header = read(resource_directory("queries") / f"{name}.sql")
+    base = _base(name)
+    if base is None:
+        variant = header.variant
+    else:
+        variant = _header(base).variant
+        if variant is None:
+            raise HeaderError(f"{header.path}: {base} has no variants")
+        value = "" if variant.type == "BOOLEAN" else f" {name.removeprefix(f'{base}-')}"
+        header = replace(header, words=f"{base} --{variant.name}{value}", variant=variant)
+    return header if variant is None else replace(header, params=(variant, *header.params))
 
 
 def _meant(name: str, views: Callable[[], Collection[str]]) -> str:
@@ -99,9 +152,10 @@ def _meant(name: str, views: Callable[[], Collection[str]]) -> str:
         if name in views():
             return f"it is a view: msgflow sql 'FROM {name}'"
         words = tuple(nearest(name, query_names()))
-    return " or ".join(f"msgflow query {other}" for other in words) or "msgflow query --list"
+    commands = (f"msgflow query {load_query(other).words}" for other in words)
+    return " or ".join(commands) or "msgflow query --list"
 
 
 def load_queries() -> tuple[Header, ...]:
-    """Return all queries, sorted by name."""
-    return tuple(load_query(name) for name in query_names())
+    """Return all queries, sorted by name, each with its variants behind it."""
+    return tuple(map(_header, _files()))

@@ -84,7 +84,7 @@ def find_start(
         if last_ns is None:
             raise UsageError(
                 f"the trace shows no message that was published on the topic — {topic}",
-                f"msgflow query info-topics --run {one.run_id}",
+                f"msgflow query topics --run {one.run_id}",
             )
         raise UsageError(
             f"no message was published on {topic} at or after that time — {at}",

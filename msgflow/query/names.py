@@ -36,10 +36,10 @@ _HOSTS = "SELECT hostname AS name FROM main.host WHERE list_contains($runs, run_
 _SERVICES = "SELECT service_name AS name FROM main.service WHERE list_contains($runs, run_id)"
 # By kind of name: the names of a run, and the command that lists them.
 _KNOWN = {
-    "topic": (_TOPICS, "msgflow query info-topics"),
-    "node": (_NODES, "msgflow query info-nodes"),
-    "callback": (_CALLBACKS, "msgflow query callback-duration"),
-    "host": (_HOSTS, "msgflow query info-hosts"),
+    "topic": (_TOPICS, "msgflow query topics"),
+    "node": (_NODES, "msgflow query info --section nodes"),
+    "callback": (_CALLBACKS, "msgflow query callbacks"),
+    "host": (_HOSTS, "msgflow query info --section hosts"),
     "place": (f"{_TOPICS} UNION {_NODES} UNION {_SERVICES}", "msgflow query graph"),
 }
 _WORDS = {"place": "topic or node"}
@@ -47,7 +47,7 @@ _WORDS = {"place": "topic or node"}
 # the ids.
 _IDS = {
     "flow": ("take", "take_id", "msgflow query flows"),
-    "callback_id": ("callback", "callback_id", "msgflow query executor-wait"),
+    "callback_id": ("callback", "callback_id", "msgflow query waits"),
 }
 _MISSING = """
 SELECT each

@@ -57,7 +57,7 @@ class QueryResult:
         return {column.name: column.unit for column in self.header.columns if column.unit}
 
     def __repr__(self) -> str:
-        name = "SQL" if self.header is None else self.header.name
+        name = "SQL" if self.header is None else self.header.words
         return f"<QueryResult of {name}: {len(self)} rows>"
 
     def __str__(self) -> str:
@@ -156,7 +156,7 @@ class QueryResult:
 
         metadata = {"msgflow.version": __version__}
         if self.header is not None:
-            metadata["msgflow.query"] = self.header.name
+            metadata["msgflow.query"] = self.header.words
         target = Path(path)
         with replacing(target) as temporary:
             table = self.table.replace_schema_metadata(metadata)

@@ -83,7 +83,7 @@ def run_query(
     ]
     if part.has_window and not header.has_window:
         raise UsageError(
-            f"the query has no time window — {header.name}",
+            f"the query has no time window — {header.words}",
             "leave out --start, --end and --skip-first",
         )
     runs = part.runs(connection)
@@ -99,7 +99,7 @@ def run_query(
     values = reserved | own
     bindings = {name: values[name] for name in used[-1]} | chosen
     with (
-        query_errors(header.name, f"the query failed: {{}} — {header.name}"),
+        query_errors(header.words, f"the query failed: {{}} — {header.words}"),
         _steps(connection, header, used, values),
     ):
         try:
@@ -163,8 +163,8 @@ def bind(
     Raises:
         UsageError: unknown or missing parameter, or a value that does not fit.
     """
-    called = header.name if command is None else command
-    command = command or f"msgflow query {header.name}"
+    called = header.words if command is None else command
+    command = command or f"msgflow query {header.words}"
     names = [param.name for param in header.params]
     by_name: dict[str, Value] = {}
     for name, value in given.items():

@@ -122,7 +122,7 @@ def conditions_of(header: Header, selection: Selection) -> tuple[list[str], dict
             columns = columns_of(header, kind)
             if not columns:
                 raise UsageError(
-                    f"{header.name} has no column with a {kind} — --{kind} {names[0]}",
+                    f"{header.words} has no column with a {kind} — --{kind} {names[0]}",
                     _what_it_has(header),
                 )
             bindings[f"selected_{kind}"] = list(names)
@@ -134,7 +134,7 @@ def conditions_of(header: Header, selection: Selection) -> tuple[list[str], dict
         if names := getattr(selection, word):
             if not columns_of(header, PATH):
                 raise UsageError(
-                    f"{header.name} has no paths — --{word} {names[0]}", _what_it_has(header)
+                    f"{header.words} has no paths — --{word} {names[0]}", _what_it_has(header)
                 )
             bindings[f"selected_{word}"] = list(names)
             conditions.append(_visits(header, word))
@@ -180,7 +180,7 @@ def _order(header: Header, selection: Selection) -> list[str]:
     if selection.slowest is not None:
         if header.slowest is None:
             raise UsageError(
-                f"{header.name} has no --slowest: its rows have no duration of their own",
+                f"{header.words} has no --slowest: its rows have no duration of their own",
                 "--sort COLUMN:desc --limit N",
             )
         if selection.sort or selection.limit is not None:

@@ -14,6 +14,7 @@
     -- heading: rank, latency_ns
     -- note: clocks
     -- when: staging.gap
+    -- variant: measure VARCHAR {latency|age} = 'latency'  What is measured
 
 The header ends at the first line that is not a `--` comment. Two spaces end a parameter's default.
 
@@ -26,6 +27,9 @@ The header ends at the first line that is not a `--` comment. Two spaces end a p
 - `when`: tables, or macros of a run. If none of them has a row, this object has none either, and an
   ingest leaves it empty without running its SQL. In `schema/model` such an object declares its
   columns, from which the empty table is made. Only objects that take long to plan have it.
+
+- `variant`: a parameter whose values are queries of their own. The default is this file, and `age`
+  stands in the file of the same name with `-age` behind it; a BOOLEAN `each`, in that with `-each`.
 
 The unit of a column may also say what the column names: 'node', 'topic', 'callback', 'host' or
 'path'. Options that choose rows by them use it. In a public view over the table of the same name, a
@@ -69,7 +73,7 @@ _MINIMUM = re.compile(r"(-?\d+)\.\.")
 _REPEATABLE = ("param", "column")
 _SINGLE = (
     "name", "title", "description", "cause", "cure", "grain", "kind", "severity", "note", "when",
-    "brief", "answer", "heading", "slowest",
+    "brief", "answer", "heading", "slowest", "variant",
 )  # fmt: skip
 _KINDS = ("view", "inline", "macro")
 _NOTES = ("clocks",)
@@ -158,6 +162,8 @@ class Header:
         slowest: column by which rows are the slowest, else None.
         steps: what a query makes before, in order.
         when: tables and macros of a run; if none of them has a row, this has none.
+        variant: parameter that chooses between this query and others; its default is this one.
+        words: the name, and the option that chooses this variant.
     """
 
     name: str
@@ -179,6 +185,8 @@ class Header:
     slowest: str | None = None
     steps: tuple[Step, ...] = ()
     when: tuple[str, ...] = ()
+    variant: Param | None = None
+    words: str = ""
 
     @cached_property
     def needs(self) -> tuple[str, ...]:
@@ -246,6 +254,7 @@ def parse(text: str, path: Path) -> Header:
     if note is not None and note not in _NOTES:
         raise _error(path, 1, f"note {note!r} is not one of {', '.join(_NOTES)}")
     params = tuple(_param(field, path) for field in fields if field.key == "param")
+    variants = [_param(field, path) for field in fields if field.key == "variant"]
     columns = tuple(_column(field, path) for field in fields if field.key == "column")
     _check_names(params, path)
     _check_names(columns, path)
@@ -273,6 +282,8 @@ def parse(text: str, path: Path) -> Header:
         slowest=single.get("slowest"),
         steps=steps,
         when=_names(single.get("when", "")),
+        variant=variants[0] if variants else None,
+        words=single["name"],
     )
 
 
@@ -303,7 +314,7 @@ def _split(text: str, path: Path) -> tuple[list[_Field], str]:
                 raise _error(path, number, "the header starts with a continuation line")
             last = fields.pop()
             # Two spaces, so that the description of a parameter may begin on the next line.
-            gap = "  " if last.key == "param" else " "
+            gap = "  " if last.key in ("param", "variant") else " "
             joined = f"{last.value}{gap}{continuation['value']}".strip()
             fields.append(_Field(last.key, joined, last.line))
         elif match := _FIELD.fullmatch(line.rstrip()):

@@ -95,8 +95,10 @@ SUBJECTS: dict[str, Subject] = {
                 "e2e-latency", "{}_ns", Dimension.TIME, _ALL, "pairs", "flow",
                 "no flow reached the end of the path in the time window",
             ),
-            "reaction_time": Metric("reaction-time", "{}_ns", Dimension.TIME, _ALL, "intervals"),
-            "age": Metric("data-age", "{}_ns", Dimension.TIME, _ALL, "outputs"),
+            "reaction_time": Metric(
+                "e2e-latency-reaction", "{}_ns", Dimension.TIME, _ALL, "intervals"
+            ),
+            "age": Metric("e2e-latency-age", "{}_ns", Dimension.TIME, _ALL, "outputs"),
             "completeness": Metric(
                 "e2e-latency", f"reached / nullif({_ARRIVALS}, 0)", Dimension.SHARE, (), _ARRIVALS
             ),
@@ -105,7 +107,7 @@ SUBJECTS: dict[str, Subject] = {
                 "lost_flow",
             ),
         },
-        dict.fromkeys(("e2e-latency", "reaction-time", "data-age"), "path"),
+        dict.fromkeys(("e2e-latency", "e2e-latency-reaction", "e2e-latency-age"), "path"),
     ),
     "timer": Subject(
         {
@@ -129,58 +131,58 @@ SUBJECTS: dict[str, Subject] = {
     "callback": Subject(
         {
             "duration": Metric(
-                "callback-duration", "{}_ns", Dimension.TIME, _ALL, "count - open", "callback"
+                "callbacks", "{}_ns", Dimension.TIME, _ALL, "count - open", "callback"
             ),
             "period": Metric(
-                "callback-duration", "period_{}_ns", Dimension.TIME, ("min", "median", "max")
+                "callbacks", "period_{}_ns", Dimension.TIME, ("min", "median", "max")
             ),
-            "wait": Metric("executor-wait", "wait_{}_ns", Dimension.TIME, ("median", "max")),
+            "wait": Metric("waits", "wait_{}_ns", Dimension.TIME, ("median", "max")),
         },
-        dict.fromkeys(("callback-duration", "executor-wait"), "node || ' ' || callback"),
+        dict.fromkeys(("callbacks", "waits"), "node || ' ' || callback"),
         {
             "callback": Filter(
-                {"callback-duration": ("callback", "symbol"), "executor-wait": ("callback",)},
+                {"callbacks": ("callback", "symbol"), "waits": ("callback",)},
                 _CALLBACKS, "callback",
             ),
             "node": Filter(
-                {"callback-duration": ("node",), "executor-wait": ("node",)}, _NODES, "node"
+                {"callbacks": ("node",), "waits": ("node",)}, _NODES, "node"
             ),
         },
     ),
     "topic": Subject(
         {
-            "rate": Metric("publication-rate", "rate_hz", Dimension.RATE),
+            "rate": Metric("topics-rate", "rate_hz", Dimension.RATE),
             "period": Metric(
-                "publication-rate", "period_{}_ns", Dimension.TIME, ("min", "median", "p95", "max")
+                "topics-rate", "period_{}_ns", Dimension.TIME, ("min", "median", "p95", "max")
             ),
-            "jitter": Metric("publication-rate", "period_deviation_ns", Dimension.TIME),
+            "jitter": Metric("topics-rate", "period_deviation_ns", Dimension.TIME),
             "latency": Metric(
-                "transport-latency", "{}_ns", Dimension.TIME, _ALL, "linked", "message"
+                "topics-latency", "{}_ns", Dimension.TIME, _ALL, "linked", "message"
             ),
             "loss": Metric(
-                "delivery", "lost / nullif(published - unconnected, 0)", Dimension.SHARE, (),
-                "published - unconnected",
+                "topics-delivery", "lost / nullif(published - unconnected, 0)",
+                Dimension.SHARE, (), "published - unconnected",
             ),
             "completeness": Metric(
-                "delivery", "delivered / nullif(published - unconnected, 0)", Dimension.SHARE,
-                (), "published - unconnected",
+                "topics-delivery", "delivered / nullif(published - unconnected, 0)",
+                Dimension.SHARE, (), "published - unconnected",
             ),
         },
         {
-            "publication-rate": "publisher || ' → ' || topic_name",
-            "transport-latency": "topic_name || ' → ' || subscriber",
-            "delivery": "topic_name || ' → ' || subscriber",
+            "topics-rate": "publisher || ' → ' || topic_name",
+            "topics-latency": "topic_name || ' → ' || subscriber",
+            "topics-delivery": "topic_name || ' → ' || subscriber",
         },
         {
             "topic": Filter(
-                dict.fromkeys(("publication-rate", "transport-latency", "delivery"),
+                dict.fromkeys(("topics-rate", "topics-latency", "topics-delivery"),
                               ("topic_name",)), _TOPICS, "topic",
             ),
             "node": Filter(
                 {
-                    "publication-rate": ("publisher",),
-                    "transport-latency": ("subscriber",),
-                    "delivery": ("subscriber",),
+                    "topics-rate": ("publisher",),
+                    "topics-latency": ("subscriber",),
+                    "topics-delivery": ("subscriber",),
                 },
                 "SELECT DISTINCT full_name FROM main.node WHERE run_id = $run_id", "node",
             ),

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from msgflow.run.choice import Run
 
 Row = dict[str, Any]
-QUERIES = ("e2e-latency", "timers", "publication-rate", "service-latency", "action-latency")
+QUERIES = ("e2e-latency", "timers", "topics-rate", "service-latency", "action-latency")
 # With fewer values, a percentile is only their largest.
 LEAST_VALUES = 20
 # A topic that pauses or comes in bursts has no rate: the deviation of its period is larger.
@@ -37,7 +37,7 @@ def suggest_targets(run: Run, results: Mapping[str, Sequence[Row]], margin: floa
     entries = [
         *_paths(results["e2e-latency"], margin),
         *_timers(results["timers"], margin),
-        *_topics(results["publication-rate"]),
+        *_topics(results["topics-rate"]),
         *_calls(results["service-latency"], "service", "round_trip", "round_trip", margin),
         *_calls(results["action-latency"], "action", "goal", "result", margin),
     ]

@@ -33,9 +33,9 @@ Params = dict[str, Any]
 
 # Named queries that pages show, with the numbers of `msgflow query`.
 NAMED = (
-    "e2e-latency", "path-breakdown", "reaction-time", "data-age", "executor-usage",
-    "executor-wait", "interference", "publication-rate", "transport-latency", "service-latency",
-    "action-latency", "indirect-links", "delivery", "info-hosts", "info-processes", "info-topics",
+    "e2e-latency", "path-breakdown", "e2e-latency-reaction", "e2e-latency-age", "executor-usage",
+    "waits", "waits-pair", "topics-rate", "topics-latency", "service-latency",
+    "action-latency", "links", "topics-delivery", "info-hosts", "info-processes", "topics",
     "clocks",
 )  # fmt: skip
 # A window with more bars than this is drawn in bins, in so many at the most.
@@ -207,7 +207,7 @@ class Pages:
                 "description": header.description,
                 "notes": result.notes,
                 "columns": {column.name: column.description for column in header.columns},
-                "command": f"msgflow query {name} --run {shlex.quote(extent.run.name)}",
+                "command": f"msgflow query {header.words} --run {shlex.quote(extent.run.name)}",
             },
             origin_ns=extent.origin_ns,
             units=result.units,

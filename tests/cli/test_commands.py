@@ -49,7 +49,7 @@ def test_every_command_has_help(msgflow: Msgflow, command: str) -> None:
 @pytest.mark.parametrize(
     "command",
     [
-        "query callbacks",
+        "query callbacks --each",
         "sql 'SELECT 1'",
         "check",
         "report -o page.html",
@@ -224,7 +224,7 @@ def test_db_upgrade_of_old_views(msgflow: Msgflow, small_database: Path) -> None
     "command",
     [
         "info",
-        "query info-runs",
+        "query info",
         "flow --topic /chatter",
         "sql FROM\u00a0run",
         "db check",

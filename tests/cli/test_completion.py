@@ -113,10 +113,10 @@ def test_names_of_the_database(small_database: Path, tmp_path: Path) -> None:
         }
         hosts = {name for (name,) in connection.execute("SELECT hostname FROM host").fetchall()}
     expected = {
-        "query publication-rate --topic /ch": {"/chatter"},
+        "query topics --measure rate --topic /ch": {"/chatter"},
         "query e2e-latency --node /ta": {"/talker"},
-        "query callback-duration --callback ": labels,
-        "query executor-wait --host ": hosts,
+        "query callbacks --callback ": labels,
+        "query waits --host ": hosts,
         "query e2e-latency --from /ta": {"/talker"},
         "query e2e-latency --via /chat": {"/chatter"},
         "query e2e-latency --run m": {"morning"},
@@ -133,10 +133,10 @@ def test_names_of_the_database(small_database: Path, tmp_path: Path) -> None:
 
 
 def test_the_option_is_before_the_variable(small_database: Path, tmp_path: Path) -> None:
-    words = ["query", "info-topics", "--db", str(small_database), "--run", "m"]
+    words = ["query", "topics", "--db", str(small_database), "--run", "m"]
     assert ask(words, tmp_path, database=tmp_path / "none.duckdb") == ["morning"]
     assert small_database == tmp_path / "msgflow.duckdb"
-    assert ask(["query", "info-topics", "--run", "m"], tmp_path) == ["morning"]
+    assert ask(["query", "topics", "--run", "m"], tmp_path) == ["morning"]
 
 
 def test_names_of_paths(tmp_path: Path) -> None:
@@ -163,7 +163,7 @@ def test_no_database_has_no_names(tmp_path: Path, what: str) -> None:
             connection.execute("CREATE TABLE run AS SELECT 'x' AS name")
     elif what == "pipe":
         os.mkfifo(path)
-    assert ask(["query", "info-topics", "--run", "x"], tmp_path, database=path) == []
+    assert ask(["query", "topics", "--run", "x"], tmp_path, database=path) == []
     assert path.exists() == (what != "missing")
 
 
@@ -171,7 +171,7 @@ def test_a_database_in_use_has_no_names(small_database: Path, tmp_path: Path) ->
     copy = tmp_path / "copy.duckdb"
     shutil.copyfile(small_database, copy)
     with duckdb.connect(str(copy)):
-        assert ask(["query", "info-topics", "--run", "m"], tmp_path, database=copy) == []
+        assert ask(["query", "topics", "--run", "m"], tmp_path, database=copy) == []
 
 
 def test_nothing_keeps_the_database_open(
@@ -198,7 +198,7 @@ def test_views_of_a_foreign_file_do_not_run_for_ever(tmp_path: Path) -> None:
             "CREATE VIEW run AS SELECT sum(a.range * b.range)::VARCHAR AS name"
             " FROM range(10000000) AS a, range(10000000) AS b"
         )
-    assert ask(["query", "info-topics", "--run", "1"], tmp_path, database=path) == []
+    assert ask(["query", "topics", "--run", "1"], tmp_path, database=path) == []
 
 
 def test_an_unknown_query_completes_nothing(small_database: Path, tmp_path: Path) -> None:

@@ -40,7 +40,7 @@ def test_from_a_suggestion_to_links(msgflow: Msgflow, shared_traces: Path, tmp_p
     result = msgflow("ingest", shared_traces / "pingpong", "--links", file)
     assert result.exit_code == 2
     assert "no such node" in result.stderr
-    assert "pingpong" not in msgflow("query", "info-runs").stdout
+    assert "pingpong" not in msgflow("query", "info").stdout
 
 
 def test_without_runs_or_files(msgflow: Msgflow, fresh_database: Path, tmp_path: Path) -> None:
@@ -57,7 +57,7 @@ def test_without_runs_or_files(msgflow: Msgflow, fresh_database: Path, tmp_path:
 
 def test_what_is_doubtful_of_suggestions_is_said(msgflow: Msgflow, fresh_database: Path) -> None:
     case = "several_candidates_of_one_node"
-    cases = Path(__file__).parents[1] / "query" / "cases" / "link-suggestions"
+    cases = Path(__file__).parents[1] / "query" / "cases" / "links-suggested"
     with duckdb.connect(str(fresh_database)) as con:
         fill_case(con, cases / f"{case}.case")
         derive(con, 1)

@@ -64,7 +64,7 @@ def test_the_tools_and_what_they_answer(small_database: Path) -> None:
         ("check", {"run": "all"}),
         ("list_queries", {}),
         ("list_queries", {"name": "e2e-latency"}),
-        ("run_query", {"name": "info-topics", "run": "morning", "topic": ["/ch*"]}),
+        ("run_query", {"name": "topics", "run": "morning", "topic": ["/ch*"]}),
         ("schema", {}),
         ("schema", {"view": "run"}),
         ("sql", {"query": "SELECT name FROM run ORDER BY run_id DESC"}),
@@ -101,7 +101,7 @@ def test_answers_are_capped_and_say_so(small_database: Path) -> None:
     assert len(json.dumps(wide)) < mcp_server.MOST_CHARACTERS + 1_000
     assert len(wide["rows"]) == 9
     assert "only 9 of these 20 rows have room in 20,000 characters" in wide["notes"][-1]
-    rows = one(small_database, "run_query", name="info-topics", internal=True, limit=1)
+    rows = one(small_database, "run_query", name="topics", internal=True, limit=1)
     assert len(rows["rows"]) == 1
     assert "only the first 1 of" in rows["notes"][-1]
 
@@ -114,7 +114,7 @@ def test_answers_are_capped_and_say_so(small_database: Path) -> None:
         (("sql", {"query": "FROM '/etc/passwd'"}), ["/etc/passwd does not exist"]),
         (("sql", {"query": "FROM nothing"}), ["nothing"]),
         (("run_query", {"name": "latency"}), ["no such query", "hint: ", "e2e-latency"]),
-        (("run_query", {"name": "info-runs", "run": "x"}), ["no such run — x", "morning (1)"]),
+        (("run_query", {"name": "info", "run": "x"}), ["no such run — x", "morning (1)"]),
         (
             ("run_query", {"name": "e2e-latency", "parameters": {"paths": "/etc/passwd"}}),
             ["e2e-latency has no such parameter — paths"],

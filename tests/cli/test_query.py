@@ -20,7 +20,7 @@ def test_the_list_names_every_query(msgflow: Msgflow) -> None:
         result = msgflow(*arguments)
         assert result.exit_code == 0
         for header in load_queries():
-            assert header.name in result.stdout
+            assert header.words in result.stdout
             assert header.title in result.stdout
 
 
@@ -44,15 +44,15 @@ def test_names_of_the_command_line_are_not_taken_by_queries() -> None:
 
 
 def test_show_prints_the_file_and_opens_nothing(msgflow: Msgflow) -> None:
-    result = msgflow("query", "info-topics", "--show")
+    result = msgflow("query", "topics", "--show")
     assert result.exit_code == 0
     assert result.stdout == next(
-        header.path.read_text() for header in load_queries() if header.name == "info-topics"
+        header.path.read_text() for header in load_queries() if header.name == "topics"
     )
 
 
 def test_rows_go_to_stdout_and_words_to_stderr(msgflow: Msgflow, small_database: Path) -> None:
-    result = msgflow("query", "info-topics", "--db", small_database)
+    result = msgflow("query", "topics", "--db", small_database)
     assert result.exit_code == 0
     assert "/chatter" in result.stdout
     assert "/rosout" not in result.stdout
@@ -64,7 +64,7 @@ def test_rows_go_to_stdout_and_words_to_stderr(msgflow: Msgflow, small_database:
 
 def test_options_select(msgflow: Msgflow, small_database: Path) -> None:
     def rows(*options: str) -> list[dict[str, object]]:
-        arguments = ("query", "info-topics", "--db", small_database, "--format", "json")
+        arguments = ("query", "topics", "--db", small_database, "--format", "json")
         return json.loads(msgflow(*arguments, *options).stdout)
 
     assert [row["run_id"] for row in rows()] == [2]
@@ -76,31 +76,31 @@ def test_options_select(msgflow: Msgflow, small_database: Path) -> None:
 def test_the_database_comes_from_the_environment_or_lies_here(
     msgflow: Msgflow, small_database: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert msgflow("query", "info-runs").exit_code == 4
+    assert msgflow("query", "info").exit_code == 4
     Path("msgflow.duckdb").symlink_to(small_database)
-    assert msgflow("query", "info-runs").exit_code == 0
+    assert msgflow("query", "info").exit_code == 0
     Path("msgflow.duckdb").unlink()
     monkeypatch.setenv("MSGFLOW_DB", str(small_database))
-    assert msgflow("query", "info-runs").exit_code == 0
-    assert msgflow("query", "info-runs", "--db", "none.duckdb").exit_code == 4
+    assert msgflow("query", "info").exit_code == 0
+    assert msgflow("query", "info", "--db", "none.duckdb").exit_code == 4
 
 
 def test_a_file_is_written_in_the_format_of_its_suffix(
     msgflow: Msgflow, small_database: Path
 ) -> None:
-    result = msgflow("query", "info-runs", "--db", small_database, "-o", "runs.parquet")
+    result = msgflow("query", "info", "--db", small_database, "-o", "runs.parquet")
     assert result.exit_code == 0
     assert result.stdout == ""
     assert "1 row written to runs.parquet" in result.stderr
     assert pq.read_table("runs.parquet")["name"].to_pylist() == ["noon"]
-    msgflow("query", "info-runs", "--db", small_database, "-o", "runs.x", "--format", "csv")
+    msgflow("query", "info", "--db", small_database, "-o", "runs.x", "--format", "csv")
     assert Path("runs.x").read_text().startswith('"run_id","name"')
 
 
 def test_durations_and_times_are_for_people_in_tables_only(
     msgflow: Msgflow, small_database: Path
 ) -> None:
-    arguments = ("query", "info-runs", "--db", small_database, "--format")
+    arguments = ("query", "info", "--db", small_database, "--format")
     table = msgflow(*arguments, "table").stdout
     assert "2.500 s" in table
     assert "2023-11-14T22:13:30.000000000Z" in table
@@ -113,19 +113,19 @@ def test_durations_and_times_are_for_people_in_tables_only(
 @pytest.mark.parametrize(
     ("arguments", "code", "error", "hint"),
     [
-        (("info-topic",), 2, "there is no such query — info-topic", "msgflow query info-topics"),
-        (("info-runs", "--limits", "3"), 2, "no such option: --limits", "info-runs --help"),
-        (("info-runs", "--run", "x"), 2, "there is no such run — x", "morning (1), noon (2)"),
-        (("info-runs", "--start", "1s"), 2, "no time window — info-runs", "leave out --start"),
+        (("info-topic",), 2, "there is no such query — info-topic", "msgflow query topics"),
+        (("info", "--limits", "3"), 2, "no such option: --limits", "info --help"),
+        (("info", "--run", "x"), 2, "there is no such run — x", "morning (1), noon (2)"),
+        (("info", "--start", "1s"), 2, "no time window — info", "leave out --start"),
         (
-            ("info-runs", "--format", "xml"),
+            ("info", "--format", "xml"),
             2,
             "'--format': 'xml' is not one of",
-            "info-runs --help",
+            "info --help",
         ),
-        (("info-runs", "--list"), 2, "--list takes no name of a query", "info-runs --help"),
-        (("--list", "info-runs"), 2, "--list takes no name of a query", "info-runs --help"),
-        (("info-runs", "-o", "no/dir/x.csv"), 2, "no such file or directory", "can be written"),
+        (("info", "--list"), 2, "--list takes no name of a query", "info --help"),
+        (("--list", "info"), 2, "--list takes no name of a query", "info --help"),
+        (("info", "-o", "no/dir/x.csv"), 2, "no such file or directory", "can be written"),
     ],
 )
 def test_mistakes_have_a_message_and_a_code(
@@ -148,23 +148,21 @@ def test_mistakes_have_a_message_and_a_code(
 
 
 def test_times_are_chosen_for_programs_only(msgflow: Msgflow, small_database: Path) -> None:
-    result = msgflow(
-        "query", "info-runs", "--db", small_database, "--format", "jsonl", "--times", "iso"
-    )
+    result = msgflow("query", "info", "--db", small_database, "--format", "jsonl", "--times", "iso")
     assert result.exit_code == 0
     row = json.loads(result.stdout)
     assert row["start_utc"].endswith("Z")
     assert "duration_s" in row
-    refused = msgflow("query", "info-runs", "--db", small_database, "--times", "iso")
+    refused = msgflow("query", "info", "--db", small_database, "--times", "iso")
     assert refused.exit_code == 2
     assert "--times" in refused.stderr
 
 
 def test_a_suffix_of_no_format_is_refused(msgflow: Msgflow, small_database: Path) -> None:
     for name in ("runs.xlsx", "runs.png"):
-        result = msgflow("query", "info-runs", "--db", small_database, "-o", name)
+        result = msgflow("query", "info", "--db", small_database, "-o", name)
         assert result.exit_code == 2
         assert name in result.stderr
         assert not Path(name).exists()
-    assert msgflow("query", "info-runs", "--db", small_database, "-o", "runs.txt").exit_code == 0
+    assert msgflow("query", "info", "--db", small_database, "-o", "runs.txt").exit_code == 0
     assert Path("runs.txt").read_text().startswith("run_id")

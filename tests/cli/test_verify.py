@@ -45,7 +45,7 @@ def test_from_a_suggestion_to_verdicts(demo: Msgflow, tmp_path: Path) -> None:
 def test_exit_codes(
     demo: Msgflow, tmp_path: Path, requirement: str, code: int, allowed: int
 ) -> None:
-    topics = demo("query", "publication-rate", "--format", "jsonl").stdout.splitlines()
+    topics = demo("query", "topics", "--measure", "rate", "--format", "jsonl").stdout.splitlines()
     publisher = json.loads(topics[0])
     file = tmp_path / "targets.yaml"
     requirement = requirement.replace("/planner", publisher["publisher"])

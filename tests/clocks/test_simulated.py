@@ -29,7 +29,7 @@ def test_three_hosts_in_a_chain(tmp_path: Path) -> None:
             "SELECT count(*), max(uncertainty_ns), min(latency_ns) FROM remote_latency "
             "WHERE uncertainty_ns IS NULL OR latency_ns + uncertainty_ns < 200_000"
         ).to_arrow()
-        notes = database.query("transport-latency", internal=True).notes
+        notes = database.query("topics-latency", internal=True).notes
     assert {row["reference"] for row in rows.values()} == {"alpha"}
     own = {"alpha": 0.0, "beta": 90e-6, "gamma": -70e-6}
     for name, row in rows.items():

@@ -135,8 +135,8 @@ def test_a_forged_view_or_macro_reaches_no_other_file(place: Path, forged: str) 
             database.findings,
             database.check,
             lambda: database.query("info-nodes", run="all").to_arrow().to_pylist(),
-            lambda: database.query("info-runs", run="all").to_arrow().to_pylist(),
-            lambda: database.query("info-topics", where="upper(topic_name) = 'X'"),
+            lambda: database.query("info", run="all").to_arrow().to_pylist(),
+            lambda: database.query("topics", where="upper(topic_name) = 'X'"),
             lambda: database.sql("SELECT upper(name), sum(1) FROM run GROUP BY ALL").to_arrow(),
             lambda: database.sql("FROM node").to_arrow(),
         )

@@ -75,7 +75,7 @@ def test_a_publication_may_take_until_its_thread_goes_on(
 
 
 def test_what_a_busy_executor_added_is_said(empty_database: Path, tmp_path: Path) -> None:
-    """The numbers are worked out by hand in the golden cases of executor-wait."""
+    """The numbers are worked out by hand in the golden cases of waits."""
     path = tmp_path / "busy.duckdb"
     shutil.copyfile(empty_database, path)
     with duckdb.connect(str(path)) as connection:

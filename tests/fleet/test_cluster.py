@@ -119,7 +119,7 @@ def test_much_goes_wrong(
                 options={},
                 content=Content(views=False, database=False),
             ).values["part"]
-        for table in ("flow", "callback_duration", "delivery", "distribution", "finding"):
+        for table in ("flow", "callbacks", "topics_delivery", "distribution", "finding"):
             alone = read_part(other, table, part, run["run"])
             assert alone is not None
             assert read_part(lake, table, run["part"], run["run"]) == alone, table

@@ -143,8 +143,8 @@ def test_a_run_is_what_its_recording_gives_alone(
         part = run_row["part"]
         with Database(alone) as opened:
             for query, path in (
-                ("callback-duration", f"callback_duration/part={part}"),
-                ("delivery", f"delivery/part={part}"),
+                ("callbacks", f"callbacks/part={part}"),
+                ("topics-delivery", f"topics_delivery/part={part}"),
             ):
                 expected = opened.query(query, internal=True).to_arrow().to_pylist()
                 found = duckdb.sql(

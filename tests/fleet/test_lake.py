@@ -87,7 +87,7 @@ def test_answers_are_those_of_the_database(
     lake, part, _ = holding
     lake.commit([row(part)])
     with Database(databases[0]) as database:
-        for name in ("e2e-latency", "callback-duration", "delivery"):
+        for name in ("e2e-latency", "callbacks", "topics-delivery"):
             expected = database.query(name, internal=True).to_arrow().drop_columns(["run_id"])
             found = [values[1:] for values in rows_of(lake, name.replace("-", "_"))]
             assert found == sorted(map(tuple, (r.values() for r in expected.to_pylist())))

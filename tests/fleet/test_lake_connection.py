@@ -88,7 +88,7 @@ def test_only_files_of_the_chosen_runs_are_opened(
         found = reading.connection.execute("SELECT DISTINCT run FROM flow").fetchall()
         assert [key for (key,) in found] == reading.choice.runs["run"].to_pylist()
         with pytest.raises(duckdb.CatalogException):
-            reading.connection.execute("FROM delivery")
+            reading.connection.execute("FROM topics_delivery")
 
 
 def test_the_connection_reaches_nothing_else(night: Lake, tmp_path: Path) -> None:
@@ -180,8 +180,8 @@ def test_a_bucket_answers_as_a_folder_does(
     lake, store = in_bucket
     for name, more in (
         ("e2e-latency", {"group_by": ["robot"]}),
-        ("callback-duration", {"where": "robot = 'r1'"}),
-        ("delivery", {"where": "name = 'second'"}),
+        ("callbacks", {"where": "robot = 'r1'"}),
+        ("topics-delivery", {"where": "name = 'second'"}),
     ):
         expected = fleet_query(night, name, **more).table  # type: ignore[arg-type]
         assert fleet_query(lake, name, **more).table.equals(expected)  # type: ignore[arg-type]

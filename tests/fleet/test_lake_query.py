@@ -18,10 +18,17 @@ from msgflow.cli.app import app
 from msgflow.errors import QueryError, UsageError
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.lake_connection import Reading, choose
-from msgflow.fleet.lake_query import fleet_query, fleet_sql, fleet_worst, names, statements
+from msgflow.fleet.lake_query import (
+    fleet_query,
+    fleet_sql,
+    fleet_worst,
+    header_of,
+    names,
+    statements,
+)
 from msgflow.fleet.part import Content, write_part
 from msgflow.ingest import ingest
-from msgflow.query.catalogue import query_names
+from msgflow.query.catalogue import load_query
 from msgflow.sim import simulate
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "fleet.md").read_text(encoding="utf-8")
@@ -49,13 +56,12 @@ def test_headers_are_those_of_the_statements(night: Lake) -> None:
 
 
 def test_names_are_those_of_the_queries_of_one_run() -> None:
-    assert set(names()) - set(query_names()) == {"findings"}
     for name in names():
-        assert f"`{name}`" in PAGE
+        assert f"`{load_query(name).words}`" in PAGE
 
 
 @pytest.mark.parametrize(
-    "name", [name for name in names() if name not in ("findings", "data-quality")]
+    "name", [name for name in names() if name not in ("info-findings", "info-quality")]
 )
 def test_one_run_is_what_its_database_says(
     night: Lake, databases: tuple[Path, Path], name: str
@@ -75,7 +81,7 @@ def test_one_run_is_what_its_database_says(
 
 
 def test_findings_of_one_run_are_added_up(night: Lake, databases: tuple[Path, Path]) -> None:
-    found = fleet_query(night, "findings", where="name = 'second'").table.to_pylist()
+    found = fleet_query(night, "info-findings", where="name = 'second'").table.to_pylist()
     with Database(databases[1]) as database:
         rows = database.query("info-findings").to_arrow().to_pylist()
     assert len(rows) >= len(found) > 0
@@ -108,7 +114,7 @@ def test_latencies_of_several_runs_are_those_of_all_their_flows(night: Lake) -> 
 
 def test_times_of_several_runs_are_off_by_less_than_a_hundredth(night: Lake) -> None:
     where = "name IN ('first', 'second')"
-    found = fleet_query(night, "callback-duration", where=where, internal=True)
+    found = fleet_query(night, "callbacks", where=where, internal=True)
     assert "medians and other quantiles of several runs are off by less than 1 %" in found.notes
     exact = fleet_sql(
         night,
@@ -130,9 +136,9 @@ def test_times_of_several_runs_are_off_by_less_than_a_hundredth(night: Lake) -> 
 def test_quantiles_of_the_same_run_twice_are_its_own(night: Lake) -> None:
     """All times of a run and its copy have the quantiles of the run, counts are doubled."""
     for name, count, times in (
-        ("callback-duration", "count", ["period_median_ns", "median_ns", "p95_ns", "p99_ns"]),
-        ("executor-wait", "count", ["wait_median_ns"]),
-        ("transport-latency", "takes", ["median_ns", "p95_ns", "p99_ns"]),
+        ("callbacks", "count", ["period_median_ns", "median_ns", "p95_ns", "p99_ns"]),
+        ("waits", "count", ["wait_median_ns"]),
+        ("topics-latency", "takes", ["median_ns", "p95_ns", "p99_ns"]),
     ):
         one, both = (
             fleet_query(night, name, where=where, internal=True).table.to_pylist()
@@ -149,7 +155,7 @@ def test_quantiles_of_the_same_run_twice_are_its_own(night: Lake) -> None:
 
 def test_reasons_and_shares_are_of_sums(night: Lake) -> None:
     one, both = (
-        fleet_query(night, "delivery", where=where, internal=True).table.to_pylist()
+        fleet_query(night, "topics-delivery", where=where, internal=True).table.to_pylist()
         for where in ("name = 'first'", "robot = 'r1'")
     )
     assert any(row["reasons"] for row in one)
@@ -196,27 +202,27 @@ def test_groups_are_of_labels_and_of_columns(night: Lake) -> None:
     assert {row["soft-ware"] for row in found.table.to_pylist()} == {None, "a'b"}
     assert {row["name"] for row in found.table.to_pylist()} == {"first", "second", "copy"}
     # A column of the query has its name first.
-    assert "label_run" not in fleet_query(night, "delivery", group_by=["run"]).columns
-    assert fleet_query(night, "findings", group_by=["name"]).columns[0] == "label_name"
+    assert "label_run" not in fleet_query(night, "topics-delivery", group_by=["run"]).columns
+    assert fleet_query(night, "info-findings", group_by=["name"]).columns[0] == "label_name"
     with pytest.raises(UsageError, match=r"(?s)such a label — robo.*did you mean robot"):
         fleet_query(night, "e2e-latency", group_by=["robo"])
     with pytest.raises(UsageError, match="such a label — is_removed"):
         fleet_query(night, "e2e-latency", group_by=["is_removed"])
     # Of one run each, quantiles are its own.
-    assert "off by less" in str(fleet_query(night, "callback-duration").notes)
-    assert "off by less" not in str(fleet_query(night, "callback-duration", group_by=["run"]).notes)
+    assert "off by less" in str(fleet_query(night, "callbacks").notes)
+    assert "off by less" not in str(fleet_query(night, "callbacks", group_by=["run"]).notes)
 
 
 def test_rows_are_chosen(night: Lake) -> None:
-    whole = fleet_query(night, "callback-duration")
+    whole = fleet_query(night, "callbacks")
     node = whole.table["node"][0].as_py()
     some = fleet_query(
-        night, "callback-duration", selection={"node": node, "sort": "max_ns:desc", "limit": 1}
+        night, "callbacks", selection={"node": node, "sort": "max_ns:desc", "limit": 1}
     )
     assert some.table["node"].to_pylist() == [node]
     assert "is_internal" not in some.columns
     with pytest.raises(UsageError, match="no such parameter — case"):
-        fleet_query(night, "delivery", case="last")
+        fleet_query(night, "topics-delivery", case="last")
     with pytest.raises(UsageError, match="no such value — best"):
         fleet_query(night, "e2e-latency", case="best")
 
@@ -232,8 +238,10 @@ def test_what_a_lake_cannot_answer(night: Lake) -> None:
     assert result.exit_code == 2
     assert "a lake does not hold what this query needs" in result.stderr
     listed = run("query").stdout
-    assert all(name in listed for name in names())
-    result = CliRunner().invoke(app, ["fleet", "query", "delivery"], env={"MSGFLOW_LAKE": ""})
+    assert all(header_of(name).words in listed for name in names())
+    result = CliRunner().invoke(
+        app, ["fleet", "query", "topics", "--measure", "delivery"], env={"MSGFLOW_LAKE": ""}
+    )
     assert result.exit_code == 2
     assert "no lake is named" in result.stderr
 
@@ -314,8 +322,8 @@ def test_a_lake_of_an_earlier_version_lacks_tables(night: Lake, tmp_path: Path) 
     lake = Lake.open_or_create(tmp_path / "lake")
     row = night.runs().to_pylist()[0]
     lake.commit([row | {"labels": dict(row["labels"] or ()), "msgflow_version": "0.0.1"}])
-    with pytest.raises(UsageError, match="an earlier msgflow wrote them — delivery"):
-        fleet_query(lake, "delivery")
+    with pytest.raises(UsageError, match="an earlier msgflow wrote them — topics_delivery"):
+        fleet_query(lake, "topics-delivery")
 
 
 def test_nobody_waits_for_pandas(night: Lake) -> None:

@@ -74,9 +74,9 @@ def test_a_burst(empty_database: Path, tmp_path: Path) -> None:
     limit(con, "450MB")
     full = {"detail": "full"}
     parts = run_query(con, load_query("critical-path"), full).to_arrow().to_pylist()
-    (pair,) = run_query(con, load_query("interference"), {}).to_arrow().to_pylist()
-    waits = run_query(con, load_query("waits"), {}).to_arrow().to_pylist()
-    by_callback = run_query(con, load_query("executor-wait"), {}).to_arrow().to_pylist()
+    (pair,) = run_query(con, load_query("waits-pair"), {}).to_arrow().to_pylist()
+    waits = run_query(con, load_query("waits-instance"), {}).to_arrow().to_pylist()
+    by_callback = run_query(con, load_query("waits"), {}).to_arrow().to_pylist()
     analysis.close()
     assert (pair["waits"], pair["instances"]) == (MESSAGES - 1, MESSAGES * (MESSAGES - 1) // 2)
     assert pair["overlap_max_ns"] == sum(wait["busy_max_ns"] or 0 for wait in waits)

@@ -50,7 +50,7 @@ def damaging(self, *arguments, **options):
     raise TraceError("planted")
 
 def untrue(self, name, **options):
-    return query(self, "info-runs" if name == "delivery" else name, **options)
+    return query(self, "info" if name == "topics-delivery" else name, **options)
 
 PLANTS = {
     "nothing": {},

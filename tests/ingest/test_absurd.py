@@ -29,7 +29,7 @@ def directories(root: Path) -> list[Path]:
 def findings(database: Path) -> dict[str, tuple[str, int, str]]:
     with open_db(database) as opened:
         rows = opened.sql("SELECT name, severity, count, detail FROM finding").to_arrow()
-        for name in ("info-findings", "e2e-latency", "data-quality", "info-runs"):
+        for name in ("info-findings", "e2e-latency", "info-quality", "info"):
             opened.query(name)
     return {row["name"]: (row["severity"], row["count"], row["detail"]) for row in rows.to_pylist()}
 

@@ -241,7 +241,7 @@ def test_declared_or_traced_the_links_are_the_same(
     file = tmp_path / f"{name}.yaml"
     with Database(plain) as database:
         database.ingest(shared_traces / name, ignore=["ros2:message_link_*"])
-        suggestions = database.query("link-suggestions").to_arrow().to_pylist()
+        suggestions = database.query("links-suggested").to_arrow().to_pylist()
         file.write_text(suggest_links(suggestions, "msgflow links apply FILE"))
         database.close()
         assert rows(plain, links) != rows(traced, links)

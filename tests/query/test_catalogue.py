@@ -1,28 +1,89 @@
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
+from msgflow.database import open_db
 from msgflow.db.objects import public_names
 from msgflow.errors import UsageError
 from msgflow.name_suggestions import meant_or, nearest
-from msgflow.query.catalogue import QUERIES_BY_WORD, load_queries, load_query, query_names
+from msgflow.query.catalogue import (
+    QUERIES_BY_WORD,
+    choose_query,
+    load_queries,
+    load_query,
+    query_names,
+)
+from msgflow.sql.value import Value
 
 
 def test_the_catalogue_is_the_folder() -> None:
-    assert "info-topics" in query_names()
-    assert [header.name for header in load_queries()] == list(query_names())
-    assert load_query("info-topics").title == "Topics"
+    assert "topics" in query_names()
+    names = [header.name for header in load_queries()]
+    assert names == sorted(path.stem for path in load_query("topics").path.parent.glob("*.sql"))
+    assert [header.name for header in load_queries() if " " not in header.words] == list(
+        query_names()
+    )
+    assert load_query("topics").title == "Topics"
+
+
+def test_a_newcomer_can_read_the_list() -> None:
+    assert len(query_names()) <= 20
+
+
+def test_every_variant_is_a_value_of_the_option_of_its_query() -> None:
+    for name in query_names():
+        variant = load_query(name).variant
+        files = {header.name for header in load_queries() if header.name.startswith(f"{name}-")}
+        if variant is None:
+            assert not files
+        elif variant.type == "BOOLEAN":
+            assert (files, variant.default) == ({f"{name}-{variant.name}"}, False)
+        else:
+            chosen = {f"{name}-{value}" for value in variant.choices}
+            assert files == chosen - {f"{name}-{variant.default}"}
+            assert variant.default in variant.choices
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "words"),
+    [
+        ("topics", {}, "topics"),
+        ("topics", {"measure": "rate", "node": "/a"}, "topics --measure rate"),
+        ("topics", {"measure": "messages"}, "topics"),
+        ("topics", {"measure": None}, "topics"),
+        ("topics-rate", {}, "topics --measure rate"),
+        ("topics-rate", {"measure": "latency"}, "topics --measure latency"),
+        ("callbacks", {"each": True}, "callbacks --each"),
+        ("callbacks", {"each": "yes"}, "callbacks --each"),
+        ("callbacks-each", {"each": False}, "callbacks"),
+        ("callbacks", {"each": "maybe"}, "callbacks"),
+        ("flows", {"measure": "rate"}, "flows"),
+    ],
+)
+def test_an_option_chooses_a_variant(name: str, given: dict[str, Value], words: str) -> None:
+    assert choose_query(name, given).words == words
+
+
+def test_a_value_that_no_variant_has_is_refused(small_database: Path) -> None:
+    with open_db(small_database) as database:
+        with pytest.raises(UsageError, match="--measure has no such value — rates") as raised:
+            database.query("topics", measure="rates")
+        assert "did you mean rate" in str(raised.value.hint)
+        rates = database.query("topics", measure="rate")
+        assert rates.columns == database.query("topics-rate").columns
 
 
 def test_a_file_is_parsed_once() -> None:
-    assert load_query("info-topics") is load_query("info-topics", public_names)
+    assert load_query("topics") is load_query("topics", public_names)
 
 
 def test_an_unknown_query_is_refused_with_similar_ones() -> None:
     with pytest.raises(UsageError) as raised:
-        load_query("info-topic")
-    assert raised.value.message == "there is no such query — info-topic"
-    assert "msgflow query info-topics" in str(raised.value.hint)
+        load_query("topic-s")
+    assert raised.value.message == "there is no such query — topic-s"
+    assert "msgflow query topics" in str(raised.value.hint)
 
 
 def test_without_a_similar_one_the_list_is_named() -> None:
@@ -32,9 +93,9 @@ def test_without_a_similar_one_the_list_is_named() -> None:
 
 
 def test_nearest_finds_slips_and_parts() -> None:
-    known = ["callback-duration", "e2e-latency", "flows"]
+    known = ["executor-usage", "e2e-latency", "flows"]
     assert nearest("e2e-latncy", known) == ["e2e-latency"]
-    assert nearest("duration", known)[0] == "callback-duration"
+    assert nearest("usage", known)[0] == "executor-usage"
     assert nearest("", known) == []
     assert nearest("foo", ("roots", "reached")) == []
 
@@ -48,11 +109,11 @@ def test_what_may_be_meant_comes_before_what_there_is() -> None:
 @pytest.mark.parametrize(
     ("name", "hint"),
     [
-        ("jitter", "msgflow query timers or msgflow query publication-rate"),
-        ("drops", "msgflow query delivery"),
-        ("Blocking", "msgflow query interference"),
-        ("topics", "msgflow query info-topics"),
-        ("loss", "msgflow query delivery or msgflow query data-quality"),
+        ("jitter", "msgflow query timers or msgflow query topics --measure rate"),
+        ("drops", "msgflow query topics --measure delivery"),
+        ("Blocking", "msgflow query waits --by pair"),
+        ("nodes", "msgflow query info --section nodes"),
+        ("loss", "msgflow query topics --measure delivery or msgflow query info --section quality"),
         ("executor_wait", "it is a view: msgflow sql 'FROM executor_wait'"),
         ("take", "it is a view: msgflow sql 'FROM take'"),
         ("../x/../node.", "msgflow query --list"),
@@ -65,6 +126,5 @@ def test_words_for_what_a_query_answers(name: str, hint: str) -> None:
 
 
 def test_every_word_leads_to_a_query() -> None:
-    assert {query for queries in QUERIES_BY_WORD.values() for query in queries} <= set(
-        query_names()
-    )
+    for queries in QUERIES_BY_WORD.values():
+        assert all(load_query(query) for query in queries)

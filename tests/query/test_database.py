@@ -20,12 +20,12 @@ def test_the_public_names_are_there() -> None:
 def test_asking_a_database(small_database: Path) -> None:
     with msgflow.open_db(small_database) as database:
         assert [run.name for run in database.runs()] == ["morning", "noon"]
-        topics = database.query("info-topics")
+        topics = database.query("topics")
         assert topics.to_arrow()["topic_name"].to_pylist() == ["/chatter"]
         assert [run.name for run in topics.runs] == ["noon"]
-        both = database.query("info-topics", run="all", internal=True)
+        both = database.query("topics", run="all", internal=True)
         assert len(both) == 3
-        assert "info-topics" in [header.name for header in database.list_queries()]
+        assert "topics" in [header.name for header in database.list_queries()]
 
 
 def test_sql_is_read_only_and_shut_in(small_database: Path, tmp_path: Path) -> None:
@@ -95,7 +95,7 @@ def test_what_needs_more_memory_than_it_may_take_says_so(small_database: Path) -
         msgflow.open_db(small_database, memory_limit="60MB") as database,
         pytest.raises(QueryError, match=r"more memory is needed .* — callbacks") as raised,
     ):
-        database.query("callbacks", where=f"start_ns > ({all_at_once})")
+        database.query("callbacks-each", where=f"start_ns > ({all_at_once})")
     assert "--memory-limit" in str(raised.value.hint)
 
 

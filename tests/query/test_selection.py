@@ -36,32 +36,33 @@ def rows(database: Database, name: str, **given: Any) -> list[dict[str, Any]]:
 
 
 def test_names_choose_rows(database: Database) -> None:
-    every = rows(database, "executor-wait")
-    assert rows(database, "executor-wait", node=PLANNER) == [
-        row for row in every if row["node"] == PLANNER
-    ]
-    both = rows(database, "executor-wait", node=[PLANNER, "/camera/*"], callback="Timer(*")
+    every = rows(database, "waits")
+    assert rows(database, "waits", node=PLANNER) == [row for row in every if row["node"] == PLANNER]
+    both = rows(database, "waits", node=[PLANNER, "/camera/*"], callback="Timer(*")
     assert [(row["node"], row["callback"]) for row in both] == [
         ("/camera/driver", "Timer(33.333 ms)")
     ]
     assert {row["host"] for row in rows(database, "executor-usage", host="robot-base")} == {
         "robot-base"
     }
-    pairs = rows(database, "clock-pairs", host="robot-base")
+    pairs = rows(database, "clocks-pair", host="robot-base")
     assert len(pairs) == 2
     # A row with one of several names in a list.
-    waiting = rows(database, "interference", node=PLANNER)
+    waiting = rows(database, "waits-pair", node=PLANNER)
     assert {row["node"] for row in waiting} | {row["meanwhile_node"] for row in waiting} == {
         PLANNER
     }
 
 
 def test_topics_by_glob_and_in_one_text(database: Database) -> None:
-    names = [row["topic_name"] for row in rows(database, "delivery", topic="/imu/*, /camera/image")]
+    names = [
+        row["topic_name"]
+        for row in rows(database, "topics-delivery", topic="/imu/*, /camera/image")
+    ]
     assert names == ["/camera/image", "/imu/data"]
-    assert rows(database, "unmatched", topic="/imu/data", internal=True) == [
+    assert rows(database, "topics-unmatched", topic="/imu/data", internal=True) == [
         row
-        for row in rows(database, "unmatched", internal=True)
+        for row in rows(database, "topics-unmatched", internal=True)
         if row["topic_name"] == "/imu/data"
     ]
 
@@ -116,24 +117,24 @@ def test_sorting_and_limits(database: Database) -> None:
 
 
 def test_hidden_rows_do_not_count_to_the_limit(database: Database) -> None:
-    result = database.query("info-topics", limit=2)
+    result = database.query("topics", limit=2)
     assert len(result) == 2
     assert "2 of 10 rows" in result.notes
     assert "2 internal rows are hidden; --internal shows them" in result.notes
-    none = database.query("info-topics", where="topic_name = '/rosout'")
+    none = database.query("topics", where="topic_name = '/rosout'")
     assert len(none) == 0
     assert "1 internal row is hidden; --internal shows them" in none.notes
     assert none.columns == result.columns
 
 
 def test_conditions(database: Database) -> None:
-    every = rows(database, "executor-wait")
-    assert rows(database, "executor-wait", where="count > 50 AND node LIKE '/imu%'") == [
+    every = rows(database, "waits")
+    assert rows(database, "waits", where="count > 50 AND node LIKE '/imu%'") == [
         row for row in every if row["count"] > 50 and row["node"].startswith("/imu")
     ]
-    assert len(rows(database, "executor-wait", where="true -- all of them")) == len(every)
+    assert len(rows(database, "waits", where="true -- all of them")) == len(every)
     inner = "node IN (SELECT full_name FROM main.node WHERE name = 'planner')"
-    assert {row["node"] for row in rows(database, "executor-wait", where=inner)} == {PLANNER}
+    assert {row["node"] for row in rows(database, "waits", where=inner)} == {PLANNER}
 
 
 @pytest.mark.parametrize(
@@ -162,7 +163,7 @@ def test_conditions(database: Database) -> None:
 )
 def test_what_is_no_condition_is_refused(database: Database, where: str, message: str) -> None:
     with pytest.raises(UsageError) as raised:
-        database.query("executor-wait", where=where)
+        database.query("waits", where=where)
     assert message in raised.value.message
     assert raised.value.hint
 
@@ -170,7 +171,7 @@ def test_what_is_no_condition_is_refused(database: Database, where: str, message
 def test_the_nearest_column_is_named(database: Database) -> None:
     for given in ({"where": "cont > 1"}, {"sort": "cont"}):
         with pytest.raises(UsageError) as raised:
-            database.query("executor-wait", **given)  # type: ignore[arg-type]
+            database.query("waits", **given)  # type: ignore[arg-type]
         assert "did you mean count" in (raised.value.hint or "")
 
 
@@ -178,7 +179,7 @@ def test_the_nearest_column_is_named(database: Database) -> None:
     ("query", "given", "message"),
     [
         ("clocks", {"node": "/a"}, "clocks has no column with a node — --node /a"),
-        ("info-runs", {"via": "/a"}, "info-runs has no paths — --via /a"),
+        ("info", {"via": "/a"}, "info has no paths — --via /a"),
         (
             "e2e-latency",
             {"slowest": 3},
@@ -188,8 +189,8 @@ def test_the_nearest_column_is_named(database: Database) -> None:
         ("flows", {"sort": "latency:down"}, "rows are sorted asc or desc — latency:down"),
         ("flows", {"limit": 0}, "--limit is at least 1 — 0"),
         ("flows", {"limit": "3"}, "--limit is at least 1 — 3"),
-        ("executor-wait", {"node": 3}, "node is a name or several — 3"),
-        ("executor-wait", {"node": "\x1b31m"}, "there is no such node in the run"),
+        ("waits", {"node": 3}, "node is a name or several — 3"),
+        ("waits", {"node": "\x1b31m"}, "there is no such node in the run"),
         ("e2e-latency", {"from_": "/camera/nothing*"}, "no topic or node in the run fits"),
     ],
 )
@@ -358,5 +359,5 @@ def test_what_left_nothing_is_said(database: Database) -> None:
         nothing.notes
     )
     assert "nothing fits" not in " ".join(database.query("e2e-latency", to="/base/motors").notes)
-    missed = database.query("callback-duration", where="count < 0")
+    missed = database.query("callbacks", where="count < 0")
     assert missed.notes[-1] == "nothing fits --where 'count < 0': try with less"

@@ -12,5 +12,5 @@ def test_reasons_of_unmatched() -> None:
     """Each reason that the vocabulary allows can be asked for, and no other."""
     (kind,) = (h for h in kinds_of("database") if short_name(h) == "vocabulary_is_closed")
     lists = re.findall(r"reason NOT IN \(([^)]*)\)", kind.body)
-    (reason,) = (p for p in load_query("unmatched").params if p.name == "reason")
+    (reason,) = (p for p in load_query("topics-unmatched").params if p.name == "reason")
     assert set(reason.choices) == set(re.findall(r"'(\w+)'", " ".join(lists)))

@@ -115,7 +115,7 @@ def compare(trace: Path, directory: Path) -> dict[str, tuple[set[Link], set[Link
     suggested, doubtful = set(), set()
     with open_db(directory / "plain.duckdb") as database:
         database.ingest(trace, ignore=["ros2:message_link_*"])
-        for row in database.query("link-suggestions").to_arrow().to_pylist():
+        for row in database.query("links-suggested").to_arrow().to_pylist():
             links = {
                 (row["kind"], row["node"], each, output)
                 for each in row["inputs"]

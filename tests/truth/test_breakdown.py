@@ -189,10 +189,12 @@ def test_maximum_reaction_time_is_maximum_data_age(
         f"'callback_end', {WINDOW}) JOIN flow_path([1], NULL, NULL) USING (path_id) "
         "WHERE status = 'reached' GROUP BY ALL ORDER BY 1"
     ).fetchall()
-    ages = {row["path"]: row for row in measured(con, "data-age")}
+    ages = {row["path"]: row for row in measured(con, "e2e-latency-age")}
     assert set(ages) == {path for _, path, _ in first}
     for _, path, arrived_ns in first:
-        reactions = {row["path"]: row for row in measured(con, "reaction-time", arrived_ns + 1)}
+        reactions = {
+            row["path"]: row for row in measured(con, "e2e-latency-reaction", arrived_ns + 1)
+        }
         assert ages[path]["peak_max_ns"] == reactions[path]["max_ns"]
 
 

@@ -184,7 +184,7 @@ def test_lost_messages_are_a_share_of_those_connected(tmp_path: Path) -> None:
     with Database(tmp_path / "run.duckdb") as database:
         database.ingest(simulation.directory)
         found = rows(database.verify(targets))
-        delivery = database.query("delivery").to_arrow().to_pylist()
+        delivery = database.query("topics-delivery").to_arrow().to_pylist()
     for row in delivery:
         connected = row["published"] - row["unconnected"]
         values = {

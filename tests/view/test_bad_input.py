@@ -149,7 +149,7 @@ def test_a_run_without_links(way: str, demo: Path, tmp_path: Path, page: Page) -
         page.go("#/paths")
         assert "There are no paths" in page.page.locator("main").inner_text()
         page.go("#/timeline?x=1")
-        assert page.page.evaluate("msgflow.page.renderer.bars.table.rows") > 1000
+        assert page.page.evaluate("msgflow.page.renderer.bars.table.rows") > 900
         page.go(f"#/timeline?flow=take:{number}")
         assert ("take", number) in page.flow()
 

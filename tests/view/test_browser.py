@@ -257,7 +257,7 @@ def test_numbers_of_the_overview_are_those_of_the_queries(
 ) -> None:
     with open_db(demo) as opened:
         latency = opened.query("e2e-latency").to_arrow().to_pylist()
-        topics = opened.query("info-topics").to_arrow().to_pylist()
+        topics = opened.query("topics").to_arrow().to_pylist()
     for address in (serve(demo).address, report(demo)):
         page.page.goto("about:blank")
         page.open(address)
@@ -380,7 +380,7 @@ def test_slow_edges_and_hosts_stand_out_in_the_graph(
     page.open(report(systems))
     page.go("#/graph")
     with open_db(systems) as opened:
-        rows = opened.query("transport-latency").to_arrow().to_pylist()
+        rows = opened.query("topics-latency").to_arrow().to_pylist()
     medians = [row["median_ns"] for row in rows if row["median_ns"] is not None]
     slow = page.page.evaluate("msgflow.page.model.slow")
     assert slow == pytest.approx(10 * page.page.evaluate(

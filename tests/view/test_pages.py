@@ -95,8 +95,8 @@ def test_a_point_of_the_latency_leads_to_its_flow(demo: Path, report: Report, pa
 @pytest.mark.parametrize("way", few(["served", "file"], "file"))
 def test_graph(way: str, systems: Path, serve: Serve, report: Report, page: Page) -> None:
     with open_db(systems) as opened:
-        rates = opened.query("publication-rate", run=3).to_arrow().to_pylist()
-        latency = opened.query("transport-latency", run=3).to_arrow().to_pylist()
+        rates = opened.query("topics-rate", run=3).to_arrow().to_pylist()
+        latency = opened.query("topics-latency", run=3).to_arrow().to_pylist()
     page.open(serve(systems).address if way == "served" else report(systems))
     page.go("#/graph?run=3")
     names = page.page.locator(".graph g[role=button]").evaluate_all(
@@ -159,7 +159,7 @@ def test_actions_in_the_graph(tmp_path: Path, report: Report, page: Page) -> Non
 def test_executors(way: str, demo: Path, serve: Serve, report: Report, page: Page) -> None:
     with open_db(demo) as opened:
         usage = opened.query("executor-usage").to_arrow().to_pylist()
-        blame = opened.query("interference").to_arrow().to_pylist()
+        blame = opened.query("waits-pair").to_arrow().to_pylist()
     page.open(serve(demo).address if way == "served" else report(demo))
     page.go("#/executors")
     assert page.page.locator("canvas.strip").count() == len(usage)

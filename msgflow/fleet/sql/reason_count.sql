@@ -5,11 +5,11 @@
 -- kind: inline
 WITH listed AS (
     SELECT g.label_group, d.topic_name, d.subscriber, 'reasons' AS name, d.reasons AS text
-    FROM delivery AS d
+    FROM topics_delivery AS d
     JOIN run_group AS g ON d.run = g.run
     UNION ALL
     SELECT g.label_group, d.topic_name, d.subscriber, 'orphan_reasons', d.orphan_reasons
-    FROM delivery AS d
+    FROM topics_delivery AS d
     JOIN run_group AS g ON d.run = g.run
 ),
 part AS (

@@ -30,8 +30,8 @@ export class GraphPage {
     clear(this.root, waiting());
     const { app } = this;
     const [rates, transports, services, actions, indirect, executors, rows] = await Promise.all([
-      app.query("publication-rate"), app.query("transport-latency"), app.query("service-latency"), app.query("action-latency"),
-      app.query("indirect-links"), app.fetch("executor_node"), app.fetch("row"),
+      app.query("topics-rate"), app.query("topics-latency"), app.query("service-latency"), app.query("action-latency"),
+      app.query("links"), app.fetch("executor_node"), app.fetch("row"),
     ]);
     this.tables = { rates, transports, services, actions };
     this.model = model({ rates, transports, services, actions, indirect, executors, rows });

@@ -76,7 +76,7 @@ export class OverviewPage {
     });
     const others = [
       fill(topics, async () => {
-        const table = await app.query("info-topics");
+        const table = await app.query("topics");
         return [dataTable(table, { label: "topics", shown: 12, nothing: "no topics" }), notes(table.meta.notes), command(table.meta.command)];
       }),
       fill(processes, async () => {

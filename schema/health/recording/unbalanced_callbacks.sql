@@ -6,7 +6,7 @@
 -- cause: The callback threw an exception that was caught further up, or the event callback_end is
 --     not enabled; or it is of a service that answers later, before Kilted, in an executor that has
 --     no events.
--- cure: Enable ros2:callback_end; look at the callbacks (msgflow query callback-duration) for
+-- cure: Enable ros2:callback_end; look at the callbacks (msgflow query callbacks) for
 --     exceptions.
 -- grain: one row per process
 -- severity: warning

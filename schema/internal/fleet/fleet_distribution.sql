@@ -8,7 +8,7 @@
 -- param: runs BIGINT[]  Runs
 -- column: run_id BIGINT  Run
 -- column: measure VARCHAR  'callback_duration', 'callback_period' (from one start to the next),
---     'callback_wait' (as executor-wait has it) or 'transport_latency' (publication to take)
+--     'callback_wait' (as waits has it) or 'transport_latency' (publication to take)
 -- column: node VARCHAR  Node of the callback, or the one that received
 -- column: subject VARCHAR  What triggers the callback, or the topic
 -- column: is_internal BOOLEAN  Infrastructure of ROS

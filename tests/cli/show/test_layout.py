@@ -108,11 +108,11 @@ CASES = {
     "paths": result_of("e2e-latency", LATENCIES),
     "alike_paths": result_of("e2e-latency", ALIKE),
     "one_path": result_of("e2e-latency", LATENCIES[1:2]),
-    "waits": result_of("waits", WAITS),
+    "waits": result_of("waits-instance", WAITS),
     "runs": result_of(
         "e2e-latency", [*LATENCIES, {**LATENCIES[0], "run_id": 2}], runs=(RUN, OTHER)
     ),
-    "hostile": result_of("info-topics", HOSTILE),
+    "hostile": result_of("topics", HOSTILE),
     "finding": result_of("info-findings", FINDING),
 }
 
@@ -149,7 +149,7 @@ def test_every_column_is_shown_or_named() -> None:
 
 
 def test_long_results_stop_and_say_how_many_rows_there_are() -> None:
-    result = result_of("info-topics", [{"topic_name": f"/{n}", "take_count": n} for n in range(60)])
+    result = result_of("topics", [{"topic_name": f"/{n}", "take_count": n} for n in range(60)])
     shown = lay_out(result, 100)
     assert len(shown.columns[0].cells) == MOST_ROWS == 50
     assert shown.notes[0] == "the first 50 of 60 rows: --wide shows all"
@@ -160,13 +160,13 @@ def test_long_results_stop_and_say_how_many_rows_there_are() -> None:
 @pytest.mark.parametrize("width", [80, 100, 120])
 def test_a_zero_that_is_the_answer_is_shown(width: int) -> None:
     quality = result_of(
-        "data-quality",
+        "info-quality",
         [{"scope": "run", "subject": "morning", "measure": "orphan_takes", "total": 4214}] * 2,
     )
     assert "affected" in [column.title for column in lay_out(quality, width).columns]
     assert all("affected," not in note for note in lay_out(quality, width).notes)
     delivery = result_of(
-        "delivery",
+        "topics-delivery",
         [
             {
                 "topic_name": "/perception/camera/image", "subscriber": "/perception/detector",
@@ -228,7 +228,7 @@ def test_columns_that_somebody_chose_are_all_shown() -> None:
 
 def callbacks(*nodes: str) -> QueryResult:
     return result_of(
-        "callback-duration",
+        "callbacks",
         [
             {
                 "node": node, "callback": f"Subscription({node}/topic)", "count": 299,
@@ -270,7 +270,7 @@ def test_short_text_is_not_broken_for_a_less_important_column() -> None:
         }
         for n in range(2)
     ]  # fmt: skip
-    waits = result_of("waits", rows)
+    waits = result_of("waits-instance", rows)
     least = next(width for width in range(60, 99) if "since" in titles_of(waits, width))
     assert "of the last timer 0" in lines_of(waits, least)[2]
     assert least > 60
@@ -309,7 +309,7 @@ def test_a_result_without_rows_has_no_lines() -> None:
 
 def test_moments_are_whole_where_the_rows_tell_when_runs_began() -> None:
     rows = [{"name": "morning", "start_ns": BEGIN, "end_ns": BEGIN + 10**9, "duration_ns": 10**9}]
-    lines = lines_of(result_of("info-runs", rows), 200)
+    lines = lines_of(result_of("info", rows), 200)
     assert "2023-11-14T22:13:20.000000000Z" in "".join(lines)
     # Rounded down: --start with it leaves nothing out.
     (start,) = (c.cells for c in lay_out(CASES["waits"], 120).columns if c.name == "start_ns")

@@ -1,6 +1,6 @@
--- name: fleet.publication_rate
+-- name: fleet.topics_rate
 -- title: Publication rates and periods, of many runs
--- description: As the query publication-rate says it of one run. The rate is that of all runs
+-- description: As the query topics --measure rate says it of one run. The rate is that of all runs
 --     together, without the time between them. Medians and deviations of runs cannot be added up:
 --     the smallest and the largest median of any publisher stand for them.
 -- grain: one row per topic, publishing node and group of runs
@@ -33,7 +33,7 @@ SELECT
     max(p.period_median_ns) AS period_median_most_ns,
     max(p.period_max_ns) AS period_max_ns,
     bool_and(p.is_internal) AS is_internal
-FROM publication_rate AS p
+FROM topics_rate AS p
 JOIN run_group AS g ON p.run = g.run
 GROUP BY g.label_group, p.topic_name, p.publisher
 ORDER BY p.topic_name, p.publisher, g.label_group

@@ -1,4 +1,4 @@
--- name: clock-pairs
+-- name: clocks-pair
 -- title: Messages and packets by which clocks are corrected
 -- description: Messages and network packets between hosts of two clocks, for each direction, with
 --     the shortest delay of each after the current correction. A correction needs both directions;

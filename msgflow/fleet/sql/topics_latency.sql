@@ -1,6 +1,6 @@
--- name: fleet.transport_latency
+-- name: fleet.topics_latency
 -- title: Latency from publication to take by topic and receiver, of many runs
--- description: As the query transport-latency says it of one run. Quantiles of several subscriptions
+-- description: As the query topics --measure latency says it of one run. Quantiles of several subscriptions
 --     are off by less than 1 %, means by less than 1 ns, all else is exact.
 -- grain: one row per topic, receiving node and group of runs
 -- column: label_group BIGINT        Group of runs
@@ -38,7 +38,7 @@ WITH merged AS (
         any_value(t.p99_ns) AS p99_ns,
         max(t.max_ns) AS max_ns,
         bool_and(t.is_internal) AS is_internal
-    FROM transport_latency AS t
+    FROM topics_latency AS t
     JOIN run_group AS g ON t.run = g.run
     GROUP BY g.label_group, t.topic_name, t.subscriber
 )

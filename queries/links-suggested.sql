@@ -1,4 +1,4 @@
--- name: link-suggestions
+-- name: links-suggested
 -- title: Links that the data suggest
 -- description: Where messages seem to be kept for later: a timer publishes while messages that its
 --     node receives lead nowhere (periodic_async), or callbacks of a node's subscriptions publish

@@ -1,8 +1,8 @@
--- name: transport-latency
+-- name: topics-latency
 -- title: Latency from publication to take by topic and subscription
 -- description: How long messages took from the end of their publication to their take. That
 --     includes the time for which the receiving executor was busy with other callbacks. A trace
---     does not say when a message arrived, so this time is given as bounds, those of executor-wait;
+--     does not say when a message arrived, so this time is given as bounds, those of waits;
 --     the rest was the network or an idle executor. A negative latency means that the clocks of two
 --     hosts are apart. Takes without a known publication are counted, but not measured.
 -- grain: one row per topic, receiving node and subscription

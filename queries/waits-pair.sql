@@ -1,8 +1,8 @@
--- name: interference
+-- name: waits-pair
 -- title: Which callbacks keep which others waiting
 -- description: For every pair of callbacks of one executor: how long one ran while the other
 --     waited. The literature calls this interference, or blocking if the one that ran should not
---     have come first; callbacks are never interrupted. Bounds are those of executor-wait. Each
+--     have come first; callbacks are never interrupted. Bounds are those of waits. Each
 --     thread of an executor counts.
 -- grain: one row per waiting callback and callback that ran meanwhile
 -- column: run_id BIGINT             Run

@@ -1,7 +1,10 @@
--- name: info-runs
+-- name: info
 -- title: Runs in the database
 -- description: What was ingested, when, and how much of it the tracer lost.
 -- grain: one row per run
+-- variant: section VARCHAR {runs|hosts|processes|nodes|counts|findings|quality} = 'runs'  What to
+--     list: runs, hosts, processes, nodes, rows per table, findings, or what share of the answers
+--     defects affect
 -- column: run_id BIGINT                  Identity of the run
 -- column: name VARCHAR                   Name of the run
 -- column: start_ns BIGINT [epoch ns]     First event

@@ -1,9 +1,10 @@
--- name: indirect-links
+-- name: links
 -- title: Declared links
 -- description: Every declared link (annotation) and what it explains: publications, those with a
 --     message of every input, links, and how long messages waited in their caches. Entries of kind
 --     direct and independent explain no indirect links.
 -- grain: one row per annotation
+-- variant: suggested BOOLEAN = false  Links that the data suggest, in place of those declared
 -- column: run_id BIGINT             Run
 -- column: kind VARCHAR              'periodic_async', 'partial_sync', 'approximate_sync', 'direct'
 --     or 'independent'

@@ -1,7 +1,7 @@
--- name: unmatched
+-- name: topics-unmatched
 -- title: Takes without a publication, and messages that were not taken, each with its reason
 -- description: Every take whose publication is not known, and every message that a subscription of
---     its topic did not take, in order of time. The query delivery counts them.
+--     its topic did not take, in order of time. The query topics --measure delivery counts them.
 -- grain: one row per take without a publication, or publication and subscription without a take
 -- param: side VARCHAR {take|publication} = NULL   Only takes without a publication, or only
 --     publications without a take
@@ -15,8 +15,8 @@
 -- column: topic_name VARCHAR [topic]  Topic
 -- column: publisher VARCHAR [node]  Node that published; empty: not known
 -- column: subscriber VARCHAR [node]  Node that took, or should have taken
--- column: status VARCHAR          'skipped', 'lost', 'unconnected', 'unknown', as in delivery;
---     'orphan': a take without a publication
+-- column: status VARCHAR          'skipped', 'lost', 'unconnected', 'unknown', as with --measure
+--     delivery; 'orphan': a take without a publication
 -- column: reason VARCHAR          Why the other side is missing
 -- column: source_timestamp_ns BIGINT [epoch ns]  Stamp of the message
 -- column: publication_id BIGINT   Identity of the publication

@@ -1,9 +1,12 @@
--- name: info-topics
+-- name: topics
 -- title: Topics
 -- description: The topics of a run: who publishes and subscribes, how many messages were published
 --     and how many were handed over. Publishers and subscriptions without a known topic are a
 --     row of their own.
 -- grain: one row per topic
+-- variant: measure VARCHAR {messages|rate|latency|delivery|unmatched} = 'messages'  What is
+--     measured: numbers of messages, rates and periods by publisher, the latency from publication
+--     to take, what became of the messages, or messages and takes without a partner, one by one
 -- column: run_id BIGINT               Run
 -- column: topic_name VARCHAR [topic]  Topic
 -- column: publisher_count BIGINT      Publishers

@@ -1,6 +1,6 @@
--- name: fleet.callback_duration
+-- name: fleet.callbacks
 -- title: Callback durations and periods, of many runs
--- description: As the query callback-duration says it of one run. Quantiles of several callbacks
+-- description: As the query callbacks says it of one run. Quantiles of several callbacks
 --     are off by less than 1 %, all else is exact.
 -- grain: one row per node, callback and group of runs
 -- column: label_group BIGINT        Group of runs
@@ -42,7 +42,7 @@ WITH merged AS (
         sum(c.total_ns)::BIGINT AS total_ns,
         string_agg(DISTINCT c.symbol, ', ' ORDER BY c.symbol) AS symbol,
         bool_and(c.is_internal) AS is_internal
-    FROM callback_duration AS c
+    FROM callbacks AS c
     JOIN run_group AS g ON c.run = g.run
     GROUP BY g.label_group, c.node, c.callback
 )

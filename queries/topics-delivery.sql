@@ -1,4 +1,4 @@
--- name: delivery
+-- name: topics-delivery
 -- title: Messages delivered, skipped and lost by topic and subscription
 -- description: What became of the messages published in the time window at each subscription of
 --     their topic. Skipped: newer messages took their place in the queue. Lost: they did not arrive

@@ -1,6 +1,6 @@
--- name: fleet.data_quality
+-- name: fleet.info_quality
 -- title: Data quality: what is missing, and in how many runs
--- description: As the query data-quality says it of one run, added up over traces and processes;
+-- description: As the query info --section quality says it of one run, added up over traces and processes;
 --     topics have a row each.
 -- grain: one row per scope, topic, measure and group of runs
 -- column: label_group BIGINT     Group of runs
@@ -24,7 +24,7 @@ SELECT
     sum(q.total)::BIGINT AS total,
     100.0::DOUBLE * sum(q.affected) / nullif(sum(q.total), 0) AS affected_percent,
     bool_and(q.is_internal) AS is_internal
-FROM data_quality AS q
+FROM info_quality AS q
 JOIN run_group AS g ON q.run = g.run
 GROUP BY ALL
 ORDER BY q.scope, topic, q.measure, g.label_group

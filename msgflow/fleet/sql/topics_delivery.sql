@@ -1,6 +1,6 @@
--- name: fleet.delivery
+-- name: fleet.topics_delivery
 -- title: Messages delivered, skipped and lost by topic and receiver, of many runs
--- description: As the query delivery says it of one run. Counts are added, and the shares are of
+-- description: As the query topics --measure delivery says it of one run. Counts are added, and the shares are of
 --     their sums.
 -- grain: one row per topic, receiving node and group of runs
 -- column: label_group BIGINT        Group of runs
@@ -38,7 +38,7 @@ WITH merged AS (
         sum(d.unknown)::BIGINT AS unknown,
         sum(d.orphans)::BIGINT AS orphans,
         bool_and(d.is_internal) AS is_internal
-    FROM delivery AS d
+    FROM topics_delivery AS d
     JOIN run_group AS g ON d.run = g.run
     GROUP BY g.label_group, d.topic_name, d.subscriber
 )

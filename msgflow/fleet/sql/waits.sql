@@ -1,6 +1,6 @@
--- name: fleet.executor_wait
+-- name: fleet.waits
 -- title: How long callbacks waited, of many runs
--- description: As the query executor-wait says it of one run. The median of several callbacks is off
+-- description: As the query waits says it of one run. The median of several callbacks is off
 --     by less than 1 %, all else is exact.
 -- grain: one row per node, callback and group of runs
 -- column: label_group BIGINT        Group of runs
@@ -43,7 +43,7 @@ WITH merged AS (
         sum(w.unknown)::BIGINT AS unknown,
         sum(w.loss_affected)::BIGINT AS loss_affected,
         bool_and(w.is_internal) AS is_internal
-    FROM executor_wait AS w
+    FROM waits AS w
     JOIN run_group AS g ON w.run = g.run
     GROUP BY g.label_group, w.node, w.callback
 )

@@ -1,0 +1,83 @@
+-- name: waits-instance
+-- title: Waits of callbacks, one by one
+-- description: For every callback instance: the time since the end of the publication of its
+--     message (or since the timer was due, or the request was sent), for how much of it the
+--     executor was busy with other callbacks, as bounds, and with which. Instances nested in others
+--     are left out.
+-- grain: one row per callback instance that is not nested in another
+-- param: callback_id BIGINT = NULL  Only instances of this callback_id (query waits lists
+--     them)
+-- param: min_busy_ns BIGINT {0..} = 0  Only waits in which the executor may have been busy for that
+--     long [ns]
+-- column: run_id BIGINT             Run
+-- column: start_ns BIGINT [epoch ns]  Start of the callback
+-- column: node VARCHAR [node]  Node of the callback
+-- column: callback VARCHAR [callback]  What triggers it
+-- column: since VARCHAR             Where the wait begins: 'publication', 'stamp', 'request' or
+--     'timer'; empty: not known
+-- column: wait_ns BIGINT [ns]       From there to the start of the callback
+-- column: busy_min_ns BIGINT [ns]   Executor busy with others meanwhile, at least
+-- column: busy_max_ns BIGINT [ns]   Executor busy with others meanwhile, at most
+-- column: rest_min_ns BIGINT [ns]   Network, idle or overhead, at least
+-- column: rest_max_ns BIGINT [ns]   Network, idle or overhead, at most
+-- column: meanwhile VARCHAR         What ran meanwhile and for how long, the longest first, with
+--     its node if it is another one
+-- column: is_loss_affected BOOLEAN  A gap of the trace lies in it
+-- column: callback_instance_id BIGINT  Identity of the callback instance
+-- column: callback_id BIGINT        Identity of the callback
+-- column: is_internal BOOLEAN       Infrastructure of ROS
+-- slowest: wait_ns
+-- brief: start_ns, node, callback, wait_ns, busy_max_ns, meanwhile, busy_min_ns, since,
+--     rest_max_ns, rest_min_ns, callback_instance_id
+-- note: clocks
+WITH waited AS MATERIALIZED (
+    SELECT
+        run_id, callback_instance_id, callback_id, start_ns, since, wait_ns, busy_min_ns,
+        busy_max_ns, is_loss_affected, meanwhile_callback_ids, meanwhile_ns
+    FROM main.executor_wait_explained($runs)
+    WHERE start_ns >= $start_ns
+        AND start_ns < $end_ns
+        AND coalesce(callback_id = $callback_id, true)
+        AND coalesce(busy_max_ns, busy_min_ns) >= $min_busy_ns
+),
+pair AS (
+    SELECT
+        callback_instance_id,
+        callback_id,
+        unnest(meanwhile_callback_ids) AS meanwhile_callback_id,
+        unnest(meanwhile_ns) AS overlap_ns
+    FROM waited
+),
+meanwhile AS (
+    SELECT
+        p.callback_instance_id,
+        string_agg(
+            CASE WHEN o.node = l.node THEN '' ELSE o.node || ' ' END
+            || printf('%s %.3f ms', o.label, p.overlap_ns / 1e6),
+            ', ' ORDER BY p.overlap_ns DESC, p.meanwhile_callback_id
+        ) AS names
+    FROM pair AS p
+    JOIN main.callback_label AS l ON p.callback_id = l.callback_id
+    JOIN main.callback_label AS o ON p.meanwhile_callback_id = o.callback_id
+    GROUP BY p.callback_instance_id
+)
+SELECT
+    w.run_id,
+    w.start_ns,
+    l.node,
+    l.label AS callback,
+    w.since,
+    w.wait_ns,
+    w.busy_min_ns,
+    w.busy_max_ns,
+    w.wait_ns - w.busy_max_ns AS rest_min_ns,
+    w.wait_ns - w.busy_min_ns AS rest_max_ns,
+    m.names AS meanwhile,
+    w.is_loss_affected,
+    w.callback_instance_id,
+    w.callback_id,
+    l.is_internal
+FROM waited AS w
+JOIN main.callback_label AS l ON w.callback_id = l.callback_id
+LEFT JOIN meanwhile AS m ON w.callback_instance_id = m.callback_instance_id
+ORDER BY w.run_id, w.start_ns, w.callback_instance_id
