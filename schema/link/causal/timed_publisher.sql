@@ -15,7 +15,7 @@ CREATE OR REPLACE MACRO derive.timed_publisher(only_run, followers) AS TABLE
 WITH timer AS (
     SELECT process_id, period_ns, min(created_ns) AS created_ns
     FROM store.timer
-    WHERE run_id = only_run AND period_ns > 0 AND created_ns IS NOT NULL
+    WHERE run_id = only_run AND period_ns > 0
     GROUP BY process_id, period_ns
 ),
 publisher AS (
