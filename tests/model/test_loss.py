@@ -146,7 +146,13 @@ def test_traces_pause_apart(system: RosSystem, analyse: Analyse) -> None:
 
 
 def test_flushing_at_the_end_is_no_pause(system: RosSystem, analyse: Analyse) -> None:
-    """Stopping leaves an empty packet in every stream, long after the last event."""
+    """Stopping leaves an empty packet in every stream, long after the last event.
+
+    Another system may go on.
+    """
+    alone(system, 1)
+    system.add_packet(0, 95 * MS, trace=1)
+    system.add_packet(95 * MS, 99 * MS, trace=1)
     for cpu in (0, 1):
         system.add_packet(0, 10 * MS, cpu=cpu)
         system.add_packet(90 * MS, 90 * MS, count=0, cpu=cpu)
