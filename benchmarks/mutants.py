@@ -71,7 +71,8 @@ RULES = (
     ("clock/clock_line.sql", ("schema/test_clock_pair.py", "schema/test_clock_hull.py")),
     ("clock/clock_line_error.sql", ("schema/test_clock_pair.py", "schema/test_clock_hull.py")),
     ("clock/clock_sync.sql", ("schema/test_clock_chain.py", "schema/test_clock_pair.py")),
-    ("model/gap/pause_limit.sql", ("model/test_gap.py",)),
+    ("model/gap/pause_limit.sql", ("model/test_loss.py",)),
+    ("model/gap/silence.sql", ("model/test_loss.py",)),
     *((f"health/recording/{each}.sql", (f"schema/cases/finding.{each}",)) for each in FINDINGS),
 )
 

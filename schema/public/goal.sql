@@ -65,7 +65,6 @@ alone AS MATERIALIZED (FROM derive.goal_alone('span')),
 answer AS (
     SELECT request_id, min(sent_ns) AS sent_ns, min(taken_ns) AS taken_ns
     FROM main.response
-    WHERE request_id IS NOT NULL
     GROUP BY request_id
 ),
 result AS (

@@ -375,11 +375,11 @@ def test_what_opens_a_chunk_shows_that_nothing_was_stopped(
 
 
 def test_each_chunk_is_opened_so(system: RosSystem, analyse: Analyse) -> None:
-    """Silences behind the second and the third one; the latest counts."""
-    opened = 2_000 * MS, 3_000 * MS
+    """Silences behind the second and the third one, far apart; the latest counts."""
+    opened = 2_000 * MS, 4_000 * MS
     for trace in range(3):
         system.add_source(trace, "host", "boot", "recording")
-    bounds = 0, *(at + 35 * MS for at in opened), 4_000 * MS
+    bounds = 0, *(at + 35 * MS for at in opened), 5_000 * MS
     for trace in range(3):
         end = opened[trace] if trace < 2 else bounds[3]
         events_at(system, *range(bounds[trace], end, 10 * MS), trace=trace)
