@@ -92,7 +92,8 @@ member AS MATERIALIZED (
         AND n.subscription_id = m.subscription_id
         AND n.start_ns <= m.stamp_ns
 ),
--- Sets that start later are worse already with one of the messages that they would need.
+-- No set is better as soon as one of the messages that it would need makes it too wide: those of
+-- sets that start earlier have come.
 excluded AS (
     SELECT
         s.annotation_id, s.pivot_id,
@@ -103,8 +104,7 @@ excluded AS (
             END
         ) AS event_id
     FROM start AS s
-    JOIN narrowest AS n
-        ON s.annotation_id = n.annotation_id AND s.pivot_id = n.pivot_id AND s.start_ns > n.start_ns
+    JOIN narrowest AS n ON s.annotation_id = n.annotation_id AND s.pivot_id = n.pivot_id
     JOIN around AS a
         ON s.annotation_id = a.annotation_id AND s.pivot_id = a.pivot_id AND a.last_ns < s.start_ns
     GROUP BY s.annotation_id, s.pivot_id, s.start_ns
