@@ -72,11 +72,11 @@ NAMESPACES = "SELECT name, pid_namespace FROM store.process ORDER BY process_id"
 def called(system: RosSystem, *threads: Thread) -> None:
     """A callback on each thread; each has its publisher and publishes."""
     for thread in threads:
-        handle = sum(thread.name.encode())
+        handle = sum(str(thread.name).encode())
         system.publisher(thread, handle, f"/{thread.name}")
     for number in range(3):
         for thread in threads:
-            handle = sum(thread.name.encode())
+            handle = sum(str(thread.name).encode())
             system.add("ros2:callback_start", thread, callback=handle, is_intra_process=0)
             system.publish(thread, handle, number + handle)
             system.add("ros2:callback_end", thread, callback=handle)
@@ -116,6 +116,22 @@ def test_a_name_that_comes_back_in_another_life_is_a_new_name(
         system.context(Thread(7, name="python3"))
         called(system, Thread(7, name="python3"))
         called(system, Thread(7, name="listener"))
+    assert analyse(system).rows("SELECT DISTINCT pid_namespace FROM store.process") == [(None,)]
+
+
+def test_another_thread_begins_no_life(system: RosSystem, analyse: Analyse) -> None:
+    for number in range(2):
+        system.publish(Thread(7, name="front"), 0x10, number)
+        system.publish(Thread(7, name="rear"), 0x11, number)
+        if number == 0:
+            system.context(Thread(8))
+    assert analyse(system).rows(NAMESPACES) == [("front", -1), ("rear", -2), ("main", None)]
+
+
+def test_a_name_that_some_events_lack_is_no_other_one(system: RosSystem, analyse: Analyse) -> None:
+    """Where a channel has no context for it. Threads take turns."""
+    front, rear = Thread(7, name="front"), Thread(8, name="rear")
+    called(system, front, rear, Thread(7, name=None), Thread(8, name=None))
     assert analyse(system).rows("SELECT DISTINCT pid_namespace FROM store.process") == [(None,)]
 
 
