@@ -122,7 +122,7 @@ party AS (
     SELECT run_id, action_name, NULL, action_server_id, process_id FROM server
 ),
 torn AS (
-    SELECT DISTINCT t.goal_id
+    SELECT t.goal_id
     FROM timed AS t
     JOIN party AS y
         ON t.run_id = y.run_id
