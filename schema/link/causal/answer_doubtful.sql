@@ -77,7 +77,7 @@ pair AS (
 judged AS MATERIALIZED (
     SELECT
         a.subscription_id, a.publisher_id, a.usual_number,
-        t.publisher_id IS NOT NULL
+        a.publisher_id IN (FROM derive.timed_publisher(only_run, 'follower'))
         OR CASE
             WHEN a.take_count < 5 THEN p.created_ns IS NULL OR s.created_ns IS NULL
             ELSE r.spread_ns < 0.8 * a.spread_ns OR a.least_number < a.most_number
@@ -86,7 +86,6 @@ judged AS MATERIALIZED (
     JOIN rhythm AS r ON a.publisher_id = r.publisher_id
     JOIN store.publisher AS p ON a.publisher_id = p.publisher_id
     LEFT JOIN store.subscription AS s ON a.subscription_id = s.subscription_id
-    LEFT JOIN derive.timed_publisher(only_run, 'follower') AS t ON a.publisher_id = t.publisher_id
 )
 SELECT f.publication_id
 FROM follower AS f
