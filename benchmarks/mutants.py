@@ -3,8 +3,8 @@
     python benchmarks/mutants.py [FILE… --tests SELECTION…] [--line N]… [--replace OLD NEW]…
         [--timeout 300]
 
-Collects the tests once, then for each number of the files (doubled, halved) and each comparison
-(turned round), or each place of OLD, runs them in a child that reads the file with that one change.
+For each number of the files (doubled, halved) and each comparison (turned round), or each place of
+OLD, runs the tests in a child that reads the file with that one change.
 Without files: the rules of `RULES`, each with the tests that are about it (`make mutants`).
 No file is written. Prints a line for each change: the test that failed first, or `SURVIVED`.
 Numbers 0 and 1 and those in comments and quotes are left alone. The exit code is 1 if a change
@@ -19,13 +19,12 @@ import re
 import signal
 import subprocess
 import sys
+import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-
-from msgflow.db import derivation, objects
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -38,20 +37,43 @@ TOKEN = re.compile(
 )
 TURNED = {"<=": ">", ">=": "<", "<": ">=", ">": "<=", "<>": "="}
 TRIVIAL = {"0", "1"}
-# Rules with numbers of their own, and the tests that have to notice when one changes.
+# Findings with numbers of their own: their golden cases have to notice when one changes.
+FINDINGS = (
+    "busy_waiting",
+    "clock_jumps",
+    "discarded_events",
+    "latency_uncertain",
+    "path_cut",
+    "process_fell_silent",
+    "stream_ends_early",
+)
+# Likewise rules, and the tests that are about them.
 RULES = (
     (
         "link/nearest",
-        ("test_nearest_rules", "test_pair_rules", "test_clock_rules", "test_stamp_clock"),
+        (
+            "schema/test_nearest_rules.py",
+            "schema/test_pair_rules.py",
+            "schema/test_clock_rules.py",
+            "schema/test_stamp_clock.py",
+        ),
     ),
-    ("delivery/delivery_limit.sql", ("test_delivery_rules", "test_orphan_rules")),
-    ("delivery/undelivered.sql", ("test_delivery_rules",)),
-    ("delivery/orphan_take.sql", ("test_orphan_rules", "test_delivery_rules")),
-    ("clock/clock_hull.sql", ("test_clock_hull", "test_clock_pair")),
-    ("clock/clock_pair.sql", ("test_clock_pair", "test_clock_hull")),
-    ("clock/clock_line.sql", ("test_clock_pair", "test_clock_hull")),
-    ("clock/clock_line_error.sql", ("test_clock_pair", "test_clock_hull")),
-    ("clock/clock_sync.sql", ("test_clock_chain", "test_clock_pair")),
+    ("link/causal/answer_doubtful.sql", ("schema/test_answer_doubtful.py",)),
+    ("link/causal/approximate_set.sql", ("schema/cases/derive.link_causal_indirect",)),
+    (
+        "delivery/delivery_limit.sql",
+        ("schema/test_delivery_rules.py", "schema/test_orphan_rules.py"),
+    ),
+    ("delivery/undelivered.sql", ("schema/test_delivery_rules.py",)),
+    ("delivery/orphan_take.sql", ("schema/test_orphan_rules.py", "schema/test_delivery_rules.py")),
+    ("clock/clock_hull.sql", ("schema/test_clock_hull.py", "schema/test_clock_pair.py")),
+    ("clock/clock_pair.sql", ("schema/test_clock_pair.py", "schema/test_clock_hull.py")),
+    ("clock/clock_line.sql", ("schema/test_clock_pair.py", "schema/test_clock_hull.py")),
+    ("clock/clock_line_error.sql", ("schema/test_clock_pair.py", "schema/test_clock_hull.py")),
+    ("clock/clock_sync.sql", ("schema/test_clock_chain.py", "schema/test_clock_pair.py")),
+    ("model/gap/pause_limit.sql", ("model/test_loss.py",)),
+    ("model/gap/silence.sql", ("model/test_loss.py",)),
+    *((f"health/recording/{each}.sql", (f"schema/cases/finding.{each}",)) for each in FINDINGS),
 )
 
 
@@ -98,58 +120,58 @@ def _new(match: re.Match[str]) -> list[str]:
     return [str(round(each)) if whole else repr(each) for each in (value * 2, value / 2)]
 
 
-class Loop:
-    """Runs the collected tests for each change, in place of once."""
+class FirstFailure:
+    """Keeps the first test that fails, or the place that cannot be read."""
 
-    def __init__(self, todo: Sequence[Mutant], timeout: int) -> None:
-        self.todo = todo
-        self.timeout = timeout
-        self.survived = 0
+    name = ""
 
-    def pytest_runtestloop(self, session: pytest.Session) -> bool:
-        """Run the tests without any change, and then with each."""
-        if failure := self.first_failure(session, None):
-            pytest.exit(f"fails without any change — {failure}", 2)
-        for mutant in self.todo:
-            failure = self.first_failure(session, mutant)
-            self.survived += failure is None
-            print(f"{mutant}  {failure or 'SURVIVED'}", flush=True)
-        print(f"\n{len(self.todo)} changes, {self.survived} survived")
-        return True
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Look at each step of each test."""
+        self.keep(report)
 
-    def first_failure(self, session: pytest.Session, mutant: Mutant | None) -> str | None:
-        """Return the first test that fails in a child; one that takes too long has failed."""
-        reading, writing = os.pipe()
-        child = os.fork()
-        if child == 0:
-            os.close(reading)
-            signal.alarm(self.timeout)
-            failure = "the tests cannot be run"
-            try:
-                failure = _run(session, mutant) or ""
-            finally:
-                os.write(writing, failure.encode())
-                os._exit(0)
-        os.close(writing)
-        with os.fdopen(reading) as pipe:
-            failure = pipe.read()
-        _, status = os.waitpid(child, 0)
-        return "timeout or crash" if status else failure or None
+    def pytest_collectreport(self, report: pytest.CollectReport) -> None:
+        """Look at what each file and folder gave."""
+        self.keep(report)
+
+    def keep(self, report: pytest.TestReport | pytest.CollectReport) -> None:
+        """Keep what failed, if nothing did before."""
+        if report.failed:
+            self.name = self.name or report.nodeid
 
 
-def _run(session: pytest.Session, mutant: Mutant | None) -> str | None:
+def first_failure(tests: Sequence[str], timeout: int, mutant: Mutant | None = None) -> str | None:
+    """Return the first test that fails in a child; one that takes too long has failed.
+
+    Only the child imports the program, so that nothing remembers the file without the change.
+    """
+    reading, writing = os.pipe()
+    child = os.fork()
+    if child == 0:
+        os.close(reading)
+        signal.alarm(timeout)
+        failure = "the tests cannot be run"
+        try:
+            failure = _run(tests, mutant)
+        finally:
+            os.write(writing, failure.encode())
+            os._exit(0)
+    os.close(writing)
+    with os.fdopen(reading) as pipe:
+        failure = pipe.read()
+    _, status = os.waitpid(child, 0)
+    return "timeout or crash" if status else failure or None
+
+
+def _run(tests: Sequence[str], mutant: Mutant | None) -> str:
     if mutant is not None:
         _change(mutant)
-    with Path(os.devnull).open("w") as nowhere:
-        os.dup2(nowhere.fileno(), 1)
-        os.dup2(nowhere.fileno(), 2)
-    for place, item in enumerate(session.items):
-        following = session.items[place + 1] if place + 1 < len(session.items) else None
-        failed = session.testsfailed
-        item.config.hook.pytest_runtest_protocol(item=item, nextitem=following)
-        if session.testsfailed > failed:
-            return item.nodeid
-    return None
+        with Path(os.devnull).open("w") as nowhere:
+            os.dup2(nowhere.fileno(), 1)
+            os.dup2(nowhere.fileno(), 2)
+    first = FirstFailure()
+    options = ["-q", "-x", "-p", "no:cacheprovider", "-p", "no:xdist"]
+    code = pytest.main([*options, *tests], plugins=[first])
+    return first.name or ("" if code == 0 else "the tests cannot be run")
 
 
 def _change(mutant: Mutant) -> None:
@@ -163,14 +185,6 @@ def _change(mutant: Mutant) -> None:
         return text[: mutant.begin] + mutant.new + text[mutant.end :]
 
     Path.read_text = changed  # type: ignore[assignment, method-assign]
-    # What collecting the tests has read.
-    for cached in (
-        objects.load,
-        objects.views,
-        objects.definition_hash,
-        derivation.derivation_hash,
-    ):
-        cached.cache_clear()
 
 
 def every_rule(options: Sequence[str]) -> int:
@@ -180,7 +194,7 @@ def every_rule(options: Sequence[str]) -> int:
         found = ROOT / "schema" / place
         files = sorted(found.glob("*.sql")) if found.is_dir() else [found]
         command = [sys.executable, __file__, *(str(file.relative_to(ROOT)) for file in files)]
-        command += ["--tests", *(f"tests/schema/{test}.py" for test in tests), *options]
+        command += ["--tests", *(f"tests/{test}" for test in tests), *options]
         codes.append(subprocess.run(command, cwd=ROOT, check=False).returncode)
     return max(codes)
 
@@ -200,19 +214,27 @@ def main() -> None:
         sys.exit(every_rule(sys.argv[1:]))
     if not arguments.tests:
         parser.error("which tests? give --tests")
-    loop = Loop(
-        [
-            mutant
-            for file in arguments.files
-            for mutant in mutants(file, arguments.replace)
-            if not arguments.line or mutant.line in arguments.line
-        ],
-        arguments.timeout,
-    )
+    todo = [
+        mutant
+        for file in arguments.files
+        for mutant in mutants(file, arguments.replace)
+        if not arguments.line or mutant.line in arguments.line
+    ]
     os.chdir(ROOT)
-    options = ["-p", "no:cacheprovider", "-p", "no:xdist", "-s", *arguments.tests]
-    code = pytest.main(options, plugins=[loop])
-    sys.exit(code or bool(loop.survived))
+    # The program beside this file, whatever is installed.
+    sys.path.insert(0, str(ROOT))
+    # Each change makes an empty database of its own: none of them is for the cache of the user.
+    with tempfile.TemporaryDirectory(prefix="msgflow-mutants-") as cache:
+        os.environ["XDG_CACHE_HOME"] = cache
+        if failure := first_failure(arguments.tests, arguments.timeout):
+            sys.exit(f"fails without any change — {failure}")
+        survived = 0
+        for mutant in todo:
+            failure = first_failure(arguments.tests, arguments.timeout, mutant)
+            survived += failure is None
+            print(f"{mutant}  {failure or 'SURVIVED'}", flush=True)
+    print(f"\n{len(todo)} changes, {survived} survived")
+    sys.exit(bool(survived))
 
 
 if __name__ == "__main__":

@@ -11,23 +11,23 @@ WITH named AS (
         s.host, r.vpid, r.thread_index, n.procname, n.first_event_id,
         i.event_id AS initialised_event_id,
         lag(n.procname) OVER (
-            PARTITION BY n.thread_index, i.event_id ORDER BY n.first_event_id
+            PARTITION BY n.thread_index ORDER BY n.first_event_id
         ) IS DISTINCT FROM n.procname AS is_other
     FROM raw.thread_name AS n
     ASOF LEFT JOIN raw.ros2_rcl_init AS i
         ON n.thread_index = i.thread_index AND n.first_event_id >= i.event_id
     JOIN raw.thread AS r ON n.thread_index = r.thread_index
     JOIN session_trace AS s ON r.trace_index = s.trace_index
-    WHERE r.pid_ns IS NULL AND r.vpid >= 0 AND n.procname IS NOT NULL
+    WHERE r.pid_ns IS NULL AND n.procname IS NOT NULL
 ),
 alternating AS (
-    SELECT DISTINCT host, vpid, thread_index
+    SELECT host, vpid, thread_index
     FROM named
     GROUP BY host, vpid, thread_index, initialised_event_id
     HAVING count(*) FILTER (is_other) > count(DISTINCT procname)
 ),
 renamed AS (
-    SELECT DISTINCT a.host, a.vpid
+    SELECT a.host, a.vpid
     FROM alternating AS a
     JOIN raw.ros2_callback_end AS e ON a.thread_index = e.thread_index
     JOIN raw.ros2_callback_start AS b

@@ -65,7 +65,6 @@ alone AS MATERIALIZED (FROM derive.goal_alone('span')),
 answer AS (
     SELECT request_id, min(sent_ns) AS sent_ns, min(taken_ns) AS taken_ns
     FROM main.response
-    WHERE request_id IS NOT NULL
     GROUP BY request_id
 ),
 result AS (
@@ -123,7 +122,7 @@ party AS (
     SELECT run_id, action_name, NULL, action_server_id, process_id FROM server
 ),
 torn AS (
-    SELECT DISTINCT t.goal_id
+    SELECT t.goal_id
     FROM timed AS t
     JOIN party AS y
         ON t.run_id = y.run_id

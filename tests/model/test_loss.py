@@ -146,7 +146,13 @@ def test_traces_pause_apart(system: RosSystem, analyse: Analyse) -> None:
 
 
 def test_flushing_at_the_end_is_no_pause(system: RosSystem, analyse: Analyse) -> None:
-    """Stopping leaves an empty packet in every stream, long after the last event."""
+    """Stopping leaves an empty packet in every stream, long after the last event.
+
+    Another system may go on.
+    """
+    alone(system, 1)
+    system.add_packet(0, 95 * MS, trace=1)
+    system.add_packet(95 * MS, 99 * MS, trace=1)
     for cpu in (0, 1):
         system.add_packet(0, 10 * MS, cpu=cpu)
         system.add_packet(90 * MS, 90 * MS, count=0, cpu=cpu)
@@ -369,11 +375,11 @@ def test_what_opens_a_chunk_shows_that_nothing_was_stopped(
 
 
 def test_each_chunk_is_opened_so(system: RosSystem, analyse: Analyse) -> None:
-    """Silences behind the second and the third one; the latest counts."""
-    opened = 2_000 * MS, 3_000 * MS
+    """Silences behind the second and the third one, far apart; the latest counts."""
+    opened = 2_000 * MS, 4_000 * MS
     for trace in range(3):
         system.add_source(trace, "host", "boot", "recording")
-    bounds = 0, *(at + 35 * MS for at in opened), 4_000 * MS
+    bounds = 0, *(at + 35 * MS for at in opened), 5_000 * MS
     for trace in range(3):
         end = opened[trace] if trace < 2 else bounds[3]
         events_at(system, *range(bounds[trace], end, 10 * MS), trace=trace)

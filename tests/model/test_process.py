@@ -72,11 +72,11 @@ NAMESPACES = "SELECT name, pid_namespace FROM store.process ORDER BY process_id"
 def called(system: RosSystem, *threads: Thread) -> None:
     """A callback on each thread; each has its publisher and publishes."""
     for thread in threads:
-        handle = sum(thread.name.encode())
+        handle = sum(str(thread.name).encode())
         system.publisher(thread, handle, f"/{thread.name}")
     for number in range(3):
         for thread in threads:
-            handle = sum(thread.name.encode())
+            handle = sum(str(thread.name).encode())
             system.add("ros2:callback_start", thread, callback=handle, is_intra_process=0)
             system.publish(thread, handle, number + handle)
             system.add("ros2:callback_end", thread, callback=handle)
@@ -119,15 +119,64 @@ def test_a_name_that_comes_back_in_another_life_is_a_new_name(
     assert analyse(system).rows("SELECT DISTINCT pid_namespace FROM store.process") == [(None,)]
 
 
+def test_another_thread_begins_no_life(system: RosSystem, analyse: Analyse) -> None:
+    for number in range(2):
+        system.publish(Thread(7, name="front"), 0x10, number)
+        system.publish(Thread(7, name="rear"), 0x11, number)
+        if number == 0:
+            system.context(Thread(8))
+    assert analyse(system).rows(NAMESPACES) == [("front", -1), ("rear", -2), ("main", None)]
+
+
+def test_a_name_that_some_events_lack_is_no_other_one(system: RosSystem, analyse: Analyse) -> None:
+    """Where a channel has no context for it. Threads take turns."""
+    front, rear = Thread(7, name="front"), Thread(8, name="rear")
+    called(system, front, rear, Thread(7, name=None), Thread(8, name=None))
+    assert analyse(system).rows("SELECT DISTINCT pid_namespace FROM store.process") == [(None,)]
+
+
+def renaming(system: RosSystem, pid: int, trace: int = 0) -> None:
+    """A thread has one name while it waits, and another while its callback runs."""
+    idle, busy = Thread(pid, name="idle", trace=trace), Thread(pid, name="busy", trace=trace)
+    for number in range(3):
+        system.add("ros2:callback_start", idle, callback=0x1)
+        system.publish(busy, 0x10, number)
+        system.add("ros2:callback_end", busy, callback=0x1)
+        system.add("ros2:rclcpp_executor_wait_for_work", idle, timeout=-1)
+
+
 def test_a_thread_that_renames_itself_in_callbacks_is_one(
     system: RosSystem, analyse: Analyse
 ) -> None:
-    for number in range(3):
-        system.add("ros2:callback_start", Thread(7, name="idle"), callback=0x1)
-        system.publish(Thread(7, name="busy"), 0x10, number)
-        system.add("ros2:callback_end", Thread(7, name="busy"), callback=0x1)
-        system.add("ros2:rclcpp_executor_wait_for_work", Thread(7, name="idle"), timeout=-1)
+    renaming(system, 7)
     assert analyse(system).rows(NAMESPACES) == [("idle", None)]
+
+
+@pytest.mark.parametrize(("pid", "trace"), [(8, 0), (7, 1)])
+def test_a_thread_that_renames_itself_says_nothing_of_others(
+    system: RosSystem, analyse: Analyse, pid: int, trace: int
+) -> None:
+    """Another one of this host, or one with this id on another host."""
+    system.add_source(1, "beta", "boot")
+    called(system, Thread(7, name="front"), Thread(7, name="rear"))
+    renaming(system, pid, trace)
+    assert analyse(system).rows(NAMESPACES) == [("front", -1), ("rear", -2), ("idle", None)]
+
+
+def test_processes_with_one_id_are_those_of_a_host(system: RosSystem, analyse: Analyse) -> None:
+    """Elsewhere, others have that id: two as well, or one of the same name."""
+    for trace, host in enumerate(("alpha", "beta", "gamma")):
+        system.add_source(trace, host, "boot")
+    called(system, Thread(7, name="front"), Thread(7, name="rear"))
+    called(system, Thread(7, name="left", trace=1), Thread(7, name="right", trace=1))
+    called(system, Thread(7, name="rear", trace=2))
+    assert analyse(system).rows(NAMESPACES) == [
+        ("front", -1),
+        ("rear", -2),
+        ("left", -1),
+        ("right", -2),
+        ("rear", None),
+    ]
 
 
 @pytest.mark.parametrize(("return_ns", "is_ambiguous"), [(9_990, True), (10_000, False)])

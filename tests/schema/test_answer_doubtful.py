@@ -53,14 +53,14 @@ class Process:
         publications: (time, publisher, thread).
         timers: (period, time of initialisation, process).
         gaps: (begin, end) of what is not recorded.
-        is_new: it began after the recording.
+        old: what was there before the recording: publishers, subscriptions.
     """
 
-    takes: list[tuple[float, int, int]] = field(default_factory=list)
+    takes: list[tuple[float, int | None, int]] = field(default_factory=list)
     publications: list[tuple[float, int, int]] = field(default_factory=list)
     timers: list[tuple[float, float, int]] = field(default_factory=list)
     gaps: list[tuple[float, float]] = field(default_factory=list)
-    is_new: bool = True
+    old: Sequence[str] = ()
 
     def doubtful(self) -> list[tuple[int, float]]:
         """Publisher and time of each doubtful publication, in order."""
@@ -70,15 +70,14 @@ class Process:
             + [(*publication, True) for publication in self.publications],
             key=lambda event: (event[0], event[3]),
         )
-        created = 0 if self.is_new else None
         with derived(STAGE, NAMES) as con:
             con.executemany(
                 "INSERT INTO store.publisher (publisher_id, created_ns) VALUES (?, ?)",
-                [(publisher, created) for publisher in (ANSWER, TICK, TOCK)],
+                [(each, None if "publishers" in self.old else 0) for each in (ANSWER, TICK, TOCK)],
             )
             con.executemany(
                 "INSERT INTO store.subscription (subscription_id, created_ns) VALUES (?, ?)",
-                [(subscription, created) for subscription in (1, 2, 3)],
+                [(each, None if "subscriptions" in self.old else 0) for each in (1, 2, 3)],
             )
             for period, start, process in self.timers:
                 con.execute(
@@ -150,7 +149,7 @@ def run(
 ) -> Process:
     """Execute timers that are due, then messages that are there, as the executors of rclpy do."""
     chance = Random(seed)
-    process = Process(is_new=is_new)
+    process = Process(old=() if is_new else ("publishers", "subscriptions"))
     process.timers = [(each.period, each.start, 1) for each in timers if each.is_traced]
     arrivals = sorted(
         (
@@ -299,8 +298,8 @@ def test_half_is_as_late_as_a_tenth_of_the_period(late: Sequence[float], is_doub
     process = steady(100 * len(late), moments)
     process.timers = [(100, -95, 1)]
     assert process.doubtful_publishers() == {TICK: float(is_doubtful)}
-    # Another process, one whose initialisation comes later, other periods.
-    for other in ((100, -95, 2), (100, 3_905, 1), (101, -95, 1)):
+    # Another process, one whose initialisation comes later, other periods, none.
+    for other in ((100, -95, 2), (100, 3_905, 1), (101, -95, 1), (0, -95, 1)):
         process.timers = [other]
         assert process.doubtful() == []
 
@@ -328,10 +327,12 @@ def test_most_wait_for_a_callback(others: int, is_doubtful: bool) -> None:
 
 @pytest.mark.parametrize(("period", "is_doubtful"), [(40, True), (39.9, False)])
 def test_a_timer_would_publish_again_before_the_next_take(period: float, is_doubtful: bool) -> None:
-    """If that is a period away."""
+    """If that is a period away: the next one of this thread."""
     process = steady(200, [160])
+    process.takes += [(number * 200 + 170, 2, 2) for number in range(1, 20)]
+    process.publications += [(number * 200 + 171, TOCK, 2) for number in range(1, 20)]
     process.timers = [(period, 360 - 10.5 * period, 1)]
-    assert process.doubtful_publishers() == {TICK: float(is_doubtful)}
+    assert process.doubtful_publishers() == {TICK: float(is_doubtful), TOCK: 0}
 
 
 @pytest.mark.parametrize(("spread", "is_doubtful"), [(10, False), (13, True)])
@@ -372,6 +373,37 @@ def test_too_few_intervals_without_a_gap(rest: int, is_doubtful: bool) -> None:
     assert process.doubtful_publishers() == {TICK: float(is_doubtful)}
 
 
+def answering(intervals: Sequence[float], delays: Sequence[float]) -> Process:
+    """Publications at these intervals, each so long after a take."""
+    process = Process()
+    at = 0.0
+    for interval, delay in zip(intervals, delays, strict=True):
+        at += interval
+        process.takes.append((at - delay, 1, 1))
+        process.publications.append((at, TICK, 1))
+    return process
+
+
+@pytest.mark.parametrize(("short", "counts"), [(7, False), (15, True)])
+def test_a_few_short_delays_and_intervals_say_nothing(short: int, counts: bool) -> None:
+    """Those of less than a tenth of the messages."""
+    rare = [number < short for number in range(101)]
+    delays = answering([90, 100] * 50 + [90], [20 if each else 40 for each in rare])
+    assert delays.doubtful_publishers() == {TICK: float(counts)}
+    intervals = answering([60 if each else 100 for each in rare], [20, 40] * 50 + [20])
+    assert intervals.doubtful_publishers() == {TICK: float(not counts)}
+
+
+def test_the_first_publication_after_a_take_tells_the_delay() -> None:
+    """Others may come later after some messages."""
+    process = Process()
+    for number in range(1, 101):
+        process.takes.append((number * 100, 1, 1))
+        last = 85 if number % 6 == 0 else 77
+        process.publications += [(number * 100 + each, TICK, 1) for each in (2, 27, 52, last)]
+    assert process.doubtful() == []
+
+
 @pytest.mark.parametrize(("more", "is_doubtful"), [(10, False), (11, True)])
 def test_another_number_per_message(more: int, is_doubtful: bool) -> None:
     """After more than a tenth of the messages; if it is less, only what comes beyond."""
@@ -382,6 +414,38 @@ def test_another_number_per_message(more: int, is_doubtful: bool) -> None:
     assert process.doubtful() == sorted((TICK, round(at, 6)) for at, _, _ in expected)
 
 
+@pytest.mark.parametrize(("fewer", "is_doubtful"), [(9, False), (11, True)])
+def test_a_smaller_number_per_message(fewer: int, is_doubtful: bool) -> None:
+    process = steady(100, [2, 30], 100)
+    for number in range(1, fewer + 1):
+        process.publications.remove((number * 100 + 30, TICK, 1))
+    assert process.doubtful_publishers() == {TICK: float(is_doubtful)}
+
+
+def test_what_comes_beyond_the_usual_number_of_few_messages() -> None:
+    """Usual is what half of the messages have, or fewer."""
+    process = steady(100, [2, 30], 4)
+    process.publications.remove((130, TICK, 1))
+    assert process.doubtful() == []
+    process.publications.remove((230, TICK, 1))
+    assert process.doubtful() == [(TICK, 330), (TICK, 430)]
+
+
+def test_each_publisher_has_a_usual_number() -> None:
+    process = steady(100, [2], 100)
+    process.publications += [(number * 100 + 3, TOCK, 1) for number in range(1, 101)]
+    beyond: list[tuple[float, int, int]] = [(530, TICK, 1), (540, TOCK, 1)]
+    process.publications += beyond
+    assert process.doubtful() == [(publisher, at) for at, publisher, _ in beyond]
+
+
+def test_the_usual_number_may_differ_by_subscription() -> None:
+    process = steady(100, [2, 30], 100)
+    process.takes += [(number * 100 + 50, 2, 1) for number in range(1, 101)]
+    process.publications += [(number * 100 + 52, TICK, 1) for number in range(1, 101)]
+    assert process.doubtful() == []
+
+
 @pytest.mark.parametrize(("gap", "is_doubtful"), [(5.4, False), (7.5, True)])
 def test_a_burst_is_closer_than_a_tenth_of_the_interval(gap: float, is_doubtful: bool) -> None:
     process = steady(100, [2], 100)
@@ -390,12 +454,20 @@ def test_a_burst_is_closer_than_a_tenth_of_the_interval(gap: float, is_doubtful:
 
 
 @pytest.mark.parametrize("count", [1, 4, 5])
-def test_too_few_to_tell(count: int) -> None:
+@pytest.mark.parametrize("old", ["publishers", "subscriptions"])
+def test_too_few_to_tell(count: int, old: str) -> None:
     """They are answers if no timer may be there that is not traced."""
     process = steady(50, [3], count)
     assert process.doubtful() == []
-    process.is_new = False
+    process.old = [old]
     assert process.doubtful_publishers() == {TICK: float(count < 5)}
+
+
+def test_of_a_subscription_that_is_not_known() -> None:
+    """It is older than the recording."""
+    process = steady(50, [3], 4)
+    process.takes = [(at, None, thread) for at, _, thread in process.takes]
+    assert process.doubtful_publishers() == {TICK: 1}
 
 
 def test_few_messages_of_another_subscription() -> None:

@@ -31,7 +31,7 @@ class Thread:
 
     pid: int = 100
     tid: int | None = None
-    name: str = "main"
+    name: str | None = "main"
     cpu: int = 0
     trace: int = 0
     pid_ns: int | None = None

@@ -11,7 +11,7 @@ WITH foreign_word AS (
     FROM store.gap
     WHERE kind NOT IN ('loss', 'packets', 'pause')
     UNION ALL
-    SELECT DISTINCT run_id, 'run.clock_sync', clock_sync
+    SELECT run_id, 'run.clock_sync', clock_sync
     FROM store.run
     WHERE clock_sync NOT IN ('none', 'messages', 'file')
     UNION ALL

@@ -11,7 +11,7 @@
 WITH stamped AS (
     SELECT
         run_id, host_id,
-        shift_ns - lag(shift_ns) OVER (PARTITION BY run_id, host_id ORDER BY from_ns) AS step_ns
+        shift_ns - lag(shift_ns) OVER (PARTITION BY host_id ORDER BY from_ns) AS step_ns
     FROM derive.stamp_shift
     WHERE host_id NOT IN (
         SELECT h.host_id
@@ -35,7 +35,7 @@ step AS (
             lag(segment) OVER on_clock AS previous_segment
         FROM store.stamp_clock
         WHERE message_count > 0
-        WINDOW on_clock AS (PARTITION BY run_id, clock_id ORDER BY at_ns)
+        WINDOW on_clock AS (PARTITION BY clock_id ORDER BY at_ns)
     ) AS c
     JOIN store.host AS h ON c.clock_id = h.clock_id
     WHERE c.segment > c.previous_segment

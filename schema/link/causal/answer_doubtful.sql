@@ -92,7 +92,7 @@ pair AS (
 judged AS MATERIALIZED (
     SELECT
         a.subscription_id, a.publisher_id, a.usual_number,
-        t.publisher_id IS NOT NULL
+        a.publisher_id IN (FROM derive.timed_publisher(only_run, 'follower'))
         OR CASE
             WHEN a.take_count < 5 THEN p.created_ns IS NULL OR s.created_ns IS NULL
             ELSE r.spread_ns < 0.8 * a.spread_ns OR a.least_number < a.most_number
@@ -101,27 +101,14 @@ judged AS MATERIALIZED (
     JOIN rhythm AS r ON a.publisher_id = r.publisher_id
     JOIN store.publisher AS p ON a.publisher_id = p.publisher_id
     LEFT JOIN store.subscription AS s ON a.subscription_id = s.subscription_id
-    LEFT JOIN derive.timed_publisher(only_run, 'follower') AS t ON a.publisher_id = t.publisher_id
-),
-excess AS (
-    SELECT
-        f.publication_id,
-        sum(f.number) OVER (
-            PARTITION BY f.take_id, f.publisher_id
-            ORDER BY f.start_event_id ROWS UNBOUNDED PRECEDING
-        ) > j.usual_number AS is_excess
-    FROM follower AS f
-    JOIN answered AS a ON f.take_id = a.take_id AND f.publisher_id = a.publisher_id
-    JOIN judged AS j
-        ON a.subscription_id IS NOT DISTINCT FROM j.subscription_id
-        AND a.publisher_id = j.publisher_id
-    WHERE a.number > j.usual_number AND NOT j.is_doubtful
 )
 SELECT f.publication_id
 FROM follower AS f
 JOIN judged AS j
     ON f.subscription_id IS NOT DISTINCT FROM j.subscription_id
     AND f.publisher_id = j.publisher_id
-WHERE j.is_doubtful
-UNION ALL
-SELECT publication_id FROM excess WHERE is_excess
+QUALIFY j.is_doubtful
+    OR sum(f.number) OVER (
+        PARTITION BY f.take_id, f.publisher_id
+        ORDER BY f.start_event_id ROWS UNBOUNDED PRECEDING
+    ) > j.usual_number

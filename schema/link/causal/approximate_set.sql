@@ -35,10 +35,10 @@ around AS MATERIALIZED (
         l.start_event_id AS last_event_id,
         l.age_ns, l.next_ns, l.next_event_id, l.is_set_back,
         -- Where it goes on after it waited for this input: those with older messages have come.
-        max(coalesce(l.next_event_id, 9223372036854775807)) OVER (
-            PARTITION BY p.annotation_id, p.pivot_id
-            ORDER BY l.stamp_ns ROWS UNBOUNDED PRECEDING
-        ) AS resumed_event_id
+        CASE
+            WHEN bool_and(l.next_event_id IS NOT NULL) OVER before THEN
+                max(l.next_event_id) OVER before
+        END AS resumed_event_id
     FROM (
         SELECT
             m.annotation_id, m.callback_instance_id AS pivot_id, m.stamp_ns AS pivot_ns,
@@ -51,11 +51,14 @@ around AS MATERIALIZED (
         ON p.annotation_id = l.annotation_id
         AND p.subscription_id = l.subscription_id
         AND p.pivot_ns >= l.stamp_ns
+    WINDOW before AS (
+        PARTITION BY p.annotation_id, p.pivot_id ORDER BY l.stamp_ns ROWS UNBOUNDED PRECEDING
+    )
     QUALIFY count(*) OVER (PARTITION BY p.annotation_id, p.pivot_id) = p.input_count
 ),
 -- Moments that a set may start at: no later one has the same messages.
 start AS (
-    SELECT DISTINCT annotation_id, pivot_id, pivot_ns, last_ns AS start_ns FROM around
+    SELECT annotation_id, pivot_id, pivot_ns, last_ns AS start_ns FROM around
 ),
 possible AS MATERIALIZED (
     SELECT
@@ -89,7 +92,8 @@ member AS MATERIALIZED (
         AND n.subscription_id = m.subscription_id
         AND n.start_ns <= m.stamp_ns
 ),
--- Sets that start later are worse already with one of the messages that they would need.
+-- No set is better as soon as one of the messages that it would need makes it too wide: those of
+-- sets that start earlier have come.
 excluded AS (
     SELECT
         s.annotation_id, s.pivot_id,
@@ -100,8 +104,7 @@ excluded AS (
             END
         ) AS event_id
     FROM start AS s
-    JOIN narrowest AS n
-        ON s.annotation_id = n.annotation_id AND s.pivot_id = n.pivot_id AND s.start_ns > n.start_ns
+    JOIN narrowest AS n ON s.annotation_id = n.annotation_id AND s.pivot_id = n.pivot_id
     JOIN around AS a
         ON s.annotation_id = a.annotation_id AND s.pivot_id = a.pivot_id AND a.last_ns < s.start_ns
     GROUP BY s.annotation_id, s.pivot_id, s.start_ns
@@ -130,7 +133,7 @@ proven AS (
 ),
 -- Each end and each start may be older.
 close AS (
-    SELECT DISTINCT p.annotation_id, p.pivot_id
+    SELECT p.annotation_id, p.pivot_id
     FROM possible AS p
     JOIN narrowest AS n
         ON p.annotation_id = n.annotation_id
@@ -157,4 +160,4 @@ SELECT
 FROM proven AS p
 JOIN member AS m ON p.annotation_id = m.annotation_id AND p.pivot_id = m.pivot_id
 LEFT JOIN close AS c ON p.annotation_id = c.annotation_id AND p.pivot_id = c.pivot_id
-WHERE p.proof_event_id < 9223372036854775807
+WHERE p.proof_event_id IS NOT NULL

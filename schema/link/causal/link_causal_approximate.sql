@@ -26,7 +26,7 @@ published AS MATERIALIZED (
     JOIN store.annotation_input AS i
         ON b.annotation_id = i.annotation_id AND b.subscription_id = i.subscription_id
     JOIN store.publication AS p ON b.publication_id = p.publication_id
-    WHERE b.kind = 'approximate_sync' AND p.run_id = only_run
+    WHERE p.run_id = only_run
 ),
 firing AS (
     SELECT

@@ -7,7 +7,7 @@
 --     period before the thread takes its next message: else the timer would have published again.
 --     A timer is due at its initialisation plus whole periods. Executors of rclpy initialise a
 --     timer for every wait that may time out: the first of each period stands for all.
--- grain: one row per publisher that a timer of its process explains
+-- grain: one row per publisher and period of a timer of its process that explains it
 -- param: only_run BIGINT  Run to look at
 -- param: followers VARCHAR  Name of rows of publisher_id, start_ns, delay_ns (since the take),
 --     rest_ns (until the next take; NULL: none)
@@ -15,7 +15,7 @@ CREATE OR REPLACE MACRO derive.timed_publisher(only_run, followers) AS TABLE
 WITH timer AS (
     SELECT process_id, period_ns, min(created_ns) AS created_ns
     FROM store.timer
-    WHERE run_id = only_run AND period_ns > 0 AND created_ns IS NOT NULL
+    WHERE run_id = only_run AND period_ns > 0
     GROUP BY process_id, period_ns
 ),
 publisher AS (
@@ -49,6 +49,6 @@ explained AS (
     FROM late
     GROUP BY publisher_id, period_ns
 )
-SELECT DISTINCT publisher_id
+SELECT publisher_id
 FROM explained
 WHERE prompt_count >= 0.5 * publication_count OR due_count >= 0.8 * publication_count

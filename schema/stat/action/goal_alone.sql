@@ -9,7 +9,7 @@ CREATE OR REPLACE MACRO derive.goal_alone(spans) AS TABLE
 WITH change AS (
     SELECT action_server_id, start_ns AS at_ns, goal_id, 1 AS change FROM query_table(spans)
     UNION ALL
-    SELECT action_server_id, end_ns, goal_id, -1 FROM query_table(spans) WHERE end_ns IS NOT NULL
+    SELECT action_server_id, end_ns, goal_id, -1 FROM query_table(spans)
 ),
 -- Of one open goal, the sum is its identity.
 summed AS (

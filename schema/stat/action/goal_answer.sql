@@ -17,7 +17,6 @@ WITH answer AS MATERIALIZED (
     FROM store.response AS r
     JOIN query_table(servers) AS s ON r.service_id = s.action_server_id
     JOIN store.process AS p ON s.process_id = p.process_id
-    WHERE r.sent_ns IS NOT NULL
 ),
 executing AS MATERIALIZED (
     SELECT thread_id, at_ns
@@ -63,7 +62,6 @@ step AS (
     SELECT s.action_server_id, r.sent_ns, r.response_id, -1
     FROM store.response AS r
     JOIN query_table(servers) AS s ON r.service_id = s.result_service_id
-    WHERE r.sent_ns IS NOT NULL
 ),
 summed AS (
     SELECT *, sum(change) OVER earlier AS balance

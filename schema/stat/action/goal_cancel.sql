@@ -14,7 +14,7 @@ WITH asked AS MATERIALIZED (
     FROM store.request AS q
     JOIN query_table(servers) AS s ON q.service_id = s.cancel_service_id
     JOIN store.response AS r ON q.request_id = r.request_id
-    WHERE r.sent_ns IS NOT NULL AND r.sender_thread_id = q.receiver_thread_id
+    WHERE r.sender_thread_id = q.receiver_thread_id
 ),
 -- A thread may take several requests at once: behind another response, the status may be of that.
 published AS (
