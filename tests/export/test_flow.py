@@ -74,6 +74,23 @@ def test_a_publication_may_take_until_its_thread_goes_on(
         assert "publishes /image  in 10 ns or more" in str(database.flow(publication_id=1))
 
 
+def test_a_flow_that_ends_at_a_node_which_publishes_says_so(
+    empty_database: Path, tmp_path: Path
+) -> None:
+    with database_of("../main.dead_end/kept_messages", empty_database, tmp_path) as database:
+        flow = database.flow("/boxes")
+        *_, last = str(flow).splitlines()
+        text = "ends here; /fusion publishes /objects from /clusters: msgflow links suggest"
+        assert last.strip() == text
+        assert [node["otherwise_published"] for node in flow.nodes.values()][-1] == (
+            "/objects from /clusters"
+        )
+        assert f"\x1b[2m{text}" in tree_text(flow, color=True)
+        # What comes back to the node ends a loop, and a sink publishes nothing.
+        assert "ends here" not in str(database.flow("/plan"))
+        assert "ends here" not in str(database.flow("/tracks"))
+
+
 def test_what_a_busy_executor_added_is_said(empty_database: Path, tmp_path: Path) -> None:
     """The numbers are worked out by hand in the golden cases of executor-wait."""
     path = tmp_path / "busy.duckdb"
