@@ -2,7 +2,7 @@
 
 import { color } from "./dom.js";
 import { lowerBound } from "./timeline_rows.js";
-import { EVENT, PALE, PART_COLORS, duration, partTitle } from "./labels.js";
+import { BLOCKED, EVENT, PALE, PART_COLORS, duration, partTitle } from "./labels.js";
 
 export const AXIS = 30;
 const BAR_TOP = 3;
@@ -11,7 +11,7 @@ const LEAST_WIDTH = 1;
 export function palette() {
   const names = [
     "ink", "soft", "faint", "page", "panel", "line", "stripe", "timer", "subscription", "service",
-    "publication", "take", "call", "wait", "process", "execute", "event", "transport", "direct", "indirect",
+    "publication", "take", "call", "wait", "process", "execute", "blocked", "event", "transport", "direct", "indirect",
     "critical", "gap", "pick", "focus",
   ];
   return Object.fromEntries(names.map((name) => [name, color(name)]));
@@ -157,6 +157,7 @@ export class Renderer {
       case 3: case 4: return colors.call;
       case 5: return colors.wait;
       case 6: return colors.process;
+      case BLOCKED: return colors.blocked;
       case EVENT: return colors.event;
       default: return colors.execute;
     }
@@ -176,7 +177,7 @@ export class Renderer {
     const full = lane.height - 2 * BAR_TOP;
     const end = lowerBound(starts, range[0], range[1], to);
     let at = lowerBound(reach, range[0], end, from);
-    const shares = new Float64Array(9);
+    const shares = new Float64Array(10);
     let column = -1;
     const flush = () => {
       if (column < 0) return;
@@ -532,7 +533,7 @@ export class Renderer {
 const leastHeight = (kind, full) => (kind === 5 ? 0 : kind === EVENT ? full : 4);
 const HEIGHT_HALF = 10;
 // Drawn from below: what an executor does for callbacks first.
-const ORDER = [7, 6, 0, 1, 2, 3, 4, 5, 8];
+const ORDER = [7, BLOCKED, 6, 0, 1, 2, 3, 4, 5, EVENT];
 const LINK_STYLE = [
   { color: "transport" }, { color: "direct" }, { color: "indirect", dash: [6, 3] },
   { color: "indirect", dash: [2, 3] }, { color: "direct", dash: [4, 2] },

@@ -107,9 +107,11 @@ drawn AS NOT MATERIALIZED (
     UNION ALL
     SELECT
         thread_id * 8 + 3, start_ns, coalesce(end_ns, start_ns), 7,
-        list_position(['wait', 'process', 'execute'], state), executor_id, NULL
-    FROM main.executor_state
+        list_position(['wait', 'select', 'take', 'callback', 'service', 'blocked'], activity),
+        executor_id, NULL
+    FROM main.executor_activity
     WHERE run_id = $run_id AND start_ns >= $start_ns AND start_ns < $end_ns
+        AND thread_id IN (SELECT thread_id FROM main.executor_state WHERE run_id = $run_id)
 ),
 -- What ends at a moment before what begins there, the inner before the outer, and what begins the
 -- other way round.
