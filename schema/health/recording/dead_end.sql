@@ -38,11 +38,11 @@ output AS (
 )
 SELECT
     n.run_id,
-    derive.node_label(n.full_name, p.name, p.pid) AS subject,
+    main.node_label(n.full_name, p.name, p.pid) AS subject,
     i.number::BIGINT AS count,
     printf(
         '%s end at %s, which publishes %s: msgflow links suggest',
-        i.received, derive.node_label(n.full_name, p.name, p.pid), o.published
+        i.received, main.node_label(n.full_name, p.name, p.pid), o.published
     ) AS detail
 FROM input AS i
 JOIN output AS o ON i.node_id = o.node_id

@@ -48,7 +48,7 @@ back (subscription_id, publishing_id, from_subscription_id, is_source) AS (
 ended AS (
     SELECT
         s.topic_name,
-        derive.node_label(n.full_name, p.name, p.pid) AS node,
+        main.node_label(n.full_name, p.name, p.pid) AS node,
         d.subscription_id IS NOT NULL AS is_dead_end,
         CASE
             WHEN s.node_id IN (SELECT publishing_id FROM back) THEN 1
@@ -76,7 +76,7 @@ last AS (
     WHERE rank = (SELECT min(rank) FROM ended)
 ),
 first AS (
-    SELECT derive.first_three(derive.node_label(n.full_name, p.name, p.pid)) AS nodes
+    SELECT derive.first_three(main.node_label(n.full_name, p.name, p.pid)) AS nodes
     -- What a publisher that is not traced sends begins where it is received.
     FROM (
         SELECT DISTINCT b.publishing_id
