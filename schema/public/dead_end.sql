@@ -3,12 +3,11 @@
 -- description: Subscriptions at which flows end although their node publishes: at least three
 --     messages came, and none of their callbacks led to anything, while timers of the node or other
 --     messages led to publications. Either the node only consumes these messages, or it keeps them,
---     and what it publishes depends on them: then a link has to be declared. A link is likely,
---     unless one of two things speaks against it: the messages descend from what the node publishes
---     itself, and end a loop, or only messages on another topic led to publications, before the first
---     one came, or in callbacks that run shorter: to keep a message takes less time than to use it.
---     Topics of ROS itself, topics that the node publishes on, too, and inputs of annotations are
---     left out.
+--     and what it publishes depends on them: then a link has to be declared. A link is not
+--     likely if the messages descend from what the node publishes itself, and end a loop. Nor is it
+--     if messages on another topic led to publications before the first one came, or in callbacks
+--     that run shorter: to keep a message takes less time than to use it. Topics of ROS itself,
+--     topics that the node also publishes on, and inputs of annotations are left out.
 -- grain: one row per such subscription, publisher of its node, and timer or subscription whose
 --     callbacks published
 -- param: runs BIGINT[]  Runs to look at

@@ -98,7 +98,11 @@ def test_suggestions_are_written_and_applied_in_one_go(
     assert "no candidate is without a doubt: nothing is declared\n" in again.stderr
     assert msgflow("links", "list", "--format", "csv").stdout == listed
     assert msgflow("links", "apply", "again.yaml").exit_code == 0
-    assert msgflow("links", "list", "--format", "csv").stdout == listed
+    # All but the identity, the last column.
+    anew = msgflow("links", "list", "--format", "csv").stdout
+    assert [line.rpartition(",")[0] for line in anew.splitlines()] == [
+        line.rpartition(",")[0] for line in listed.splitlines()
+    ]
     assert text.count("- kind:") == Path("again.yaml").read_text().count("- kind:")
 
 

@@ -19,7 +19,7 @@ CASES = Path(__file__).resolve().parents[1] / "schema" / "cases" / "main.flow_st
 
 
 def database_of(case: str, empty_database: Path, directory: Path) -> Database:
-    path = directory / f"{case}.duckdb"
+    path = directory / "case.duckdb"
     shutil.copyfile(empty_database, path)
     with duckdb.connect(str(path)) as connection:
         fill_case(connection, CASES / f"{case}.case")

@@ -61,7 +61,8 @@ WITH slice AS MATERIALIZED (
 link AS (
     SELECT
         CASE l.from_kind WHEN 'callback_instance' THEN 0 WHEN 'publication' THEN 1
-            WHEN 'take' THEN 2 ELSE CASE WHEN q.taken_ns IS NULL THEN 3 ELSE 4 END
+            WHEN 'take' THEN 2 WHEN 'request' THEN CASE WHEN q.taken_ns IS NULL THEN 3 ELSE 4 END
+            ELSE CASE WHEN a.taken_ns IS NULL THEN 5 ELSE 6 END
         END AS from_code,
         l.from_id,
         CASE l.to_kind WHEN 'callback_instance' THEN 0 WHEN 'publication' THEN 1
@@ -72,6 +73,7 @@ link AS (
         l.link_kind
     FROM main.flow_edge AS l
     LEFT JOIN main.request AS q ON l.from_kind = 'request' AND l.from_id = q.request_id
+    LEFT JOIN main.response AS a ON l.from_kind = 'response' AND l.from_id = a.response_id
     LEFT JOIN main.request AS o ON l.to_kind = 'request' AND l.to_id = o.request_id
     LEFT JOIN main.response AS r ON l.to_kind = 'response' AND l.to_id = r.response_id
     WHERE l.run_id = $run_id
