@@ -1,7 +1,7 @@
 -- name: bar
 -- description: What the timeline draws as a bar: callback instances, publications, takes, requests
---     and responses of services, from sending to taking, what executor threads did, and events of
---     the user's own tracepoints, which have no length. Threads have their states as recorded, but
+--     and responses of services, from sending to taking, what executor threads did, states of
+--     managed nodes, and events of the user's own tracepoints, which have no length. Threads have their states as recorded, but
 --     for the time after the callback: main.executor_activity would take far longer for a window.
 -- grain: one row per bar
 -- kind: inline
@@ -10,7 +10,7 @@
 --     client, else of the service, else of the process
 -- column: kind UTINYINT  0 callback instance, 1 publication, 2 take, 3 request, 4 response; of
 --     a thread of an executor: 5 wait, 6 select, 7 take and callback, 9 blocked; 8 event of the
---     user
+--     user; of a managed node: 10 active, 11 not active
 -- column: id BIGINT  Identity of the thing within its kind; of threads the first callback instance
 --     in it, of events the one inside which they happened, -1: none
 -- column: start_ns BIGINT [epoch ns]  Begin
@@ -85,3 +85,7 @@ JOIN event_row AS r
     ON u.process_id = r.process_id
     AND c.node_id IS NOT DISTINCT FROM r.node_id
     AND u.name = r.name
+UNION ALL
+SELECT
+    run_id, -2 * node_id - 1, CASE WHEN state = 'active' THEN 10 ELSE 11 END, -1, start_ns, end_ns, 0
+FROM main.node_state
