@@ -99,7 +99,7 @@ def suggest(
                 + ", ".join(dict.fromkeys(row["node"] for row in found.doubtful))
             )
         text = found.text(shlex.join(words))
-        if not (apply and found.certain):
+        if path is None or not apply or not found.certain:
             print_text(text, path)
             if apply:
                 print_status("no candidate is without a doubt: nothing is declared")
