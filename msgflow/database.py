@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from msgflow.export.perfetto import PerfettoTrace
     from msgflow.export.views import ExportedView
     from msgflow.ingest import IngestProgress, IngestReport
-    from msgflow.links import AppliedLinks
+    from msgflow.links import AppliedLinks, LinkSuggestions
     from msgflow.query.compare import Comparison
     from msgflow.run.choice import Run
     from msgflow.sql.header import Header
@@ -175,7 +175,7 @@ class Database:
         )
 
     def apply_links(
-        self, file: str | Path, *, run: str | int | None = None
+        self, file: str | Path, *, run: str | int | None = None, content: str | None = None
     ) -> tuple[AppliedLinks, ...]:
         """Declare the indirect links of a file and derive all links anew, in one transaction.
 
@@ -184,6 +184,7 @@ class Database:
         Args:
             file: YAML; docs/causes.md has its form.
             run: 'all', a name or an id; the latest run when None.
+            content: of the file, if it is not written yet.
 
         Raises:
             UsageError: not such a file, no such run, or a link that does not fit the run.
@@ -191,9 +192,37 @@ class Database:
         """
         from msgflow.links import apply_links, read_links
 
-        links = read_links(Path(file))
+        links = read_links(Path(file), content)
         self.close()
         return apply_links(self.path, links, run=run, memory_limit=self._memory_limit)
+
+    def suggest_links(self, *, run: str | int | None = None) -> LinkSuggestions:
+        """Return candidates for links of a run, and the links that a file declared for it.
+
+        Args:
+            run: a name or an id; the latest run when None.
+
+        Raises:
+            UsageError: no such run.
+            QueryError: the database could not run a query.
+            DatabaseError: the file cannot be opened.
+        """
+        from msgflow.links import LinkSuggestions
+        from msgflow.sql.statement import internal_sql
+
+        found = self.query("links-suggested", run=run)
+        return LinkSuggestions(
+            found.runs,
+            found.to_arrow().to_pylist(),
+            [
+                row
+                for one in found.runs
+                for row in internal_sql()
+                .run(self.connection, "link_of_file", {"run_id": one.run_id})
+                .to_arrow_table()
+                .to_pylist()
+            ],
+        )
 
     def apply_clocks(
         self, clock_sync: str | Path, *, run: str | int | None = None

@@ -35,11 +35,13 @@ class YamlFile:
         path: the file.
         example: of its content, for hints.
         quoting: what users forget to quote, for the hint of a file that is not YAML.
+        content: of the file, if it is not written yet.
     """
 
     path: Path
     example: str
     quoting: str
+    content: str | None = None
 
     def fail(self, line: int, what: str, hint: str | None = None) -> NoReturn:
         """Raise the error of a line."""
@@ -111,7 +113,9 @@ class YamlFile:
         from ruamel.yaml import YAML
         from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
-        text = read_text(self.path, "cannot read the file", self.example)
+        text = self.content
+        if text is None:
+            text = read_text(self.path, "cannot read the file", self.example)
         try:
             return YAML(typ="safe", pure=True).compose(text)
         except MarkedYAMLError as error:
@@ -140,18 +144,19 @@ def quoted(text: str) -> str:
     return json.dumps(text, ensure_ascii=False)
 
 
-def list_lines(key: str, items: Sequence[str]) -> list[str]:
+def list_lines(key: str, items: Sequence[str], width: int = _WIDTH) -> list[str]:
     """Return the lines of a list in brackets, for files that people read in a terminal.
 
     Args:
         key: with the spaces before it.
         items: in the form of YAML, see `quoted`.
+        width: most characters of a line, unless one item has more.
     """
     lines = [f"{key}: ["]
     indent = " " * (len(key) - len(key.lstrip()) + 2)
     for place, item in enumerate(items, start=1):
         text = f"{item}, " if place < len(items) else f"{item}]"
-        if len(lines[-1]) + len(text.rstrip()) > _WIDTH:
+        if len(lines[-1]) + len(text.rstrip()) > width:
             lines.append(indent)
         lines[-1] += text
     return [line.rstrip() for line in lines]

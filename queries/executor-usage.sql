@@ -1,9 +1,12 @@
 -- name: executor-usage
 -- title: What executor threads spent their time on
--- description: Time of each executor thread in the three states that its events show (waiting for
---     work, looking for what is ready, executing), and in callbacks. An executor without such
---     events (events executor, static executor, rclpy) has callback time only. The callback share
---     is the share of the time for which the thread was seen.
+-- description: Time of each executor thread by what it did (executor_activity): wait for work, look
+--     for what is ready, take messages, run callbacks, or stand blocked. A thread of a
+--     multi-threaded executor is blocked after a callback, until it gets the lock of the executor
+--     and may look for work again. Meanwhile another thread may hold the lock and wait for work:
+--     then the executor has nothing to do. These times add up to the time for which the thread was
+--     seen. Of an executor without events of its own (events executor, static executor, rclpy) only
+--     takes and callbacks are known.
 -- grain: one row per executor thread
 -- column: run_id BIGINT             Run
 -- column: host VARCHAR [host]  Host
@@ -13,22 +16,29 @@
 -- column: executor_kind VARCHAR     Kind of executor
 -- column: seen_ns BIGINT [ns]       Time for which the thread was seen in the time window
 -- column: wait_ns BIGINT [ns]       Waiting for work
--- column: process_ns BIGINT [ns]    Looking for what is ready; where a loop polls the executor
+-- column: select_ns BIGINT [ns]     Looking for what is ready; where a loop polls the executor
 --     (spin_some; finding polled_executor), also what the loop does between two polls
--- column: execute_ns BIGINT [ns]    Executing, including taking messages; in a multi-threaded
---     executor also blocked behind a callback until it may look for work again
--- column: callback_ns BIGINT [ns]   In callbacks with an end; nested time counts once
+-- column: take_ns BIGINT [ns]       Taking messages, up to the callback
+-- column: callback_ns BIGINT [ns]   In callbacks, services included; nested time counts once. A
+--     callback never seen to end lasts until the first event that cannot be inside it
+-- column: blocked_ns BIGINT [ns]    Waiting for the lock of a multi-threaded executor after a
+--     callback
+-- column: unknown_ns BIGINT [ns]    Not known: before the first event of the executor, in a gap of
+--     the trace, or outside of callbacks where the executor has no events
 -- column: callbacks BIGINT          Callbacks that began
 -- column: callback_share DOUBLE [share] Callback time divided by time seen, 0 to 1
 -- column: executor_id BIGINT        Identity of the executor
 -- column: thread_id BIGINT          Identity of the thread
--- brief: process, tid, callback_share, callback_ns, callbacks, host, execute_ns, wait_ns, seen_ns,
---     executor_kind, pid, process_ns
+-- brief: process, tid, callback_share, callback_ns, blocked_ns, wait_ns, callbacks, select_ns,
+--     take_ns, host, seen_ns, unknown_ns, executor_kind, pid
 WITH member AS (
     SELECT
         x.run_id, x.executor_id, x.thread_id, e.kind, t.tid, p.pid, p.name, h.hostname,
         greatest(t.first_seen_ns, $start_ns) AS first_ns,
-        least(t.last_seen_ns, $end_ns) AS last_ns
+        least(t.last_seen_ns, $end_ns) AS last_ns,
+        x.thread_id IN (
+            SELECT thread_id FROM main.executor_state WHERE list_contains($runs, run_id)
+        ) AS has_states
     FROM main.executor_thread AS x
     JOIN main.executor AS e ON x.executor_id = e.executor_id
     JOIN main.thread AS t ON x.thread_id = t.thread_id
@@ -36,46 +46,52 @@ WITH member AS (
     JOIN main.host AS h ON p.host_id = h.host_id
     WHERE list_contains($runs, x.run_id)
 ),
-last_state AS (
-    SELECT thread_id, max(start_ns) AS start_ns
-    FROM main.executor_state
+broken AS (
+    SELECT thread_id, max(resumed_ns) AS resumed_ns
+    FROM main.thread_break
     WHERE list_contains($runs, run_id)
     GROUP BY thread_id
 ),
--- The last state of a thread lasts until its last event; before a gap, its end is not known.
-in_state AS (
+-- The last activity of a thread lasts until its last event; before a gap, its end is not known.
+activity AS (
     SELECT
-        m.thread_id,
-        s.state,
-        greatest(
-            least(coalesce(s.end_ns, m.last_ns), m.last_ns)
-            - greatest(s.start_ns, m.first_ns),
-            0
-        ) AS duration_ns
-    FROM member AS m
-    JOIN main.executor_state AS s ON m.thread_id = s.thread_id
-    JOIN last_state AS l ON m.thread_id = l.thread_id
-    WHERE s.end_ns IS NOT NULL OR l.start_ns = s.start_ns
+        a.thread_id, a.activity, a.start_ns,
+        CASE
+            WHEN a.end_ns IS NOT NULL THEN a.end_ns
+            WHEN b.resumed_ns > a.start_ns THEN a.start_ns
+            ELSE 9223372036854775807
+        END AS end_ns
+    FROM main.executor_activity AS a
+    LEFT JOIN broken AS b ON a.thread_id = b.thread_id
+    WHERE list_contains($runs, a.run_id)
 ),
-state AS (
+spent AS (
+    SELECT
+        a.thread_id,
+        CASE a.activity WHEN 'service' THEN 'callback' ELSE a.activity END AS activity,
+        sum(greatest(least(a.end_ns, m.last_ns) - greatest(a.start_ns, m.first_ns), 0))::BIGINT
+            AS duration_ns
+    FROM activity AS a
+    JOIN member AS m ON a.thread_id = m.thread_id
+    GROUP BY ALL
+),
+summed AS (
     SELECT
         thread_id,
-        sum(CASE WHEN state = 'wait' THEN duration_ns ELSE 0 END)::BIGINT AS wait_ns,
-        sum(CASE WHEN state = 'process' THEN duration_ns ELSE 0 END)::BIGINT AS process_ns,
-        sum(CASE WHEN state = 'execute' THEN duration_ns ELSE 0 END)::BIGINT AS execute_ns
-    FROM in_state
+        coalesce(sum(duration_ns) FILTER (WHERE activity = 'wait'), 0)::BIGINT AS wait_ns,
+        coalesce(sum(duration_ns) FILTER (WHERE activity = 'select'), 0)::BIGINT AS select_ns,
+        coalesce(sum(duration_ns) FILTER (WHERE activity = 'take'), 0)::BIGINT AS take_ns,
+        coalesce(sum(duration_ns) FILTER (WHERE activity = 'callback'), 0)::BIGINT AS callback_ns,
+        coalesce(sum(duration_ns) FILTER (WHERE activity = 'blocked'), 0)::BIGINT AS blocked_ns,
+        sum(duration_ns)::BIGINT AS known_ns
+    FROM spent
     GROUP BY thread_id
 ),
 callback AS (
-    SELECT
-        m.thread_id,
-        count(*) FILTER (WHERE i.start_ns >= $start_ns AND i.start_ns < $end_ns) AS callbacks,
-        sum(
-            greatest(least(i.end_ns, m.last_ns) - greatest(i.start_ns, m.first_ns), 0)
-        ) FILTER (WHERE i.parent_id IS NULL AND i.end_ns IS NOT NULL)::BIGINT AS callback_ns
-    FROM member AS m
-    JOIN main.callback_instance AS i ON m.thread_id = i.thread_id
-    GROUP BY m.thread_id
+    SELECT thread_id, count(*) AS callbacks
+    FROM main.callback_instance
+    WHERE list_contains($runs, run_id) AND start_ns >= $start_ns AND start_ns < $end_ns
+    GROUP BY thread_id
 )
 SELECT
     m.run_id,
@@ -85,16 +101,18 @@ SELECT
     m.tid,
     m.kind AS executor_kind,
     greatest(m.last_ns - m.first_ns, 0) AS seen_ns,
-    s.wait_ns,
-    s.process_ns,
-    s.execute_ns,
-    coalesce(c.callback_ns, 0) AS callback_ns,
+    CASE WHEN m.has_states THEN coalesce(s.wait_ns, 0) END AS wait_ns,
+    CASE WHEN m.has_states THEN coalesce(s.select_ns, 0) END AS select_ns,
+    coalesce(s.take_ns, 0) AS take_ns,
+    coalesce(s.callback_ns, 0) AS callback_ns,
+    CASE WHEN m.has_states THEN coalesce(s.blocked_ns, 0) END AS blocked_ns,
+    greatest(m.last_ns - m.first_ns, 0) - coalesce(s.known_ns, 0) AS unknown_ns,
     coalesce(c.callbacks, 0) AS callbacks,
-    coalesce(c.callback_ns, 0) / nullif(greatest(m.last_ns - m.first_ns, 0), 0)::DOUBLE
+    coalesce(s.callback_ns, 0) / nullif(greatest(m.last_ns - m.first_ns, 0), 0)::DOUBLE
         AS callback_share,
     m.executor_id,
     m.thread_id
 FROM member AS m
-LEFT JOIN state AS s ON m.thread_id = s.thread_id
+LEFT JOIN summed AS s ON m.thread_id = s.thread_id
 LEFT JOIN callback AS c ON m.thread_id = c.thread_id
 ORDER BY m.run_id, m.hostname, m.pid, m.tid, m.thread_id

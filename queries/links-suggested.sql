@@ -1,12 +1,12 @@
 -- name: links-suggested
 -- title: Links that the data suggest
--- description: Where messages seem to be kept for later: a timer publishes while messages that its
---     node receives lead nowhere (periodic_async), or callbacks of a node's subscriptions publish
---     only once each of several inputs has had a message (partial_sync), or later, when it is clear
---     which messages are closest in time (approximate_sync). And where a node without
---     traced callbacks seems to publish by itself, not because of the message before
---     (independent). Only the author of the node knows whether that is so: review the candidates
---     before you apply any.
+-- description: Where messages seem to be kept for later: a timer, or messages on another topic,
+--     lead to publications, while messages that the node receives lead nowhere (periodic_async), or
+--     callbacks of several of a node's subscriptions publish only once each of them has had a
+--     message (partial_sync), or later, when it is clear which messages are closest in time
+--     (approximate_sync). And where a node without traced callbacks seems to publish by itself, not
+--     because of the message before (independent). Only the author of the node knows whether that
+--     is so: review the candidates before you apply any.
 -- grain: one row per candidate
 -- param: min_share DOUBLE = 0.95    Minimum share of publications that had a new message of a
 --     topic, for it to count as an input of a partial_sync candidate; and of those that did not
@@ -61,62 +61,15 @@ input AS (
     LEFT JOIN caused AS c ON r.callback_instance_id = c.callback_instance_id
     GROUP BY r.node_id, r.subscription_id, r.topic_name
 ),
-timer_publication AS (
-    SELECT t.timer_id, t.node_id, t.period_ns, c.topic_name, count(*) AS publication_count
-    FROM main.timer AS t
-    JOIN main.callback AS k ON t.timer_id = k.timer_id
-    JOIN main.callback_instance AS i ON k.callback_id = i.callback_id
-    JOIN caused AS c ON i.callback_instance_id = c.callback_instance_id AND c.kind = 'direct'
-    WHERE t.node_id = c.node_id
-    GROUP BY t.timer_id, t.node_id, t.period_ns, c.topic_name
+-- Messages lead nowhere, while timers or other messages lead to publications.
+dead_end AS MATERIALIZED (
+    SELECT *, timer_id IS NOT NULL AS is_timed FROM main.dead_end($runs)
 ),
--- A timer publishes, and messages lead nowhere. What it publishes itself is no input of it.
-dead_end AS (
-    SELECT
-        node_id,
-        list(DISTINCT topic_name ORDER BY topic_name) AS inputs,
-        string_agg(
-            printf('%d messages on %s', run_count, topic_name), ' and ' ORDER BY topic_name
-        ) AS evidence
-    FROM input AS i
-    ANTI JOIN timer_publication AS t ON i.node_id = t.node_id AND i.topic_name = t.topic_name
-    WHERE i.leading_count = 0
-    GROUP BY node_id
-),
-publishing_timer AS (
-    SELECT
-        timer_id,
-        node_id,
-        list(topic_name) AS outputs,
-        printf(
-            'its timer of %.10g ms published %s',
-            any_value(period_ns) / 1e6,
-            string_agg(
-                printf('%d messages on %s', publication_count, topic_name), ' and '
-                ORDER BY topic_name
-            )
-        ) AS evidence
-    FROM timer_publication
-    GROUP BY timer_id, node_id
-),
--- All timers of a node would use the same inputs: they are one candidate.
-periodic AS (
-    SELECT
-        t.node_id,
-        'periodic_async' AS kind,
-        any_value(d.inputs) AS inputs,
-        list_sort(list_distinct(flatten(list(t.outputs)))) AS outputs,
-        printf(
-            '%s, while %s led nowhere',
-            string_agg(t.evidence, ', ' ORDER BY t.timer_id),
-            any_value(d.evidence)
-        ) AS evidence,
-        CASE
-            WHEN count(*) > 1 THEN 'each of its timers may use only some of the inputs, or none'
-        END AS doubt
-    FROM publishing_timer AS t
-    JOIN dead_end AS d ON t.node_id = d.node_id
-    GROUP BY t.node_id
+declared AS (
+    SELECT o.publisher_id
+    FROM main.annotation AS a
+    JOIN main.annotation_output AS o ON a.annotation_id = o.annotation_id
+    WHERE a.kind IN ('partial_sync', 'approximate_sync')
 ),
 -- Callbacks of subscriptions publish once per set of messages.
 fired AS (
@@ -125,6 +78,7 @@ fired AS (
         r.callback_instance_id, r.start_ns, min(c.start_ns) AS published_ns
     FROM caused AS c
     JOIN input_run AS r ON c.callback_instance_id = r.callback_instance_id
+    ANTI JOIN declared AS d ON c.publisher_id = d.publisher_id
     WHERE c.kind = 'direct' AND c.node_id = r.node_id
     GROUP BY ALL
 ),
@@ -187,9 +141,6 @@ synchronous AS (
             ),
             ', ' ORDER BY i.topic_name, i.subscription_id
         ) AS evidence,
-        -- An output that waits for a message is published by the run that gets it.
-        string_agg(i.topic_name, ' and ' ORDER BY i.topic_name, i.subscription_id)
-            FILTER (WHERE m.own_count = 0) AS unproven,
         min(m.met_count) AS met_count,
         coalesce(any_value(p.patient_count), 0) AS patient_count,
         CASE
@@ -201,7 +152,12 @@ synchronous AS (
     JOIN input AS i ON m.subscription_id = i.subscription_id
     LEFT JOIN patient AS p ON m.publisher_id = p.publisher_id
     WHERE m.met_count >= m.firing_count * $min_share
-        AND (i.leading_count = 0 OR m.own_count > 0)
+        -- An output that waits for a message is published by the run that gets it. Where no output
+        -- waited for any message of an input, the latest one counts, as for periodic_async.
+        AND (
+            m.own_count > 0
+            OR i.leading_count = 0 AND p.patient_count > m.firing_count * (1 - $min_share)
+        )
     GROUP BY m.node_id, m.publisher_id, m.output_topic
     HAVING count(DISTINCT i.topic_name) > 1 AND any_value(m.firing_count) >= 3
         AND sum(i.run_count) > any_value(m.firing_count)
@@ -225,13 +181,95 @@ partial AS (
             END,
             min(evidence)
         ) AS evidence,
-        CASE
-            WHEN kind = 'approximate_sync' THEN
-                'it is supposed that message_filters (ApproximateTime) chose the messages'
-            ELSE printf('no output waited for %s, which may only be more frequent', min(unproven))
+        CASE WHEN kind = 'approximate_sync' THEN
+            'it is supposed that message_filters (ApproximateTime) chose the messages'
         END AS doubt
     FROM synchronous
     GROUP BY node_id, kind, inputs
+),
+-- What one timer published, or the callbacks of one subscription.
+published AS (
+    SELECT
+        subscription_id, is_timed, timer_id, trigger_id,
+        printf(
+            '%s %s',
+            string_agg(
+                printf('%d messages on %s', publication_count, output_topic), ' and '
+                ORDER BY output_topic, publisher_id
+            ),
+            cause
+        ) AS evidence
+    FROM dead_end
+    GROUP BY subscription_id, is_timed, timer_id, trigger_id, cause
+),
+cause AS (
+    SELECT
+        subscription_id, is_timed,
+        string_agg(evidence, ', ' ORDER BY timer_id, trigger_id) AS evidence
+    FROM published
+    GROUP BY subscription_id, is_timed
+),
+-- A timer that publishes has what it needs from somewhere. Other messages are a cause already: one
+-- output may use what is kept, and another not.
+undecided AS (
+    SELECT subscription_id
+    FROM dead_end
+    GROUP BY subscription_id
+    HAVING count(DISTINCT timer_id) > 1
+        OR count(DISTINCT CASE WHEN NOT is_timed THEN publisher_id END) > 1
+        OR count(*) < count(DISTINCT publisher_id)
+        * (count(DISTINCT timer_id) + count(DISTINCT trigger_id))
+),
+chosen_by_time AS (
+    SELECT DISTINCT publisher_id FROM synchronous WHERE kind = 'approximate_sync'
+),
+kept AS (
+    SELECT
+        d.node_id, d.subscription_id, d.is_timed, d.topic_name, d.message_count,
+        list(DISTINCT d.output_topic ORDER BY d.output_topic) AS outputs,
+        concat_ws(
+            '; ',
+            CASE WHEN count(u.subscription_id) > 0 THEN
+                'which of its outputs use the messages is not known' END,
+            CASE WHEN bool_or(d.is_loop) THEN
+                printf('messages on %s descend from what the node publishes', d.topic_name) END,
+            CASE WHEN NOT d.is_timed AND count(a.publisher_id) > 0 THEN
+                'message_filters (ApproximateTime) may choose the messages' END,
+            CASE WHEN NOT d.is_timed AND sum(d.early_count) > 0 THEN
+                printf(
+                    '%d messages were published before the first one on %s came',
+                    sum(d.early_count), d.topic_name
+                ) END,
+            CASE WHEN NOT d.is_timed AND max(d.run_ns) > min(d.publishing_run_ns) THEN
+                printf(
+                    'callbacks of %s run for %.3g ms, those that publish for %.3g ms: to keep a '
+                    || 'message takes less',
+                    d.topic_name, max(d.run_ns) / 1e6, min(d.publishing_run_ns) / 1e6
+                ) END
+        ) AS doubt
+    FROM dead_end AS d
+    LEFT JOIN undecided AS u ON d.subscription_id = u.subscription_id
+    LEFT JOIN chosen_by_time AS a ON d.publisher_id = a.publisher_id
+    GROUP BY d.node_id, d.subscription_id, d.is_timed, d.topic_name, d.message_count
+),
+periodic AS (
+    SELECT
+        k.node_id,
+        'periodic_async' AS kind,
+        list(DISTINCT k.topic_name ORDER BY k.topic_name) AS inputs,
+        k.outputs,
+        printf(
+            'it published %s, while %s led nowhere',
+            c.evidence,
+            string_agg(
+                printf('%d messages on %s', k.message_count, k.topic_name), ' and '
+                ORDER BY k.topic_name, k.subscription_id
+            )
+        ) AS evidence,
+        nullif(k.doubt, '') AS doubt
+    FROM kept AS k
+    JOIN cause AS c ON k.subscription_id = c.subscription_id AND k.is_timed = c.is_timed
+    GROUP BY k.node_id, k.is_timed, k.outputs, c.evidence, k.doubt
 ),
 -- What may have been published by a timer that shows no event.
 doubtful AS (
@@ -279,14 +317,15 @@ independent AS (
 received AS (
     SELECT node_id, list(DISTINCT topic_name ORDER BY topic_name) AS topics
     FROM input
+    WHERE leading_count > 0
     GROUP BY node_id
 ),
 candidate AS (
-    SELECT node_id, kind, inputs, outputs, evidence, doubt FROM periodic
+    SELECT node_id, kind, inputs, outputs, evidence, doubt, false AS is_set FROM periodic
     UNION ALL
-    SELECT node_id, kind, inputs, outputs, evidence, doubt FROM partial
+    SELECT node_id, kind, inputs, outputs, evidence, doubt, true FROM partial
     UNION ALL
-    SELECT node_id, kind, inputs, outputs, evidence, doubt FROM independent
+    SELECT node_id, kind, inputs, outputs, evidence, doubt, false FROM independent
 )
 SELECT
     n.run_id,
@@ -300,14 +339,11 @@ SELECT
             '; ',
             c.doubt,
             CASE
-                WHEN c.kind <> 'independent'
-                    AND count(*) OVER (
-                        PARTITION BY c.node_id, c.kind = 'independent'
-                    ) > 1 THEN
+                WHEN c.is_set AND count(*) OVER (PARTITION BY c.node_id, c.is_set) > 1 THEN
                     'the node has several candidates, which may share inputs, or be one'
             END,
             CASE
-                WHEN c.kind <> 'independent' AND NOT list_has_all(c.inputs, r.topics) THEN
+                WHEN c.is_set AND NOT list_has_all(c.inputs, r.topics) THEN
                     printf(
                         'the node also receives %s, which may be inputs as well',
                         array_to_string(

@@ -125,7 +125,15 @@ class _Painter:
         room = self.width - _INDENT * branch.depth - self.time_width - _GAP
         for line in branch.lines:
             grid.add_row(self._time(line.item.node), self._text(line, room))
+            if line.item.node["otherwise_published"] and not line.is_reference:
+                grid.add_row("", self._ending(line.item.node, room))
         return grid
+
+    def _ending(self, node: Row, room: int) -> Text:
+        """Return what may be missing at a node where all messages of a topic end."""
+        place, published = _printable(node["node"]), _printable(node["otherwise_published"])
+        text = f"ends here; {place} publishes {published}: msgflow links suggest"
+        return Text(_bound(text, room), style="dim")
 
     def _text(self, line: Line, room: int) -> Text:
         item = line.item

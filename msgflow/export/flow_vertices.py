@@ -32,6 +32,7 @@ _NODE = (
     "busy_max_ns",
     "until_ns",
     "user_events",
+    "otherwise_published",
 )
 _STATE = ("missing", "reason", "cut_count", "internal_count")
 NOT_TAKEN = "not_taken"
@@ -50,7 +51,8 @@ class FlowVertices:
         table: the rows of `main.flow_step`, nearest to the start first, with the bounds of
             `main.executor_wait` for how long the executor was busy (busy_min_ns, busy_max_ns), and
             when the thread of a publication went on at the latest (until_ns), and the user's events
-            in a callback instance: name, event_count, first_ns (user_events).
+            in a callback instance: name, event_count, first_ns (user_events), and what its node
+            publishes for other reasons, if all its messages end there (otherwise_published).
         notes: what the rows do not say, a sentence each.
     """
 

@@ -45,7 +45,7 @@ class PerfettoTrace:
     Attributes:
         path: the file.
         run: what it is of.
-        slices: callbacks, publications, takes, requests, responses and states of executors.
+        slices: callbacks, publications, takes, requests, responses and activities of executors.
         arrows: links between them.
         values: values of counters.
         gaps: stretches of a host in which something was not recorded.

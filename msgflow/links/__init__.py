@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from msgflow.links.annotations import AppliedLinks, apply_links, declare_links
-from msgflow.links.file import DeclaredLink, LinksFile, read_links, suggest_links
+from msgflow.links.file import DeclaredLink, LinksFile, read_links
+from msgflow.links.suggestion import LinkSuggestions
 
 __all__ = [
     "AppliedLinks",
     "DeclaredLink",
+    "LinkSuggestions",
     "LinksFile",
     "apply_links",
     "declare_links",
     "read_links",
-    "suggest_links",
 ]

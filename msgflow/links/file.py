@@ -13,14 +13,12 @@ links:
 
 from __future__ import annotations
 
-import textwrap
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from msgflow.yaml_file import Text, YamlFile, line_of, list_lines, quoted
+from msgflow.yaml_file import Text, YamlFile, line_of
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
     from pathlib import Path
     from typing import NoReturn
 
@@ -34,14 +32,6 @@ _REQUIRED = ("kind", "node", "inputs", "outputs")
 _OPTIONAL = ("inputs_of", "process", "host")
 _EXAMPLE = "links: [{kind: periodic_async, node: /fusion, inputs: [/lidar], outputs: [/objects]}]"
 _QUOTING = "quote patterns that begin with *, as in '*_raw'"
-_HEAD = (
-    "Candidates for links, found in what was traced. Only the author of a node knows what it does"
-    " with messages: review every entry, delete what is wrong, then run the command below. Not"
-    " everything is found: messages that also lead elsewhere, such as those that two links of a"
-    " node share, may be missing."
-)
-# With the indent of an entry, no comment is wider than a terminal of 80 columns.
-_WIDTH = 76
 
 
 @dataclass(frozen=True)
@@ -88,13 +78,17 @@ class LinksFile:
         YamlFile(self.path, _EXAMPLE, _QUOTING).fail(line, what, hint)
 
 
-def read_links(path: Path) -> LinksFile:
+def read_links(path: Path, content: str | None = None) -> LinksFile:
     """Read a file with declared links; whether its names exist is for a run to say.
+
+    Args:
+        path: the file.
+        content: of the file, if it is not written yet.
 
     Raises:
         UsageError: the file cannot be read, is not YAML, or not of the form above.
     """
-    file = YamlFile(path, _EXAMPLE, _QUOTING)
+    file = YamlFile(path, _EXAMPLE, _QUOTING, content)
     return LinksFile(path, tuple(_link(file, entry) for entry in file.entries("links")))
 
 
@@ -115,37 +109,3 @@ def _link(file: YamlFile, node: Any) -> DeclaredLink:
         file.optional(fields, "host"),
         line_of(node),
     )
-
-
-def suggest_links(rows: Sequence[Mapping[str, Any]], command: str) -> str:
-    """Return a file with the candidates, and the evidence of each as a comment.
-
-    Args:
-        rows: of the query `links --suggested`.
-        command: what applies the file.
-    """
-    lines = [*_comment(_HEAD), f"#   {command}"]
-    if not rows:
-        return "\n".join([*lines, "# There are none.", "links: []"])
-    lines.append("links:")
-    for row in rows:
-        lines += _entry(row)
-    return "\n".join(lines)
-
-
-def _entry(row: Mapping[str, Any]) -> list[str]:
-    lines = [
-        *(f"  {line}" for line in _comment(f"{row['node']}: {row['evidence']}")),
-        *(f"  {line}" for line in _comment(f"Doubtful: {row['doubt']}." if row["doubt"] else "")),
-        f"  - kind: {row['kind']}",
-        f"    node: {quoted(row['node'])}",
-    ]
-    if row["is_name_repeated"]:
-        lines += [f"    process: {row['pid']}", f"    host: {quoted(row['host'])}"]
-    for side in ("inputs", "outputs"):
-        lines += list_lines(f"    {side}", [quoted(name) for name in row[side]])
-    return lines
-
-
-def _comment(text: str) -> list[str]:
-    return [f"# {line}" for line in textwrap.wrap(text, _WIDTH, break_on_hyphens=False)]

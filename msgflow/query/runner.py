@@ -26,6 +26,7 @@ from msgflow.query.selection import (
 from msgflow.run.slice import LATEST, Slice
 from msgflow.run.window import format_epoch
 from msgflow.sql.failure import first_line, query_errors
+from msgflow.sql.statement import internal_sql
 from msgflow.sql.value import described_type, parse_text
 from msgflow.text.values import format_duration
 
@@ -117,7 +118,8 @@ def run_query(
     notes += missing
     narrowing = _narrowing(own, selection)
     if runs and not has_rows and narrowing:
-        notes.append(f"nothing fits {' '.join(narrowing)}: try with less")
+        why = _missing_way(connection, runs, own) or "try with less"
+        notes.append(f"nothing fits {' '.join(narrowing)}: {why}")
     if header.note == "clocks" and table.num_rows:
         notes += clock_notes(connection, runs)
     return QueryResult(table, header, runs, notes)
@@ -148,6 +150,31 @@ def _narrowing(parameters: Mapping[str, Value], selection: Selection) -> list[st
     given |= {name: ",".join(getattr(selection, name)) for name in (*KINDS, "via", "without")}
     given["where"] = selection.where
     return [f"--{name} {shlex.quote(str(value))}" for name, value in given.items() if value]
+
+
+def _missing_way(
+    connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], parameters: Mapping[str, Value]
+) -> str | None:
+    """Return why no path leads from one place to another, if both are given and none does."""
+    places = {name: parameters.get(name) for name in ("from", "to")}
+    if not all(places.values()):
+        return None
+    chosen = {"runs": [run.run_id for run in runs], **places}
+    found = internal_sql().run(connection, "missing_way", chosen).fetchall()
+    if not found:
+        return None
+    ((last, topics, first, is_joint, is_dead_end, is_sink),) = found
+    if last is None:
+        return f"no message of {places['from']} was received"
+    cure = ": msgflow links suggest" if is_dead_end else ""
+    if not is_dead_end and not is_sink:
+        cure = ": a link may be missing (msgflow links apply FILE)"
+    ends = f"flows from {places['from']} end at {last} (on {topics})"
+    if is_joint:
+        return f"{ends}, which publishes towards {places['to']}{cure}"
+    if first is None:
+        return f"{ends}, and nothing arrives at {places['to']}{cure}"
+    return f"{ends}, and those to {places['to']} begin at {first}{cure}"
 
 
 def bind(

@@ -315,7 +315,10 @@ class _Maker:
             row["row_key"]
             for row in rows
             if row["row_key"] in keys
-            or (row["kind"] in ("timer", "event") and (row["process_id"], row["node"]) in nodes)
+            or (
+                row["kind"] in ("timer", "event", "state")
+                and (row["process_id"], row["node"]) in nodes
+            )
             or (row["kind"] == "thread" and row["process_id"] in processes)
         ]
 

@@ -3,44 +3,24 @@
 -- description: The chains of main.flow_path, each as its last step and a pointer to the chain
 --     without it: the cost of lists of what lies on them would grow with the square of their
 --     length. No subscription comes twice in a chain: each has a bit that tells whether it was
---     there. A name or glob that fits a topic stands for topics. One that fits none stands for
---     nodes: a node is often called like the topic that it publishes.
+--     there. derive.place says what names stand for.
 -- grain: one row per run and chain
 CREATE OR REPLACE MACRO derive.flow_chain(
     runs, from_topic, to_topic, max_depth := 32, max_paths := 1000
 ) AS TABLE
-WITH RECURSIVE wanted AS (
-    SELECT DISTINCT is_end, trim(pattern) AS pattern
-    FROM (
-        SELECT false AS is_end, unnest(string_split(from_topic::VARCHAR, ',')) AS pattern
-        UNION ALL
-        SELECT true, unnest(string_split(to_topic::VARCHAR, ','))
-    )
-),
-wanted_topic AS MATERIALIZED (
-    SELECT DISTINCT w.is_end, w.pattern, p.topic_name
-    FROM wanted AS w
-    JOIN store.publisher AS p ON p.topic_name = w.pattern OR p.topic_name GLOB w.pattern
-    WHERE list_contains(runs, p.run_id)
-),
-wanted_node AS MATERIALIZED (
-    SELECT DISTINCT w.is_end, n.node_id
-    FROM wanted AS w
-    ANTI JOIN wanted_topic AS t ON w.is_end = t.is_end AND w.pattern = t.pattern
-    JOIN store.node AS n ON n.full_name = w.pattern OR n.full_name GLOB w.pattern
-    WHERE list_contains(runs, n.run_id)
-),
+WITH RECURSIVE start_place AS MATERIALIZED (FROM derive.place(runs, from_topic)),
+end_place AS MATERIALIZED (FROM derive.place(runs, to_topic)),
 hop AS MATERIALIZED (
     SELECT
         h.run_id, h.from_subscription_id, h.route, h.publisher_id, h.subscription_id, h.is_cached,
         CASE
             WHEN h.from_subscription_id IS NOT NULL THEN false
             WHEN from_topic IS NULL THEN h.is_source
-            ELSE (p.topic_name IN (SELECT topic_name FROM wanted_topic WHERE NOT is_end)) IS true
-                OR (p.node_id IN (SELECT node_id FROM wanted_node WHERE NOT is_end)) IS true
+            ELSE (p.topic_name IN (SELECT topic_name FROM start_place)) IS true
+                OR (p.node_id IN (SELECT node_id FROM start_place)) IS true
         END AS is_start,
-        (p.topic_name IN (SELECT topic_name FROM wanted_topic WHERE is_end)) IS true
-        OR (s.node_id IN (SELECT node_id FROM wanted_node WHERE is_end)) IS true AS is_last
+        (p.topic_name IN (SELECT topic_name FROM end_place)) IS true
+        OR (s.node_id IN (SELECT node_id FROM end_place)) IS true AS is_last
     FROM store.flow_hop AS h
     JOIN store.publisher AS p ON h.publisher_id = p.publisher_id
     JOIN store.subscription AS s ON h.subscription_id = s.subscription_id

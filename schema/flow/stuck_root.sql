@@ -4,7 +4,10 @@
 --     and whether the recording may have cut them. It may where no message passed that step later,
 --     or, of messages that were published and not taken, none earlier (their readers were not there
 --     yet). What became of a message that was taken is recorded until its process ends:
---     `recorded_until_ns`.
+--     `recorded_until_ns`. Nothing is cut where the callback of the message ended without an
+--     output, or where the node was inactive. Whether a callback had an output is not known if
+--     events may be missing in it. A publisher that published while its node was inactive does not
+--     depend on its state.
 -- grain: one row per path and root that did not arrive
 -- param: missing VARCHAR  Name of rows of path_id, root_key, publication_id: the root's last one
 -- param: lineages VARCHAR  Name of rows of path_id, prefix_id, depth: paths, with their beginnings
@@ -79,6 +82,45 @@ finished AS (
     JOIN store.take AS t ON a.take_id = t.take_id
     WHERE a.path_id IN (SELECT path_id FROM stuck WHERE publisher_id IS NULL)
     GROUP BY a.path_id
+),
+inactive AS (
+    SELECT p.publisher_id, n.start_ns, n.end_ns
+    FROM store.publisher AS p
+    JOIN derive.node_state AS n ON p.node_id = n.node_id
+    WHERE p.publisher_id IN (SELECT publisher_id FROM stuck)
+        AND n.state IN ('unconfigured', 'configuring', 'inactive', 'cleaningup', 'finalized')
+),
+managed AS (
+    SELECT DISTINCT i.publisher_id
+    FROM inactive AS i
+    ANTI JOIN (
+        SELECT i.publisher_id
+        FROM inactive AS i
+        JOIN store.publication AS b
+            ON i.publisher_id = b.publisher_id AND b.start_ns BETWEEN i.start_ns AND i.end_ns
+    ) AS b ON i.publisher_id = b.publisher_id
+),
+-- A service that was asked, or an answer to another node, may lead to a publication later.
+asked AS (
+    SELECT callback_instance_id FROM store.link_request WHERE list_contains(runs, run_id)
+    UNION
+    SELECT callback_instance_id FROM store.link_response WHERE list_contains(runs, run_id)
+),
+-- Why a message was not followed by a publication, where that is known.
+withheld AS (
+    SELECT
+        s.path_id, s.root_key,
+        CASE
+            WHEN s.route = [] AND m.publisher_id IS NOT NULL THEN 'node_inactive'
+            WHEN c.end_ns IS NOT NULL AND NOT c.is_loss_affected
+                AND (s.route = [] OR a.callback_instance_id IS NULL) THEN 'no_output'
+        END AS reason
+    FROM stuck AS s
+    LEFT JOIN store.callback_instance AS c ON s.take_id = c.take_id
+    LEFT JOIN asked AS a ON c.callback_instance_id = a.callback_instance_id
+    ASOF LEFT JOIN inactive AS i ON s.publisher_id = i.publisher_id AND s.taken_ns >= i.start_ns
+    LEFT JOIN managed AS m ON i.publisher_id = m.publisher_id AND s.taken_ns < i.end_ns
+    WHERE s.publisher_id IS NOT NULL AND s.publication_id IS NULL AND NOT s.is_cached
 )
 SELECT
     s.path_id,
@@ -86,11 +128,12 @@ SELECT
     CASE
         WHEN s.publisher_id IS NULL THEN 'callback_not_finished'
         WHEN s.publication_id IS NOT NULL THEN coalesce(u.reason, 'unknown')
-        ELSE 'not_published'
+        ELSE coalesce(w.reason, 'not_published')
     END AS reason,
     s.publication_id IS NULL AND s.is_cached AS is_cached,
     coalesce(
         CASE
+            WHEN w.reason IS NOT NULL THEN false
             WHEN s.publisher_id IS NULL THEN s.taken_ns > f.last_ns
             WHEN s.publication_id IS NOT NULL THEN
                 b.start_ns < d.first_ns OR b.start_ns > d.last_ns
@@ -109,6 +152,7 @@ LEFT JOIN delivered AS d
 LEFT JOIN finished AS f ON s.path_id = f.path_id
 LEFT JOIN store.undelivered AS u
     ON s.publication_id = u.publication_id AND s.subscription_id = u.subscription_id
+LEFT JOIN withheld AS w ON s.path_id = w.path_id AND s.root_key = w.root_key
 LEFT JOIN store.take AS t ON s.take_id = t.take_id
 LEFT JOIN store.process AS p ON t.process_id = p.process_id
 LEFT JOIN derive.process_clock AS k ON t.process_id = k.process_id

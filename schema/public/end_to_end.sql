@@ -5,7 +5,8 @@
 --     instances of timers that published, or publications (always with from_event 'publish'). The
 --     time window applies to roots. A message that stopped a root is lost if others passed the same
 --     step later, and earlier too if nobody took it; else it is cut by the recording. One that was
---     taken is lost as well if its process was recorded for longer than any flow of the path took.
+--     taken is lost as well if its process was recorded for longer than any flow of the path took,
+--     and if its callback ended without an output or its node was inactive.
 -- grain: one row per path, root and take at the sink; one per path and root that did not reach it
 -- param: runs BIGINT[]  Runs to look at
 -- param: from_topic VARCHAR = NULL  Topics or nodes where flows start: names or globs, separated by
@@ -32,8 +33,10 @@
 -- column: sink_ns BIGINT [epoch ns]  End of the flow
 -- column: latency_ns BIGINT [ns]  From the start of the root to the end
 -- column: status VARCHAR  'reached', 'superseded', 'lost' or 'cut_by_recording'
--- column: reason VARCHAR  Why it did not arrive: 'not_published', 'superseded',
---     'callback_not_finished', or a reason of main.stat_delivery for the message that stopped it
+-- column: reason VARCHAR  Why it did not arrive: 'no_output' (a callback ended without any),
+--     'node_inactive' (a managed node), 'not_published' (one or the other cannot be known),
+--     'superseded', 'callback_not_finished', or a reason of main.stat_delivery for the message that
+--     stopped it
 -- column: is_first BOOLEAN  First arrival of the root
 -- column: is_last BOOLEAN  Last arrival of the root
 -- column: is_newest BOOLEAN  Newest root of the arrival

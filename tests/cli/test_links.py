@@ -7,10 +7,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 import duckdb
+import pytest
 from golden import fill_case
 from typer.testing import Result
 
 from msgflow.db.derivation import derive
+from msgflow.errors import UsageError
+from msgflow.sim import simulate
 
 Msgflow = Callable[..., Result]
 
@@ -65,7 +68,59 @@ def test_what_is_doubtful_of_suggestions_is_said(msgflow: Msgflow, fresh_databas
     assert result.exit_code == 0
     assert "2 of 2 candidates are doubtful, see the comments: /merge\n" in result.stderr
     text = result.stdout.replace("\n  # ", " ")
-    assert text.count("Doubtful: ") == text.count("the node has several candidates") == 2
+    assert text.count("Doubtful: ") == text.count("which of its outputs use the messages") == 2
+
+
+def test_suggestions_are_written_and_applied_in_one_go(
+    msgflow: Msgflow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    trace = simulate("periodic_async", tmp_path / "trace", factor=0.1).directory
+    assert msgflow("ingest", trace, "--ignore", "ros2:message_link_*").exit_code == 0
+    Path("links.yaml").write_text("mine")
+    result = msgflow("links", "suggest", "--apply")
+    assert result.exit_code == 2
+    assert "there is a file of this name — links.yaml" in result.stderr
+    assert Path("links.yaml").read_text() == "mine"
+    (Path("links.yaml")).unlink()
+    result = msgflow("links", "suggest", "--apply")
+    assert result.exit_code == 0
+    assert result.stdout == ""
+    assert "/periodic_1_to_1: /a → /periodic_1_to_1/0 (periodic_async)\n" in result.stderr
+    assert "links declared: " in result.stderr
+    assert result.stderr.endswith("written to links.yaml\n")
+    text = Path("links.yaml").read_text()
+    listed = msgflow("links", "list", "--format", "csv").stdout
+    assert '"/periodic_1_to_1","/a","/periodic_1_to_1/0"' in listed
+    # What is declared stays in the file, and nothing is declared anew.
+    again = msgflow("links", "suggest", "--apply", "-o", "again.yaml")
+    assert again.exit_code == 0
+    assert "no candidate is without a doubt: nothing is declared\n" in again.stderr
+    assert msgflow("links", "list", "--format", "csv").stdout == listed
+    assert msgflow("links", "apply", "again.yaml").exit_code == 0
+    # All but the identity, the last column.
+    anew = msgflow("links", "list", "--format", "csv").stdout
+    assert [line.rpartition(",")[0] for line in anew.splitlines()] == [
+        line.rpartition(",")[0] for line in listed.splitlines()
+    ]
+    assert text.count("- kind:") == Path("again.yaml").read_text().count("- kind:")
+
+
+def test_a_file_that_cannot_be_applied_is_not_written(
+    msgflow: Msgflow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    trace = simulate("periodic_async", tmp_path / "trace", factor=0.1).directory
+    assert msgflow("ingest", trace, "--ignore", "ros2:message_link_*").exit_code == 0
+
+    def refuse(*_: object) -> None:
+        raise UsageError("does not fit")
+
+    monkeypatch.setattr("msgflow.links.annotations.match_links", refuse)
+    file = tmp_path / "new.yaml"
+    result = msgflow("links", "suggest", "--apply", "-o", file)
+    assert result.exit_code == 2
+    assert "does not fit" in result.stderr
+    assert not file.exists()
 
 
 def test_suggestions_are_for_one_run(msgflow: Msgflow, fresh_database: Path) -> None:

@@ -19,7 +19,7 @@ CASES = Path(__file__).resolve().parents[1] / "schema" / "cases" / "main.flow_st
 
 
 def database_of(case: str, empty_database: Path, directory: Path) -> Database:
-    path = directory / f"{case}.duckdb"
+    path = directory / "case.duckdb"
     shutil.copyfile(empty_database, path)
     with duckdb.connect(str(path)) as connection:
         fill_case(connection, CASES / f"{case}.case")
@@ -72,6 +72,23 @@ def test_a_publication_may_take_until_its_thread_goes_on(
         )
     with Database(path) as database:
         assert "publishes /image  in 10 ns or more" in str(database.flow(publication_id=1))
+
+
+def test_a_flow_that_ends_at_a_node_which_publishes_says_so(
+    empty_database: Path, tmp_path: Path
+) -> None:
+    with database_of("../main.dead_end/kept_messages", empty_database, tmp_path) as database:
+        flow = database.flow("/boxes")
+        *_, last = str(flow).splitlines()
+        text = "ends here; /fusion publishes /objects from /clusters: msgflow links suggest"
+        assert last.strip() == text
+        assert [node["otherwise_published"] for node in flow.nodes.values()][-1] == (
+            "/objects from /clusters"
+        )
+        assert f"\x1b[2m{text}" in tree_text(flow, color=True)
+        # What comes back to the node ends a loop, and a sink publishes nothing.
+        assert "ends here" not in str(database.flow("/plan"))
+        assert "ends here" not in str(database.flow("/tracks"))
 
 
 def test_what_a_busy_executor_added_is_said(empty_database: Path, tmp_path: Path) -> None:

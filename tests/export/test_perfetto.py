@@ -19,6 +19,7 @@ from msgflow import Database, UsageError
 from msgflow.clocks import apply_clocks, read_clock_sync
 from msgflow.database import open_db
 
+SYSTEMS = ("demo", "services", "nested", "partial_sync", "multi_threaded")
 IDENTITIES = (
     "callback_instance_id", "publication_id", "take_id", "request_id", "response_id", "executor_id",
 )  # fmt: skip
@@ -112,9 +113,7 @@ def decode(path: Path) -> Decoded:
     return decoded
 
 
-@pytest.fixture(
-    scope="module", params=few(["demo", "services", "nested", "partial_sync"], "demo", "services")
-)
+@pytest.fixture(scope="module", params=few(SYSTEMS, "demo", "services", "multi_threaded"))
 def exported(
     request: pytest.FixtureRequest,
     simulated: Callable[..., Path],
@@ -168,12 +167,14 @@ def test_callbacks_and_publications_are_slices_of_their_threads(exported: Export
 def test_slices_are_nested_as_callbacks_are(exported: Exported) -> None:
     connection, decoded = exported
     depths = {
-        identity(one)[1]: one.depth for one in decoded.slices if "callback_instance_id" in one.notes
+        identity(one)[1]: one.depth
+        for one in decoded.slices
+        if "callback_instance_id" in one.notes and one.end > one.begin
     }
     assert depths == dict(
         connection.execute(
             "SELECT callback_instance_id, depth - 1 FROM store.callback_instance"
-            " WHERE coalesce(end_ns > start_ns, true)"
+            " WHERE end_ns > start_ns"
         ).fetchall()
     )
 
@@ -197,18 +198,24 @@ def test_every_link_is_an_arrow(exported: Exported) -> None:
     assert len(found) > 50
 
 
-def test_states_of_executors_have_a_track_each(exported: Exported) -> None:
+def test_activities_of_executors_have_a_track_each(exported: Exported) -> None:
     connection, decoded = exported
     found = Counter(
         (one.track, one.name, one.begin, one.end) for one in decoded.slices if one.track % 8 == 3
     )
     expected = Counter(
         connection.execute(
-            "SELECT thread_id * 8 + 3, state, start_ns, coalesce(end_ns, start_ns)"
-            " FROM executor_state"
+            "SELECT thread_id * 8 + 3, activity, start_ns, coalesce(end_ns, start_ns)"
+            " FROM executor_activity SEMI JOIN executor_state USING (thread_id)"
         ).fetchall()
     )
     assert found == expected
+    names = {name for _, name, _, _ in found}
+    assert names >= {"wait", "select", "take", "callback"}
+    # Only executors of several threads block them.
+    assert ("blocked" in names) == any(
+        "multi" in kind for (kind,) in connection.execute("SELECT kind FROM executor").fetchall()
+    )
     for track in {track for track, *_ in found}:
         assert decoded.tracks[track].parent_uuid == track - 1
 

@@ -150,7 +150,7 @@ def test_what_became_of_every_root(built: Analysis, chain: Chain) -> None:
     for root, status, reason in (
         ("A", "cut_by_recording", "before_discovery"),
         ("D", "lost", "lost_in_transport"),
-        ("E", "lost", "not_published"),
+        ("E", "lost", "no_output"),
         ("F", "lost", "lost_in_transport"),
         ("G", "lost", "callback_not_finished"),
         ("I", "cut_by_recording", "pending_at_end"),
@@ -290,7 +290,7 @@ def test_the_query(built: Analysis, chain: Chain, case: str, sinks: list[tuple[s
     assert row["pairs"] == len(latencies)
     assert (row["min_ns"], row["max_ns"]) == (latencies[0], latencies[-1])
     assert row["median_ns"] == latencies[(len(latencies) - 1) // 2]
-    assert row["lost_reasons"] == "callback_not_finished 1, lost_in_transport 2, not_published 1"
+    assert row["lost_reasons"] == "callback_not_finished 1, lost_in_transport 2, no_output 1"
 
 
 def graph(system: RosSystem, *edges: tuple[str | None, int, str], rounds: int = 1) -> None:

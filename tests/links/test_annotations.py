@@ -226,12 +226,12 @@ def test_what_the_trace_declares_itself_is_not_declared_again(
 def test_declared_or_traced_the_links_are_the_same(
     shared_traces: Path, tmp_path: Path, name: str
 ) -> None:
-    """Also where they are declared by what the suggestions say."""
-    from msgflow.links import suggest_links
+    """Also where they are declared by what the suggestions say.
 
+    Where one input always publishes, they say periodic_async: the links are those of partial_sync.
+    """
     links = (
-        "SELECT kind, callback_instance_id, publication_id, candidate_count "
-        "FROM link_causal ORDER BY ALL"
+        "SELECT callback_instance_id, publication_id, candidate_count FROM link_causal ORDER BY ALL"
     )
     traced, plain, declared = (
         tmp_path / f"{name}-{kind}.duckdb" for kind in ("traced", "plain", "declared")
@@ -241,8 +241,7 @@ def test_declared_or_traced_the_links_are_the_same(
     file = tmp_path / f"{name}.yaml"
     with Database(plain) as database:
         database.ingest(shared_traces / name, ignore=["ros2:message_link_*"])
-        suggestions = database.query("links-suggested").to_arrow().to_pylist()
-        file.write_text(suggest_links(suggestions, "msgflow links apply FILE"))
+        file.write_text(database.suggest_links().text("msgflow links apply FILE"))
         database.close()
         assert rows(plain, links) != rows(traced, links)
         database.apply_links(file)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from msgflow.errors import UsageError
-from msgflow.links import read_links, suggest_links
+from msgflow.links import LinkSuggestions, read_links
 
 GOOD = """# ours
 links:
@@ -103,14 +103,37 @@ def test_suggestions_can_be_read_back(tmp_path: Path) -> None:
         "host": "true",
         "is_name_repeated": True,
     }
-    text = suggest_links([row], "msgflow links apply FILE")
+    certain = row | {"doubt": None}
+    kept = row | {"kind": "independent", "inputs_of": "/tf_listener", "is_name_repeated": False}
+    suggestions = LinkSuggestions((), [row, certain], [kept])
+    assert (suggestions.certain, suggestions.doubtful) == ([certain], [row])
+    text = suggestions.text("msgflow links apply FILE")
     assert "  # Doubtful: the node also receives - /x." in text.splitlines()
-    certain = suggest_links([row | {"doubt": None}], "msgflow links apply FILE")
-    assert "Doubtful" not in certain
-    (link,) = read_links(write(tmp_path, text)).links
+    assert max(map(len, text.splitlines())) <= 80
+    declared, link = read_links(write(tmp_path, text)).links
+    assert (declared.kind, declared.process) == ("independent", None)
+    assert declared.inputs_of is not None
+    assert declared.inputs_of.value == "/tf_listener"
     assert link.node.value == "/no"
     assert [item.value for item in link.inputs] == row["inputs"]
     assert [item.value for item in link.outputs] == row["outputs"]
     assert (link.process and link.process.value, link.host and link.host.value) == ("42", "true")
+    assert read_links(write(tmp_path, LinkSuggestions((), []).text("x"))).links == ()
+
+
+def test_a_doubtful_entry_is_a_comment_that_becomes_an_entry(tmp_path: Path) -> None:
+    row = {
+        "kind": "partial_sync",
+        "node": "/fusion",
+        "inputs": [f"/a/long/name/of/a/topic/{number}" for number in range(6)],
+        "outputs": ["/c"],
+        "evidence": "none",
+        "doubt": "some",
+        "is_name_repeated": False,
+    }
+    text = LinkSuggestions((), [row]).text("x")
     assert max(map(len, text.splitlines())) <= 80
-    assert read_links(write(tmp_path, suggest_links([], "x"))).links == ()
+    assert read_links(write(tmp_path, text)).links == ()
+    head, entry = text.split("  # Doubtful: some.\n")
+    (link,) = read_links(write(tmp_path, head + entry.replace("# ", ""))).links
+    assert [item.value for item in link.inputs] == row["inputs"]

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
+import duckdb
 import pytest
+from golden import fill_case
 from thorough import few
 
 from msgflow.database import Database
@@ -361,3 +364,52 @@ def test_what_left_nothing_is_said(database: Database) -> None:
     assert "nothing fits" not in " ".join(database.query("e2e-latency", to="/base/motors").notes)
     missed = database.query("callbacks", where="count < 0")
     assert missed.notes[-1] == "nothing fits --where 'count < 0': try with less"
+
+
+@pytest.mark.parametrize(
+    ("start", "end", "why"),
+    [
+        (
+            "/boxes",
+            "/viewer",
+            "flows from /boxes end at /fusion (on /boxes), and those to /viewer begin at /tracker:"
+            " msgflow links suggest",
+        ),
+        (
+            "/boxes",
+            "/objects",
+            "flows from /boxes end at /fusion (on /boxes), which publishes towards /objects:"
+            " msgflow links suggest",
+        ),
+        (
+            "/boxes",
+            "/path",
+            "flows from /boxes end at /fusion (on /boxes), and nothing arrives at /path:"
+            " msgflow links suggest",
+        ),
+        (
+            "/tracks",
+            "/boxes",
+            "flows from /tracks end at /viewer (on /tracks), and those to /boxes begin at /camera",
+        ),
+        (
+            "/imu",
+            "/odom",
+            "flows from /imu end at /driver (on /plan), and those to /odom begin at /base:"
+            " a link may be missing (msgflow links apply FILE)",
+        ),
+        ("/result", "/path", "no message of /result was received"),
+    ],
+)
+def test_why_no_path_leads_from_one_place_to_another_is_said(
+    fresh_database: Path, start: str, end: str, why: str
+) -> None:
+    case = Path(__file__).parents[1] / "schema" / "cases" / "main.dead_end" / "kept_messages.case"
+    with duckdb.connect(str(fresh_database)) as con:
+        fill_case(con, case)
+    with Database(fresh_database) as database:
+        for query in ("e2e-latency", "path-breakdown", "critical-path"):
+            notes = database.query(query, from_=start, to=end).notes
+            assert notes == [f"nothing fits --from {start} --to {end}: {why}"]
+        there = database.query("e2e-latency", from_="/imu", to="/plan", where="reached < 0")
+        assert there.notes[-1].endswith("--where 'reached < 0': try with less")

@@ -1,12 +1,13 @@
 """Indirect links that `msgflow links suggest` finds, compared with those that nodes declare.
 
-`compare` ingests a trace twice: with the declarations of its nodes, and without them. A link is
-(kind, node, input, output). Links of a doubtful candidate are listed as doubtful too.
+`compare` ingests a trace twice: with the declarations of its nodes, and without them, where it
+applies what is suggested without a doubt.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 from msgflow import open_db
 from msgflow.sim.entity import (
@@ -23,18 +24,37 @@ from msgflow.sim.system import Host, Node, Process, Scenario
 if TYPE_CHECKING:
     from pathlib import Path
 
-_PERIODS = {"/a": 7, "/b": 11, "/c": 16, "/d": 23}
-Link = tuple[str, str, str, str]
+    from msgflow import Database
 
-_DECLARED = """
-SELECT DISTINCT a.kind, n.full_name, s.topic_name, p.topic_name
-FROM annotation AS a
-JOIN annotation_input AS i ON a.annotation_id = i.annotation_id
-JOIN annotation_output AS o ON a.annotation_id = o.annotation_id
-JOIN subscription AS s ON i.subscription_id = s.subscription_id
-JOIN publisher AS p ON o.publisher_id = p.publisher_id
-JOIN node AS n ON s.node_id = n.node_id
+_PERIODS = {"/a": 7, "/b": 11, "/c": 16, "/d": 23}
+_LINKS = """
+SELECT n.full_name, s.topic_name, p.topic_name, l.callback_instance_id, l.publication_id,
+    l.candidate_count > 1 AS is_marked
+FROM link_causal AS l
+JOIN callback_instance AS i ON l.callback_instance_id = i.callback_instance_id
+JOIN callback AS c ON i.callback_id = c.callback_id
+JOIN subscription AS s ON c.subscription_id = s.subscription_id
+JOIN publication AS b ON l.publication_id = b.publication_id
+JOIN publisher AS p ON b.publisher_id = p.publisher_id
+JOIN node AS n ON p.node_id = n.node_id
+WHERE l.annotation_id IS NOT NULL
 """
+
+
+@dataclass(frozen=True)
+class Compared:
+    """What is suggested for a node, beside what it declares.
+
+    Attributes:
+        missing: pairs of input and output with links that nothing suggests, not even in doubt.
+        wrong: links of suggestions without a doubt that it does not declare, if no mark of the link
+            says that another message may be the right one.
+        found: links between messages that suggestions without a doubt have in common with it.
+    """
+
+    missing: int
+    wrong: int
+    found: int
 
 
 def merges() -> Scenario:
@@ -107,27 +127,35 @@ def _merge(name: str, *links: tuple[tuple[str, ...], tuple[str, ...]]) -> Node:
     )
 
 
-def compare(trace: Path, directory: Path) -> dict[str, tuple[set[Link], set[Link], set[Link]]]:
-    """Return for each node its declared links, those suggested, and those of them in doubt."""
+def compare(trace: Path, directory: Path) -> dict[str, Compared]:
+    """Return for each node how its declarations and the suggestions differ."""
+
+    def links(database: Database) -> set[tuple[Any, ...]]:
+        return {tuple(row.values()) for row in database.sql(_LINKS).to_arrow().to_pylist()}
+
     with open_db(directory / "declared.duckdb") as database:
         database.ingest(trace)
-        declared = {tuple(row.values()) for row in database.sql(_DECLARED).to_arrow().to_pylist()}
-    suggested, doubtful = set(), set()
+        declared = links(database)
     with open_db(directory / "plain.duckdb") as database:
         database.ingest(trace, ignore=["ros2:message_link_*"])
-        for row in database.query("links-suggested").to_arrow().to_pylist():
-            links = {
-                (row["kind"], row["node"], each, output)
-                for each in row["inputs"]
-                for output in row["outputs"]
-            }
-            suggested |= links
-            doubtful |= links if row["doubt"] else set()
-
-    def of(node: str, links: set[Link]) -> set[Link]:
-        return {link for link in links if link[1] == node}
-
+        suggestions = database.suggest_links()
+        database.apply_links("links.yaml", content=suggestions.text("msgflow links apply FILE"))
+        applied = links(database)
+    suggested = {
+        (row["node"], each, output)
+        for row in suggestions.candidates
+        for each in row["inputs"]
+        for output in row["outputs"]
+    }
+    missing = {link[:3] for link in declared} - suggested
+    known = {link[:5] for link in declared}
+    wrong = {link for link in applied if link[:5] not in known and not link[5]}
     return {
-        node: (of(node, declared), of(node, suggested), of(node, doubtful))
-        for node in sorted({link[1] for link in declared | suggested})
+        node: Compared(
+            *(
+                len([link for link in each if link[0] == node])
+                for each in (missing, wrong, applied & declared)
+            )
+        )
+        for node in sorted({link[0] for link in declared | applied})
     }

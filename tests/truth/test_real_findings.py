@@ -12,15 +12,22 @@ SELECT name, subject, count, detail FROM finding WHERE severity <> 'info' ORDER 
 """
 # Recordings, and the start of each sentence of msgflow check.
 EXPECTED: dict[str, list[tuple[str, str | None, int]]] = {
-    "real_cache": [],
-    "real_container": [("busy_waiting", "component_conta 7031 on vm", 22_700)],
+    "real_cache": [("dead_end", "/cacher", 292), ("dead_end", "/joiner", 176)],
+    "real_container": [
+        ("busy_waiting", "component_conta 7031 on vm", 22_700),
+        ("dead_end", "/fusion", 191),
+    ],
     "real_events": [
+        ("dead_end", "/filter", 180),
         ("executor_without_events", "back 14325 on vm", 532),
         ("executor_without_events", "front 14327 on vm", 1029),
     ],
-    "real_filters": [],
+    "real_filters": [("dead_end", "/approx", 96), ("dead_end", "/exact", 84)],
     "real_intra": [],
-    "real_jazzy_container": [("busy_waiting", "component_conta 9529 on vm", 24_264)],
+    "real_jazzy_container": [
+        ("busy_waiting", "component_conta 9529 on vm", 24_264),
+        ("dead_end", "/fusion", 198),
+    ],
     "real_jazzy_pipeline": [],
     "real_jazzy_services": [("missing_layer", "requests", 129)],
     "real_late": [
@@ -43,7 +50,13 @@ EXPECTED: dict[str, list[tuple[str, str | None, int]]] = {
         ("process_without_rclcpp", "python3.11 19963 on vm", 437),
         ("process_without_rclcpp", "python3.11 19964 on vm", 142),
     ],
-    "real_reference": [("busy_waiting", "perception 18109 on vm", 38_747)],
+    "real_reference": [
+        ("busy_waiting", "perception 18109 on vm", 38_747),
+        ("dead_end", "/behaviour", 170),
+        ("dead_end", "/localizer", 231),
+        ("dead_end", "/object_fusion", 49),
+        ("dead_end", "/tracker", 58),
+    ],
     "real_services": [],
 }
 

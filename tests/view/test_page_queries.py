@@ -69,16 +69,44 @@ def test_bars_are_the_instances_of_the_views(demo: Path, read: Read) -> None:
         )
         assert connection.execute(f"({sql}) EXCEPT ALL ({drawn})").fetchall() == []
         assert connection.execute(f"({drawn}) EXCEPT ALL ({sql})").fetchall() == []
-    for kind, state in ((5, "wait"), (6, "process"), (7, "execute")):
-        drawn = (
-            f"SELECT (row_key - 6) // 8, start_at + {origin}, length FROM bars WHERE kind = {kind}"
+
+
+def test_lanes_of_executors_are_what_their_threads_did(
+    simulated: Callable[..., Path], read: Read
+) -> None:
+    connection = read(simulated("multi_threaded", 0.3))
+    bars = run_page_query(connection, "segments", values(connection, Pages()))
+    connection.register("bars", bars)
+    ((origin,),) = connection.execute("SELECT start_ns FROM run").fetchall()
+    for kind, sql in (
+        (5, "SELECT * EXCLUDE state FROM did WHERE state = 'wait'"),
+        (
+            9,
+            "SELECT thread_id, start_ns, end_ns - start_ns FROM executor_activity"
+            " WHERE activity = 'blocked' AND end_ns IS NOT NULL",
+        ),
+    ):
+        did = (
+            "WITH did AS (SELECT state, thread_id, start_ns, coalesce(end_ns, start_ns) - start_ns"
+            " FROM executor_state)"
         )
-        sql = (
-            "SELECT thread_id, start_ns, coalesce(end_ns, start_ns) - start_ns"
-            f" FROM executor_state WHERE state = '{state}'"
-        )
-        assert connection.execute(f"({sql}) EXCEPT ALL ({drawn})").fetchall() == []
-        assert connection.execute(f"({drawn}) EXCEPT ALL ({sql})").fetchall() == []
+        wanted = connection.execute(f"{did} {sql} ORDER BY ALL").fetchall()
+        drawn = connection.execute(
+            f"SELECT (row_key - 6) // 8, start_at + {origin}, length FROM bars"
+            f" WHERE kind = {kind} ORDER BY ALL"
+        ).fetchall()
+        assert len(drawn) > 20
+        assert drawn == wanted
+    # What a thread did in a state is one bar or two, together as long.
+    assert (
+        connection.execute(
+            "SELECT thread_id, sum(end_ns - start_ns) FROM executor_state GROUP BY 1 ORDER BY 1"
+        ).fetchall()
+        == connection.execute(
+            "SELECT (row_key - 6) // 8, sum(length) FROM bars WHERE kind IN (5, 6, 7, 9)"
+            " GROUP BY 1 ORDER BY 1"
+        ).fetchall()
+    )
 
 
 def test_every_bar_has_a_row(systems: Path, demo: Path, read: Read) -> None:
@@ -346,15 +374,17 @@ def test_flows_of_paths_are_those_that_e2e_latency_counts(demo: Path, read: Read
         )[:10]
 
 
-def test_executors_over_time_add_up(demo: Path, read: Read) -> None:
-    connection = read(demo)
+def test_executors_over_time_add_up(simulated: Callable[..., Path], read: Read) -> None:
+    connection = read(simulated("multi_threaded", 0.3))
     pages = Pages()
     shares = decoded(pages.answer(connection, "executor_share", {})).rows
-    for state in ("wait", "process", "execute"):
-        ((wanted,),) = connection.execute(
-            "SELECT sum(end_ns - start_ns) FROM executor_state WHERE state = ?", [state]
-        ).fetchall()
-        assert sum(row["busy"] for row in shares if row["state"] == state) == wanted
+    wanted = connection.execute(
+        "SELECT CASE WHEN activity IN ('take', 'service') THEN 'callback' ELSE activity END,"
+        " sum(end_ns - start_ns) FROM executor_activity WHERE end_ns IS NOT NULL GROUP BY 1"
+    ).fetchall()
+    assert {name for name, _ in wanted} == {"wait", "select", "callback", "blocked"}
+    for activity, length in wanted:
+        assert sum(row["busy"] for row in shares if row["activity"] == activity) == length
     assert all(0 <= row["busy"] <= row["length"] for row in shares)
 
 

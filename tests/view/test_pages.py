@@ -164,8 +164,10 @@ def test_executors(way: str, demo: Path, serve: Serve, report: Report, page: Pag
     page.go("#/executors")
     assert page.page.locator("canvas.strip").count() == len(usage)
     page.page.locator("details.beside summary").first.click()
-    durations = ("seen_ns", "wait_ns", "process_ns", "execute_ns", "callback_ns")
-    assert [row[1:2] + row[5:10] for row in cells(page, "executor threads")] == [
+    durations = (
+        "seen_ns", "wait_ns", "select_ns", "take_ns", "callback_ns", "blocked_ns", "unknown_ns",
+    )  # fmt: skip
+    assert [row[1:2] + row[5:12] for row in cells(page, "executor threads")] == [
         [row["process"], *(shown(row[name]) for name in durations)] for row in usage
     ]
     found = {(row[0], row[1], row[2], row[3], row[7]) for row in cells(page, "interference")}

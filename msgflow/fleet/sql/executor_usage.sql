@@ -11,14 +11,17 @@
 -- column: threads BIGINT            Threads of all these runs
 -- column: seen_ns BIGINT [ns]       Time for which threads were seen
 -- column: wait_ns BIGINT [ns]       Waiting for work
--- column: process_ns BIGINT [ns]    Looking for what is ready
--- column: execute_ns BIGINT [ns]    Executing, including taking messages
--- column: callback_ns BIGINT [ns]   In callbacks with an end; nested time counts once
+-- column: select_ns BIGINT [ns]     Looking for what is ready
+-- column: take_ns BIGINT [ns]       Taking messages, up to the callback
+-- column: callback_ns BIGINT [ns]   In callbacks, services included; nested time counts once
+-- column: blocked_ns BIGINT [ns]    Waiting for the lock of a multi-threaded executor after a
+--     callback
+-- column: unknown_ns BIGINT [ns]    Not known
 -- column: callbacks BIGINT          Callbacks that began
 -- column: callback_share DOUBLE [share] Callback time divided by time seen, 0 to 1
 -- column: callback_share_max DOUBLE [share] The same of the busiest thread of any run
--- brief: process, callback_share, callback_share_max, runs, threads, callback_ns, callbacks, host,
---     execute_ns, wait_ns, seen_ns, executor_kind, process_ns
+-- brief: process, callback_share, callback_share_max, runs, threads, callback_ns, blocked_ns,
+--     wait_ns, callbacks, host, select_ns, take_ns, seen_ns, unknown_ns, executor_kind
 SELECT
     g.label_group,
     u.host,
@@ -28,9 +31,11 @@ SELECT
     count(*) AS threads,
     sum(u.seen_ns)::BIGINT AS seen_ns,
     sum(u.wait_ns)::BIGINT AS wait_ns,
-    sum(u.process_ns)::BIGINT AS process_ns,
-    sum(u.execute_ns)::BIGINT AS execute_ns,
+    sum(u.select_ns)::BIGINT AS select_ns,
+    sum(u.take_ns)::BIGINT AS take_ns,
     sum(u.callback_ns)::BIGINT AS callback_ns,
+    sum(u.blocked_ns)::BIGINT AS blocked_ns,
+    sum(u.unknown_ns)::BIGINT AS unknown_ns,
     sum(u.callbacks)::BIGINT AS callbacks,
     sum(u.callback_ns) / nullif(sum(u.seen_ns), 0)::DOUBLE AS callback_share,
     max(u.callback_share) AS callback_share_max

@@ -1,15 +1,17 @@
 -- name: bar
 -- description: What the timeline draws as a bar: callback instances, publications, takes, requests
---     and responses of services, from sending to taking, states of executors, and events of the
---     user's own tracepoints, which have no length.
+--     and responses of services, from sending to taking, what executor threads did, states of
+--     managed nodes, and events of the user's own tracepoints, which have no length. Threads have their states as recorded, but
+--     for the time after the callback: main.executor_activity would take far longer for a window.
 -- grain: one row per bar
 -- kind: inline
 -- column: run_id BIGINT  Run
 -- column: row_key BIGINT  Row of the timeline, see row.sql; of requests and responses that of the
 --     client, else of the service, else of the process
--- column: kind UTINYINT  0 callback instance, 1 publication, 2 take, 3 request, 4 response; states
---     of an executor: 5 wait, 6 process, 7 execute; 8 event of the user
--- column: id BIGINT  Identity of the thing within its kind; of states the first callback instance
+-- column: kind UTINYINT  0 callback instance, 1 publication, 2 take, 3 request, 4 response; of
+--     a thread of an executor: 5 wait, 6 select, 7 take and callback, 9 blocked; 8 event of the
+--     user; of a managed node: 10 active, 11 not active
+-- column: id BIGINT  Identity of the thing within its kind; of threads the first callback instance
 --     in it, of events the one inside which they happened, -1: none
 -- column: start_ns BIGINT [epoch ns]  Begin
 -- column: end_ns BIGINT [epoch ns]  End; the begin where the end was not seen
@@ -57,10 +59,21 @@ FROM main.response AS r
 JOIN main.thread AS t ON coalesce(r.receiver_thread_id, r.sender_thread_id) = t.thread_id
 UNION ALL
 SELECT
-    run_id, 8 * thread_id + 6, CASE state WHEN 'wait' THEN 5 WHEN 'process' THEN 6 ELSE 7 END,
-    coalesce(callback_instance_id, -1), start_ns, coalesce(end_ns, start_ns),
-    (2 * (end_ns IS NULL)::UTINYINT)::UTINYINT
-FROM main.executor_state
+    s.run_id, 8 * s.thread_id + 6, CASE s.state WHEN 'wait' THEN 5 WHEN 'process' THEN 6 ELSE 7 END,
+    coalesce(s.callback_instance_id, -1), s.start_ns,
+    CASE WHEN s.state = 'execute' THEN least(coalesce(s.end_ns, s.start_ns), i.end_ns)
+        ELSE coalesce(s.end_ns, s.start_ns) END,
+    (2 * (s.end_ns IS NULL)::UTINYINT)::UTINYINT
+FROM main.executor_state AS s
+LEFT JOIN main.callback_instance AS i ON s.callback_instance_id = i.callback_instance_id
+UNION ALL
+SELECT
+    s.run_id, 8 * s.thread_id + 6, CASE WHEN e.kind LIKE 'multi_threaded%' THEN 9 ELSE 6 END,
+    s.callback_instance_id, i.end_ns, s.end_ns, 0
+FROM main.executor_state AS s
+JOIN main.executor AS e ON s.executor_id = e.executor_id
+JOIN main.callback_instance AS i ON s.callback_instance_id = i.callback_instance_id
+WHERE s.state = 'execute' AND i.end_ns < s.end_ns
 UNION ALL
 SELECT
     u.run_id, r.row_key, 8, coalesce(u.callback_instance_id, -1), u.at_ns, u.at_ns,
@@ -72,3 +85,7 @@ JOIN event_row AS r
     ON u.process_id = r.process_id
     AND c.node_id IS NOT DISTINCT FROM r.node_id
     AND u.name = r.name
+UNION ALL
+SELECT
+    run_id, -2 * node_id - 1, CASE WHEN state = 'active' THEN 10 ELSE 11 END, -1, start_ns, end_ns, 0
+FROM main.node_state

@@ -1,8 +1,8 @@
 -- name: executor_share
 -- title: What executor threads did over time
--- description: States of executor threads by pieces of time; of threads whose executor tells
---     nothing of itself, the time in callbacks.
--- grain: one row per thread, piece of time and state
+-- description: What executor threads did (main.executor_activity) by pieces of time. Of threads
+--     whose executor tells nothing of itself, takes and callbacks alone are known.
+-- grain: one row per thread, piece of time and activity
 -- param: run BIGINT  Run
 -- param: origin_ns BIGINT  What times count from, epoch ns
 -- param: start_ns BIGINT  Begin of the window, epoch ns
@@ -11,29 +11,21 @@
 -- column: thread_id BIGINT  The thread
 -- column: start_at BIGINT [ns since origin]  Begin of the piece
 -- column: length BIGINT [ns]  Length of the piece
--- column: state VARCHAR  'wait', 'process', 'execute', or 'callback'
--- column: busy BIGINT [ns]  Time of the piece in the state
+-- column: activity VARCHAR  'wait', 'select', 'callback' (or a take, or a service) or 'blocked'
+-- column: busy BIGINT [ns]  Time of the piece with it
 WITH extent AS (
     SELECT ($end_ns - $start_ns) // $bins + 1 AS width
 ),
-silent AS (
-    SELECT DISTINCT thread_id FROM main.executor_thread WHERE run_id = $run
-    EXCEPT
-    SELECT DISTINCT thread_id FROM main.executor_state WHERE run_id = $run
-),
 did AS (
-    SELECT thread_id, state, start_ns, end_ns
-    FROM main.executor_state
+    SELECT
+        thread_id, start_ns, end_ns,
+        CASE WHEN activity IN ('take', 'service') THEN 'callback' ELSE activity END AS activity
+    FROM main.executor_activity
     WHERE run_id = $run AND end_ns IS NOT NULL
-    UNION ALL
-    SELECT thread_id, 'callback', start_ns, end_ns
-    FROM main.callback_instance
-    WHERE run_id = $run AND end_ns IS NOT NULL AND parent_id IS NULL
-        AND thread_id IN (SELECT thread_id FROM silent)
 ),
 clipped AS (
     SELECT
-        d.thread_id, d.state, e.width,
+        d.thread_id, d.activity, e.width,
         greatest(d.start_ns, $start_ns) - $start_ns AS begin_at,
         least(d.end_ns, $end_ns) - $start_ns AS end_at
     FROM did AS d
@@ -41,12 +33,12 @@ clipped AS (
     WHERE d.start_ns < $end_ns AND d.end_ns > $start_ns
 ),
 whole AS (
-    SELECT thread_id, state, width, begin_at, end_at, begin_at // width AS bin
+    SELECT thread_id, activity, width, begin_at, end_at, begin_at // width AS bin
     FROM clipped
     WHERE begin_at // width = (end_at - 1) // width
     UNION ALL
     SELECT
-        thread_id, state, width, begin_at, end_at,
+        thread_id, activity, width, begin_at, end_at,
         unnest(range(begin_at // width, (end_at - 1) // width + 1))
     FROM clipped
     WHERE begin_at // width <> (end_at - 1) // width
@@ -55,8 +47,8 @@ SELECT
     thread_id,
     $start_ns - $origin_ns + bin * width AS start_at,
     width AS length,
-    state,
+    activity,
     sum(least(end_at, (bin + 1) * width) - greatest(begin_at, bin * width))::BIGINT AS busy
 FROM whole
-GROUP BY thread_id, bin, width, state
-ORDER BY thread_id, start_at, state
+GROUP BY thread_id, bin, width, activity
+ORDER BY thread_id, start_at, activity

@@ -1,17 +1,17 @@
 -- name: row
 -- title: Rows of the timeline
 -- description: Everything that has a row in the timeline, in its order: by host, process and node;
---     there timers, subscriptions, services, clients, publishers and events of the user, and below
---     each process the threads of its executors.
+--     there the states of a managed node, timers, subscriptions, services, clients, publishers and
+--     events of the user, and below each process the threads of its executors.
 -- grain: one row per row of the timeline
 -- param: run BIGINT  Run
 -- column: row_key BIGINT  Identity of the row: eight times that of the object, plus its kind; of
---     events see event_row.sql
+--     events see event_row.sql; of states -2 times that of the node, less 1
 -- column: kind VARCHAR  'timer', 'subscription', 'service', 'client', 'publisher', 'callback' (of
---     an unknown kind), 'event' (of the user), 'thread' or 'middleware' (what belongs to no object
---     of a node)
+--     an unknown kind), 'event' (of the user), 'state' (of a managed node), 'thread' or
+--     'middleware' (what belongs to no object of a node)
 -- column: object_id BIGINT  Identity of the timer, subscription, …; of 'middleware' the process, of
---     'event' the first
+--     'state' the node, of 'event' the first
 -- column: host VARCHAR  Machine or container
 -- column: process VARCHAR  Name of the process and its pid
 -- column: process_id BIGINT  Identity of the process
@@ -76,9 +76,15 @@ object AS (
             END
         ) IS NULL
     UNION ALL
-    SELECT row_key, 'event', -row_key, process_id, node_id, name, NULL, false, 9
+    SELECT row_key, 'event', -row_key // 2, process_id, node_id, name, NULL, false, 9
     FROM event_row
     WHERE run_id = $run
+    UNION ALL
+    SELECT DISTINCT
+        -2 * n.node_id - 1, 'state', n.node_id, n.process_id, n.node_id, 'state', NULL, false, 0
+    FROM main.node_state AS s
+    JOIN main.node AS n ON s.node_id = n.node_id
+    WHERE s.run_id = $run
     UNION ALL
     SELECT
         8 * x.thread_id + 6, 'thread', x.thread_id, t.process_id, NULL,

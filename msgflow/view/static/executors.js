@@ -7,7 +7,11 @@ import { dataTable, besides } from "./table.js";
 import { command, failed, notes, waiting } from "./notice.js";
 import { fill, section } from "./overview.js";
 
-const STATES = [["execute", "execute"], ["callback", "execute"], ["process", "process"], ["wait", "wait"]];
+// What a thread did, its colour, and what it is called.
+const ACTIVITIES = [
+  ["callback", "execute", "takes and callbacks"], ["blocked", "blocked", "blocked: after a callback, waits for the lock of the executor"],
+  ["select", "process", "select: looks for what is ready"], ["wait", "wait", "wait: for work"],
+];
 
 export class ExecutorsPage {
   constructor(app, root) {
@@ -31,18 +35,18 @@ export class ExecutorsPage {
         const list = h("div", { className: "strips" },
           h("div", { className: "strip-row strip-axis" }, h("div", {}, "since the begin of the run"), h("div", { className: "axis" }, ticks)));
         for (let row = 0; row < usage.rows; row++) {
-          const canvas = h("canvas", { className: "strip", role: "img", "aria-label": `states of thread ${usage.tid[row]} over time` });
+          const canvas = h("canvas", { className: "strip", role: "img", "aria-label": `what thread ${usage.tid[row]} did over time` });
           this.strips.places.push({ canvas, thread: usage.thread_id[row] });
           const busy = usage.seen_ns[row] ? usage.callback_ns[row] / usage.seen_ns[row] : NaN;
           list.append(h("div", { className: "strip-row" },
             h("div", {}, h("b", {}, `${usage.process[row] ?? "?"} ${usage.tid[row]}`), h("div", { className: "soft" }, `${usage.host[row]} · ${String(usage.executor_kind[row]).replace("_", "-")} · ${percent(busy)} in callbacks`)), canvas));
         }
         requestAnimationFrame(() => this.drawStrips());
-        return [h("p", { className: "soft" }, "Each column is a piece of the run, filled with the share of time in each state: a full column is 100 %. Click to see it in the timeline."),
-          h("div", { className: "legend" }, [["execute", "execute (or in callbacks, where the executor tells nothing)"], ["process", "process: looking for work"], ["wait", "wait"]].map(([name, text]) =>
-            h("span", { className: "legend-item" }, h("span", { className: `swatch color-${name}` }), text))),
+        return [h("p", { className: "soft" }, "Each column is a piece of the run, filled with the share of time that went to each: a full column is 100 %. Click to see it in the timeline."),
+          h("div", { className: "legend" }, ACTIVITIES.map(([, shade, text]) =>
+            h("span", { className: "legend-item" }, h("span", { className: `swatch color-${shade}` }), text))),
           list,
-          besides("as a table", dataTable(usage, { label: "executor threads", columns: ["host", "process", "pid", "tid", "executor_kind", "seen_ns", "wait_ns", "process_ns", "execute_ns", "callback_ns", "callbacks", "callback_share"] })),
+          besides("as a table", dataTable(usage, { label: "executor threads", columns: ["host", "process", "pid", "tid", "executor_kind", "seen_ns", "wait_ns", "select_ns", "take_ns", "callback_ns", "blocked_ns", "unknown_ns", "callbacks", "callback_share"] })),
           notes(usage.meta.notes), command(usage.meta.command)];
       }),
       fill(blame, async () => {
@@ -84,10 +88,10 @@ export class ExecutorsPage {
       context.fillRect(0, 0, box.width, box.height);
       const filled = new Map();
       const rows = byThread.get(thread) ?? [];
-      for (const [state, shade] of STATES) {
+      for (const [activity, shade] of ACTIVITIES) {
         context.fillStyle = color(shade);
         for (const row of rows) {
-          if (shares.state[row] !== state) continue;
+          if (shares.activity[row] !== activity) continue;
           const x = (shares.start_at[row] / whole) * box.width;
           const width = Math.max((shares.length[row] / whole) * box.width, 1) + 0.3;
           const below = filled.get(shares.start_at[row]) ?? 0;

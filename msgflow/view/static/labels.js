@@ -1,9 +1,12 @@
 // Labels: names that people read, for columns of queries, statistics and kinds.
 
 export const KINDS = [
-  "callback instance", "publication", "take", "request", "response", "wait", "process", "execute", "event",
+  "callback instance", "publication", "take", "request", "response", "wait", "select", "take and callback", "event", "blocked", "node active", "node not active",
 ];
 export const EVENT = 8;
+export const BLOCKED = 9;
+export const ACTIVE = 10;
+export const INACTIVE = 11;
 export const KIND_NAMES = ["callback_instance", "publication", "take", "request", "response"];
 
 export const LINKS = {

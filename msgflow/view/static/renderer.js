@@ -2,7 +2,7 @@
 
 import { color } from "./dom.js";
 import { lowerBound } from "./timeline_rows.js";
-import { EVENT, PALE, PART_COLORS, duration, partTitle } from "./labels.js";
+import { ACTIVE, BLOCKED, EVENT, INACTIVE, PALE, PART_COLORS, duration, partTitle } from "./labels.js";
 
 export const AXIS = 30;
 const BAR_TOP = 3;
@@ -11,7 +11,7 @@ const LEAST_WIDTH = 1;
 export function palette() {
   const names = [
     "ink", "soft", "faint", "page", "panel", "line", "stripe", "timer", "subscription", "service",
-    "publication", "take", "call", "wait", "process", "execute", "event", "transport", "direct", "indirect",
+    "publication", "take", "call", "wait", "process", "execute", "blocked", "event", "active", "transport", "direct", "indirect",
     "critical", "gap", "pick", "focus",
   ];
   return Object.fromEntries(names.map((name) => [name, color(name)]));
@@ -85,7 +85,7 @@ export class Renderer {
     c.clip();
     for (const lane of shown) {
       if (lane.type !== "row") continue;
-      c.globalAlpha = this.flow && lane.kind !== "thread" && lane.kind !== "event" ? 0.22 : 1;
+      c.globalAlpha = this.flow && !["thread", "event", "state"].includes(lane.kind) ? 0.22 : 1;
       this.drawRow(lane);
     }
     if (this.links && !this.flow) this.drawLinks();
@@ -144,7 +144,7 @@ export class Renderer {
     const { colors } = this;
     return { timer: colors.timer, subscription: colors.subscription, service: colors.service,
       client: colors.call, publisher: colors.publication, callback: colors.timer,
-      thread: colors.execute, event: colors.event, middleware: colors.soft }[kind] ?? colors.soft;
+      thread: colors.execute, event: colors.event, state: colors.active, middleware: colors.soft }[kind] ?? colors.soft;
   }
 
   barColor(kind, laneKind) {
@@ -155,9 +155,11 @@ export class Renderer {
       case 1: return colors.publication;
       case 2: return colors.take;
       case 3: case 4: return colors.call;
-      case 5: return colors.wait;
+      case 5: case INACTIVE: return colors.wait;
       case 6: return colors.process;
+      case BLOCKED: return colors.blocked;
       case EVENT: return colors.event;
+      case ACTIVE: return colors.active;
       default: return colors.execute;
     }
   }
@@ -176,7 +178,7 @@ export class Renderer {
     const full = lane.height - 2 * BAR_TOP;
     const end = lowerBound(starts, range[0], range[1], to);
     let at = lowerBound(reach, range[0], end, from);
-    const shares = new Float64Array(9);
+    const shares = new Float64Array(12);
     let column = -1;
     const flush = () => {
       if (column < 0) return;
@@ -532,7 +534,7 @@ export class Renderer {
 const leastHeight = (kind, full) => (kind === 5 ? 0 : kind === EVENT ? full : 4);
 const HEIGHT_HALF = 10;
 // Drawn from below: what an executor does for callbacks first.
-const ORDER = [7, 6, 0, 1, 2, 3, 4, 5, 8];
+const ORDER = [7, BLOCKED, 6, 0, 1, 2, 3, 4, 5, EVENT, ACTIVE, INACTIVE];
 const LINK_STYLE = [
   { color: "transport" }, { color: "direct" }, { color: "indirect", dash: [6, 3] },
   { color: "indirect", dash: [2, 3] }, { color: "direct", dash: [4, 2] },
@@ -575,6 +577,7 @@ function mark(c, kind, x, y) {
   else if (kind === "publisher") { c.moveTo(x - 3, y - 4); c.lineTo(x + 4, y); c.lineTo(x - 3, y + 4); }
   else if (kind === "service" || kind === "client") { c.moveTo(x, y - 4); c.lineTo(x + 4, y); c.lineTo(x, y + 4); c.lineTo(x - 4, y); }
   else if (kind === "event") { c.moveTo(x - 4, y - 4); c.lineTo(x + 4, y - 4); c.lineTo(x, y + 4); }
+  else if (kind === "state") c.rect(x - 4, y - 2, 8, 4);
   else if (kind === "thread") { c.rect(x - 4, y - 3, 8, 2); c.rect(x - 4, y + 1, 8, 2); }
   else c.rect(x - 3.5, y - 3.5, 7, 7);
   c.fill();

@@ -108,7 +108,7 @@ export class TimelinePage {
     return h("div", { className: "legend", "aria-label": "colours" },
       item("timer", "timer callback"), item("subscription", "subscription callback"), item("service", "service callback"),
       item("publication", "publication"), item("take", "take"), item("call", "request, response"),
-      item("execute", "executor: execute"), item("process", "process"), item("wait", "wait"), item("event", "event of your own"),
+      item("execute", "executor thread: take and callback"), item("blocked", "blocked: waits for the executor's lock"), item("process", "select: looks for work"), item("wait", "wait: for work"), item("event", "event of your own"), item("active", "managed node: active"), item("wait", "not active"),
       item("transport", "publish to take", "stroke"), item("direct", "direct link", "stroke"),
       item("indirect", "indirect link", "stroke dashed"), item("critical", "critical path", "stroke"),
       item("gap", "not recorded"), h("span", { className: "legend-item" }, "low columns: several bars, as high as their share of the time; hatched: lost events may hide a part"));

@@ -5,7 +5,7 @@ export const HEIGHTS = { critical: 26, host: 22, process: 20, node: 20, row: 20 
 // Kinds of rows that may be hidden, and what the boxes for that say.
 export const ROW_KINDS = {
   timer: "timers", subscription: "subscriptions", service: "services", client: "clients",
-  publisher: "publishers", event: "events of your own", thread: "executors",
+  publisher: "publishers", event: "events of your own", state: "states of managed nodes", thread: "executors",
 };
 
 // Options: internal, query, hidden (Set of row keys), folded (Set of header keys), kinds (Set that

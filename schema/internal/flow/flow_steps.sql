@@ -3,7 +3,8 @@
 -- description: The steps of `main.flow_step`, with how long the executor was busy before the
 --     callbacks of takes and requests, and when the thread went on after a publication
 --     (until_ns): writing the message comes after the last event of the call, so that it took until
---     then at most. And the events of the user's own tracepoints inside of callback instances.
+--     then at most. And the events of the user's own tracepoints inside of callback instances. And
+--     what else made the node of a dead end publish (main.dead_end): there a link may be missing.
 -- grain: one row per vertex and link that leads to it
 -- param: kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or 'response'
 -- param: id BIGINT  Its identity
@@ -79,11 +80,30 @@ happened AS (
         ) AS user_events
     FROM named
     GROUP BY callback_instance_id
+),
+-- Callbacks of one subscription lead on, or none does.
+ended AS (
+    SELECT d.subscription_id, derive.first_three(d.published) AS published
+    FROM (
+        SELECT subscription_id, derive.first_three(output_topic) || ' ' || cause AS published
+        FROM main.dead_end([$run_id])
+        WHERE NOT is_loop
+        GROUP BY subscription_id, cause
+    ) AS d
+    GROUP BY d.subscription_id
+),
+otherwise AS (
+    SELECT i.callback_instance_id, e.published
+    FROM store.callback_instance AS i
+    JOIN store.callback AS c ON i.callback_id = c.callback_id
+    JOIN ended AS e ON c.subscription_id = e.subscription_id
+    WHERE i.run_id = $run_id
+        AND i.callback_instance_id IN (SELECT id FROM step WHERE kind = 'callback_instance')
 )
 SELECT s.run_id, s.depth, s.from_kind, s.from_id, s.link_kind, s.wait_ns, s.candidate_count,
     s.is_loss_affected, s.kind, s.id, s.start_ns, s.end_ns, s.node, s.label, s.topic_name,
     s.symbol, s.thread, s.host, s.missing, s.reason, s.cut_count, s.internal_count,
-    w.busy_min_ns, w.busy_max_ns, u.until_ns, v.user_events
+    w.busy_min_ns, w.busy_max_ns, u.until_ns, v.user_events, o.published AS otherwise_published
 FROM step AS s
 LEFT JOIN (
     SELECT callback_instance_id, busy_min_ns, busy_max_ns
@@ -91,5 +111,6 @@ LEFT JOIN (
     WHERE run_id = $run_id AND since IN ('publication', 'request')
 ) AS w ON s.kind = 'callback_instance' AND s.id = w.callback_instance_id
 LEFT JOIN happened AS v ON s.kind = 'callback_instance' AND s.id = v.callback_instance_id
+LEFT JOIN otherwise AS o ON s.kind = 'callback_instance' AND s.id = o.callback_instance_id
 LEFT JOIN went_on AS u ON s.kind = 'publication' AND s.id = u.publication_id
 ORDER BY abs(s.depth), s.depth, s.start_ns, s.kind, s.id, s.from_kind, s.from_id, s.link_kind

@@ -4,7 +4,7 @@
 -- grain: one row per name
 -- param: run_id BIGINT  Run
 -- column: code INTEGER  What kind of slice has it
--- column: id BIGINT  Of the callback, publisher, subscription, client, service or state
+-- column: id BIGINT  Of the callback, publisher, subscription, client, service or activity
 -- column: name VARCHAR  The name
 SELECT 0 AS code, callback_id AS id, node || ' ' || label AS name
 FROM main.callback_label
@@ -39,5 +39,6 @@ FROM (VALUES (0, 'callback'), (1, 'publish ?'), (2, 'take ?'), (3, 'request ?'),
     (4, 'take request ?'), (5, 'respond ?'), (6, 'take response ?')) AS unknown (code, name)
 UNION ALL
 SELECT 7, id, name
-FROM (VALUES (1, 'wait'), (2, 'process'), (3, 'execute')) AS state (id, name)
+FROM (VALUES (1, 'wait'), (2, 'select'), (3, 'take'), (4, 'callback'), (5, 'service'),
+    (6, 'blocked')) AS activity (id, name)
 ORDER BY code, id

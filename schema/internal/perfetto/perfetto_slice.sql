@@ -62,7 +62,7 @@ link AS (
     SELECT
         CASE l.from_kind WHEN 'callback_instance' THEN 0 WHEN 'publication' THEN 1
             WHEN 'take' THEN 2 WHEN 'request' THEN CASE WHEN q.taken_ns IS NULL THEN 3 ELSE 4 END
-            ELSE 6
+            ELSE CASE WHEN a.taken_ns IS NULL THEN 5 ELSE 6 END
         END AS from_code,
         l.from_id,
         CASE l.to_kind WHEN 'callback_instance' THEN 0 WHEN 'publication' THEN 1
@@ -73,6 +73,7 @@ link AS (
         l.link_kind
     FROM main.flow_edge AS l
     LEFT JOIN main.request AS q ON l.from_kind = 'request' AND l.from_id = q.request_id
+    LEFT JOIN main.response AS a ON l.from_kind = 'response' AND l.from_id = a.response_id
     LEFT JOIN main.request AS o ON l.to_kind = 'request' AND l.to_id = o.request_id
     LEFT JOIN main.response AS r ON l.to_kind = 'response' AND l.to_id = r.response_id
     WHERE l.run_id = $run_id
@@ -108,9 +109,11 @@ drawn AS NOT MATERIALIZED (
     UNION ALL
     SELECT
         thread_id * 8 + 3, start_ns, coalesce(end_ns, start_ns), 7,
-        list_position(['wait', 'process', 'execute'], state), executor_id, NULL
-    FROM main.executor_state
+        list_position(['wait', 'select', 'take', 'callback', 'service', 'blocked'], activity),
+        executor_id, NULL
+    FROM main.executor_activity
     WHERE run_id = $run_id AND start_ns >= $start_ns AND start_ns < $end_ns
+        AND thread_id IN (SELECT thread_id FROM main.executor_state WHERE run_id = $run_id)
 ),
 -- What ends at a moment before what begins there, the inner before the outer, and what begins the
 -- other way round.

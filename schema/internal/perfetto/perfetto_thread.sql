@@ -1,6 +1,6 @@
 -- name: internal.perfetto_thread
 -- title: Threads in Perfetto
--- description: The tracks of threads, and of the states of executors on them.
+-- description: The tracks of threads, and of what their executors did on them.
 -- grain: one row per thread
 -- param: run_id BIGINT  Run
 -- column: track BIGINT  Its track

@@ -48,7 +48,7 @@ INSERT INTO store.executor_thread (run_id, executor_id, thread_id) VALUES (1, 1,
 INSERT INTO store.executor_state
     (run_id, executor_id, thread_id, state, start_ns, end_ns, callback_instance_id, start_event_id)
 VALUES (1, 1, 1, 'wait', 100, 1240, NULL, 1), (1, 1, 1, 'process', 1240, 1290, NULL, 2),
-    (1, 1, 1, 'execute', 1290, 1510, 20, 3), (1, 1, 1, 'wait', 1510, NULL, NULL, 4);
+    (1, 1, 1, 'execute', 1290, 1510, 20, 4), (1, 1, 1, 'wait', 1510, NULL, NULL, 9);
 INSERT INTO store.publication
     (publication_id, run_id, trace_id, publisher_id, process_id, thread_id, start_ns, end_ns,
      is_loss_affected, start_event_id, end_event_id)
@@ -57,8 +57,8 @@ VALUES (1, 1, 2, 1, 2, 2, 150, 160, false, 1, 2), (2, 1, 1, 2, 1, 1, 1400, 1420,
 INSERT INTO store.take
     (take_id, run_id, trace_id, subscription_id, process_id, thread_id, taken_ns, method,
      is_loss_affected, start_event_id, end_event_id)
-VALUES (1, 1, 1, 1, 1, 1, 1250, 'rmw', false, 1, 1), (2, 1, 2, 2, 2, 2, 650, 'rmw', false, 2, 2),
-    (3, 1, 1, NULL, 1, 1, 1600, 'rmw', false, 3, 3);
+VALUES (1, 1, 1, 1, 1, 1, 1250, 'rmw', false, 3, 3), (2, 1, 2, 2, 2, 2, 650, 'rmw', false, 6, 6),
+    (3, 1, 1, NULL, 1, 1, 1600, 'rmw', false, 10, 10);
 INSERT INTO store.request
     (request_id, run_id, client_id, service_id, sequence_number, sent_ns, taken_ns,
      sender_thread_id, receiver_thread_id)
@@ -69,8 +69,8 @@ INSERT INTO store.callback_instance
      end_event_id, effective_end_event_id)
 VALUES (10, 1, 2, 1, 2, 2, 100, 200, NULL, NULL, false, false, 1, NULL, 1, 2, 2),
     (11, 1, 2, 1, 2, 2, 250, 260, NULL, NULL, false, false, 1, NULL, 3, 4, 4),
-    (20, 1, 1, 2, 1, 1, 1300, 1500, 1, NULL, false, false, 1, NULL, 3, 6, 6),
-    (21, 1, 1, 5, 1, 1, 1350, 1380, NULL, NULL, true, false, 2, 20, 4, 5, 5),
+    (20, 1, 1, 2, 1, 1, 1300, 1500, 1, NULL, false, false, 1, NULL, 5, 8, 8),
+    (21, 1, 1, 5, 1, 1, 1350, 1380, NULL, NULL, true, false, 2, 20, 6, 7, 7),
     (30, 1, 2, 3, 2, 2, 700, NULL, 2, NULL, false, true, 1, NULL, 7, NULL, NULL),
     (40, 1, 1, 4, 1, 3, 1450, 1480, NULL, 1, false, false, 1, NULL, 8, 9, 9);
 INSERT INTO store.response

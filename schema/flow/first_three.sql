@@ -1,0 +1,7 @@
+-- name: derive.first_three
+-- kind: macro
+-- description: Names of a group in words: the first three, and how many more there are.
+CREATE OR REPLACE MACRO derive.first_three(names) AS
+array_to_string(list(DISTINCT names ORDER BY names)[:3], ', ')
+|| CASE WHEN count(DISTINCT names) > 3 THEN printf(' and %d more', count(DISTINCT names) - 3)
+    ELSE '' END

@@ -1,0 +1,26 @@
+-- name: derive.place
+-- kind: macro
+-- description: What names or globs, separated by commas, stand for. One that fits a topic stands
+--     for topics. One that fits none stands for nodes: a node is often called like the topic that
+--     it publishes.
+-- grain: one row per topic, and per node
+-- param: runs BIGINT[]  Runs to look at
+-- param: names VARCHAR  Names or globs
+CREATE OR REPLACE MACRO derive.place(runs, names) AS TABLE
+WITH wanted AS (
+    SELECT DISTINCT trim(pattern) AS pattern
+    FROM (SELECT unnest(string_split(names::VARCHAR, ',')) AS pattern)
+),
+topic AS MATERIALIZED (
+    SELECT DISTINCT w.pattern, p.topic_name
+    FROM wanted AS w
+    JOIN store.publisher AS p ON p.topic_name = w.pattern OR p.topic_name GLOB w.pattern
+    WHERE list_contains(runs, p.run_id)
+)
+SELECT DISTINCT topic_name, NULL::BIGINT AS node_id FROM topic
+UNION ALL
+SELECT DISTINCT NULL, n.node_id
+FROM wanted AS w
+ANTI JOIN topic AS t ON w.pattern = t.pattern
+JOIN store.node AS n ON n.full_name = w.pattern OR n.full_name GLOB w.pattern
+WHERE list_contains(runs, n.run_id)

@@ -1,0 +1,50 @@
+-- name: finding.dead_end
+-- title: Messages that end at a node which publishes
+-- description: No callback of a subscription led to anything, but the node publishes by a timer, or
+--     because of other messages. If it keeps the messages for that, paths and flows that should go
+--     on end there, and no end-to-end latency goes through the node.
+-- cause: The trace does not show that a node keeps a message for later. Or it really only consumes
+--     these messages.
+-- cure: msgflow links suggest writes a file with the links that are likely; with --apply it
+--     declares them at once. Where a node only consumes messages, an entry of kind independent says
+--     so (docs/causes.md).
+-- grain: one row per node
+-- severity: warning
+-- param: run_id BIGINT  Run
+WITH dead_end AS MATERIALIZED (FROM main.dead_end([$run_id])),
+input AS (
+    SELECT
+        node_id,
+        sum(message_count) AS number,
+        string_agg(
+            printf('%s on %s', derive.counted(message_count, 'message'), topic_name), ' and '
+            ORDER BY topic_name, subscription_id
+        ) AS received
+    FROM (
+        SELECT DISTINCT node_id, subscription_id, topic_name, message_count
+        FROM dead_end
+        WHERE is_likely
+    )
+    GROUP BY node_id
+),
+output AS (
+    SELECT node_id, derive.first_three(published) AS published
+    FROM (
+        SELECT node_id, derive.first_three(output_topic) || ' ' || cause AS published
+        FROM dead_end
+        GROUP BY node_id, cause
+    )
+    GROUP BY node_id
+)
+SELECT
+    n.run_id,
+    main.node_label(n.full_name, p.name, p.pid) AS subject,
+    i.number::BIGINT AS count,
+    printf(
+        '%s end at %s, which publishes %s: msgflow links suggest',
+        i.received, main.node_label(n.full_name, p.name, p.pid), o.published
+    ) AS detail
+FROM input AS i
+JOIN output AS o ON i.node_id = o.node_id
+JOIN store.node AS n ON i.node_id = n.node_id
+JOIN store.process AS p ON n.process_id = p.process_id

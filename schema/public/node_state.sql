@@ -1,0 +1,21 @@
+-- name: main.node_state
+-- description: States of managed nodes (with a lifecycle). The state before the first change lasts
+--     from the creation of the node, or from the first event of its process. The last one lasts
+--     until the last event of the process. A state is left out where the next change leaves another
+--     one: a change in between was not recorded. A node that never changed its state has none.
+-- grain: one row per stretch of a node in one state
+-- column: run_id BIGINT  Run that the row belongs to
+-- column: node_id BIGINT  Node
+-- column: state VARCHAR  State as the node calls it: 'unconfigured', 'inactive', 'active',
+--     'finalized', or between two of them 'configuring', 'activating' and so on
+-- column: start_ns BIGINT [epoch ns]  Begin
+-- column: end_ns BIGINT [epoch ns]  End
+SELECT
+    s.run_id,
+    s.node_id,
+    s.state,
+    derive.corrected_ns(s.start_ns, p.offset_ns, p.drift_ppb, p.reference_ns) AS start_ns,
+    derive.corrected_ns(s.end_ns, p.offset_ns, p.drift_ppb, p.reference_ns) AS end_ns
+FROM derive.node_state AS s
+JOIN store.node AS n ON s.node_id = n.node_id
+JOIN derive.process_clock AS p ON n.process_id = p.process_id

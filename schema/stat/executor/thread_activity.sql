@@ -1,0 +1,130 @@
+-- name: derive.thread_activity
+-- description: What executor threads did, in detail (main.executor_activity), by the clock of their
+--     executor.
+-- grain: one row per interval of a thread in which nothing changed
+WITH instance AS (
+    SELECT
+        i.run_id, i.thread_id, i.callback_instance_id, i.parent_id, i.start_ns, i.end_ns,
+        i.start_event_id, i.end_event_id, i.effective_end_event_id, i.take_id, c.kind
+    FROM store.callback_instance AS i
+    JOIN store.callback AS c ON i.callback_id = c.callback_id
+),
+-- A callback never seen to end was over at the first event that cannot be inside of it.
+outside AS (
+    SELECT start_event_id AS event_id, thread_id, start_ns AS at_ns FROM store.executor_state
+    UNION ALL
+    SELECT start_event_id, thread_id, start_ns FROM store.callback_instance
+    UNION ALL
+    SELECT resumed_event_id, thread_id, resumed_ns FROM store.thread_break
+),
+closed AS (
+    SELECT
+        i.run_id, i.thread_id, i.effective_end_event_id AS event_id, any_value(x.at_ns) AS at_ns,
+        i.callback_instance_id, i.parent_id
+    FROM instance AS i
+    JOIN outside AS x
+        ON i.thread_id = x.thread_id AND i.effective_end_event_id = x.event_id
+    WHERE i.end_event_id IS NULL
+    GROUP BY ALL
+),
+change AS (
+    SELECT
+        run_id, thread_id, resumed_event_id AS event_id, 0 AS step, resumed_ns AS at_ns,
+        NULL::BIGINT AS running_id, 0 AS state, NULL AS kind
+    FROM store.thread_break
+    UNION ALL
+    SELECT run_id, thread_id, end_event_id, 1, end_ns, parent_id, 0, NULL
+    FROM instance
+    WHERE end_event_id IS NOT NULL
+    UNION ALL
+    SELECT run_id, thread_id, event_id, 1, at_ns, parent_id, 0, NULL
+    FROM closed
+    UNION ALL
+    SELECT
+        run_id, thread_id, start_event_id, 2, start_ns, NULL,
+        CASE state WHEN 'wait' THEN 1 WHEN 'process' THEN 2 ELSE 3 END, NULL
+    FROM store.executor_state
+    UNION ALL
+    SELECT run_id, thread_id, start_event_id, 3, start_ns, callback_instance_id, 0, kind
+    FROM instance
+    UNION ALL
+    SELECT t.run_id, t.thread_id, t.start_event_id, 4, t.taken_ns, NULL, 0, i.kind
+    FROM store.take AS t
+    LEFT JOIN instance AS i ON t.take_id = i.take_id
+    WHERE t.method <> 'callback_only' AND t.start_event_id IS NOT NULL
+),
+-- Each of these is the number of an event, with a digit that says which or what.
+situation AS (
+    SELECT
+        run_id, thread_id, event_id, step, at_ns, kind,
+        coalesce(max(CASE WHEN step = 0 THEN event_id END) OVER so_far, -1) AS break_event_id,
+        max(CASE WHEN state > 0 THEN event_id * 4 + state END) OVER so_far AS state_mark,
+        max(CASE WHEN step IN (1, 3) THEN event_id * 4 + step END) OVER so_far AS run_mark
+    FROM change
+    WINDOW so_far AS (
+        PARTITION BY run_id, thread_id ORDER BY event_id, step ROWS UNBOUNDED PRECEDING
+    )
+),
+-- A take while the executor executes is what it is about to do anyway.
+split AS (
+    SELECT
+        run_id, thread_id, event_id, step, at_ns, kind, break_event_id, run_mark,
+        run_mark // 4 AS run_event_id,
+        CASE WHEN state_mark // 4 >= break_event_id THEN state_mark // 4 END AS state_event_id,
+        CASE WHEN state_mark // 4 >= break_event_id THEN state_mark % 4 ELSE 0 END AS state,
+        lead(at_ns) OVER on_thread AS next_ns,
+        lead(step) OVER on_thread AS next_step,
+        lead(kind) OVER on_thread AS next_kind
+    FROM situation
+    WHERE step < 4 OR state_mark IS NULL OR state_mark % 4 = 2 OR state_mark // 4 < break_event_id
+    WINDOW on_thread AS (PARTITION BY run_id, thread_id ORDER BY event_id, step)
+),
+run_change AS (
+    SELECT thread_id, event_id * 4 + step AS run_mark, running_id
+    FROM change
+    WHERE step IN (1, 3)
+),
+described AS (
+    SELECT
+        s.run_id, s.thread_id, s.at_ns, s.next_ns, s.next_step, s.next_kind, s.step, s.state,
+        s.kind IS NOT NULL AS has_callback,
+        coalesce(s.run_event_id > s.state_event_id, false) AS has_run,
+        i.callback_instance_id,
+        i.kind,
+        s.state > 0 AND coalesce(s.state_event_id > i.start_event_id, true) AS is_spinning
+    FROM split AS s
+    LEFT JOIN run_change AS r ON s.thread_id = r.thread_id AND s.run_mark = r.run_mark
+    LEFT JOIN instance AS i
+        ON r.running_id = i.callback_instance_id
+        AND i.effective_end_event_id > s.event_id
+        AND i.start_event_id >= s.break_event_id
+),
+classified AS (
+    SELECT
+        t.run_id,
+        t.thread_id,
+        x.executor_id,
+        t.at_ns AS start_ns,
+        CASE WHEN t.next_step > 0 THEN t.next_ns END AS end_ns,
+        t.callback_instance_id,
+        CASE
+            WHEN t.callback_instance_id IS NOT NULL AND (NOT t.is_spinning OR t.next_step = 1)
+                THEN CASE WHEN t.kind = 'service' THEN 'service' ELSE 'callback' END
+            WHEN t.step = 4 THEN CASE WHEN t.is_spinning OR t.has_callback THEN 'take' END
+            WHEN NOT t.is_spinning THEN NULL
+            WHEN t.state = 1 AND NOT t.has_run THEN 'wait'
+            WHEN t.state = 3 AND NOT t.has_run
+                THEN CASE WHEN t.next_kind = 'timer' THEN 'select' ELSE 'take' END
+            WHEN t.has_run
+                AND t.callback_instance_id IS NULL
+                AND e.kind LIKE 'multi_threaded%'
+                THEN 'blocked'
+            ELSE 'select'
+        END AS activity
+    FROM described AS t
+    JOIN store.executor_thread AS x ON t.thread_id = x.thread_id
+    JOIN store.executor AS e ON x.executor_id = e.executor_id
+)
+SELECT run_id, executor_id, thread_id, activity, start_ns, end_ns, callback_instance_id
+FROM classified
+WHERE activity IS NOT NULL AND (end_ns > start_ns OR end_ns IS NULL)
