@@ -11,8 +11,8 @@ Counted are, by kind of input:
 
 - traceback: one is printed; mistake: an error says "mistake of msgflow"; crash: the process ends by
   a signal; hang: it takes longer, or more output, than it may;
-- damage: a failed ingest changed the database, a stored run does not pass `db check`, or a file
-  outside of a lake changed;
+- damage: a failed ingest changed the database, a stored run breaks a rule, or a file outside of a
+  lake changed;
 - unreported: a query answers otherwise than without the change, and no finding, warning or error
   says that anything was wrong.
 

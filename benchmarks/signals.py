@@ -6,8 +6,8 @@
 SIGINT, SIGTERM and SIGKILL meet `ingest` (into a new and into an old database), `links apply`,
 `clocks apply`, `db upgrade` and `export` in turn, each at a moment between its start and a little
 behind its usual end. Afterwards the database has to be the old or the new one (by the rows of its
-runs), `db check` clean, and after one more command nothing else may lie in its directory. Exit code
-1 otherwise.
+runs), `check --detail` clean, and after one more command nothing else may lie in its directory.
+Exit code 1 otherwise.
 
 What gets a signal is started as a user starts it, or with `--forked` forked from a process that has
 imported all of msgflow, as the commands before and after are: then it costs less, and no signal

@@ -13,6 +13,7 @@ from msgflow.db.objects import public_names
 from msgflow.db.sql_guard import guarded_query, require_condition
 from msgflow.default_files import DEFAULT_PATHS
 from msgflow.errors import QueryError, UsageError
+from msgflow.name_suggestions import did_you_mean
 from msgflow.query.catalogue import choose_query, load_queries, query_names
 from msgflow.query.result import QueryResult
 from msgflow.query.runner import run_query
@@ -58,7 +59,14 @@ JOIN duckdb_views() AS views
     AND views.view_name = columns.table_name
 WHERE columns.database_name = current_database() AND columns.schema_name = 'main'
     AND NOT views.internal
+    AND columns.table_name = coalesce($view, columns.table_name)
 ORDER BY columns.table_name, columns.column_index
+"""
+_VIEWS = """
+SELECT view_name AS view, column_count AS columns, comment AS description
+FROM duckdb_views()
+WHERE database_name = current_database() AND schema_name = 'main' AND NOT internal
+ORDER BY view_name
 """
 
 
@@ -728,10 +736,28 @@ class Database:
         except duckdb.Error as error:
             raise in_words(error, self.path) or sql_error(error) from error
 
-    def schema(self) -> QueryResult:
-        """Return the columns of the public views, a row each, with type and meaning."""
+    def views(self) -> QueryResult:
+        """Return the public views, a row each, with the number of columns and the meaning."""
         connection = self.connection
-        return self._ask(lambda: QueryResult(connection.sql(_SCHEMA).to_arrow_table()))
+        return self._ask(lambda: QueryResult(connection.sql(_VIEWS).to_arrow_table()))
+
+    def schema(self, view: str | None = None) -> QueryResult:
+        """Return the columns of public views, a row each, with type and meaning.
+
+        Args:
+            view: its columns only; those of all when None.
+
+        Raises:
+            UsageError: there is no such view.
+        """
+        connection = self.connection
+        result = self._ask(
+            lambda: QueryResult(connection.sql(_SCHEMA, params={"view": view}).to_arrow_table())
+        )
+        if view is not None and not len(result):
+            hint = did_you_mean(view, list(public_names()), "msgflow db schema lists them")
+            raise UsageError(f"there is no such view — {view}", hint)
+        return result
 
     def list_queries(self) -> tuple[Header, ...]:
         """Return the named queries, sorted by name."""
@@ -749,20 +775,24 @@ class Database:
         connection = self.connection
         return self._ask(lambda: broken_rules(connection))
 
-    def findings(self, *, run: str | int | None = None) -> list[Finding]:
+    def findings(self, *, run: str | int | None = None, detail: bool = False) -> list[Finding]:
         """Return what is wrong with a recording: errors, then warnings, with cause and cure.
-
-        The view `main.finding` has those of severity 'info' too.
 
         Args:
             run: 'all', a name or an id; the latest run when None.
+            detail: also what is only worth knowing, and the rules that the database breaks now.
         """
         from msgflow.db.finding import read_findings
 
         connection = self.connection
-        return self._ask(
-            lambda: read_findings(connection, [one.run_id for one in Slice(run).runs(connection)])
+        found = self._ask(
+            lambda: read_findings(
+                connection, [one.run_id for one in Slice(run).runs(connection)], info=detail
+            )
         )
+        if not detail:
+            return found
+        return [*self.check(), *(each for each in found if each.phase != "database")]
 
     def clock_verdicts(
         self, *, run: str | int | None = None, only_several: bool = False

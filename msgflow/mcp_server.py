@@ -212,14 +212,7 @@ class _Tools:
     def schema(self, view: str | None = None) -> str:
         """List the views that SQL can read; with the name of a view, its columns."""
         with self._opened() as database:
-            rows = database.schema().to_arrow().to_pylist()
-        first = next(iter(rows[0])) if rows else ""
-        if view is None:
-            return _answer({}, map(json.dumps, dict.fromkeys(str(row[first]) for row in rows)))
-        chosen = [row for row in rows if row[first] == view]
-        if not chosen:
-            raise UsageError(f"there is no such view — {view}", "schema without a name")
-        return _answer({}, (json.dumps(row, ensure_ascii=False) for row in chosen))
+            return _rows(database.views() if view is None else database.schema(view), MOST_ROWS)
 
     def sql(self, query: str, limit: int = DEFAULT_ROWS) -> str:
         """Run SQL (DuckDB) that only reads the views of the database; see schema."""

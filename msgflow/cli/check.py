@@ -6,7 +6,7 @@ import shutil
 import textwrap
 from dataclasses import asdict
 from itertools import groupby
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from msgflow.db.finding import Finding
     from msgflow.export.formats import Format
+    from msgflow.query.result import QueryResult
 
 _WIDTH = 100
 PLACES_SHOWN = 10
@@ -33,6 +34,14 @@ PLACES_SHOWN = 10
 
 def command(
     run: RunOption = None,
+    detail: Annotated[
+        bool,
+        typer.Option(
+            "--detail",
+            help="Also what is worth knowing but not wrong, what the database breaks now, and what"
+            " share of the answers each defect affects",
+        ),
+    ] = False,
     form: FormatOption = None,
     output: OutputOption = None,
     memory_limit: MemoryLimitOption = None,
@@ -41,29 +50,29 @@ def command(
     """Show what is wrong with a recording, with cause and cure; exit code 1 on errors.
 
     With warnings only, the exit code is 0. A rule of the database that was broken
-    when the run was ingested (msgflow db check) is shown too. If a run has several
-    clocks, the last line says how far their times can be compared. What is worth
-    knowing, but not wrong, is in the query info --section findings.
+    when the run was ingested is shown too. If a run has several clocks, the last
+    line says how far their times can be compared.
     """
     from msgflow.database import Database
     from msgflow.run.choice import choose_runs
 
     with Database(database, memory_limit=memory_limit) as opened:
-        findings = opened.findings(run=run)
+        findings = opened.findings(run=run, detail=detail)
+        quality = opened.query("info", section="quality", run=run) if detail else None
         runs = choose_runs(opened.runs(), run)
         verdicts = opened.clock_verdicts(run=run, only_several=True)
     labels = {one.run_id: one.title for one in runs} if len(runs) > 1 else {}
-    report(findings, form, output, run_labels=labels, notes=verdicts, of="recording")
+    _report(findings, form, output, run_labels=labels, notes=verdicts, table=quality)
 
 
-def report(
+def _report(
     findings: Sequence[Finding],
     form: Format | None,
     output: Path | None,
     *,
     run_labels: Mapping[int, str],
-    notes: Sequence[str] = (),
-    of: str,
+    notes: Sequence[str],
+    table: QueryResult | None,
 ) -> None:
     """Print findings and their numbers, and end with exit code 1 on errors.
 
@@ -73,7 +82,7 @@ def report(
         output: file to write; stdout when None.
         run_labels: what to call each run; empty: runs are not named.
         notes: lines to print before the numbers of errors and warnings.
-        of: what they are about: 'recording' or 'database'.
+        table: rows to print below the numbered text.
     """
     import pyarrow as pa
 
@@ -84,18 +93,21 @@ def report(
 
     if output is None and form in (None, Format.TABLE):
         print_lines(_text(findings, run_labels))
+        if table is not None:
+            print_lines([""] if findings else [])
+            print_result(table, None, None)
     else:
         columns = ["number", *Finding.__dataclass_fields__]
         rows = [{"number": number, **asdict(finding)} for number, finding in _numbered(findings)]
-        table = pa.table({name: [row[name] for row in rows] for name in columns})
-        print_result(QueryResult(table, when_empty="no findings"), form, output)
+        listed = pa.table({name: [row[name] for row in rows] for name in columns})
+        print_result(QueryResult(listed, when_empty="no findings"), form, output)
     for note in notes:
         print_status(note)
     numbers = [
         count(len({f.name for f in findings if f.severity == severity}), severity)
         for severity in ("error", "warning")
     ]
-    print_status(", ".join(numbers) if findings else f"nothing is wrong with the {of}")
+    print_status(", ".join(numbers) if findings else "nothing is wrong with the recording")
     if any(finding.severity == "error" for finding in findings):
         raise typer.Exit(ExitCode.FAILED)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import typer
 
 from msgflow.cli.options import DatabaseOption, FormatOption, OutputOption, WideOption
@@ -25,37 +27,20 @@ def upgrade(database: DatabaseOption = DEFAULT_DATABASE) -> None:
         print_status(f"links derived anew for {count(len(done.rederived_runs), 'run')}")
 
 
-@app.command("check")
-def check(
-    form: FormatOption = None,
-    output: OutputOption = None,
-    database: DatabaseOption = DEFAULT_DATABASE,
-) -> None:
-    """Check the database itself: whether its tables agree with each other.
-
-    What is wrong with a recording, with cause and cure, is shown by `msgflow check`. The exit code
-    is 1 when a rule is broken.
-    """
-    from msgflow.cli.check import report
-    from msgflow.database import Database
-
-    with Database(database) as opened:
-        findings = opened.check()
-        names = {known.run_id: known.title for known in opened.runs()}
-    report(findings, form, output, run_labels=names, of="database")
-
-
 @app.command("schema")
 def schema(
+    view: Annotated[
+        str | None, typer.Argument(metavar="[VIEW]", help="A view: list its columns")
+    ] = None,
     form: FormatOption = None,
     wide: WideOption = False,
     output: OutputOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
-    """List the public views: one row per column, with its type and meaning."""
+    """List the public views; with the name of one, its columns with type and meaning."""
     from msgflow.cli.output import print_result
     from msgflow.database import Database
 
     with Database(database) as opened:
-        result = opened.schema()
+        result = opened.views() if view is None else opened.schema(view)
     print_result(result, form, output, wide=wide)

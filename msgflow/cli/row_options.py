@@ -55,7 +55,7 @@ def row_options(header: Header) -> dict[str, Any]:
         row_option(
             "path",
             "NAME",
-            "A path by its name in a file, see msgflow paths suggest",
+            "A path by its name in a file, see msgflow suggest paths",
             hidden=not has_ends,
             autocompletion=complete_path,
         ),

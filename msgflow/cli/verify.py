@@ -75,7 +75,7 @@ def command(
     """Check a run against the requirements of a file: passed, failed, or not measured.
 
     Exit code: 0 if all passed, 1 if one failed, 5 if none failed but one was not measured.
-    `msgflow targets suggest` writes such a file from a good run.
+    `msgflow suggest targets` writes such a file from a good run.
     """
     from msgflow.cli.output import print_result, print_runs, print_status, print_text
     from msgflow.database import Database

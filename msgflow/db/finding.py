@@ -8,7 +8,7 @@ phase, which decides when the query runs and what it reads:
 | --- | --- | --- |
 | input | once the model of an ingest is built | `staging` |
 | recording | whenever links or clocks of a run change | `store`, `derive`, `main` |
-| database | at the end of an ingest, and for `msgflow db check` | `store` |
+| database | at the end of an ingest, and for `msgflow check --detail` | `store` |
 
 A query returns `count` and `detail`, and where it applies `subject` (the place, in words) and
 `trace_id`; those that do not read `staging` return `run_id` too, and may use `$run_id`. The rows

@@ -132,7 +132,7 @@ class _Painter:
     def _ending(self, node: Row, room: int) -> Text:
         """Return what may be missing at a node where all messages of a topic end."""
         place, published = _printable(node["node"]), _printable(node["otherwise_published"])
-        text = f"ends here; {place} publishes {published}: msgflow links suggest"
+        text = f"ends here; {place} publishes {published}: msgflow suggest links"
         return Text(_bound(text, room), style="dim")
 
     def _text(self, line: Line, room: int) -> Text:

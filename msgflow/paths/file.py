@@ -69,7 +69,7 @@ class PathsFile:
             if path.name.value == name:
                 return path
         known = [path.name.value for path in self.paths]
-        others = f"it has {', '.join(known[:10]) or 'none; msgflow paths suggest finds some'}"
+        others = f"it has {', '.join(known[:10]) or 'none; msgflow suggest paths finds some'}"
         raise UsageError(
             f"{self.file.path} has no path of this name — {name}",
             did_you_mean(name, known, others),

@@ -166,7 +166,7 @@ def _missing_way(
     ((last, topics, first, is_joint, is_dead_end, is_sink),) = found
     if last is None:
         return f"no message of {places['from']} was received"
-    cure = ": msgflow links suggest" if is_dead_end else ""
+    cure = ": msgflow suggest links" if is_dead_end else ""
     if not is_dead_end and not is_sink:
         cure = ": a link may be missing (msgflow links apply FILE)"
     ends = f"flows from {places['from']} end at {last} (on {topics})"

@@ -10,6 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 from typer.testing import Result
 
+from msgflow.db.objects import public_names
 from msgflow.version import __version__
 
 Msgflow = Callable[..., Result]
@@ -26,11 +27,10 @@ COMMANDS = (
     "flow",
     "links",
     "links apply",
-    "links suggest",
-    "links list",
+    "suggest links",
+    "suggest",
     "db",
     "db upgrade",
-    "db check",
     "db schema",
     "fleet ingest",
     "fleet compact",
@@ -192,11 +192,23 @@ def test_export(msgflow: Msgflow, small_database: Path) -> None:
     assert Path("csv/node.csv").read_text().count("\n") == 2
 
 
-def test_db_schema_lists_the_views(msgflow: Msgflow, small_database: Path) -> None:
+def test_db_schema_lists_the_views_or_the_columns_of_one(
+    msgflow: Msgflow, small_database: Path
+) -> None:
     result = msgflow("db", "schema", "--db", small_database, "--format", "jsonl")
-    rows = [json.loads(line) for line in result.stdout.splitlines()]
-    assert {"view", "column", "type", "description"} == set(rows[0])
-    assert ("take", "taken_ns") in {(row["view"], row["column"]) for row in rows}
+    views = {row["view"]: row for row in map(json.loads, result.stdout.splitlines())}
+    assert views.keys() == set(public_names())
+    assert views["take"]["description"].startswith("Reception of a message")
+    result = msgflow("db", "schema", "take", "--db", small_database, "--format", "jsonl")
+    columns = [json.loads(line) for line in result.stdout.splitlines()]
+    assert len(columns) == views["take"]["columns"]
+    assert {"view", "column", "type", "description"} == set(columns[0])
+    assert {row["view"] for row in columns} == {"take"}
+    assert "taken_ns" in {row["column"] for row in columns}
+    unknown = msgflow("db", "schema", "takes", "--db", small_database)
+    assert unknown.exit_code == 2
+    assert "there is no such view — takes" in unknown.stderr
+    assert "did you mean take" in unknown.stderr
 
 
 def test_db_upgrade_of_a_current_database(msgflow: Msgflow, small_database: Path) -> None:
@@ -227,7 +239,7 @@ def test_db_upgrade_of_old_views(msgflow: Msgflow, small_database: Path) -> None
         "query info",
         "flow --topic /chatter",
         "sql FROM\u00a0run",
-        "db check",
+        "check --detail",
         "db schema",
         "db upgrade",
         "export parquet out",

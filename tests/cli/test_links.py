@@ -20,7 +20,7 @@ Msgflow = Callable[..., Result]
 
 def test_from_a_suggestion_to_links(msgflow: Msgflow, shared_traces: Path, tmp_path: Path) -> None:
     assert msgflow("ingest", shared_traces / "sync_1_1").exit_code == 0
-    result = msgflow("links", "suggest")
+    result = msgflow("suggest", "links")
     assert result.exit_code == 0
     assert result.stdout.splitlines()[-1] == "links: []"
     assert result.stderr == "run: sync_1_1 (1)\n"
@@ -32,14 +32,14 @@ def test_from_a_suggestion_to_links(msgflow: Msgflow, shared_traces: Path, tmp_p
     assert result.exit_code == 0
     assert result.stdout == ""
     assert "1 link declared: 0 indirect links between messages" in result.stderr
-    listed = msgflow("links", "list", "--format", "csv")
+    listed = msgflow("links", "--format", "csv")
     (row,) = csv.DictReader(listed.stdout.splitlines())
     assert (row["kind"], row["source"], row["inputs"]) == ("periodic_async", "file", "/topic_a")
     file.write_text(file.read_text().replace("sync_one_to_one", "sync"))
     result = msgflow("links", "apply", file, "--run", 1)
     assert result.exit_code == 2
     assert f"{file}, line 1: no such node — /sync" in result.stderr
-    assert msgflow("links", "list", "--format", "csv").stdout == listed.stdout
+    assert msgflow("links", "--format", "csv").stdout == listed.stdout
     result = msgflow("ingest", shared_traces / "pingpong", "--links", file)
     assert result.exit_code == 2
     assert "no such node" in result.stderr
@@ -64,7 +64,7 @@ def test_what_is_doubtful_of_suggestions_is_said(msgflow: Msgflow, fresh_databas
     with duckdb.connect(str(fresh_database)) as con:
         fill_case(con, cases / f"{case}.case")
         derive(con, 1)
-    result = msgflow("links", "suggest", "--db", fresh_database)
+    result = msgflow("suggest", "links", "--db", fresh_database)
     assert result.exit_code == 0
     assert "2 of 2 candidates are doubtful, see the comments: /merge\n" in result.stderr
     text = result.stdout.replace("\n  # ", " ")
@@ -78,28 +78,28 @@ def test_suggestions_are_written_and_applied_in_one_go(
     trace = simulate("periodic_async", tmp_path / "trace", factor=0.1).directory
     assert msgflow("ingest", trace, "--ignore", "ros2:message_link_*").exit_code == 0
     Path("links.yaml").write_text("mine")
-    result = msgflow("links", "suggest", "--apply")
+    result = msgflow("suggest", "links", "--apply")
     assert result.exit_code == 2
     assert "there is a file of this name — links.yaml" in result.stderr
     assert Path("links.yaml").read_text() == "mine"
     (Path("links.yaml")).unlink()
-    result = msgflow("links", "suggest", "--apply")
+    result = msgflow("suggest", "links", "--apply")
     assert result.exit_code == 0
     assert result.stdout == ""
     assert "/periodic_1_to_1: /a → /periodic_1_to_1/0 (periodic_async)\n" in result.stderr
     assert "links declared: " in result.stderr
     assert result.stderr.endswith("written to links.yaml\n")
     text = Path("links.yaml").read_text()
-    listed = msgflow("links", "list", "--format", "csv").stdout
+    listed = msgflow("links", "--format", "csv").stdout
     assert '"/periodic_1_to_1","/a","/periodic_1_to_1/0"' in listed
     # What is declared stays in the file, and nothing is declared anew.
-    again = msgflow("links", "suggest", "--apply", "-o", "again.yaml")
+    again = msgflow("suggest", "links", "--apply", "-o", "again.yaml")
     assert again.exit_code == 0
     assert "no candidate is without a doubt: nothing is declared\n" in again.stderr
-    assert msgflow("links", "list", "--format", "csv").stdout == listed
+    assert msgflow("links", "--format", "csv").stdout == listed
     assert msgflow("links", "apply", "again.yaml").exit_code == 0
     # All but the identity, the last column.
-    anew = msgflow("links", "list", "--format", "csv").stdout
+    anew = msgflow("links", "--format", "csv").stdout
     assert [line.rpartition(",")[0] for line in anew.splitlines()] == [
         line.rpartition(",")[0] for line in listed.splitlines()
     ]
@@ -117,14 +117,14 @@ def test_a_file_that_cannot_be_applied_is_not_written(
 
     monkeypatch.setattr("msgflow.links.annotations.match_links", refuse)
     file = tmp_path / "new.yaml"
-    result = msgflow("links", "suggest", "--apply", "-o", file)
+    result = msgflow("suggest", "links", "--apply", "-o", file)
     assert result.exit_code == 2
     assert "does not fit" in result.stderr
     assert not file.exists()
 
 
 def test_suggestions_are_for_one_run(msgflow: Msgflow, fresh_database: Path) -> None:
-    result = msgflow("links", "suggest", "--run", "all", "--db", fresh_database)
+    result = msgflow("suggest", "links", "--run", "all", "--db", fresh_database)
     assert result.exit_code == 2
     assert "a file for one run" in result.stderr
     assert result.stdout == ""

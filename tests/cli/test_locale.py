@@ -89,7 +89,7 @@ def test_from_the_trace_to_every_kind_of_file(tmp_path: Path) -> None:
             ["graph", "-o", "graph.svg"],
             ["flow", "--topic", "/camera/image", "--html", "flow.html"],
             ["report", "-o", "report.html"],
-            ["links", "list"],
+            ["links"],
         ],
         tmp_path,
     )

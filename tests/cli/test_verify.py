@@ -25,7 +25,7 @@ def demo(msgflow: Msgflow, simulated: Callable[..., Path]) -> Msgflow:
 
 def test_from_a_suggestion_to_verdicts(demo: Msgflow, tmp_path: Path) -> None:
     file = tmp_path / "targets.yaml"
-    assert demo("targets", "suggest", "--run", "trace", "-o", file).exit_code == 0
+    assert demo("suggest", "targets", "--run", "trace", "-o", file).exit_code == 0
     result = demo("verify", file, "trace", "--format", "json")
     assert result.exit_code == 0
     assert result.stderr.splitlines()[0] == "run: trace (1)"

@@ -80,7 +80,7 @@ def test_a_flow_that_ends_at_a_node_which_publishes_says_so(
     with database_of("../main.dead_end/kept_messages", empty_database, tmp_path) as database:
         flow = database.flow("/boxes")
         *_, last = str(flow).splitlines()
-        text = "ends here; /fusion publishes /objects from /clusters: msgflow links suggest"
+        text = "ends here; /fusion publishes /objects from /clusters: msgflow suggest links"
         assert last.strip() == text
         assert [node["otherwise_published"] for node in flow.nodes.values()][-1] == (
             "/objects from /clusters"

@@ -87,7 +87,7 @@ def test_mistakes_are_named_with_their_line(
     [
         (GOOD, "motor", "has no path of this name — motor", "did you mean motors"),
         (GOOD, "x\x1b[31m", "has no path of this name", "it has motors, rest"),
-        ("paths: []\n", "a", "has no path of this name — a", "msgflow paths suggest"),
+        ("paths: []\n", "a", "has no path of this name — a", "msgflow suggest paths"),
         (
             GOOD.replace("/control/cmd", "/control/cmds"),
             "motors",

@@ -373,19 +373,19 @@ def test_what_left_nothing_is_said(database: Database) -> None:
             "/boxes",
             "/viewer",
             "flows from /boxes end at /fusion (on /boxes), and those to /viewer begin at /tracker:"
-            " msgflow links suggest",
+            " msgflow suggest links",
         ),
         (
             "/boxes",
             "/objects",
             "flows from /boxes end at /fusion (on /boxes), which publishes towards /objects:"
-            " msgflow links suggest",
+            " msgflow suggest links",
         ),
         (
             "/boxes",
             "/path",
             "flows from /boxes end at /fusion (on /boxes), and nothing arrives at /path:"
-            " msgflow links suggest",
+            " msgflow suggest links",
         ),
         (
             "/tracks",

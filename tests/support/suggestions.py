@@ -1,4 +1,4 @@
-"""Indirect links that `msgflow links suggest` finds, compared with those that nodes declare.
+"""Indirect links that `msgflow suggest links` finds, compared with those that nodes declare.
 
 `compare` ingests a trace twice: with the declarations of its nodes, and without them, where it
 applies what is suggested without a doubt.

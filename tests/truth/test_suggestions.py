@@ -1,4 +1,4 @@
-"""What `links suggest` finds of the indirect links that simulated nodes declare."""
+"""What `suggest links` finds of the indirect links that simulated nodes declare."""
 
 from __future__ import annotations
 

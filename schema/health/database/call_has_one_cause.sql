@@ -3,7 +3,7 @@
 -- description: What a thread sent after a taken request or response has one cause, and is one
 --     message.
 -- cause: A mistake in msgflow, or input that it misunderstands.
--- cure: Report what msgflow db check prints, together with the trace.
+-- cure: Report what msgflow check --detail prints, together with the trace.
 -- grain: one row per run with such rows
 -- severity: error
 WITH call AS (

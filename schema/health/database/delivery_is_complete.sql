@@ -5,7 +5,7 @@
 --     delivered and what was not. Placeholders for readers of ring buffers do not count, nor
 --     do those that only get copies of what these carry.
 -- cause: A mistake in msgflow, or input that it misunderstands.
--- cure: Report what msgflow db check prints, together with the trace.
+-- cure: Report what msgflow check --detail prints, together with the trace.
 -- grain: one row per run and topic, or run, for which the sums differ
 -- severity: error
 WITH published AS (

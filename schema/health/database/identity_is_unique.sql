@@ -3,7 +3,7 @@
 -- description: Publications, takes, callback instances, requests, responses and events of the user
 --     have an identity of their own.
 -- cause: A mistake in msgflow, or input that it misunderstands.
--- cure: Report what msgflow db check prints, together with the trace.
+-- cure: Report what msgflow check --detail prints, together with the trace.
 -- grain: one row per run and table
 -- severity: error
 WITH repeated AS (

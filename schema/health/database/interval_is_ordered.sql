@@ -2,7 +2,7 @@
 -- title: An interval ends before it begins
 -- description: Nothing ends before it begins.
 -- cause: A mistake in msgflow, or input that it misunderstands.
--- cure: Report what msgflow db check prints, together with the trace.
+-- cure: Report what msgflow check --detail prints, together with the trace.
 -- grain: one row per run and table
 -- severity: error
 WITH reversed AS (

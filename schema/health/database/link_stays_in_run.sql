@@ -2,7 +2,7 @@
 -- title: A link leads to another run
 -- description: Nothing is linked across runs: the ids of a run are one block.
 -- cause: A mistake in msgflow, or input that it misunderstands.
--- cure: Report what msgflow db check prints, together with the trace.
+-- cure: Report what msgflow check --detail prints, together with the trace.
 -- grain: one row per run and table of links
 -- severity: error
 WITH publication AS (

@@ -3,7 +3,7 @@
 -- description: A subscription receives a publication at most once by each way: through the ring
 --     buffer of its process, and through the middleware, whose copy it drops.
 -- cause: A mistake in msgflow, or input that it misunderstands.
--- cure: Report what msgflow db check prints, together with the trace.
+-- cure: Report what msgflow check --detail prints, together with the trace.
 -- grain: one row per run with such rows
 -- severity: error
 SELECT

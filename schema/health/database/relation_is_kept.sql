@@ -2,7 +2,7 @@
 -- title: A row refers to one that does not exist
 -- description: Every identity in a column that refers to another table is one of a row there.
 -- cause: A mistake in msgflow, or input that it misunderstands.
--- cure: Report what msgflow db check prints, together with the trace.
+-- cure: Report what msgflow check --detail prints, together with the trace.
 -- grain: one row per run and column with such identities
 -- severity: error
 -- param: broken STRUCT[]  Run, column, table it refers to, count; from `relation_check.py`

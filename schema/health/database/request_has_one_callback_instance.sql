@@ -2,7 +2,7 @@
 -- title: A request and its callback instance do not agree
 -- description: A request leads to at most one callback instance, and both say so.
 -- cause: A mistake in msgflow, or input that it misunderstands.
--- cure: Report what msgflow db check prints, together with the trace.
+-- cure: Report what msgflow check --detail prints, together with the trace.
 -- grain: one row per run with such rows
 -- severity: error
 SELECT

@@ -3,7 +3,7 @@
 -- description: Kinds, methods, states, reasons and names of findings are words of the
 --     vocabulary.
 -- cause: A mistake in msgflow, or input that it misunderstands.
--- cure: Report what msgflow db check prints, together with the trace.
+-- cure: Report what msgflow check --detail prints, together with the trace.
 -- grain: one row per word that is not
 -- severity: error
 WITH foreign_word AS (

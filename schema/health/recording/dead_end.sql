@@ -5,7 +5,7 @@
 --     on end there, and no end-to-end latency goes through the node.
 -- cause: The trace does not show that a node keeps a message for later. Or it really only consumes
 --     these messages.
--- cure: msgflow links suggest writes a file with the links that are likely; with --apply it
+-- cure: msgflow suggest links writes a file with the links that are likely; with --apply it
 --     declares them at once. Where a node only consumes messages, an entry of kind independent says
 --     so (docs/causes.md).
 -- grain: one row per node
@@ -41,7 +41,7 @@ SELECT
     main.node_label(n.full_name, p.name, p.pid) AS subject,
     i.number::BIGINT AS count,
     printf(
-        '%s end at %s, which publishes %s: msgflow links suggest',
+        '%s end at %s, which publishes %s: msgflow suggest links',
         i.received, main.node_label(n.full_name, p.name, p.pid), o.published
     ) AS detail
 FROM input AS i

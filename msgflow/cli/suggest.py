@@ -1,0 +1,128 @@
+"""`msgflow suggest`: files to review, of what a run shows."""
+
+from __future__ import annotations
+
+import shlex
+from typing import Annotated
+
+import typer
+
+from msgflow.cli.options import DatabaseOption, OutputOption, RunOption
+from msgflow.cli.slice_options import with_slice
+from msgflow.default_files import DEFAULT_DATABASE, DEFAULT_LINKS
+from msgflow.errors import UsageError
+from msgflow.run.slice import LATEST, Slice
+
+app = typer.Typer()
+
+
+@app.command("links")
+def links(
+    run: RunOption = None,
+    apply: Annotated[
+        bool,
+        typer.Option(
+            "--apply",
+            help=f"Declare those without a doubt, and write the file (-o, else {DEFAULT_LINKS})",
+        ),
+    ] = False,
+    output: OutputOption = None,
+    database: DatabaseOption = DEFAULT_DATABASE,
+) -> None:
+    """Print links that the data suggest, as a file to review.
+
+    Doubtful ones are comments in it. Links that a file declared before stay in it.
+    Without --apply nothing is applied. With it, the file is written and its links
+    are declared, or nothing happens.
+    """
+    from msgflow.atomic import replacing
+    from msgflow.cli.links import print_applied
+    from msgflow.cli.output import count, print_note, print_runs, print_status, print_text
+    from msgflow.database import Database
+
+    if run == "all":
+        raise UsageError(
+            "suggestions are a file for one run, which does not fit others — all",
+            "msgflow links suggest --run NAME for each of them; msgflow query info names them",
+        )
+    if apply and output is None and DEFAULT_LINKS.exists():
+        raise UsageError(
+            f"there is a file of this name — {DEFAULT_LINKS}",
+            f"-o {DEFAULT_LINKS} replaces it, -o FILE.yaml writes another",
+        )
+    path = output or (DEFAULT_LINKS if apply else None)
+    words = ["msgflow", "links", "apply", str(path or "FILE")]
+    words += ["--run", run] if run is not None else []
+    words += ["--db", str(database)] if database != DEFAULT_DATABASE else []
+    with Database(database) as opened:
+        found = opened.suggest_links(run=run)
+        print_runs(found.runs)
+        if found.doubtful:
+            print_note(
+                f"{len(found.doubtful)} of {count(len(found.candidates), 'candidate')} are"
+                " doubtful, see the comments: "
+                + ", ".join(dict.fromkeys(row["node"] for row in found.doubtful))
+            )
+        text = found.text(shlex.join(words))
+        if path is None or not apply or not found.certain:
+            print_text(text, path)
+            if apply:
+                print_status("no candidate is without a doubt: nothing is declared")
+            return
+        with replacing(path) as temporary:
+            temporary.write_text(f"{text}\n", encoding="utf-8")
+            applied = opened.apply_links(path, run=run, content=text)
+        for row in found.certain:
+            print_status(
+                f"{row['node']}: {', '.join(row['inputs'])} → {', '.join(row['outputs'])}"
+                f" ({row['kind']})"
+            )
+        for one in applied:
+            print_applied(opened, one)
+        print_status(f"written to {path}")
+
+
+@app.command("paths")
+def paths(
+    run: RunOption = None,
+    output: OutputOption = None,
+    database: DatabaseOption = DEFAULT_DATABASE,
+) -> None:
+    """Print the paths of a run as a file with names, to choose from: paths.yaml."""
+    from msgflow.cli.output import print_note, print_runs, print_text
+    from msgflow.database import Database
+    from msgflow.paths import suggest_paths
+
+    with Database(database) as opened:
+        result = opened.query("e2e-latency", run=run)
+    print_runs(result.runs)
+    text = suggest_paths(result.to_arrow().to_pylist())
+    for note in result.notes:
+        if "cut off" in note:
+            print_note(note)
+    print_text(text, output)
+
+
+@app.command("targets")
+@with_slice("run", "skip_first")
+def targets(
+    part: Slice = LATEST,
+    margin: Annotated[
+        float,
+        typer.Option(
+            "--margin", metavar="PERCENT", min=0, help="How much more than measured is allowed"
+        ),
+    ] = 20.0,
+    output: OutputOption = None,
+    database: DatabaseOption = DEFAULT_DATABASE,
+) -> None:
+    """Write requirements that a good run meets, as a file to review.
+
+    It covers paths, timers, topics, services and actions with at least 20 values.
+    """
+    from msgflow.cli.output import print_text
+    from msgflow.database import Database
+
+    with Database(database) as opened:
+        text = opened.suggest_targets(run=part.run, skip_first=part.skip_first, margin=margin / 100)
+    print_text(text, output)
