@@ -44,7 +44,7 @@ demo: $(VENV)/.installed
 	@echo '  export MSGFLOW_DB=$(CURDIR)/$(DEMO)/msgflow.duckdb; . $(BIN)/activate'
 	@echo '  msgflow check                                    what is wrong with the recording'
 	@echo '  msgflow query critical-path --to /control/cmd    why the slowest command was late'
-	@echo '  msgflow query interference                       which callbacks keep which waiting'
+	@echo '  msgflow query waits --by pair                   which callbacks keep which waiting'
 	@echo '  msgflow flow --topic /camera/image               one message: its causes and effects'
 	@echo 'see it: $(BIN)/msgflow ui --db $(DEMO)/msgflow.duckdb'
 

@@ -104,7 +104,7 @@ def header_of(name: str, given: Mapping[str, Value] | None = None) -> Header:
         )
     header = statements().header(query.name.replace("-", "_"))
     params = header.params if variant is None else (variant, *header.params)
-    return replace(header, words=query.words, params=params, variant=variant)
+    return replace(header, chosen=query.words, params=params, variant=variant)
 
 
 def fleet_query(

@@ -141,7 +141,7 @@ def _header(name: str) -> Header:
         if variant is None:
             raise HeaderError(f"{header.path}: {base} has no variants")
         value = "" if variant.type == "BOOLEAN" else f" {name.removeprefix(f'{base}-')}"
-        header = replace(header, words=f"{base} --{variant.name}{value}", variant=variant)
+        header = replace(header, chosen=f"{base} --{variant.name}{value}", variant=variant)
     return header if variant is None else replace(header, params=(variant, *header.params))
 
 

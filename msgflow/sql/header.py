@@ -163,7 +163,7 @@ class Header:
         steps: what a query makes before, in order.
         when: tables and macros of a run; if none of them has a row, this has none.
         variant: parameter that chooses between this query and others; its default is this one.
-        words: the name, and the option that chooses this variant.
+        chosen: of a variant: the name of the query, and the option that chooses this one.
     """
 
     name: str
@@ -186,7 +186,12 @@ class Header:
     steps: tuple[Step, ...] = ()
     when: tuple[str, ...] = ()
     variant: Param | None = None
-    words: str = ""
+    chosen: str | None = None
+
+    @property
+    def words(self) -> str:
+        """What stands behind `msgflow query`: the name, and the option of a variant."""
+        return self.chosen or self.name
 
     @cached_property
     def needs(self) -> tuple[str, ...]:
@@ -283,7 +288,6 @@ def parse(text: str, path: Path) -> Header:
         steps=steps,
         when=_names(single.get("when", "")),
         variant=variants[0] if variants else None,
-        words=single["name"],
     )
 
 

@@ -113,7 +113,7 @@ def test_a_name_goes_without_other_words(database: Database, tmp_path: Path) -> 
     file.write_text(GOOD, encoding="utf-8")
     with pytest.raises(UsageError, match="a path with a name goes without others — motors"):
         database.query("e2e-latency", path="motors", paths=file, from_="/camera/image")
-    with pytest.raises(UsageError, match="info-nodes has no paths — --path motors"):
+    with pytest.raises(UsageError, match="info --section nodes has no paths — --path motors"):
         database.query("info-nodes", path="motors", paths=file)
     with pytest.raises(UsageError, match="cannot read the file"):
         database.query("e2e-latency", path="motors", paths=tmp_path / "none.yaml")
