@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -138,6 +139,8 @@ def command(
             _print_report(report, database)
         for warning in report.warnings:
             print_note(warning)
+        if not quiet:
+            _print_next(report, database)
 
 
 def _print_report(report: IngestReport, database: Path) -> None:
@@ -148,7 +151,7 @@ def _print_report(report: IngestReport, database: Path) -> None:
         f"{count(report.event_count, 'event')} read into {database} as run"
         f" {report.run_name} ({report.run_id}) in {report.seconds:.1f} s, {rate:,.0f} events/s"
     )
-    notable = (finding for finding in report.findings if finding.severity != "info")
+    notable = [finding for finding in report.findings if finding.severity != "info"]
     for name, group in groupby(notable, key=lambda finding: finding.name):
         places = list(group)
         for finding in places[:PLACES_SHOWN]:
@@ -158,6 +161,16 @@ def _print_report(report: IngestReport, database: Path) -> None:
             print_note(f"{name} ({finding.count}): {place}{finding.detail}")
         if len(places) > PLACES_SHOWN:
             print_note(f"{name}: {len(places) - PLACES_SHOWN} more places: msgflow check")
+
+
+def _print_next(report: IngestReport, database: Path) -> None:
+    from msgflow.cli.output import print_status
+
+    is_sound = all(finding.severity == "info" for finding in report.findings)
+    words = ["msgflow", *(("query", "e2e-latency") if is_sound else ("check",))]
+    if database != DEFAULT_DATABASE:
+        words += ["--db", str(database)]
+    print_status(f"next: {shlex.join(words)}")
 
 
 def _hosts(texts: list[str]) -> dict[str, list[str]]:

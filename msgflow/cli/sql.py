@@ -48,11 +48,24 @@ def command(
 ) -> None:
     """Run SQL on the public views, read-only and without access to other files.
 
-    `msgflow db schema` lists the views.
+    `msgflow db schema` lists the views. Without a query, a terminal gets a prompt.
     """
     from msgflow.cli.output import print_result
     from msgflow.confined_query import confined_sql
 
+    if text is None and file is None and output is None and sys.stdin.isatty():
+        from msgflow.cli.sql_prompt import prompt
+
+        prompt(
+            database,
+            lambda query: print_result(
+                confined_sql(database, query, limit=limit or None, memory_limit=memory_limit),
+                form,
+                None,
+                wide=wide,
+            ),
+        )
+        return
     query = sql_of(text, file, 'msgflow sql "SELECT * FROM run"')
     result = confined_sql(database, query, limit=limit or None, memory_limit=memory_limit)
     print_result(result, form, output, wide=wide)

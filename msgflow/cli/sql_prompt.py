@@ -1,0 +1,71 @@
+"""Prompt of `msgflow sql`: one query after the other, with completion of views and columns."""
+
+from __future__ import annotations
+
+import readline
+from typing import TYPE_CHECKING
+
+from msgflow.cli.errors import print_exception
+from msgflow.cli.output import print_status
+from msgflow.database import Database
+from msgflow.errors import MsgflowError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+    from pathlib import Path
+
+_WORDS = (
+    "SELECT", "FROM", "JOIN", "LEFT JOIN", "USING", "ON", "WHERE", "GROUP BY", "ORDER BY", "LIMIT",
+    "count(*)", "avg(", "min(", "max(", "quantile_disc(", "DESCRIBE",
+)  # fmt: skip
+_END = ("exit", "quit")
+
+
+def prompt(database: Path, ask: Callable[[str], None]) -> None:
+    """Ask for queries until the user ends it with Ctrl-D, `exit` or `quit`.
+
+    Args:
+        database: the file, for the names that tab completes.
+        ask: runs a query and prints its rows.
+
+    Raises:
+        DatabaseError: the file cannot be opened.
+    """
+    with Database(database) as opened:
+        names = opened.schema().to_arrow()
+    words = {*names["view"].to_pylist(), *names["column"].to_pylist(), *_WORDS}
+    readline.set_completer(completer(words))
+    readline.set_completer_delims(" \t\n,()=<>")
+    readline.parse_and_bind("tab: complete")
+    print_status(
+        "a query ends with ; or an empty line; tab completes names; Ctrl-D ends"
+    )
+    lines: list[str] = []
+    while True:
+        try:
+            line = input("   ...> " if lines else "msgflow> ")
+        except EOFError:
+            print_status("")
+            return
+        if not lines and line.strip().rstrip("; ").lower() in _END:
+            return
+        if line.strip():
+            lines.append(line)
+        if lines and (not line.strip() or line.rstrip().endswith(";")):
+            query = "\n".join(lines)
+            lines.clear()
+            try:
+                ask(query)
+            except MsgflowError as error:
+                print_exception(error)
+
+
+def completer(words: Iterable[str]) -> Callable[[str, int], str | None]:
+    """Return a function for readline: the n-th word that begins with a text, in any case."""
+    known = sorted(words)
+
+    def complete(text: str, number: int) -> str | None:
+        fitting = [word for word in known if word.lower().startswith(text.lower())]
+        return fitting[number] if number < len(fitting) else None
+
+    return complete
