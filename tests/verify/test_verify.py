@@ -197,6 +197,31 @@ def test_lost_messages_are_a_share_of_those_connected(tmp_path: Path) -> None:
     assert any(row["value"] < 1 for row in found if row["metric"] == "completeness")
 
 
+def test_roots_that_a_queue_dropped_are_losses(overwritten: Path, check: Check) -> None:
+    """Of ten roots, two were not connected and two cut; two of the others were dropped."""
+    text = """
+targets:
+  - path: [/a, /b]
+    loss: < 30 %
+    completeness: "> 60 %"
+"""
+    loss, completeness = sorted(rows(check(text, overwritten)), key=lambda row: row["line"])
+    assert (loss["value"], loss["samples"]) == (pytest.approx(2 / 6), 6)
+    assert (completeness["value"], completeness["samples"]) == (pytest.approx(3 / 6), 6)
+    assert (loss["verdict"], loss["see"]) == ("failed", "msgflow flow --callback-instance 3")
+
+
+def test_a_suggestion_says_what_was_not_delivered(overwritten: Path) -> None:
+    with Database(overwritten) as database:
+        first, *lines = database.suggest_targets().splitlines()
+    assert first.startswith("# What run ")
+    said = [line for line in lines if line.startswith("#")]
+    assert said == [
+        '# "/a → /filter": only 87.5 % of the messages were delivered (1 dropped, 0 lost). '
+        "Is this a good run?"
+    ]
+
+
 @pytest.mark.parametrize("name", few(["demo", "services", "actions"], "services", "actions"))
 def test_a_run_meets_what_is_suggested_from_it(name: str, tmp_path: Path) -> None:
     simulation = simulate(name, tmp_path / "trace", factor=0.5)
