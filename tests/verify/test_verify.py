@@ -217,8 +217,9 @@ def test_a_suggestion_says_what_was_not_delivered(overwritten: Path) -> None:
     assert first.startswith("# What run ")
     said = [line for line in lines if line.startswith("#")]
     assert said == [
-        '# "/a → /filter": only 87.5 % of the messages were delivered (1 dropped, 0 lost). '
-        "Is this a good run?"
+        f"# {way}: only {share} % of the messages were delivered (1 dropped, 0 lost)."
+        " Is this a good run?"
+        for way, share in (('"/a → /filter"', "87.5"), ('"/b → /sink"', "80"))
     ]
 
 
