@@ -105,8 +105,8 @@ SUBJECTS: dict[str, Subject] = {
                 "e2e-latency", f"reached / nullif({_ARRIVALS}, 0)", Dimension.SHARE, (), _ARRIVALS
             ),
             "loss": Metric(
-                "e2e-latency", f"(dropped + lost) / nullif({_ARRIVALS}, 0)", Dimension.SHARE, (), _ARRIVALS,
-                "lost_flow",
+                "e2e-latency", f"(dropped + lost) / nullif({_ARRIVALS}, 0)", Dimension.SHARE, (),
+                _ARRIVALS, "lost_flow",
             ),
         },
         dict.fromkeys(("e2e-latency", "e2e-latency-reaction", "e2e-latency-age"), "path"),

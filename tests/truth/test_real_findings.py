@@ -111,7 +111,9 @@ def test_a_join_that_the_other_input_triggers(recordings: Callable[[str], Ingest
     assert counts == [("cut_by_recording", 1), ("no_output", 46), ("reached", 12)]
 
 
-def test_two_queries_say_the_same_of_the_same_messages(recordings: Callable[[str], Ingested]) -> None:
+def test_two_queries_say_the_same_of_the_same_messages(
+    recordings: Callable[[str], Ingested],
+) -> None:
     """Where a path has a queue that drops, its roots end as the messages on the topic do."""
     connection = recordings("real_overload/ust").connection
     delivery = {
