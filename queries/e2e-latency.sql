@@ -2,9 +2,10 @@
 -- title: End-to-end latency by path
 -- description: How long it took from the start of a flow (the callback of the timer that published,
 --     or the publication itself) to its end (the end of the callback at the end of the path), for
---     every path of the computation graph. Every root is counted: reached the end of the path,
---     superseded by a newer input before it was used, lost on the way, or cut by the recording (too
---     close to its start or end to know).
+--     every path of the computation graph. Every root is counted once: reached the end of the path,
+--     superseded by a newer input before it was used, dropped (a queue was full), lost on the way,
+--     no output (a node did not publish), not connected, cut by the recording (too close to its
+--     start or end to know), or unknown.
 -- grain: one row per path
 -- variant: measure VARCHAR {latency|age|reaction|response} = 'latency'  What is measured: from
 --     the start of a flow to its end, how old the data behind an output are, how long at most
@@ -25,7 +26,12 @@
 -- column: roots BIGINT             Flows that began in the time window
 -- column: reached BIGINT           Roots that reached the end of the path
 -- column: superseded BIGINT        Roots replaced by a newer input before they were used
--- column: lost BIGINT              Roots lost on the way although later ones arrived
+-- column: dropped BIGINT           Roots that ended in a full queue: newer messages took their place
+-- column: lost BIGINT              Roots that were lost on the way
+-- column: no_output BIGINT         Roots that ended at a node that did not publish
+-- column: not_connected BIGINT     Roots that ended before or after a publisher and a subscription
+--     were connected
+-- column: unknown BIGINT           Roots of which the trace does not tell where they ended
 -- column: cut_by_recording BIGINT  Roots too close to the start or end of the recording to know
 -- column: loss_affected BIGINT     Roots with a gap of a trace in their time: their status may be
 --     wrong
@@ -41,10 +47,11 @@
 -- column: sink_event VARCHAR       Event that stopped the clock: to_event, or 'take' where the
 --     sink never shows a callback
 -- column: is_cut BOOLEAN           The path goes on or has siblings beyond max_depth or max_paths
--- column: lost_reasons VARCHAR     Why roots were lost or superseded, with counts
+-- column: reasons VARCHAR          Why roots did not reach the end of the path, with counts
 -- column: path VARCHAR [path]  Nodes and topics
--- brief: path, median_ns, p95_ns, max_ns, reached, roots, lost, superseded, p99_ns,
---     cut_by_recording, lost_reasons, mean_ns, min_ns, loss_affected, pairs
+-- brief: path, median_ns, p95_ns, max_ns, reached, roots, dropped, lost, superseded,
+--     no_output, p99_ns, not_connected, unknown, cut_by_recording, reasons, mean_ns, min_ns,
+--     loss_affected, pairs
 -- note: clocks
 WITH flow AS (
     SELECT
@@ -76,11 +83,11 @@ reason AS (
     SELECT
         run_id,
         path_id,
-        string_agg(reason || ' ' || number, ', ' ORDER BY reason) AS lost_reasons
+        string_agg(reason || ' ' || number, ', ' ORDER BY number DESC, reason) AS reasons
     FROM (
         SELECT run_id, path_id, reason, count(*) AS number
         FROM root
-        WHERE status IN ('lost', 'superseded')
+        WHERE status <> 'reached'
         GROUP BY run_id, path_id, reason
     )
     GROUP BY run_id, path_id
@@ -92,7 +99,11 @@ completeness AS (
         count(*) AS roots,
         count(*) FILTER (WHERE status = 'reached') AS reached,
         count(*) FILTER (WHERE status = 'superseded') AS superseded,
+        count(*) FILTER (WHERE status = 'dropped') AS dropped,
         count(*) FILTER (WHERE status = 'lost') AS lost,
+        count(*) FILTER (WHERE status = 'no_output') AS no_output,
+        count(*) FILTER (WHERE status = 'not_connected') AS not_connected,
+        count(*) FILTER (WHERE status = 'unknown') AS unknown,
         count(*) FILTER (WHERE status = 'cut_by_recording') AS cut_by_recording
     FROM root
     GROUP BY run_id, path_id
@@ -144,7 +155,11 @@ SELECT
     coalesce(c.roots, 0) AS roots,
     coalesce(c.reached, 0) AS reached,
     coalesce(c.superseded, 0) AS superseded,
+    coalesce(c.dropped, 0) AS dropped,
     coalesce(c.lost, 0) AS lost,
+    coalesce(c.no_output, 0) AS no_output,
+    coalesce(c.not_connected, 0) AS not_connected,
+    coalesce(c.unknown, 0) AS unknown,
     coalesce(c.cut_by_recording, 0) AS cut_by_recording,
     coalesce(a.number, 0) AS loss_affected,
     coalesce(l.pairs, 0) AS pairs,
@@ -157,7 +172,7 @@ SELECT
     l.max_ns,
     l.sink_event,
     p.is_cut,
-    r.lost_reasons,
+    r.reasons,
     p.path
 FROM path AS p
 LEFT JOIN completeness AS c ON p.path_id = c.path_id

@@ -22,8 +22,8 @@
 -- column: take_id BIGINT           Take at the end of the path; empty: not reached
 -- column: sink_ns BIGINT [epoch ns]  End of the flow
 -- column: latency_ns BIGINT [ns]   From the start of the root to the end
--- column: status VARCHAR           'reached', 'superseded', 'lost' or
---     'cut_by_recording'
+-- column: status VARCHAR           'reached', 'superseded', 'dropped', 'lost', 'no_output',
+--     'not_connected', 'cut_by_recording' or 'unknown'
 -- column: reason VARCHAR           Why it did not arrive
 -- column: path VARCHAR [path]  Nodes and topics
 -- slowest: latency_ns

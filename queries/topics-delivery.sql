@@ -1,11 +1,11 @@
 -- name: topics-delivery
--- title: Messages delivered, skipped and lost by topic and subscription
+-- title: Messages delivered, dropped and lost by topic and subscription
 -- description: What became of the messages published in the time window at each subscription of
---     their topic. Skipped: newer messages took their place in the queue. Lost: they did not arrive
---     or could not be taken. Unconnected: the two were not connected yet or any more, or the
---     recording ended. Unknown: events are lost, or the trace does not decide; such messages may
+--     their topic. Dropped: the queue was full, and newer messages took their place. Lost: they did
+--     not arrive or could not be taken. Not connected: the two were not connected yet or any more,
+--     or the recording ended. Unknown: events are lost, or the trace does not decide; such messages may
 --     have been delivered. Together with delivered, these counts add up to what was published. The
---     shares are of messages whose fate is known: delivered, skipped or lost. Only the depth of the
+--     shares are of messages whose fate is known: delivered, dropped or lost. Only the depth of the
 --     queue decides whether a message counts as overwritten or as lost on the way; incompatible
 --     QoS, lifespan and best effort do not show in a trace.
 -- grain: one row per topic and subscription
@@ -14,20 +14,20 @@
 -- column: subscriber VARCHAR [node]  Node that subscribes
 -- column: published BIGINT          Messages published on the topic in the time window
 -- column: delivered BIGINT          Of these, taken
--- column: skipped BIGINT            Of these, replaced by newer ones in the queue
--- column: lost BIGINT               Of these, lost
--- column: unconnected BIGINT        Of these, before or after the two were connected
+-- column: dropped BIGINT            Of these, those that newer ones replaced in a full queue
+-- column: lost BIGINT               Of these, lost on the way
+-- column: not_connected BIGINT      Of these, before or after the two were connected
 -- column: unknown BIGINT            Of these, with an unknown fate
--- column: delivered_percent DOUBLE [%]  Share delivered, of those delivered, skipped or lost
+-- column: delivered_percent DOUBLE [%]  Share delivered, of those delivered, dropped or lost
 -- column: lost_percent DOUBLE [%]   Share lost, of the same
 -- column: orphans BIGINT            Takes in the time window whose publication is not known
 -- column: reasons VARCHAR           Why messages were not taken, with counts
 -- column: orphan_reasons VARCHAR    Why publications are not known, with counts
 -- column: subscription_id BIGINT    Identity of the subscription
 -- column: is_internal BOOLEAN       ROS uses the topic for itself
--- brief: topic_name, subscriber, delivered, skipped, lost, delivered_percent, unknown,
---     lost_percent, published, reasons, unconnected, orphans, orphan_reasons
--- answer: delivered, lost, unknown
+-- brief: topic_name, subscriber, delivered, dropped, lost, delivered_percent, unknown,
+--     lost_percent, published, reasons, not_connected, orphans, orphan_reasons
+-- answer: delivered, dropped, lost, unknown
 WITH outcome AS (
     SELECT d.subscription_id, d.status, d.reason, count(*) AS number
     FROM main.stat_delivery AS d
@@ -42,9 +42,9 @@ delivery AS (
         subscription_id,
         sum(number)::BIGINT AS published,
         sum(CASE WHEN status = 'delivered' THEN number ELSE 0 END)::BIGINT AS delivered,
-        sum(CASE WHEN status = 'skipped' THEN number ELSE 0 END)::BIGINT AS skipped,
+        sum(CASE WHEN status = 'dropped' THEN number ELSE 0 END)::BIGINT AS dropped,
         sum(CASE WHEN status = 'lost' THEN number ELSE 0 END)::BIGINT AS lost,
-        sum(CASE WHEN status = 'unconnected' THEN number ELSE 0 END)::BIGINT AS unconnected,
+        sum(CASE WHEN status = 'not_connected' THEN number ELSE 0 END)::BIGINT AS not_connected,
         sum(CASE WHEN status = 'unknown' THEN number ELSE 0 END)::BIGINT AS unknown,
         string_agg(reason || ' ' || number, ', ' ORDER BY number DESC, reason) AS reasons
     FROM outcome
@@ -73,12 +73,12 @@ SELECT
     main.node_label(n.full_name, p.name, p.pid) AS subscriber,
     coalesce(d.published, 0) AS published,
     coalesce(d.delivered, 0) AS delivered,
-    coalesce(d.skipped, 0) AS skipped,
+    coalesce(d.dropped, 0) AS dropped,
     coalesce(d.lost, 0) AS lost,
-    coalesce(d.unconnected, 0) AS unconnected,
+    coalesce(d.not_connected, 0) AS not_connected,
     coalesce(d.unknown, 0) AS unknown,
-    100 * d.delivered / nullif(d.delivered + d.skipped + d.lost, 0) AS delivered_percent,
-    100 * d.lost / nullif(d.delivered + d.skipped + d.lost, 0) AS lost_percent,
+    100 * d.delivered / nullif(d.delivered + d.dropped + d.lost, 0) AS delivered_percent,
+    100 * d.lost / nullif(d.delivered + d.dropped + d.lost, 0) AS lost_percent,
     coalesce(o.orphans, 0) AS orphans,
     d.reasons,
     o.orphan_reasons,

@@ -101,7 +101,7 @@ def _items(flow: FlowVertices) -> dict[Key, Item]:
     for edge in flow.edges:
         cause = items[edge["from_kind"], edge["from_id"]]
         target = (edge["to_kind"], edge["to_id"])
-        effect = Item(flow.nodes[target]) if edge["link_kind"] == NOT_TAKEN else items[target]
+        effect = Item(flow.nodes[target]) if edge["to_kind"] == NOT_TAKEN else items[target]
         if edge is not effect.handover:
             cause.effects.append((effect, edge))
             effect.causes.append((cause, edge))

@@ -31,7 +31,6 @@ _BOUND = "\ue000"
 # Links that describe the effect in either direction, or need no words.
 _OF_EFFECT = ("transport", "service", "callback", "direct")
 # Reasons of the status 'unknown': the message may have been taken after all.
-_FATE_UNKNOWN = ("receiver_gap", "unknown", "reason unknown")
 _REQUEST = {
     "callback": "no callback was seen",
     "sending": "its sending was not seen",
@@ -187,9 +186,9 @@ class _Painter:
     def _details(self, item: Item, link: Row | None) -> list[str]:
         node = item.node
         if node["kind"] == "subscription":
+            status = "unknown" if link is None else link["link_kind"].replace("_", " ")
             reason = _reason(link)
-            is_known = reason not in _FATE_UNKNOWN
-            return [f"{'not taken' if is_known else 'take not known'}: {reason}"]
+            return [status if reason == status else f"{status}: {reason}"]
         details = [
             _waits(edge) for _, edge in item.causes if edge["link_kind"] in ("transport", "service")
         ]

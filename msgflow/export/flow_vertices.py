@@ -35,7 +35,8 @@ _NODE = (
     "otherwise_published",
 )
 _STATE = ("missing", "reason", "cut_count", "internal_count")
-NOT_TAKEN = "not_taken"
+# What a subscription did not take has such a vertex, and the status of the message as its link.
+NOT_TAKEN = "subscription"
 
 
 @dataclass(frozen=True, repr=False)
@@ -80,7 +81,7 @@ class FlowVertices:
         found: dict[Key, Row] = {}
         for row in self.table.to_pylist():
             # The edge says that a message was not taken: the subscription may miss several.
-            state = dict.fromkeys(_STATE) if row["link_kind"] == NOT_TAKEN else row
+            state = dict.fromkeys(_STATE) if row["kind"] == NOT_TAKEN else row
             node = {name: row[name] for name in _NODE} | {name: state[name] for name in _STATE}
             found.setdefault((row["kind"], row["id"]), node)
         return found
@@ -95,7 +96,7 @@ class FlowVertices:
                 "to_kind": row["kind"],
                 "to_id": row["id"],
                 **{name: row[name] for name in _LINK},
-                "reason": row["reason"] if row["link_kind"] == NOT_TAKEN else None,
+                "reason": row["reason"] if row["kind"] == NOT_TAKEN else None,
             }
             for row in self.table.to_pylist()
             if row["from_kind"] is not None

@@ -85,7 +85,9 @@ WHERE l.run_id = $run_id AND c.kind = 'timer'
 _CALLBACKS = "SELECT DISTINCT label FROM main.callback_label WHERE run_id = $run_id"
 _PROCESSES = "SELECT DISTINCT name FROM main.process WHERE run_id = $run_id"
 _NOT_DUE = "when it was due is not known: one call only, or its creation was not recorded"
-_ARRIVALS = "reached + superseded + lost"
+# Roots and messages that could arrive, as far as the recording shows.
+_ARRIVALS = "roots - not_connected - cut_by_recording"
+_CONNECTED = "published - not_connected"
 
 PATH = "path"
 SUBJECTS: dict[str, Subject] = {
@@ -103,8 +105,8 @@ SUBJECTS: dict[str, Subject] = {
                 "e2e-latency", f"reached / nullif({_ARRIVALS}, 0)", Dimension.SHARE, (), _ARRIVALS
             ),
             "loss": Metric(
-                "e2e-latency", f"lost / nullif({_ARRIVALS}, 0)", Dimension.SHARE, (), _ARRIVALS,
-                "lost_flow",
+                "e2e-latency", f"(dropped + lost) / nullif({_ARRIVALS}, 0)", Dimension.SHARE, (),
+                _ARRIVALS, "lost_flow",
             ),
         },
         dict.fromkeys(("e2e-latency", "e2e-latency-reaction", "e2e-latency-age"), "path"),
@@ -160,12 +162,12 @@ SUBJECTS: dict[str, Subject] = {
                 "topics-latency", "{}_ns", Dimension.TIME, _ALL, "linked", "message"
             ),
             "loss": Metric(
-                "topics-delivery", "lost / nullif(published - unconnected, 0)",
-                Dimension.SHARE, (), "published - unconnected",
+                "topics-delivery", f"(dropped + lost) / nullif({_CONNECTED}, 0)",
+                Dimension.SHARE, (), _CONNECTED,
             ),
             "completeness": Metric(
-                "topics-delivery", "delivered / nullif(published - unconnected, 0)",
-                Dimension.SHARE, (), "published - unconnected",
+                "topics-delivery", f"delivered / nullif({_CONNECTED}, 0)",
+                Dimension.SHARE, (), _CONNECTED,
             ),
         },
         {

@@ -15,7 +15,11 @@ if TYPE_CHECKING:
     from msgflow.run.choice import Run
 
 Row = dict[str, Any]
-QUERIES = ("e2e-latency", "timers", "topics-rate", "service-latency", "action-latency")
+QUERIES = (
+    "e2e-latency", "timers", "topics-rate", "topics-delivery", "service-latency", "action-latency",
+)  # fmt: skip
+# Of a good run nearly all messages are delivered.
+_DELIVERED_PERCENT = 99
 # With fewer values, a percentile is only their largest.
 LEAST_VALUES = 20
 # A topic that pauses or comes in bursts has no rate: the deviation of its period is larger.
@@ -28,6 +32,8 @@ _LEAST_LATENESS_NS = 1_000_000
 
 def suggest_targets(run: Run, results: Mapping[str, Sequence[Row]], margin: float) -> str:
     """Return the text of a file that `read_targets` reads, and that the run meets.
+
+    Comments behind its first line say what speaks against the run.
 
     Args:
         run: the measured run.
@@ -44,6 +50,7 @@ def suggest_targets(run: Run, results: Mapping[str, Sequence[Row]], margin: floa
     lines = [
         f"# What run {json.dumps(run.name)} met, and {100 * margin:.4g} % more: review it, keep"
         " what matters.",
+        *_undelivered(results["topics-delivery"]),
         "targets:" if entries else "targets: []",
     ]
     for kind, name, requirements in entries:
@@ -53,6 +60,17 @@ def suggest_targets(run: Run, results: Mapping[str, Sequence[Row]], margin: floa
 
 
 Entry = tuple[str, str, dict[str, str]]
+
+
+def _undelivered(rows: Sequence[Row]) -> Iterator[str]:
+    for row in rows:
+        share = row["delivered_percent"]
+        if share is not None and share < _DELIVERED_PERCENT:
+            way = json.dumps(f"{row['topic_name']} → {row['subscriber']}", ensure_ascii=False)
+            yield (
+                f"# {way}: only {share:.3g} % of the messages were delivered"
+                f" ({row['dropped']} dropped, {row['lost']} lost). Is this a good run?"
+            )
 
 
 def _paths(rows: Sequence[Row], margin: float) -> Iterator[Entry]:
@@ -68,7 +86,8 @@ def _paths(rows: Sequence[Row], margin: float) -> Iterator[Entry]:
             continue
         slow = max(row["p99_ns"] for row in group)
         share = min(
-            row["reached"] / (row["reached"] + row["superseded"] + row["lost"]) for row in group
+            row["reached"] / (row["roots"] - row["not_connected"] - row["cut_by_recording"])
+            for row in group
         )
         least = math.floor(100 * share * (1 - margin / 10))
         yield (

@@ -50,7 +50,7 @@ ORDER BY latency_ns DESC, root_ns, take_id LIMIT 1
 """,
     "lost_flow": """
 SELECT NULL::BIGINT AS latency_ns, root_ns, root_id, root_kind
-FROM ({}) WHERE path = $subject AND status = 'lost'
+FROM ({}) WHERE path = $subject AND status IN ('dropped', 'lost')
 ORDER BY root_ns, root_id LIMIT 1
 """,
 }

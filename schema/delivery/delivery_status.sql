@@ -1,13 +1,13 @@
 -- name: derive.delivery_status
 -- kind: macro
--- description: What a reason for a missing delivery means: newer messages were taken instead, the
---     message was lost, the two were not connected yet or any more, or the trace does not show it.
+-- description: What a reason for a missing delivery means: the queue was full, the message was lost
+--     on the way, the two were not connected yet or any more, or the trace does not show it.
 CREATE OR REPLACE MACRO derive.delivery_status(reason) AS
 CASE
-    WHEN reason = 'overwritten' THEN 'skipped'
+    WHEN reason = 'overwritten' THEN 'dropped'
     WHEN reason IN ('take_failed', 'not_delivered', 'lost_in_transport') THEN 'lost'
     WHEN reason IN (
         'before_subscription', 'subscription_ended', 'before_discovery', 'pending_at_end'
-    ) THEN 'unconnected'
+    ) THEN 'not_connected'
     ELSE 'unknown'
 END

@@ -63,7 +63,7 @@ CREATE OR REPLACE MACRO main.comparison(
     max_depth := 32, max_paths := 1000
 ) AS TABLE
 WITH thing AS (
-    -- A root counts once, however often it arrived; of those cut by the recording nothing is known.
+    -- A root counts once, however often it arrived; not those that could not arrive, or were cut.
     SELECT
         e.run_id,
         p.path AS subject,
@@ -77,7 +77,8 @@ WITH thing AS (
             WHEN wanted_case = 'newest' AND NOT e.is_newest THEN NULL
             ELSE e.latency_ns
         END AS value_ns,
-        e.is_first AND e.status <> 'cut_by_recording' AS is_unit,
+        e.is_first AND e.status NOT IN ('not_connected', 'cut_by_recording')
+            AS is_unit,
         e.status = 'reached' AS is_complete,
         e.is_loss_affected,
         p.is_cut

@@ -3,10 +3,11 @@
 -- description: Roots of paths, and what became of them. A root that reached the sink has one row
 --     per take there. Any other root has a single row with the reason. Roots are callback
 --     instances of timers that published, or publications (always with from_event 'publish'). The
---     time window applies to roots. A message that stopped a root is lost if others passed the same
---     step later, and earlier too if nobody took it; else it is cut by the recording. One that was
---     taken is lost as well if its process was recorded for longer than any flow of the path took,
---     and if its callback ended without an output or its node was inactive.
+--     time window applies to roots. If a root ends at a message that was not taken, its status is that of the
+--     message in main.stat_delivery. If the message was taken, the node may have ended the flow; or
+--     the recording cut it: no later message passed the step, and the process was not recorded for
+--     longer than any flow of the path took. It also cuts a root where the status of the message is
+--     unknown, and no earlier or no later message passed the step.
 -- grain: one row per path, root and take at the sink; one per path and root that did not reach it
 -- param: runs BIGINT[]  Runs to look at
 -- param: from_topic VARCHAR = NULL  Topics or nodes where flows start: names or globs, separated by
@@ -32,7 +33,9 @@
 --     shows a callback
 -- column: sink_ns BIGINT [epoch ns]  End of the flow
 -- column: latency_ns BIGINT [ns]  From the start of the root to the end
--- column: status VARCHAR  'reached', 'superseded', 'lost' or 'cut_by_recording'
+-- column: status VARCHAR  'reached'; 'superseded' (a newer input took its place in a cache);
+--     'dropped', 'lost' or 'not_connected', as in main.stat_delivery; 'no_output' (the node did not
+--     publish); 'cut_by_recording' (too close to its start or end to know) or 'unknown'
 -- column: reason VARCHAR  Why it did not arrive: 'no_output' (a callback ended without any),
 --     'node_inactive' (a managed node), 'not_published' (one or the other cannot be known),
 --     'superseded', 'callback_not_finished', or a reason of main.stat_delivery for the message that
@@ -233,9 +236,11 @@ SELECT
     r.sink_ns - r.root_ns AS latency_ns,
     CASE
         WHEN r.take_id IS NOT NULL THEN 'reached'
+        WHEN derive.delivery_status(x.reason) <> 'unknown' THEN derive.delivery_status(x.reason)
         WHEN x.is_cut THEN 'cut_by_recording'
         WHEN x.is_cached THEN 'superseded'
-        ELSE 'lost'
+        WHEN x.reason IN ('no_output', 'node_inactive') THEN 'no_output'
+        ELSE 'unknown'
     END AS status,
     CASE WHEN x.is_cached AND NOT x.is_cut THEN 'superseded' ELSE x.reason END AS reason,
     r.is_first,

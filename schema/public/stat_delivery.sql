@@ -10,8 +10,9 @@
 -- column: publisher_id BIGINT  Its publisher
 -- column: subscription_id BIGINT  Subscription that should have taken it
 -- column: take_id BIGINT  Take of the message; NULL: it was not taken, or that is not known
--- column: status VARCHAR  'delivered', 'skipped' (newer messages took its place), 'lost',
---     'unconnected' (before or after the two were connected, as far as traced) or 'unknown'
+-- column: status VARCHAR  'delivered', 'dropped' (the queue was full: newer messages took its
+--     place), 'lost' (on the way), 'not_connected' (before or after the two were connected, as far
+--     as traced) or 'unknown' (the trace does not tell)
 -- column: reason VARCHAR  Why it was not taken: 'before_subscription', 'subscription_ended',
 --     'receiver_gap', 'take_failed', 'before_discovery', 'not_delivered', 'overwritten',
 --     'lost_in_transport', 'pending_at_end' or 'unknown', the first that holds; NULL: delivered

@@ -47,8 +47,8 @@ def test_a_chain_goes_straight_down_and_what_was_asked_for_is_marked(robot: Data
         "  publish to take 40 ns (events were lost here)  take to callback 20 ns"
         "  ran NA: never seen to end  thread thread 1  Tracker::on_detections",
         "+250 ns  publishes /tracks  in 10 ns or more",
-        "├──      NA  /recorder  Subscription(/tracks)  not taken: lost_in_transport",
-        "└──      NA  /camera  Subscription(/tracks)  not taken: before_subscription",
+        "├──      NA  /recorder  Subscription(/tracks)  lost: lost_in_transport",
+        "└──      NA  /camera  Subscription(/tracks)  not connected: before_subscription",
     ]
 
 
@@ -129,8 +129,9 @@ def test_what_may_have_been_taken_is_not_called_untaken(
         )
     with database:
         tree = str(database.flow("/detections"))
-    assert f"/recorder  Subscription(/tracks)  take not known: {reason}\n" in tree
-    assert "/camera  Subscription(/tracks)  not taken: before_subscription" in tree
+    status = "unknown" if reason == "unknown" else f"unknown: {reason}"
+    assert f"/recorder  Subscription(/tracks)  {status}\n" in tree
+    assert "/camera  Subscription(/tracks)  not connected: before_subscription" in tree
 
 
 def test_the_copy_of_a_message_within_the_process_is_called_so(
@@ -155,8 +156,8 @@ def test_branches_are_indented_and_nothing_is_drawn_twice(robot: Database) -> No
         "  publish to take 40 ns (events were lost here)  take to callback 20 ns"
         "  ran NA: never seen to end  thread thread 1  Tracker::on_detections",
         "│   +240 ns  [1] publishes /tracks  in 10 ns or more",
-        "│   ├──      NA  /recorder  Subscription(/tracks)  not taken: lost_in_transport",
-        "│   └──      NA  /camera  Subscription(/tracks)  not taken: before_subscription",
+        "│   ├──      NA  /recorder  Subscription(/tracks)  lost: lost_in_transport",
+        "│   └──      NA  /camera  Subscription(/tracks)  not connected: before_subscription",
         "└── +120 ns  /tracker  Subscription(/image)  publish to take 90 ns (one of 2 candidates)"
         "  take to callback 20 ns  ran 10 ns  thread thread 1  Tracker::on_image",
         "    +240 ns  see [1]  publishes /tracks",
@@ -274,12 +275,15 @@ def test_json_has_each_node_once_and_all_edges(robot: Database) -> None:
     ends = {(edge["from_kind"], edge["from_id"]) for edge in content["edges"]}
     ends |= {(edge["to_kind"], edge["to_id"]) for edge in content["edges"]}
     assert ends == set(keys)
-    reasons = {
-        (edge["to_id"], edge["reason"])
+    fates = {
+        (edge["to_id"], edge["link_kind"], edge["reason"])
         for edge in content["edges"]
-        if edge["link_kind"] == "not_taken"
+        if edge["to_kind"] == "subscription"
     }
-    assert reasons == {(4, "lost_in_transport"), (6, "before_subscription")}
+    assert fates == {
+        (4, "lost", "lost_in_transport"),
+        (6, "not_connected", "before_subscription"),
+    }
 
 
 def test_the_message_is_the_first_at_or_after_a_time(small_database: Path) -> None:

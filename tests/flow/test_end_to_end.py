@@ -11,6 +11,7 @@ import duckdb
 import pyarrow.compute as pc
 import pytest
 from analysis import Analysis
+from fates import FATES
 from golden import SYSTEMS, fill
 from ros_system import RosSystem
 from staged_events import Thread
@@ -148,13 +149,13 @@ def test_what_became_of_every_root(built: Analysis, chain: Chain) -> None:
         begin, end = times[f"{root} start"], times[f"{sink} end"]
         expected.append(("callback_instance", begin, end, end - begin, "reached", None))
     for root, status, reason in (
-        ("A", "cut_by_recording", "before_discovery"),
+        ("A", "not_connected", "before_discovery"),
         ("D", "lost", "lost_in_transport"),
-        ("E", "lost", "no_output"),
+        ("E", "no_output", "no_output"),
         ("F", "lost", "lost_in_transport"),
-        ("G", "lost", "callback_not_finished"),
-        ("I", "cut_by_recording", "pending_at_end"),
-        ("J", "cut_by_recording", "pending_at_end"),
+        ("G", "unknown", "callback_not_finished"),
+        ("I", "not_connected", "pending_at_end"),
+        ("J", "not_connected", "pending_at_end"),
     ):
         begin = times[f"{root} start"]
         expected.append(("callback_instance", begin, None, None, status, reason))
@@ -233,8 +234,8 @@ def test_from_the_middle_the_publication_is_the_root(built: Analysis, chain: Cha
     ]
     expected += [
         ("publication", at["16 published"], None, "lost"),
-        ("publication", at["17 published"], None, "lost"),
-        ("publication", at["19 published"], None, "cut_by_recording"),
+        ("publication", at["17 published"], None, "unknown"),
+        ("publication", at["19 published"], None, "not_connected"),
     ]
     assert sorted(rows, key=str) == sorted(expected, key=str)
 
@@ -247,9 +248,9 @@ def test_to_the_middle_the_relay_is_the_sink(built: Analysis, chain: Chain) -> N
         (at[f"{root} start"], at[f"{message} end"], "reached") for root, message in heard
     ]
     expected += [
-        (at["A start"], None, "cut_by_recording"),
+        (at["A start"], None, "not_connected"),
         (at["D start"], None, "lost"),
-        (at["J start"], None, "cut_by_recording"),
+        (at["J start"], None, "not_connected"),
     ]
     assert sorted(rows, key=str) == sorted(expected, key=str)
 
@@ -263,7 +264,7 @@ def test_the_time_window_is_that_of_the_roots(built: Analysis, chain: Chain) -> 
         (at["C start"], at["13 end"], "reached"),
         (at["C start"], at["113 end"], "reached"),
         (at["D start"], None, "lost"),
-        (at["E start"], None, "lost"),
+        (at["E start"], None, "no_output"),
     ]
 
 
@@ -283,14 +284,17 @@ def test_the_query(built: Analysis, chain: Chain, case: str, sinks: list[tuple[s
     result = run_query(built.connection, load_query("e2e-latency"), {"case": case})
     (row,) = result.to_arrow().to_pylist()
     assert row["path"] == "/talker → /a → /relay → /b → /sink"
-    counts = {
-        name: row[name] for name in ("roots", "reached", "superseded", "lost", "cut_by_recording")
-    }
-    assert counts == {"roots": 10, "reached": 3, "superseded": 0, "lost": 4, "cut_by_recording": 3}
+    counts = {name: row[name] for name in ("roots", *FATES)}
+    assert {name: number for name, number in counts.items() if number} == {
+        "roots": 10, "reached": 3, "lost": 2, "no_output": 1, "not_connected": 3, "unknown": 1,
+    }  # fmt: skip
     assert row["pairs"] == len(latencies)
     assert (row["min_ns"], row["max_ns"]) == (latencies[0], latencies[-1])
     assert row["median_ns"] == latencies[(len(latencies) - 1) // 2]
-    assert row["lost_reasons"] == "callback_not_finished 1, lost_in_transport 2, no_output 1"
+    assert row["reasons"] == (
+        "lost_in_transport 2, pending_at_end 2, before_discovery 1, callback_not_finished 1,"
+        " no_output 1"
+    )
 
 
 def graph(system: RosSystem, *edges: tuple[str | None, int, str], rounds: int = 1) -> None:

@@ -62,7 +62,7 @@ def test_what_was_not_taken_is_what_no_link_shows(analysis: Analysis, every: int
         )
         found = analysis.rows(
             f"SELECT id FROM flow_step('publication', {number}, direction := 'forward', "
-            "max_depth := 0) WHERE link_kind = 'not_taken'"
+            "max_depth := 0) WHERE kind = 'subscription'"
         )
         assert set(found) == subscriptions
         shown += len(found)

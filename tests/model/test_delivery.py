@@ -84,7 +84,7 @@ def test_before_the_subscription_there_was(pair: Pair, analyse: Analyse) -> None
     pair.add_subscription()
     pair.send_and_hear(2)
     assert analyse(pair).rows(REASONS) == [
-        (1, "unconnected", "before_subscription"),
+        (1, "not_connected", "before_subscription"),
         (2, "delivered", None),
     ]
 
@@ -128,8 +128,8 @@ def test_a_subscription_ends_where_its_handle_is_used_again(pair: Pair, analyse:
     pair.send_and_hear(2)
     assert analyse(pair).rows(REASONS) == [
         (1, "delivered", None),
-        (1, "unconnected", "before_subscription"),
-        (2, "unconnected", "subscription_ended"),
+        (1, "not_connected", "before_subscription"),
+        (2, "not_connected", "subscription_ended"),
         (2, "delivered", None),
     ]
 
@@ -202,7 +202,7 @@ def test_a_queue_that_was_full(pair: Pair, analyse: Analyse) -> None:
         5: None,
         6: None,
     }
-    assert ("skipped",) in model.rows("SELECT DISTINCT status FROM stat_delivery")
+    assert ("dropped",) in model.rows("SELECT DISTINCT status FROM stat_delivery")
 
 
 @pytest.mark.thorough

@@ -5,7 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
+from fates import FATES
 from ingested import Ingested
+
+from msgflow.query.catalogue import load_query
+from msgflow.query.runner import run_query
 
 FINDINGS = """
 SELECT name, subject, count, detail FROM finding WHERE severity <> 'info' ORDER BY ALL
@@ -98,10 +102,39 @@ def test_deferred_responses_before_kilted(recordings: Callable[[str], Ingested])
 
 
 def test_a_join_that_the_other_input_triggers(recordings: Callable[[str], Ingested]) -> None:
-    """After the first twelve, /rear_tf is always last: roots at /front are lost, not cut."""
+    """After the first twelve, /rear_tf is always last: at /front the node ends flows, no cut."""
     recording = recordings("real_reference/ust")
     counts = recording.rows(
         "SELECT e.status, count(*) FROM end_to_end([1], '/front', '/ground') AS e "
         "WHERE e.is_first GROUP BY ALL ORDER BY ALL"
     )
-    assert counts == [("cut_by_recording", 1), ("lost", 46), ("reached", 12)]
+    assert counts == [("cut_by_recording", 1), ("no_output", 46), ("reached", 12)]
+
+
+def test_two_queries_say_the_same_of_the_same_messages(
+    recordings: Callable[[str], Ingested],
+) -> None:
+    """Where a path has a queue that drops, its roots end as the messages on the topic do."""
+    connection = recordings("real_overload/ust").connection
+    delivery = {
+        (row["topic_name"], row["subscriber"]): row
+        for row in run_query(connection, load_query("topics-delivery"), {}).to_arrow().to_pylist()
+        if row["delivered"]
+    }
+    paths = {
+        row["path"]: row
+        for row in run_query(connection, load_query("e2e-latency"), {}).to_arrow().to_pylist()
+    }
+    sensor, fast, slow = (
+        delivery[way] for way in (("/sensor", "/slow"), ("/fast", "/slow"), ("/slow_out", "/late"))
+    )
+    words = ("dropped", "lost", "not_connected", "unknown")
+    root = paths["/talker → /sensor → /slow"]
+    assert [root[word] for word in words] == [sensor[word] for word in words] == [438, 0, 14, 0]
+    assert (root["roots"], root["reached"]) == (sensor["published"], sensor["delivered"])
+    assert root["reasons"] == sensor["reasons"]
+    root = paths["/talker → /fast → /slow → /slow_out → /late"]
+    both = [fast[word] + slow[word] for word in words]
+    assert [root[word] for word in words] == both == [981, 0, 112, 0]
+    assert (root["reached"], root["no_output"]) == (slow["delivered"], 1)
+    assert sum(root[word] for word in FATES) == root["roots"] == fast["published"]

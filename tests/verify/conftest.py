@@ -8,7 +8,7 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from golden import SYSTEMS, fill
+from golden import SYSTEMS, fill, fill_case
 
 from msgflow.database import Database
 from msgflow.db.derivation import derive
@@ -40,6 +40,16 @@ def goals(empty_database: Path, tmp_path: Path) -> Path:
     with duckdb.connect(str(path)) as connection:
         fill(connection)
         connection.execute((SYSTEMS / "many_goals.sql").read_text())
+    return path
+
+
+@pytest.fixture
+def overwritten(empty_database: Path, tmp_path: Path) -> Path:
+    """A database with a queue that is full now and then."""
+    path = Path(shutil.copy(empty_database, tmp_path / "overwritten.duckdb"))
+    cases = Path(__file__).parents[1] / "query" / "cases"
+    with duckdb.connect(str(path)) as connection:
+        fill_case(connection, cases / "e2e-latency" / "lost_and_edge.case")
     return path
 
 

@@ -186,15 +186,41 @@ def test_lost_messages_are_a_share_of_those_connected(tmp_path: Path) -> None:
         found = rows(database.verify(targets))
         delivery = database.query("topics-delivery").to_arrow().to_pylist()
     for row in delivery:
-        connected = row["published"] - row["unconnected"]
+        connected = row["published"] - row["not_connected"]
         values = {
             one["metric"]: one["value"]
             for one in found
             if one["subject"] == f"{row['topic_name']} → {row['subscriber']}"
         }
-        assert values["loss"] == pytest.approx(row["lost"] / connected)
+        assert values["loss"] == pytest.approx((row["dropped"] + row["lost"]) / connected)
         assert values["completeness"] == pytest.approx(row["delivered"] / connected, abs=1e-4)
     assert any(row["value"] < 1 for row in found if row["metric"] == "completeness")
+
+
+def test_roots_that_a_queue_dropped_are_losses(overwritten: Path, check: Check) -> None:
+    """Of ten roots, two were not connected and two cut; two of the others were dropped."""
+    text = """
+targets:
+  - path: [/a, /b]
+    loss: < 30 %
+    completeness: "> 60 %"
+"""
+    loss, completeness = sorted(rows(check(text, overwritten)), key=lambda row: row["line"])
+    assert (loss["value"], loss["samples"]) == (pytest.approx(2 / 6), 6)
+    assert (completeness["value"], completeness["samples"]) == (pytest.approx(3 / 6), 6)
+    assert (loss["verdict"], loss["see"]) == ("failed", "msgflow flow --callback-instance 3")
+
+
+def test_a_suggestion_says_what_was_not_delivered(overwritten: Path) -> None:
+    with Database(overwritten) as database:
+        first, *lines = database.suggest_targets().splitlines()
+    assert first.startswith("# What run ")
+    said = [line for line in lines if line.startswith("#")]
+    assert said == [
+        f"# {way}: only {share} % of the messages were delivered (1 dropped, 0 lost)."
+        " Is this a good run?"
+        for way, share in (('"/a → /filter"', "87.5"), ('"/b → /sink"', "80"))
+    ]
 
 
 @pytest.mark.parametrize("name", few(["demo", "services", "actions"], "services", "actions"))

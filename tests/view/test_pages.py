@@ -18,6 +18,9 @@ from msgflow.sim import simulate
 Read = Callable[[Path], duckdb.DuckDBPyConnection]
 Report = Callable[..., str]
 Serve = Callable[[Path], Served]
+SELDOM = (
+    "superseded", "no_output", "not_connected", "unknown", "cut_by_recording", "loss_affected",
+)  # fmt: skip
 
 
 def cells(page: Page, table: str) -> list[list[str]]:
@@ -38,13 +41,12 @@ def test_paths(way: str, demo: Path, serve: Serve, report: Report, page: Page, r
     page.go("#/paths")
     latency.sort(key=lambda row: -(row["p99_ns"] or 0))
     durations = ("median_ns", "p95_ns", "p99_ns", "max_ns", "min_ns", "mean_ns")
-    counts = ("roots", "reached", "superseded", "lost", "cut_by_recording", "loss_affected")
+    counts = ("roots", "reached", "dropped", "lost", *SELDOM)
     # Of these, what is 0 on every path is left out.
-    seldom = ("superseded", "cut_by_recording", "loss_affected")
     counts = tuple(
-        name for name in counts if name not in seldom or any(row[name] for row in latency)
+        name for name in counts if name not in SELDOM or any(row[name] for row in latency)
     )
-    reasons = ["lost_reasons"] if any(row["lost_reasons"] for row in latency) else []
+    reasons = ["reasons"] if any(row["reasons"] for row in latency) else []
     wanted = [
         [
             row["path"],

@@ -10,7 +10,12 @@
 -- column: roots BIGINT             Flows that began
 -- column: reached BIGINT           Roots that reached the end of the path
 -- column: superseded BIGINT        Roots replaced by a newer input before they were used
--- column: lost BIGINT              Roots lost on the way although later ones arrived
+-- column: dropped BIGINT           Roots that ended in a full queue: newer messages took their place
+-- column: lost BIGINT              Roots that were lost on the way
+-- column: no_output BIGINT         Roots that ended at a node that did not publish
+-- column: not_connected BIGINT     Roots that ended before or after a publisher and a subscription
+--     were connected
+-- column: unknown BIGINT           Roots of which the trace does not tell where they ended
 -- column: cut_by_recording BIGINT  Roots too close to the start or end of a recording to know
 -- column: loss_affected BIGINT     Roots with a gap of a trace in their time
 -- column: pairs BIGINT             Pairs of root and arrival that the latencies are computed from
@@ -24,10 +29,11 @@
 -- column: max_ns BIGINT [ns]       Longest latency
 -- column: sink_event VARCHAR       Events that stopped the clock
 -- column: is_cut BOOLEAN           The path goes on or has siblings beyond the limits of the query
--- column: lost_reasons VARCHAR     Why roots were lost or superseded, with counts
+-- column: reasons VARCHAR          Why roots did not reach the end of the path, with counts
 -- column: path VARCHAR [path]  Nodes and topics
--- brief: path, median_ns, p95_ns, max_ns, runs, reached, roots, lost, superseded, p99_ns,
---     cut_by_recording, lost_reasons, mean_ns, min_ns, loss_affected, pairs
+-- brief: path, median_ns, p95_ns, max_ns, runs, reached, roots, dropped, lost,
+--     superseded, no_output, p99_ns, not_connected, unknown, cut_by_recording, reasons, mean_ns,
+--     min_ns, loss_affected, pairs
 WITH arrival AS MATERIALIZED (
     SELECT
         g.label_group, f.run, f.path, f.path_id, f.root_kind, f.root_id, f.latency_ns,
@@ -48,7 +54,11 @@ completeness AS (
         count(*) AS roots,
         count(*) FILTER (WHERE status = 'reached') AS reached,
         count(*) FILTER (WHERE status = 'superseded') AS superseded,
+        count(*) FILTER (WHERE status = 'dropped') AS dropped,
         count(*) FILTER (WHERE status = 'lost') AS lost,
+        count(*) FILTER (WHERE status = 'no_output') AS no_output,
+        count(*) FILTER (WHERE status = 'not_connected') AS not_connected,
+        count(*) FILTER (WHERE status = 'unknown') AS unknown,
         count(*) FILTER (WHERE status = 'cut_by_recording') AS cut_by_recording
     FROM arrival
     WHERE is_first
@@ -65,11 +75,11 @@ affected AS (
 ),
 reason AS (
     SELECT
-        label_group, path, string_agg(reason || ' ' || number, ', ' ORDER BY reason) AS lost_reasons
+        label_group, path, string_agg(reason || ' ' || number, ', ' ORDER BY number DESC, reason) AS reasons
     FROM (
         SELECT label_group, path, reason, count(*) AS number
         FROM arrival
-        WHERE is_first AND status IN ('lost', 'superseded')
+        WHERE is_first AND status <> 'reached'
         GROUP BY label_group, path, reason
     )
     GROUP BY label_group, path
@@ -105,7 +115,11 @@ SELECT
     coalesce(c.roots, 0) AS roots,
     coalesce(c.reached, 0) AS reached,
     coalesce(c.superseded, 0) AS superseded,
+    coalesce(c.dropped, 0) AS dropped,
     coalesce(c.lost, 0) AS lost,
+    coalesce(c.no_output, 0) AS no_output,
+    coalesce(c.not_connected, 0) AS not_connected,
+    coalesce(c.unknown, 0) AS unknown,
     coalesce(c.cut_by_recording, 0) AS cut_by_recording,
     coalesce(a.number, 0) AS loss_affected,
     coalesce(l.pairs, 0) AS pairs,
@@ -118,7 +132,7 @@ SELECT
     l.max_ns,
     l.sink_event,
     k.is_cut,
-    r.lost_reasons,
+    r.reasons,
     k.path
 FROM known AS k
 LEFT JOIN completeness AS c ON k.label_group = c.label_group AND k.path = c.path

@@ -1,7 +1,8 @@
 -- name: fleet.page_point
 -- title: Latencies of every path, run by run
 -- kind: inline
--- description: Quantiles of the first arrivals of each run, and how many flows began and were lost.
+-- description: Quantiles of the first arrivals of each run, and how many flows began, arrived,
+--     and were dropped or lost.
 -- grain: one row per path and run
 -- column: path VARCHAR [path]     Nodes and topics
 -- column: run VARCHAR             Key of the run
@@ -10,7 +11,8 @@
 -- column: max_ns BIGINT [ns]      Longest latency
 -- column: roots BIGINT            Flows that began
 -- column: reached BIGINT          Flows that reached the end of the path
--- column: lost BIGINT             Flows that were lost
+-- column: dropped BIGINT          Flows that ended in a full queue
+-- column: lost BIGINT             Flows that were lost on the way
 SELECT
     f.path,
     f.run,
@@ -19,6 +21,7 @@ SELECT
     max(f.latency_ns) FILTER (WHERE f.status = 'reached') AS max_ns,
     count(*) AS roots,
     count(*) FILTER (WHERE f.status = 'reached') AS reached,
+    count(*) FILTER (WHERE f.status = 'dropped') AS dropped,
     count(*) FILTER (WHERE f.status = 'lost') AS lost
 FROM flow AS f
 JOIN run AS r ON f.run = r.run

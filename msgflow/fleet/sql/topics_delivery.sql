@@ -1,5 +1,5 @@
 -- name: fleet.topics_delivery
--- title: Messages delivered, skipped and lost by topic and receiver, of many runs
+-- title: Messages delivered, dropped and lost by topic and receiver, of many runs
 -- description: As the query topics --measure delivery says it of one run. Counts are added, and the shares are of
 --     their sums.
 -- grain: one row per topic, receiving node and group of runs
@@ -7,34 +7,34 @@
 -- column: topic_name VARCHAR [topic]  Topic
 -- column: subscriber VARCHAR [node]  Node that subscribes
 -- column: runs BIGINT               Runs that have it
--- column: lossy_runs BIGINT         Of these, runs in which messages were lost
+-- column: lossy_runs BIGINT         Of these, runs in which messages were dropped or lost
 -- column: published BIGINT          Messages published on the topic
 -- column: delivered BIGINT          Of these, taken
--- column: skipped BIGINT            Of these, replaced by newer ones in the queue
--- column: lost BIGINT               Of these, lost
--- column: unconnected BIGINT        Of these, before or after the two were connected
+-- column: dropped BIGINT            Of these, those that newer ones replaced in a full queue
+-- column: lost BIGINT               Of these, lost on the way
+-- column: not_connected BIGINT      Of these, before or after the two were connected
 -- column: unknown BIGINT            Of these, with an unknown fate
--- column: delivered_percent DOUBLE [%]  Share delivered, of those delivered, skipped or lost
+-- column: delivered_percent DOUBLE [%]  Share delivered, of those delivered, dropped or lost
 -- column: lost_percent DOUBLE [%]   Share lost, of the same
 -- column: orphans BIGINT            Takes whose publication is not known
 -- column: reasons VARCHAR           Why messages were not taken, with counts
 -- column: orphan_reasons VARCHAR    Why publications are not known, with counts
 -- column: is_internal BOOLEAN       ROS uses the topic for itself
--- brief: topic_name, subscriber, delivered, skipped, lost, delivered_percent, runs, lossy_runs,
---     unknown, lost_percent, published, reasons, unconnected, orphans, orphan_reasons
--- answer: delivered, lost, unknown
+-- brief: topic_name, subscriber, delivered, dropped, lost, delivered_percent, runs, lossy_runs,
+--     unknown, lost_percent, published, reasons, not_connected, orphans, orphan_reasons
+-- answer: delivered, dropped, lost, unknown
 WITH merged AS (
     SELECT
         g.label_group,
         d.topic_name,
         d.subscriber,
         count(DISTINCT d.run) AS runs,
-        count(DISTINCT d.run) FILTER (WHERE d.lost > 0) AS lossy_runs,
+        count(DISTINCT d.run) FILTER (WHERE d.dropped + d.lost > 0) AS lossy_runs,
         sum(d.published)::BIGINT AS published,
         sum(d.delivered)::BIGINT AS delivered,
-        sum(d.skipped)::BIGINT AS skipped,
+        sum(d.dropped)::BIGINT AS dropped,
         sum(d.lost)::BIGINT AS lost,
-        sum(d.unconnected)::BIGINT AS unconnected,
+        sum(d.not_connected)::BIGINT AS not_connected,
         sum(d.unknown)::BIGINT AS unknown,
         sum(d.orphans)::BIGINT AS orphans,
         bool_and(d.is_internal) AS is_internal
@@ -50,12 +50,12 @@ SELECT
     m.lossy_runs,
     m.published,
     m.delivered,
-    m.skipped,
+    m.dropped,
     m.lost,
-    m.unconnected,
+    m.not_connected,
     m.unknown,
-    100.0::DOUBLE * m.delivered / nullif(m.delivered + m.skipped + m.lost, 0) AS delivered_percent,
-    100.0::DOUBLE * m.lost / nullif(m.delivered + m.skipped + m.lost, 0) AS lost_percent,
+    100.0::DOUBLE * m.delivered / nullif(m.delivered + m.dropped + m.lost, 0) AS delivered_percent,
+    100.0::DOUBLE * m.lost / nullif(m.delivered + m.dropped + m.lost, 0) AS lost_percent,
     m.orphans,
     r.text AS reasons,
     o.text AS orphan_reasons,

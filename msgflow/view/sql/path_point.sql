@@ -13,7 +13,8 @@
 -- column: latency BIGINT [ns]  Latency; of the slowest in the piece
 -- column: median BIGINT [ns]  Median of the piece; the latency itself where flows are one by one
 -- column: count BIGINT  Flows in the piece
--- column: missing BIGINT  Of these, flows that did not arrive, those cut by the recording left out
+-- column: missing BIGINT  Of these, flows that did not arrive; not those that were not connected, or
+--     that the recording cut
 WITH numbered AS (
     SELECT
         root_at, root_kind, root_id, take_id, latency, status,
@@ -31,7 +32,7 @@ SELECT
     max(latency) AS latency,
     quantile_disc(latency, 0.5) AS median,
     count(*) AS count,
-    count(*) FILTER (WHERE status IN ('lost', 'superseded')) AS missing
+    count(*) FILTER (WHERE status NOT IN ('reached', 'not_connected', 'cut_by_recording')) AS missing
 FROM numbered
 GROUP BY
     CASE WHEN number <= $limit THEN root_id

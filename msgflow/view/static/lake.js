@@ -13,7 +13,7 @@ const WITHOUT = "(none)";
 // Of an axis of time, seconds: so that days begin at midnight, UTC.
 const DAY = 86400;
 const STEPS = [1, 5, 15, 60, 300, 900, 3600, 7200, 21600, 43200, DAY, 2 * DAY, 7 * DAY, 14 * DAY, 28 * DAY, 91 * DAY, 364 * DAY];
-const PATH_COLUMNS = ["path", "median_ns", "p95_ns", "p99_ns", "max_ns", "runs", "roots", "reached", "lost", "superseded"];
+const PATH_COLUMNS = ["path", "median_ns", "p95_ns", "p99_ns", "max_ns", "runs", "roots", "reached", "dropped", "lost", "superseded"];
 
 export class LakePage {
   constructor(app, root) {

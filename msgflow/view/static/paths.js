@@ -8,10 +8,14 @@ import { command, doubt, doubtHelp, failed, notes, waiting } from "./notice.js";
 import { chart, redrawCharts } from "./chart.js";
 import { doubted, pathNumbers } from "./overview.js";
 
-const COLUMNS = ["path", "median_ns", "p95_ns", "p99_ns", "max_ns", "min_ns", "mean_ns", "roots", "reached", "superseded", "lost", "cut_by_recording", "loss_affected", "lost_reasons"];
+const COLUMNS = ["path", "median_ns", "p95_ns", "p99_ns", "max_ns", "min_ns", "mean_ns", "roots", "reached", "dropped", "lost", "superseded", "no_output", "not_connected", "unknown", "cut_by_recording", "loss_affected", "reasons"];
 // Shown only where they are not 0 or empty on every path.
-const SELDOM = ["superseded", "cut_by_recording", "loss_affected", "lost_reasons"];
-const FATES = [["reached", "reached the end", "good"], ["superseded", "superseded by a newer input", "color-faint"], ["lost", "lost", "error"], ["cut_by_recording", "cut by the recording", "wait"]];
+const SELDOM = ["superseded", "no_output", "not_connected", "unknown", "cut_by_recording", "loss_affected", "reasons"];
+const FATES = [
+  ["reached", "reached the end", "good"], ["superseded", "superseded by a newer input", "faint"], ["dropped", "dropped: a queue was full", "second"],
+  ["lost", "lost on the way", "error"], ["no_output", "no output: a node did not publish", "blocked"], ["not_connected", "not connected", "subscription"],
+  ["unknown", "unknown: the trace does not tell", "soft"], ["cut_by_recording", "cut by the recording", "wait"],
+];
 
 export class PathsPage {
   constructor(app, root) {
@@ -101,19 +105,19 @@ export class PathsPage {
     const legend = h("div", { className: "legend" });
     for (const [name, text, shade] of FATES) {
       const number = table[name][row];
-      const shadeName = shade.replace("color-", "");
+      if (!number && SELDOM.includes(name)) continue;
       if (number) {
         const piece = h("span", { className: "fate" });
         piece.style.width = `${(100 * number) / total}%`;
-        piece.style.background = color(shadeName);
+        piece.style.background = color(shade);
         track.append(piece);
       }
       const swatch = h("span", { className: "swatch" });
-      swatch.style.background = color(shadeName);
+      swatch.style.background = color(shade);
       legend.append(h("span", { className: "legend-item" }, swatch, `${text}: ${number.toLocaleString("en-US")} (${percent(number / total)})`));
     }
     return [h("p", {}, `${count(total, "flow")} began; ${duration(table.median_ns[row])} median, ${duration(table.p95_ns[row])} p95, ${duration(table.p99_ns[row])} p99, ${duration(table.max_ns[row])} at most`, this.isDoubted(row) && doubt(), "."),
-      track, legend, table.lost_reasons[row] && h("p", { className: "soft" }, `Reasons: ${table.lost_reasons[row]}`)];
+      track, legend, table.reasons[row] && h("p", { className: "soft" }, `Reasons: ${table.reasons[row]}`)];
   }
 
   breakdown(breakdown, path) {

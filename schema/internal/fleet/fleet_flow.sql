@@ -16,7 +16,8 @@
 --     never shows a callback
 -- column: sink_ns BIGINT [epoch ns]  End of the flow
 -- column: latency_ns BIGINT [ns]  From the start of the root to the end
--- column: status VARCHAR  'reached', 'superseded', 'lost' or 'cut_by_recording'
+-- column: status VARCHAR  'reached', 'superseded', 'dropped', 'lost', 'no_output',
+--     'not_connected', 'cut_by_recording' or 'unknown'
 -- column: reason VARCHAR  Why it did not arrive
 -- column: is_first BOOLEAN  First arrival of the root
 -- column: is_last BOOLEAN  Last arrival of the root

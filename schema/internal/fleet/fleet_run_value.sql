@@ -14,7 +14,7 @@
 -- column: value_ns BIGINT [ns]  Its value in the run; NULL: no flow of it was measured
 -- column: is_enough BOOLEAN  At least 20 values in the run, and five beyond the quantile
 -- column: number BIGINT  Values of the run
--- column: roots BIGINT  Roots, without those cut by the recording
+-- column: roots BIGINT  Roots, without those not connected or cut by the recording
 -- column: reached BIGINT  Those of them that reached the end
 -- column: loss_affected BIGINT  Those of them that have a gap of a trace in their time
 -- column: is_cut BOOLEAN  Paths of the run were left out beyond the limits
@@ -42,7 +42,7 @@ measured AS (
             path,
             status,
             is_loss_affected,
-            is_first AND status <> 'cut_by_recording' AS is_root,
+            is_first AND status NOT IN ('not_connected', 'cut_by_recording') AS is_root,
             CASE
                 WHEN status <> 'reached' THEN NULL
                 WHEN $case = 'first' AND NOT is_first THEN NULL

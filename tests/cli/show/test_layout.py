@@ -170,15 +170,15 @@ def test_a_zero_that_is_the_answer_is_shown(width: int) -> None:
         [
             {
                 "topic_name": "/perception/camera/image", "subscriber": "/perception/detector",
-                "published": 299, "delivered": 298, "unconnected": 1, "delivered_percent": 100.0,
+                "published": 299, "delivered": 298, "not_connected": 1, "delivered_percent": 100.0,
                 "lost_percent": 0.0, "reasons": "pending_at_end 1", "subscription_id": 4,
             },
         ] * 2,
     )  # fmt: skip
     titles = {column.title for column in lay_out(delivery, width).columns}
-    assert {"delivered", "lost", "unknown"} <= titles
+    assert {"delivered", "dropped", "lost", "unknown"} <= titles
     assert width < 100 or "delivered_percent" in titles
-    assert "skipped" not in titles
+    assert "orphans" not in titles
 
 
 def pieces(rank: int, latency_ns: int, path: str) -> list[dict[str, Any]]:
