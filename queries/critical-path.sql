@@ -6,6 +6,7 @@
 --     the timer that was not due yet, or the message that was still missing and how that came
 --     about. The pieces add up to the latency exactly. Unless detail is full, pieces below 1 % of
 --     the latency are summed up in one line, 'rest', and the layers of publishing are one piece.
+--     Flows with a message that was stored until its subscription existed come after all others.
 -- grain: one row per flow and piece, node or activity
 -- param: from VARCHAR = NULL  Topics or nodes where flows start: names or globs, separated by
 --     commas (default: any)
@@ -33,7 +34,7 @@
 -- column: duration_ns BIGINT [ns]  Duration; negative if parts of the flow overlap
 -- column: hop BIGINT               Number of the message on the path that it belongs or leads to
 -- column: part VARCHAR             Part of the flow: 'callback', 'cache', 'request_to_take',
---     'service', 'response_to_take', 'publish' or its layer, 'publish_to_take' or
+--     'service', 'response_to_take', 'publish' or its layer, 'stored', 'publish_to_take' or
 --     'take_to_callback'
 -- column: activity VARCHAR         What happened: the part itself; up to a take 'network_or_idle',
 --     'executor_busy' (it ran something else), 'blocked' (a callback ran that excludes the waiting

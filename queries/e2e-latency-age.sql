@@ -39,7 +39,7 @@ WITH output AS (
         path_id,
         sink_event,
         sink_ns,
-        latency_ns AS age_ns,
+        sink_ns - root_ns AS age_ns,
         is_loss_affected,
         lead(sink_ns) OVER (PARTITION BY path_id ORDER BY sink_ns, take_id) - root_ns AS peak_ns
     FROM main.end_to_end(

@@ -36,6 +36,8 @@
 -- column: loss_affected BIGINT     Roots with a gap of a trace in their time: their status may be
 --     wrong
 -- column: pairs BIGINT             Pairs of root and arrival that the latencies are computed from
+-- column: stored BIGINT            Pairs left out of the latencies: a message on the way was
+--     published before its subscription existed, and stored until then
 -- column: looped BIGINT            Later messages at the end of the path that descend from an
 --     arrival there through a loop. They are not pairs, since a path visits no subscription twice
 -- column: min_ns BIGINT [ns]       Shortest latency
@@ -51,7 +53,7 @@
 -- column: path VARCHAR [path]  Nodes and topics
 -- brief: path, median_ns, p95_ns, max_ns, reached, roots, dropped, lost, superseded,
 --     no_output, p99_ns, not_connected, unknown, cut_by_recording, reasons, mean_ns, min_ns,
---     loss_affected, pairs
+--     loss_affected, pairs, stored
 -- note: clocks
 WITH flow AS (
     SELECT
@@ -112,7 +114,8 @@ latency AS (
     SELECT
         run_id,
         path_id,
-        count(*) AS pairs,
+        count(latency_ns) AS pairs,
+        count(*) - count(latency_ns) AS stored,
         any_value(sink_event) AS sink_event,
         min(latency_ns) AS min_ns,
         quantile_disc(latency_ns, [0.5, 0.95, 0.99]) AS quantiles,
@@ -163,6 +166,7 @@ SELECT
     coalesce(c.cut_by_recording, 0) AS cut_by_recording,
     coalesce(a.number, 0) AS loss_affected,
     coalesce(l.pairs, 0) AS pairs,
+    coalesce(l.stored, 0) AS stored,
     coalesce(o.number, 0) AS looped,
     l.min_ns,
     l.quantiles[1] AS median_ns,

@@ -21,7 +21,8 @@
 -- column: root_ns BIGINT [epoch ns]  Start of the root
 -- column: take_id BIGINT           Take at the end of the path; empty: not reached
 -- column: sink_ns BIGINT [epoch ns]  End of the flow
--- column: latency_ns BIGINT [ns]   From the start of the root to the end
+-- column: latency_ns BIGINT [ns]   From the start of the root to the end; empty: not reached, or a
+--     message on the way was stored until its subscription existed
 -- column: status VARCHAR           'reached', 'superseded', 'dropped', 'lost', 'no_output',
 --     'not_connected', 'cut_by_recording' or 'unknown'
 -- column: reason VARCHAR           Why it did not arrive

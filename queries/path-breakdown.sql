@@ -3,8 +3,10 @@
 -- description: End-to-end latency of every path, hop by hop. The parts of a flow follow each other
 --     from its start to its end and add up to its latency exactly. The parts of a hop are: the
 --     callback up to its publication; the wait in a cache for other messages or a timer; calls of
---     services; publishing by layer, up to the last one; the time from there to the take; and the
---     time from the take to the callback. Publishing goes on behind the event of its last layer: it
+--     services; publishing by layer, up to the last one; the time for which a message was stored,
+--     until its subscription existed; the time from there to the take; and the time from the take
+--     to the callback. Flows with a stored message are part of the shares here, but not of the
+--     latencies of e2e-latency. Publishing goes on behind the event of its last layer: it
 --     is not known how long, and is part of the time up to the take. A trace does not say when a
 --     message arrived either, so that time is three parts, with the bounds of waits:
 --     network_or_idle, executor_busy (with other callbacks), and undecided (one or the other).
@@ -28,7 +30,7 @@
 -- column: path_id BIGINT           Number of the path
 -- column: hop BIGINT               Number of the message on the path that it belongs or leads to
 -- column: part VARCHAR             'callback', 'cache', 'service', a layer of publishing
---     ('intra', 'rclcpp', 'rcl', 'rmw', 'dds', or 'publish' where it is not known),
+--     ('intra', 'rclcpp', 'rcl', 'rmw', 'dds', or 'publish' where it is not known), 'stored',
 --     'network_or_idle', 'undecided', 'executor_busy' or 'take_to_callback'
 -- column: node VARCHAR [node]  Node that runs the callback, waits for it, or publishes
 -- column: what VARCHAR             The callback, or the topic of the message
@@ -38,9 +40,9 @@
 -- column: mean_ns BIGINT [ns]      Mean duration
 -- column: p95_ns BIGINT [ns]       95 % of the durations are at most this
 -- column: max_ns BIGINT [ns]       Longest duration
--- column: share DOUBLE [share]     Part of the latency of all flows of the path, rounded to 4
+-- column: share DOUBLE [share]     Part of the time of all flows of the path, rounded to 4
 --     places
--- column: total_ns BIGINT [ns]     Sum over all flows; all parts add up to the sum of latencies
+-- column: total_ns BIGINT [ns]     Sum over all flows; all parts add up to their time
 -- column: path VARCHAR [path]  Nodes and topics
 -- brief: path, hop, part, node, median_ns, share, max_ns, p95_ns, what, mean_ns, total_ns, flows,
 --     overlaps
@@ -152,5 +154,5 @@ LEFT JOIN main.node AS n ON b.node_id = n.node_id
 LEFT JOIN main.callback_label AS l ON m.callback_id = l.callback_id
 ORDER BY
     p.run_id, p.path, m.path_id, m.hop, m.rank,
-    list_position(['network_or_idle', 'undecided', 'executor_busy'], m.part), m.part,
+    list_position(['stored', 'network_or_idle', 'undecided', 'executor_busy'], m.part), m.part,
     m.callback_id

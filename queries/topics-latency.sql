@@ -4,13 +4,16 @@
 --     includes the time for which the receiving executor was busy with other callbacks. A trace
 --     does not say when a message arrived, so this time is given as bounds, those of waits;
 --     the rest was the network or an idle executor. A negative latency means that the clocks of two
---     hosts are apart. Takes without a known publication are counted, but not measured.
+--     hosts are apart. Takes without a known publication are counted, but not measured, and neither are
+--     messages that were stored until their subscription existed.
 -- grain: one row per topic, receiving node and subscription
 -- column: run_id BIGINT             Run
 -- column: topic_name VARCHAR [topic]  Topic
 -- column: subscriber VARCHAR [node]  Node that received
 -- column: takes BIGINT              Messages received in the time window
 -- column: linked BIGINT             Takes whose publication is known
+-- column: stored BIGINT             Links left out of the latencies: the message was published before
+--     the subscription existed, and stored until then
 -- column: ambiguous BIGINT          Links with more than one candidate
 -- column: negative BIGINT           Links with negative latency
 -- column: min_ns BIGINT [ns]        Shortest latency
@@ -24,11 +27,11 @@
 -- column: subscription_id BIGINT    Identity of the subscription
 -- column: is_internal BOOLEAN       ROS uses the topic for itself
 -- brief: topic_name, subscriber, median_ns, p95_ns, max_ns, busy_mean_min_ns, busy_mean_max_ns,
---     takes, linked, negative, ambiguous, mean_ns, p99_ns, min_ns
+--     takes, linked, stored, negative, ambiguous, mean_ns, p99_ns, min_ns
 -- note: clocks
 WITH received AS (
     SELECT
-        t.run_id, t.subscription_id, t.take_id, l.candidate_count, l.latency_ns,
+        t.run_id, t.subscription_id, l.publication_id, l.candidate_count, l.latency_ns, l.stored_ns,
         -- Between clocks that are apart the time that they show may be shorter.
         least(coalesce(w.busy_min_ns, 0), greatest(l.latency_ns, 0)) AS busy_min_ns,
         least(coalesce(w.busy_max_ns, l.latency_ns), greatest(l.latency_ns, 0)) AS busy_max_ns
@@ -50,7 +53,8 @@ measured AS (
         run_id,
         subscription_id,
         count(*) AS takes,
-        count(latency_ns) AS linked,
+        count(publication_id) AS linked,
+        count(stored_ns) AS stored,
         count(*) FILTER (WHERE candidate_count > 1) AS ambiguous,
         count(*) FILTER (WHERE latency_ns < 0) AS negative,
         min(latency_ns) AS min_ns,
@@ -69,6 +73,7 @@ SELECT
     main.node_label(n.full_name, p.name, p.pid) AS subscriber,
     m.takes,
     m.linked,
+    m.stored,
     m.ambiguous,
     m.negative,
     m.min_ns,

@@ -32,7 +32,8 @@
 -- column: sink_event VARCHAR  Event that ended the flow: to_event, or 'take' where the sink never
 --     shows a callback
 -- column: sink_ns BIGINT [epoch ns]  End of the flow
--- column: latency_ns BIGINT [ns]  From the start of the root to the end
+-- column: latency_ns BIGINT [ns]  From the start of the root to the end; NULL: it did not arrive,
+--     or a message on its way was stored (main.link_transport)
 -- column: status VARCHAR  'reached'; 'superseded' (a newer input took its place in a cache);
 --     'dropped', 'lost' or 'not_connected', as in main.stat_delivery; 'no_output' (the node did not
 --     publish); 'cut_by_recording' (too close to its start or end to know) or 'unknown'
@@ -131,6 +132,18 @@ reached (path_id, root_key, take_id) AS (
     FROM reached AS r
     JOIN path AS p ON r.path_id = p.parent_path_id
     JOIN step AS s ON r.take_id = s.from_take_id AND p.way_id = s.way_id
+),
+-- What a stored message led to. How long that took says when its reader came.
+stored (path_id, root_key, take_id) AS (
+    SELECT r.path_id, r.root_key, r.take_id
+    FROM reached AS r
+    JOIN derive.stored_take AS z ON r.take_id = z.take_id
+    WHERE list_contains(runs, z.run_id)
+    UNION
+    SELECT p.path_id, z.root_key, s.take_id
+    FROM stored AS z
+    JOIN path AS p ON z.path_id = p.parent_path_id
+    JOIN step AS s ON z.take_id = s.from_take_id AND p.way_id = s.way_id
 ),
 arrival AS MATERIALIZED (
     SELECT
@@ -233,7 +246,7 @@ SELECT
     r.take_id,
     CASE WHEN r.take_id IS NOT NULL THEN k.sink_event END AS sink_event,
     r.sink_ns,
-    r.sink_ns - r.root_ns AS latency_ns,
+    CASE WHEN z.take_id IS NULL THEN r.sink_ns - r.root_ns END AS latency_ns,
     CASE
         WHEN r.take_id IS NOT NULL THEN 'reached'
         WHEN derive.delivery_status(x.reason) <> 'unknown' THEN derive.delivery_status(x.reason)
@@ -251,3 +264,5 @@ FROM ranked AS r
 ASOF LEFT JOIN gap AS g ON r.run_id = g.run_id AND r.until_ns >= g.start_ns
 LEFT JOIN sink AS k ON r.path_id = k.path_id
 LEFT JOIN explained AS x ON r.path_id = x.path_id AND r.root_key = x.root_key
+LEFT JOIN stored AS z
+    ON r.path_id = z.path_id AND r.root_key = z.root_key AND r.take_id = z.take_id

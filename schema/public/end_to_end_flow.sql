@@ -35,7 +35,8 @@
 -- column: take_id BIGINT  Take at the end of the path
 -- column: sink_event VARCHAR  Event that ended the flow, as in main.end_to_end
 -- column: sink_ns BIGINT [epoch ns]  End of the flow
--- column: latency_ns BIGINT [ns]  From the start of the root to the end
+-- column: latency_ns BIGINT [ns]  From the start of the root to the end, also where a message was
+--     stored
 CREATE OR REPLACE MACRO main.end_to_end_flow(
     runs, from_topic := NULL, to_topic := NULL, from_event := 'callback_start',
     to_event := 'callback_end', window_start_ns := NULL, window_end_ns := NULL,
@@ -47,7 +48,7 @@ SELECT
         ORDER BY e.path_id, e.root_ns, e.root_kind, e.root_id, e.sink_ns, e.take_id
     ) AS flow_id,
     e.run_id, e.path_id, e.root_kind, e.root_id, e.root_ns, e.take_id, e.sink_event, e.sink_ns,
-    e.latency_ns
+    e.sink_ns - e.root_ns AS latency_ns
 FROM main.end_to_end(
     runs, from_topic, to_topic, from_event, to_event, window_start_ns, window_end_ns,
     max_depth := max_depth, max_paths := max_paths
@@ -64,13 +65,14 @@ WHERE derive.known_word(
         ELSE true
     END
     AND (path_ids IS NULL OR list_contains(path_ids, e.path_id))
--- The quantile is one that occurred: so many flows took no longer.
+-- The quantile is one that occurred: so many flows took no longer. Flows of stored messages come
+-- last: they have no latency in main.end_to_end.
 QUALIFY CASE
     WHEN flow_case <> 'longest' THEN true
     WHEN at_quantile IS NULL THEN row_number() OVER (
-        ORDER BY e.latency_ns DESC, e.path_id, e.root_ns, e.root_kind, e.root_id, e.take_id
+        ORDER BY e.latency_ns DESC NULLS LAST, e.path_id, e.root_ns, e.root_kind, e.root_id, e.take_id
     ) <= most_flows
     ELSE row_number() OVER (
-        ORDER BY e.latency_ns, e.path_id, e.root_ns, e.root_kind, e.root_id, e.take_id
-    ) = greatest(1, ceil(at_quantile * count(*) OVER ()))
+        ORDER BY e.latency_ns NULLS LAST, e.path_id, e.root_ns, e.root_kind, e.root_id, e.take_id
+    ) = greatest(1, ceil(at_quantile * count(e.latency_ns) OVER ()))
 END

@@ -19,7 +19,9 @@
 --     publishes or calls), 'cache' (from the end of the callback to the callback instance that
 --     publishes for it),
 --     'intra', 'rclcpp', 'rcl', 'rmw', 'dds' (publishing, from this layer to the next), 'publish'
---     (publishing, layer not known), 'publish_to_take' (from the last layer to the take: writing
+--     (publishing, layer not known), 'stored' (from the last layer until the subscription existed,
+--     of a message that was published before), 'publish_to_take' (from there, or from the last
+--     layer, to the take: writing
 --     the message, the network, an idle executor or a busy one, see main.executor_wait),
 --     'take_to_callback', 'request_to_take' (from the sending of a request), 'service' (from the
 --     start of the service callback to what it publishes or calls, or to the sending of the

@@ -25,7 +25,9 @@
 --     publishes or calls), 'cache' (from the end of the callback to the callback instance that
 --     publishes for it),
 --     'intra', 'rclcpp', 'rcl', 'rmw', 'dds' (publishing, from this layer to the next), 'publish'
---     (publishing, layer not known), 'publish_to_take' (from the last layer to the take: writing
+--     (publishing, layer not known), 'stored' (from the last layer until the subscription existed,
+--     of a message that was published before), 'publish_to_take' (from there, or from the last
+--     layer, to the take: writing
 --     the message, the network, an idle executor or a busy one, see main.executor_wait),
 --     'take_to_callback', 'request_to_take' (from the sending of a request), 'service' (from the
 --     start of the service callback to what it publishes or calls, or to the sending of the
@@ -246,6 +248,7 @@ message AS (
         i.start_ns IS NOT NULL AND (h.next_take_id IS NOT NULL OR f.sink_event <> 'take')
             AS is_called,
         h.next_take_id IS NULL AND f.sink_event = 'callback_end' AS is_finished,
+        z.created_ns AS subscribed_ns,
         coalesce(w.moments, []) AS turn
     FROM passed AS h
     JOIN flow AS f ON h.flow_id = f.flow_id
@@ -257,6 +260,7 @@ message AS (
     LEFT JOIN callback AS r
         ON f.root_id = r.callback_instance_id AND f.root_kind = 'callback_instance'
     LEFT JOIN turn AS w ON h.flow_id = w.flow_id AND h.hop = w.hop
+    LEFT JOIN derive.stored_take AS z ON h.take_id = z.take_id
 ),
 -- `lead` is the number of its parts before the layers of publishing, `place` that of all parts of
 -- the flow before it.
@@ -265,14 +269,16 @@ counted AS (
         *,
         -- Where the first layer of publishing is not known.
         start_ns IS DISTINCT FROM layer_ns AS is_vague,
-        is_entered::INTEGER + len(turn) + (start_ns IS DISTINCT FROM layer_ns)::INTEGER AS lead
+        is_entered::INTEGER + len(turn) + (start_ns IS DISTINCT FROM layer_ns)::INTEGER AS lead,
+        -- How many parts come before the time up to the take.
+        lead + layer_count + (subscribed_ns IS NOT NULL)::INTEGER AS before_take
     FROM message
 ),
 placed AS MATERIALIZED (
     SELECT
         *,
-        (sum(lead + layer_count + 1 + is_called::INTEGER) OVER (PARTITION BY flow_id ORDER BY hop))
-        ::BIGINT - (lead + layer_count + 1 + is_called::INTEGER) AS place
+        (sum(before_take + 1 + is_called::INTEGER) OVER (PARTITION BY flow_id ORDER BY hop))
+        ::BIGINT - (before_take + 1 + is_called::INTEGER) AS place
     FROM counted
 ),
 -- The layers follow each other in time, everything else in the order of causes.
@@ -343,20 +349,27 @@ every_part AS (
     UNION ALL
     SELECT
         run_id, path_id, flow_id, root_kind, root_id, take_id, latency_ns, hop, place, turn,
-        'publish_to_take', lead + layer_count + 1, end_ns, taken_ns, callback_instance_id,
-        callback_id, busy_min_ns, busy_max_ns, publication_id
+        'stored', lead + layer_count + 1, end_ns, subscribed_ns, NULL, NULL, NULL, NULL,
+        publication_id
+    FROM placed
+    WHERE subscribed_ns IS NOT NULL
+    UNION ALL
+    SELECT
+        run_id, path_id, flow_id, root_kind, root_id, take_id, latency_ns, hop, place, turn,
+        'publish_to_take', before_take + 1, coalesce(subscribed_ns, end_ns), taken_ns,
+        callback_instance_id, callback_id, busy_min_ns, busy_max_ns, publication_id
     FROM placed
     UNION ALL
     SELECT
         run_id, path_id, flow_id, root_kind, root_id, take_id, latency_ns, hop, place, turn,
-        'take_to_callback', lead + layer_count + 2, taken_ns, called_ns, callback_instance_id,
+        'take_to_callback', before_take + 2, taken_ns, called_ns, callback_instance_id,
         callback_id, NULL, NULL, publication_id
     FROM placed
     WHERE is_called
     UNION ALL
     SELECT
         run_id, path_id, flow_id, root_kind, root_id, take_id, latency_ns, hop + 1,
-        place + lead + layer_count + 1 + is_called::INTEGER, [],
+        place + before_take + 1 + is_called::INTEGER, [],
         'callback', 1, called_ns, sink_ns, callback_instance_id, callback_id, NULL, NULL, NULL
     FROM placed
     WHERE is_finished

@@ -10,7 +10,10 @@
 -- column: is_self_loop
 -- column: is_loss_affected
 -- column: is_copy
--- column: latency_ns BIGINT [ns]  From the end of the publication to the take
+-- column: latency_ns BIGINT [ns]  From the end of the publication to the take; NULL: the message
+--     was stored
+-- column: stored_ns BIGINT [ns]  How long it was stored: from the end of the publication until its
+--     subscription existed, which then read it; NULL: it was not
 SELECT
     l.run_id,
     l.publication_id,
@@ -20,7 +23,9 @@ SELECT
     l.is_self_loop,
     l.is_loss_affected,
     l.is_copy,
-    t.taken_ns - b.end_ns AS latency_ns
+    CASE WHEN z.take_id IS NULL THEN t.taken_ns - b.end_ns END AS latency_ns,
+    z.stored_ns
 FROM store.link_transport AS l
 JOIN main.publication AS b ON l.publication_id = b.publication_id
 JOIN main.take AS t ON l.take_id = t.take_id
+LEFT JOIN derive.stored_take AS z ON l.take_id = z.take_id

@@ -19,6 +19,8 @@
 -- column: cut_by_recording BIGINT  Roots too close to the start or end of a recording to know
 -- column: loss_affected BIGINT     Roots with a gap of a trace in their time
 -- column: pairs BIGINT             Pairs of root and arrival that the latencies are computed from
+-- column: stored BIGINT            Pairs left out of the latencies: a message on the way was
+--     published before its subscription existed, and stored until then
 -- column: looped BIGINT            Later messages at the end of the path that descend from an
 --     arrival there through a loop
 -- column: min_ns BIGINT [ns]       Shortest latency
@@ -33,7 +35,7 @@
 -- column: path VARCHAR [path]  Nodes and topics
 -- brief: path, median_ns, p95_ns, max_ns, runs, reached, roots, dropped, lost,
 --     superseded, no_output, p99_ns, not_connected, unknown, cut_by_recording, reasons, mean_ns,
---     min_ns, loss_affected, pairs
+--     min_ns, loss_affected, pairs, stored
 WITH arrival AS MATERIALIZED (
     SELECT
         g.label_group, f.run, f.path, f.path_id, f.root_kind, f.root_id, f.latency_ns,
@@ -88,7 +90,8 @@ latency AS (
     SELECT
         label_group,
         path,
-        count(*) AS pairs,
+        count(latency_ns) AS pairs,
+        count(*) - count(latency_ns) AS stored,
         string_agg(DISTINCT sink_event, ', ' ORDER BY sink_event) AS sink_event,
         min(latency_ns) AS min_ns,
         quantile_disc(latency_ns, [0.5, 0.95, 0.99]) AS quantiles,
@@ -123,6 +126,7 @@ SELECT
     coalesce(c.cut_by_recording, 0) AS cut_by_recording,
     coalesce(a.number, 0) AS loss_affected,
     coalesce(l.pairs, 0) AS pairs,
+    coalesce(l.stored, 0) AS stored,
     k.looped,
     l.min_ns,
     l.quantiles[1] AS median_ns,

@@ -12,7 +12,8 @@
 -- column: root_id BIGINT  Identity of the root
 -- column: root_at BIGINT [ns since origin]  Start of the root
 -- column: take_id BIGINT  Take at the end of the path; NULL: not reached
--- column: latency BIGINT [ns]  From the start of the root to the end
+-- column: latency BIGINT [ns]  From the start of the root to the end; NULL: not reached, or a message
+--     on the way was stored until its subscription existed
 -- column: status VARCHAR  As in flows
 -- column: is_loss_affected BOOLEAN  A gap of a trace lies in its time
 SELECT

@@ -11,7 +11,7 @@ const LEAST_WIDTH = 1;
 export function palette() {
   const names = [
     "ink", "soft", "faint", "page", "panel", "line", "stripe", "timer", "subscription", "service",
-    "publication", "take", "call", "wait", "process", "execute", "blocked", "event", "active", "transport", "direct", "indirect",
+    "publication", "take", "call", "wait", "process", "execute", "blocked", "event", "active", "stored", "transport", "direct", "indirect",
     "critical", "gap", "pick", "focus",
   ];
   return Object.fromEntries(names.map((name) => [name, color(name)]));

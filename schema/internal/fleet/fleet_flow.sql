@@ -15,7 +15,8 @@
 -- column: sink_event VARCHAR  Event that ended the flow: 'callback_end', or 'take' where the sink
 --     never shows a callback
 -- column: sink_ns BIGINT [epoch ns]  End of the flow
--- column: latency_ns BIGINT [ns]  From the start of the root to the end
+-- column: latency_ns BIGINT [ns]  From the start of the root to the end; NULL: not reached, or a
+--     message on the way was stored until its subscription existed
 -- column: status VARCHAR  'reached', 'superseded', 'dropped', 'lost', 'no_output',
 --     'not_connected', 'cut_by_recording' or 'unknown'
 -- column: reason VARCHAR  Why it did not arrive

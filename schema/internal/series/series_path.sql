@@ -2,7 +2,7 @@
 -- title: Latency of paths over time
 -- description: Latency of the first arrival of each flow, by the start of the flow. Paths of one
 --     name have their identity behind it.
--- grain: one row per flow that reached the end of a path
+-- grain: one row per flow with a latency
 -- param: runs BIGINT[]  Runs
 -- param: start_ns BIGINT  Begin of the window, epoch ns
 -- param: end_ns BIGINT  End of the window, epoch ns
@@ -16,5 +16,5 @@ FROM main.end_to_end(
     $runs, NULL, NULL, 'callback_start', 'callback_end', $start_ns, $end_ns
 ) AS e
 JOIN main.flow_path($runs, NULL, NULL) AS p ON e.path_id = p.path_id
-WHERE e.status = 'reached' AND e.is_first
+WHERE e.latency_ns IS NOT NULL AND e.is_first
 ORDER BY at_ns, subject, value_ns

@@ -1,0 +1,59 @@
+"""Messages that a latched publisher stored for a subscription that came later."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from ingested import Ingested
+
+from msgflow.query.catalogue import load_query
+from msgflow.query.runner import run_query
+
+
+@pytest.fixture
+def overload(recordings: Callable[[str], Ingested]) -> Ingested:
+    """Real ROS 2: `/late` joins 2 s after `/talker`, and reads the last five of `/map`."""
+    return recordings("real_overload/ust")
+
+
+def rows(overload: Ingested, query: str, **given: Any) -> list[dict[str, Any]]:
+    found = run_query(overload.connection, load_query(query), given).to_arrow().to_pylist()
+    return [row for row in found if not row.get("is_internal")]
+
+
+def test_stored_messages_are_counted_and_not_measured(overload: Ingested) -> None:
+    paths = {row["path"]: row for row in rows(overload, "e2e-latency")}
+    latched = paths.pop("/talker → /map → /late")
+    assert (latched["reached"], latched["pairs"], latched["stored"]) == (5, 0, 5)
+    assert latched["max_ns"] is None
+    # The volatile topic of the same publisher: published before /late was found, but not stored.
+    assert [(row["stored"], row["pairs"] == row["reached"]) for row in paths.values()] == [
+        (0, True)
+    ] * 3
+    topics = {row["topic_name"]: row for row in rows(overload, "topics-latency")}
+    assert {name: (row["linked"], row["stored"]) for name, row in topics.items()} == {
+        "/fast": (186, 0), "/map": (5, 5), "/plain": (32, 0), "/sensor": (145, 0),
+        "/slow_out": (100, 0),
+    }  # fmt: skip
+    assert topics["/map"]["max_ns"] is None
+
+
+def test_the_time_up_to_the_subscription_is_a_part_of_its_own(overload: Ingested) -> None:
+    parts = {
+        row["part"]: row
+        for row in rows(overload, "path-breakdown", **{"from": "/map", "to": "/map"})
+    }
+    assert parts["stored"]["flows"] == 5
+    # Published every 300 ms; the last one 650 ms before.
+    assert parts["stored"]["max_ns"] == pytest.approx(1.85e9, rel=0.01)
+    assert parts["network_or_idle"]["max_ns"] < 0.02e9
+
+
+def test_flows_of_stored_messages_are_the_last_of_the_slowest(overload: Ingested) -> None:
+    slowest = rows(overload, "critical-path")
+    assert "stored" not in {row["activity"] for row in slowest}
+    (latched,) = (row for row in rows(overload, "critical-path", to="/map") if row["at_ns"])
+    assert (latched["activity"], latched["node"]) == ("stored", "/talker")
+    assert latched["share"] > 0.99
