@@ -59,7 +59,8 @@ def command(
     with Database(database, memory_limit=memory_limit) as opened:
         findings = opened.findings(run=run, detail=detail)
         quality = opened.query("info", section="quality", run=run) if detail else None
-        runs = choose_runs(opened.runs(), run)
+        every = opened.runs()
+        runs = every if detail else choose_runs(every, run)
         verdicts = opened.clock_verdicts(run=run, only_several=True)
     labels = {one.run_id: one.title for one in runs} if len(runs) > 1 else {}
     _report(findings, form, output, run_labels=labels, notes=verdicts, table=quality)

@@ -37,9 +37,7 @@ def prompt(database: Path, ask: Callable[[str], None]) -> None:
     readline.set_completer(completer(words))
     readline.set_completer_delims(" \t\n,()=<>")
     readline.parse_and_bind("tab: complete")
-    print_status(
-        "a query ends with ; or an empty line; tab completes names; Ctrl-D ends"
-    )
+    print_status("a query ends with ; or an empty line; tab completes names; Ctrl-D ends")
     lines: list[str] = []
     while True:
         try:

@@ -155,7 +155,7 @@ def test_broken_rules_of_the_database_are_shown_alike(
     assert result.exit_code == 1
     lines = result.stdout.splitlines()
     assert lines[0] == "1. error: A row refers to one that does not exist (relation_is_kept)"
-    assert lines[1] == "   run case (1): gap.trace_id — identities that are no row of trace"
+    assert lines[1] == "   gap.trace_id — identities that are no row of trace"
     assert "2. error: A word is not of the vocabulary (vocabulary_is_closed)" in lines
     assert result.stderr == "2 errors, 0 warnings\n"
     rows = json.loads(

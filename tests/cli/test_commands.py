@@ -197,7 +197,7 @@ def test_db_schema_lists_the_views_or_the_columns_of_one(
 ) -> None:
     result = msgflow("db", "schema", "--db", small_database, "--format", "jsonl")
     views = {row["view"]: row for row in map(json.loads, result.stdout.splitlines())}
-    assert views.keys() == set(public_names())
+    assert {"take", "message", "callback_run"} < views.keys() < set(public_names())
     assert views["take"]["description"].startswith("Reception of a message")
     result = msgflow("db", "schema", "take", "--db", small_database, "--format", "jsonl")
     columns = [json.loads(line) for line in result.stdout.splitlines()]
