@@ -11,7 +11,7 @@
 -- column: taken_ns BIGINT [epoch ns]  Take
 -- column: latency_ns BIGINT [ns]  From the end of the publication to the take
 -- column: publication_id BIGINT  Publication; NULL: not known
--- column: candidate_count INTEGER  Publications that it may have been; more than 1: a guess
+-- column: candidate_count BIGINT  Publications that it may have been; more than 1: a guess
 -- column: is_loss_affected BOOLEAN  A gap of the trace may have changed it
 -- column: is_internal BOOLEAN  ROS uses the topic for itself
 SELECT

@@ -198,7 +198,7 @@ def test_db_schema_lists_the_views_or_the_columns_of_one(
     result = msgflow("db", "schema", "--db", small_database, "--format", "jsonl")
     views = {row["view"]: row for row in map(json.loads, result.stdout.splitlines())}
     assert {"take", "message", "callback_run"} < views.keys() < set(public_names())
-    assert views["take"]["description"].startswith("Reception of a message")
+    assert views["take"]["description"].startswith("Messages at the moment")
     result = msgflow("db", "schema", "take", "--db", small_database, "--format", "jsonl")
     columns = [json.loads(line) for line in result.stdout.splitlines()]
     assert len(columns) == views["take"]["columns"]
