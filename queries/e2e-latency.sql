@@ -43,8 +43,8 @@
 -- column: is_cut BOOLEAN           The path goes on or has siblings beyond max_depth or max_paths
 -- column: lost_reasons VARCHAR     Why roots were lost or superseded, with counts
 -- column: path VARCHAR [path]  Nodes and topics
--- brief: path, median_ns, p95_ns, max_ns, reached, roots, lost, superseded, p99_ns,
---     cut_by_recording, lost_reasons, mean_ns, min_ns, loss_affected, pairs
+-- brief: path, median_ns, p99_ns, max_ns, reached, lost, loss_affected, roots, p95_ns, superseded,
+--     lost_reasons, cut_by_recording, mean_ns, min_ns, pairs
 -- note: clocks
 WITH flow AS (
     SELECT

@@ -352,7 +352,6 @@ def test_processes_that_record_no_callbacks_are_named(
     assert not run_query(connection, header(QUERY), {}, Slice(run="first")).notes[1:]
 
 
-
 @pytest.mark.parametrize(
     ("uncertainty_ns", "bounds", "wrong_by"),
     [
