@@ -25,6 +25,7 @@
 -- slowest: duration_ns
 -- brief: duration_ns, node, callback, start_ns, take_id, published, tid, callback_instance_id,
 --     process, host
+-- note: callbacks
 WITH instance AS (
     SELECT
         run_id, callback_instance_id, callback_id, process_id, thread_id, start_ns,

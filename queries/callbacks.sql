@@ -22,7 +22,8 @@
 -- column: symbol VARCHAR            Function registered for the callback
 -- column: callback_id BIGINT        Identity of the callback
 -- column: is_internal BOOLEAN       Infrastructure of ROS
--- brief: node, callback, median_ns, max_ns, p95_ns, count, period_median_ns, p99_ns, mean_ns
+-- brief: node, callback, count, median_ns, p99_ns, max_ns, p95_ns, period_median_ns, mean_ns
+-- note: callbacks
 WITH instance AS (
     SELECT
         run_id,

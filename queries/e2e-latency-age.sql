@@ -31,7 +31,7 @@
 --     never shows a callback
 -- column: is_cut BOOLEAN           The path goes on or has siblings beyond max_depth or max_paths
 -- column: path VARCHAR [path]  Nodes and topics
--- brief: path, outputs, median_ns, p95_ns, max_ns, peak_max_ns, loss_affected, p99_ns,
+-- brief: path, outputs, median_ns, p99_ns, max_ns, peak_max_ns, loss_affected, p95_ns,
 --     peak_median_ns, peak_p95_ns, mean_ns
 -- note: clocks
 WITH output AS (

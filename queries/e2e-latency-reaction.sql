@@ -32,8 +32,8 @@
 --     never shows a callback
 -- column: is_cut BOOLEAN           The path goes on or has siblings beyond max_depth or max_paths
 -- column: path VARCHAR [path]  Nodes and topics
--- brief: path, inputs, median_ns, p95_ns, max_ns, unanswered, event_mean_ns, p99_ns,
---     loss_affected, intervals, mean_ns, min_ns
+-- brief: path, inputs, median_ns, p99_ns, max_ns, unanswered, loss_affected, p95_ns,
+--     event_mean_ns, intervals, mean_ns, min_ns
 -- note: clocks
 WITH input AS (
     SELECT

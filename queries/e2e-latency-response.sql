@@ -30,7 +30,7 @@
 --     never shows a callback
 -- column: is_cut BOOLEAN           The path goes on or has siblings beyond max_depth or max_paths
 -- column: path VARCHAR [path]  Nodes and topics
--- brief: path, response, count, median_ns, p95_ns, max_ns, p99_ns, mean_ns, min_ns
+-- brief: path, response, count, median_ns, p99_ns, max_ns, p95_ns, mean_ns, min_ns
 -- note: clocks
 WITH input AS (
     SELECT

@@ -27,7 +27,7 @@
 -- column: reached BIGINT           Roots that reached the end of the path
 -- column: superseded BIGINT        Roots replaced by a newer input before they were used
 -- column: dropped BIGINT           Roots that ended in a full queue: newer messages took their
---     place 
+--     place
 -- column: lost BIGINT              Roots that were lost on the way
 -- column: no_output BIGINT         Roots that ended at a node that did not publish
 -- column: not_connected BIGINT     Roots that ended before or after a publisher and a subscription
@@ -52,9 +52,9 @@
 -- column: is_cut BOOLEAN           The path goes on or has siblings beyond max_depth or max_paths
 -- column: reasons VARCHAR          Why roots did not reach the end of the path, with counts
 -- column: path VARCHAR [path]  Nodes and topics
--- brief: path, median_ns, p95_ns, max_ns, reached, roots, dropped, lost, superseded,
---     no_output, p99_ns, not_connected, unknown, cut_by_recording, reasons, mean_ns, min_ns,
---     loss_affected, pairs, stored
+-- brief: path, median_ns, p99_ns, max_ns, reached, lost, loss_affected, dropped, roots, p95_ns,
+--     superseded, no_output, reasons, not_connected, unknown, cut_by_recording, mean_ns, min_ns,
+--     pairs, stored
 -- note: clocks
 WITH flow AS (
     SELECT

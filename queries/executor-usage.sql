@@ -31,6 +31,7 @@
 -- column: thread_id BIGINT          Identity of the thread
 -- brief: process, tid, callback_share, callback_ns, blocked_ns, wait_ns, callbacks, select_ns,
 --     take_ns, host, seen_ns, unknown_ns, executor_kind, pid
+-- note: callbacks
 WITH member AS (
     SELECT
         x.run_id, x.executor_id, x.thread_id, e.kind, t.tid, p.pid, p.name, h.hostname,

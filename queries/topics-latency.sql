@@ -26,8 +26,8 @@
 -- column: max_ns BIGINT [ns]        Longest latency
 -- column: subscription_id BIGINT    Identity of the subscription
 -- column: is_internal BOOLEAN       ROS uses the topic for itself
--- brief: topic_name, subscriber, median_ns, p95_ns, max_ns, busy_mean_min_ns, busy_mean_max_ns,
---     takes, linked, stored, negative, ambiguous, mean_ns, p99_ns, min_ns
+-- brief: topic_name, subscriber, median_ns, p99_ns, max_ns, takes, p95_ns, busy_mean_min_ns,
+--     busy_mean_max_ns, linked, stored, negative, ambiguous, mean_ns, min_ns
 -- note: clocks
 WITH received AS (
     SELECT

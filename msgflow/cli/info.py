@@ -83,9 +83,11 @@ def _for_screen(results: dict[str, QueryResult], width: int) -> Iterator[str]:
         if position:
             yield ""
         yield section.upper()
-        shown = lay_out(result, width)
+        # The line about columns stands in brackets.
+        shown = lay_out(result, width - 2)
         yield from screen_lines(shown, width)
-        notes = shown.notes if len(result) else ("none",)
+        said = () if shown.not_shown is None else (shown.not_shown,)
+        notes = (*said, *shown.notes) if len(result) else ("none",)
         for note in notes:
             yield from wrap(f"({note})", width)
 

@@ -31,14 +31,20 @@ def command(
         list[str],
         typer.Argument(
             metavar="TRACE...",
-            help="Directories with CTF traces, at any depth, or archives of such; all of them"
-            " become one run",
+            help="Directories with CTF traces, at any depth, or archives of such",
         ),
     ],
     name: Annotated[
         str | None,
-        typer.Option("--name", help="Name of the run", show_default="from the path"),
+        typer.Option("--name", help="Name of the run", show_default="that of its folder"),
     ] = None,
+    together: Annotated[
+        bool,
+        typer.Option(
+            "--together",
+            help="One run of all traces, though they are recordings of different times",
+        ),
+    ] = False,
     replace: Annotated[
         bool, typer.Option("--replace", help="Replace the run that already holds these traces")
     ] = False,
@@ -109,38 +115,65 @@ def command(
     ] = False,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
-    """Read LTTng traces of a ROS 2 system into a database, as one run."""
+    """Read LTTng traces of a ROS 2 system into a database, each recording as a run.
+
+    Traces of one session, and sessions whose times overlap, are one recording.
+    """
     hosts = _hosts(host or [])
     # From before the imports, which may lose Ctrl-C, until the stored run is reported.
     with noted_interrupts():
         from msgflow.cli.output import print_note
         from msgflow.cli.progress import ingest_progress
         from msgflow.database import Database
+        from msgflow.ingest.recordings import Recording, find_recordings
 
         with (
             Database(database, memory_limit=memory_limit) as opened,
             ingest_progress(quiet) as progress,
         ):
-            report = opened.ingest(
-                traces,
-                name=name,
-                replace=replace,
-                hosts=hosts,
-                keep_staging=keep_staging,
-                links=links,
-                clock_sync=clock_sync,
-                reader=reader.value,
-                strict=strict,
-                ignore=ignore or [],
-                events=events or [],
-                progress=progress,
+            recordings = [Recording(traces, hosts)]
+            # How far clocks are apart is not known before they are brought together.
+            if not together and clock_sync == "none":
+                recordings = find_recordings(traces, hosts, reader=reader.value)
+            if len(recordings) > 1:
+                _require_no_word_for_one(len(recordings), name, keep_staging)
+                if not quiet:
+                    print_note(
+                        f"{len(recordings)} recordings, whose times do not overlap, become as many"
+                        " runs: --together makes one"
+                    )
+            for recording in recordings:
+                report = opened.ingest(
+                    recording.paths,
+                    name=name,
+                    replace=replace,
+                    hosts=recording.hosts,
+                    keep_staging=keep_staging,
+                    links=links,
+                    clock_sync=clock_sync,
+                    reader=reader.value,
+                    strict=strict,
+                    ignore=ignore or [],
+                    events=events or [],
+                    progress=progress,
+                )
+                if not quiet:
+                    _print_report(report, database)
+                for warning in report.warnings:
+                    print_note(warning)
+            if not quiet:
+                _print_next(report, database)
+
+
+def _require_no_word_for_one(count: int, name: str | None, keep_staging: Path | None) -> None:
+    given = {"--name": name, "--keep-staging": keep_staging}
+    for option, value in given.items():
+        if value is not None:
+            raise UsageError(
+                f"{option} is for one run, these traces are {count} recordings whose times do not"
+                " overlap",
+                f"--together makes one run; or leave out {option}",
             )
-        if not quiet:
-            _print_report(report, database)
-        for warning in report.warnings:
-            print_note(warning)
-        if not quiet:
-            _print_next(report, database)
 
 
 def _print_report(report: IngestReport, database: Path) -> None:

@@ -145,7 +145,7 @@ WideOption = Annotated[
     bool,
     typer.Option(
         "--wide",
-        help="On a terminal, show all columns and rows, however wide",
+        help="Show all columns and rows of a table, however wide",
         rich_help_panel=OUTPUT,
     ),
 ]

@@ -70,7 +70,7 @@ def print_result(
         result: the rows.
         form: what to write; chosen by the suffix of `path`, else a table, when None.
         path: file to write, replaced when it exists; stdout when None.
-        wide: show all columns and rows on a terminal too.
+        wide: show all columns and rows.
         columns: names of those to write, separated by commas; all when None.
         most_rows: how many rows a table on a terminal has; all when None.
 
@@ -91,10 +91,12 @@ def print_result(
         stdout = data_stream()
         if form is Format.PARQUET and stdout.isatty():
             raise UsageError("Parquet is not for a terminal", "name a file with -o FILE.parquet")
-        if form is Format.TABLE and stdout.isatty() and not wide:
-            _print_for_screen(result, columns is not None, most_rows)
+        on_terminal = stdout.isatty()
+        if form is Format.TABLE and not wide and (on_terminal or _is_brief(result, columns)):
+            # A pipe has room for all rows, and people read no more than so many columns.
+            _print_for_screen(result, columns is not None, most_rows if on_terminal else None)
         else:
-            write_result(result, form, terminal(stdout) if stdout.isatty() else stdout)
+            write_result(result, form, terminal(stdout) if on_terminal else stdout)
     if path is None and not len(result):
         print_note(result.when_empty)
     for note in result.notes:
@@ -110,6 +112,11 @@ def is_screen() -> bool:
     return data_stream().isatty()
 
 
+def _is_brief(result: QueryResult, columns: str | None) -> bool:
+    """Tell whether the header says which columns of the result are important."""
+    return columns is None and result.header is not None and bool(result.header.brief)
+
+
 def _print_for_screen(result: QueryResult, is_chosen: bool, most_rows: int | None) -> None:
     from msgflow.cli.show.layout import lay_out
     from msgflow.cli.show.screen import screen_lines
@@ -117,6 +124,8 @@ def _print_for_screen(result: QueryResult, is_chosen: bool, most_rows: int | Non
     width = screen_width()
     shown = lay_out(result, width, most_rows=most_rows, is_chosen=is_chosen)
     print_lines(screen_lines(shown, width))
+    if shown.not_shown is not None:
+        typer.secho(_shown(shown.not_shown), err=True, dim=True)
     for note in shown.notes:
         print_note(note)
 

@@ -33,6 +33,7 @@ from msgflow.errors import DatabaseError, UsageError
 from msgflow.ingest import model, refusals, staging
 from msgflow.ingest.hostnames import hostnames_of
 from msgflow.ingest.load import Loaded, load_traces
+from msgflow.ingest.recordings import session_folder
 from msgflow.links import declare_links, read_links
 from msgflow.run.choice import is_run_name
 from msgflow.sql.failure import database_errors, in_words
@@ -119,7 +120,7 @@ def ingest(
         paths: CTF traces, session directories, directories above such, or archives of such.
         database: the database file; created where it does not exist, or where a symbolic link of
             that name points to.
-        name: name of the run; that of the first path when None.
+        name: name of the run; that of the first session's folder when None.
         replace: delete the runs that hold some of these packets already, or have this name.
         hosts: name of a host -> path or paths; the traces below belong to that host. Where several
             paths lead to a trace, the deepest counts.
@@ -300,8 +301,9 @@ def _store(
 
 
 def fallback_name(paths: Sequence[str | Path]) -> str:
-    """Return the name of a run for which none is given: that of the first path."""
-    name = archive.stem(Path(os.path.realpath(paths[0])))
+    """Return the name of a run for which none is given: that of the first session's folder."""
+    first = Path(os.path.realpath(paths[0]))
+    name = session_folder(first.parent / archive.stem(first)).name
     return name if is_run_name(name) else f"run-{name}".rstrip("-")
 
 

@@ -122,6 +122,8 @@ def run_query(
         notes.append(f"nothing fits {' '.join(narrowing)}: {why}")
     if header.note == "clocks" and table.num_rows:
         notes += clock_notes(connection, runs)
+    if header.note == "callbacks":
+        notes += _without_callbacks(connection, runs)
     return QueryResult(table, header, runs, notes)
 
 
@@ -256,6 +258,23 @@ def _beside(
         return [nothing]
     ((first, last),) = seen
     return [f"{nothing}: it lasts {format_duration(last - first)}, from {format_epoch(first)}"]
+
+
+def _without_callbacks(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run]) -> list[str]:
+    """Return a note that names the processes of which no callbacks are known, if there are any."""
+    rows = connection.execute(
+        "SELECT DISTINCT subject FROM main.finding "
+        "WHERE list_contains($runs, run_id) AND name = 'process_without_rclcpp' ORDER BY subject",
+        {"runs": [run.run_id for run in runs]},
+    ).fetchall()
+    if not rows:
+        return []
+    names = ", ".join(subject for (subject,) in rows)
+    what = "process records" if len(rows) == 1 else "processes record"
+    return [
+        f"{len(rows)} {what} no callbacks, without rclcpp (as those of rclpy): {names};"
+        " path-breakdown has their times from take to publication"
+    ]
 
 
 def _columns_hint(header: Header, error: Exception) -> str:

@@ -19,6 +19,7 @@
 The header ends at the first line that is not a `--` comment. Two spaces end a parameter's default.
 
 - `note: clocks`: rows compare times of hosts, so the runner names clocks that differ.
+- `note: callbacks`: rows are made of callbacks, so the runner names processes that record none.
 - `brief`: the columns that a narrow terminal shows, the most important first.
 - `answer`: columns that stay where they are 0 in all rows, since people ask for them.
 - `heading`: columns that stand above a table on a terminal, once for each value of the first one,
@@ -76,7 +77,7 @@ _SINGLE = (
     "brief", "answer", "heading", "slowest", "variant",
 )  # fmt: skip
 _KINDS = ("view", "inline", "macro")
-_NOTES = ("clocks",)
+_NOTES = ("clocks", "callbacks")
 
 
 class HeaderError(ValueError):
@@ -153,7 +154,8 @@ class Header:
         severity: severity of a finding, else None.
         cause: cause of a finding, else None.
         cure: remedy for a finding, else None.
-        note: 'clocks' where rows compare times of several hosts, else None.
+        note: 'clocks' where rows compare times of several hosts, 'callbacks' where they are made of
+            callbacks, else None.
         body: the SQL below the header; of a query in steps, the statement that returns its rows.
         path: the file.
         brief: columns for where not all have a place, the most important first.

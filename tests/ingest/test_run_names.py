@@ -28,6 +28,29 @@ def test_a_directory_of_such_a_name_gives_another(tmp_path: Path) -> None:
         assert fallback_name([tmp_path / name]) == f"run-{name}"
 
 
+@pytest.mark.parametrize(
+    "below",
+    [
+        "ust",
+        "kernel",
+        "ust/uid/1000/64-bit",
+        "ust/pid/talker-7-20260314-120000",
+        "ust/ust/uid",
+        "archives/20260314T120000+0000-20260314T120001+0000-0/ust/uid/1000/64-bit",
+    ],
+)
+def test_a_run_has_the_name_of_the_folder_of_its_session(tmp_path: Path, below: str) -> None:
+    assert fallback_name([tmp_path / "night" / below]) == "night"
+    assert fallback_name([tmp_path / "ust_of_night"]) == "ust_of_night"
+
+
+def test_an_archive_of_half_a_session_has_the_name_of_its_folder(tmp_path: Path) -> None:
+    archive = tmp_path / "night" / "ust.tar.gz"
+    archive.parent.mkdir()
+    archive.touch()
+    assert fallback_name([archive]) == "night"
+
+
 def test_no_path_is_not_the_current_directory(new_database: Path) -> None:
     with pytest.raises(UsageError, match="the path of a trace is empty"):
         ingest([""], new_database)

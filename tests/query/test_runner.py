@@ -325,6 +325,33 @@ def test_clocks_that_differ_are_named(
     assert late.notes == []
 
 
+def test_processes_that_record_no_callbacks_are_named(
+    connection: duckdb.DuckDBPyConnection,
+) -> None:
+    connection.execute(
+        "CREATE TABLE finding AS SELECT * FROM (VALUES "
+        "(1, 'process_without_rclcpp', 'b 8 on vm'), (1, 'process_without_rclcpp', 'a 7 on vm'), "
+        "(1, 'started_late', 'c 9 on vm'), (2, 'process_without_rclcpp', 'd 1 on vm'), "
+        "(3, 'started_late', 'c 9 on vm')) AS t (run_id, name, subject)"
+    )
+    noted = header(QUERY.replace("-- param", "-- note: callbacks\n-- param"))
+    rest = "path-breakdown has their times from take to publication"
+
+    def notes(run: str) -> list[str]:
+        return list(run_query(connection, noted, {}, Slice(run=run)).notes[-1:])
+
+    assert notes("first") == [
+        "2 processes record no callbacks, without rclcpp (as those of rclpy): a 7 on vm, b 8 on vm;"
+        f" {rest}"
+    ]
+    assert notes("second") == [
+        f"1 process records no callbacks, without rclcpp (as those of rclpy): d 1 on vm; {rest}"
+    ]
+    connection.execute("DELETE FROM finding WHERE name <> 'started_late'")
+    assert notes("second") == []
+    assert not run_query(connection, header(QUERY), {}, Slice(run="first")).notes[1:]
+
+
 @pytest.mark.parametrize(
     ("uncertainty_ns", "bounds", "wrong_by"),
     [

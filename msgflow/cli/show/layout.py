@@ -1,9 +1,10 @@
 """Layout of a result on a terminal: which columns have a place, and how wide they are.
 
-Columns with nothing in them are left out and named in a note, unless the header of the query lists
-them under `answer`: that nothing was lost is an answer. Paths get numbers and stand once, below the
-table. A table that is still too wide loses its least important columns, by the order of `brief` in
-the header. If not even the most important columns fit, every row becomes a record.
+Columns with nothing in them are left out, unless the header of the query lists them under `answer`:
+that nothing was lost is an answer. Paths get numbers and stand once, below the table. A table that
+is still too wide loses its least important columns, by the order of `brief` in the header. The
+first of `brief` never yield: if they do not fit, every row becomes a record. One line says what is
+not shown.
 """
 
 from __future__ import annotations
@@ -33,8 +34,8 @@ PATH = "path"
 PATH_ID = "path_id"
 RUN = "run_id"
 _SYMBOLS = ("symbol", "symbols")
-# A table needs room for so many of its most important columns. For so many, names may be broken.
-_ESSENTIAL = 3
+# So many of the most important columns never yield. For so many, names may be broken.
+_ESSENTIAL = 5
 _WANTED = 6
 # The narrowest column of text, in cells, and the most lines of a cell. Plain SQL does not say what
 # is important: its cells may have more lines.
@@ -79,6 +80,7 @@ class Layout:
         widths: of the columns, in cells; None if each row is a record.
         paths: the paths with the numbers 1, 2, …
         notes: what is left out, a sentence each.
+        not_shown: which columns are left out, in one line; None if none are.
     """
 
     headings: tuple[str, ...]
@@ -86,6 +88,7 @@ class Layout:
     widths: tuple[int, ...] | None
     paths: tuple[str, ...]
     notes: tuple[str, ...]
+    not_shown: str | None
 
 
 def screen_width() -> int:
@@ -129,15 +132,19 @@ def lay_out(
     left_out = [column for column in columns if column.name not in names]
     is_table = _least(shown) <= width and not (left_out and first.num_rows == 1)
     if not keeps_all:
-        important = _by_importance(result, columns)[:_ESSENTIAL]
+        brief = () if result.header is None else result.header.brief[:_ESSENTIAL]
+        important = [column for column in columns if column.name in brief]
         is_table = is_table and all(column.name in names for column in important)
     if not is_table:
         shown, left_out = columns, []
-    if nothing:
-        notes.append(f"0 or empty in all rows: {', '.join(nothing)}")
-    notes += _of_columns_left_out(left_out, remedy) if first.num_rows else []
     widths = tuple(_widths(shown, width)) if is_table else None
-    return Layout(headings, tuple(shown), widths, paths, tuple(notes))
+    not_shown = _not_shown(left_out, nothing, width, remedy) if first.num_rows else None
+    return Layout(headings, tuple(shown), widths, paths, tuple(notes), not_shown)
+
+
+def _free(columns: Sequence[ShownColumn]) -> int:
+    """Return how many columns are shown besides those of `brief`: paths and runs."""
+    return sum(column.name in (PATH, RUN) for column in columns)
 
 
 def _that_say_something(result: QueryResult, keeps_all: bool) -> tuple[list[str], list[str]]:
@@ -293,8 +300,11 @@ def _by_importance(result: QueryResult, columns: list[ShownColumn]) -> list[Show
     """Return the columns, the most important first; those alike in all rows come last."""
     header = result.header
     brief = () if header is None else header.brief
-    kept = {PATH, RUN, *brief[:_WANTED], *(() if header is None else header.answer)}
-    places = {name: place for place, name in enumerate(dict.fromkeys((PATH, RUN, *brief)))}
+    others = [name for name in brief if name not in (PATH, RUN)]
+    # Rows whose order nothing explains look like a mistake.
+    order = () if header is None or header.slowest is None else (header.slowest,)
+    kept = {PATH, RUN, *order, *others[:_WANTED], *(() if header is None else header.answer)}
+    places = {name: place for place, name in enumerate(dict.fromkeys((PATH, RUN, *order, *brief)))}
     return sorted(
         columns,
         key=lambda column: (
@@ -311,9 +321,10 @@ def _that_fit(result: QueryResult, columns: list[ShownColumn], width: int) -> li
         return columns
     ranked = _by_importance(result, columns)
     chosen = _greedy(ranked, width)
-    if any(column not in chosen for column in ranked[:_WANTED]):
+    first = ranked[: _WANTED + _free(columns)]
+    if any(column not in chosen for column in first):
         # Names are broken for the wanted columns only.
-        wanted = {column.name for column in _greedy(_broken(ranked[:_WANTED]), width)}
+        wanted = {column.name for column in _greedy(_broken(first), width)}
         first = [column for column in ranked if column.name in wanted]
         rest = [column for column in ranked if column.name not in wanted]
         chosen = _greedy(rest, width, first) if _least(first) <= width else _broken(first)
@@ -388,14 +399,29 @@ def _is_alike(column: ShownColumn) -> bool:
     return len(column.cells) > 1 and len(set(column.cells)) == 1 and column.width <= _WORD
 
 
-def _of_columns_left_out(columns: list[ShownColumn], remedy: str) -> list[str]:
-    """Return notes about columns that do not fit, with the value of those alike in all rows."""
+def _not_shown(
+    columns: Sequence[ShownColumn], nothing: Sequence[str], width: int, remedy: str
+) -> str | None:
+    """Return one line that names columns, with the value of those alike in all rows.
+
+    Args:
+        columns: that have no room.
+        nothing: titles of those that are 0 or empty in all rows.
+        width: of the line. What it has no room for is counted.
+        remedy: how to see them.
+    """
     alike = [column for column in columns if _is_alike(column)]
-    others = [column.title for column in columns if column not in alike]
-    notes = []
-    if alike:
-        same = ", ".join(f"{column.title} {column.cells[0]}" for column in alike)
-        notes.append(f"the same in all rows: {same}")
-    if others:
-        notes.append(f"no room for {', '.join(others)}: {remedy}")
-    return notes
+    words = [column.title for column in columns if column not in alike]
+    words += [f"{column.title} ({column.cells[0]} in all rows)" for column in alike]
+    words += [f"{title} (empty)" for title in nothing]
+    if not words:
+        return None
+    lines = (
+        f"not shown: {', '.join([*words[:count], *more])}; {remedy}"
+        for count in range(len(words), 0, -1)
+        for more in [[f"{len(words) - count} more"] if count < len(words) else []]
+    )
+    return next(
+        (line for line in lines if cell_len(line) <= width),
+        f"{len(words)} columns are not shown; {remedy}",
+    )

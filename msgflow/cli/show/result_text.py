@@ -28,6 +28,7 @@ def result_text(result: QueryResult) -> str:
     lines = [
         *(line for label, text in head for line in _labelled(label, text, width)),
         *screen_lines(shown, width),
+        *([] if shown.not_shown is None else [shown.not_shown]),
         *(line for note in notes for line in _labelled("note: ", note, width)),
     ]
     return "\n".join(lines)

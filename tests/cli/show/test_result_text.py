@@ -64,7 +64,7 @@ def test_printing_fits_the_width_of_the_terminal(monkeypatch: pytest.MonkeyPatch
         lines = str(result).splitlines()
         assert columns - 15 < max(map(len, lines)) <= columns
         assert lines[0] == "run: a\\x1b[31m (3)"
-        assert "note: 0 or empty in all rows: open" in lines
+        assert "not shown: open (empty); to_arrow() has all" in lines
         assert any(line.startswith("path  /node_0 → ") for line in lines)
     # No terminal and no COLUMNS: 100.
     monkeypatch.delenv("COLUMNS")

@@ -1,0 +1,168 @@
+"""Recordings among the traces below some paths: which of them become one run.
+
+Traces of one session belong together. So do sessions with a trace in common (the chunks of a
+rotation, snapshots), and sessions whose times overlap: their hosts may have sent each other
+messages. A session that records no initialisation belongs to the one before it that does (dual
+sessions).
+"""
+
+from __future__ import annotations
+
+import itertools
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from msgflow import trace as trace_package
+from msgflow.ingest.hostnames import hostnames_of
+from msgflow.trace import archive
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Mapping, Sequence
+
+    from msgflow.trace import TraceInfo
+
+# What LTTng makes below the folder of a session: buffers by user or by process, and chunks.
+_OF_LTTNG = re.compile(
+    r"((/archives/[^/]+)?(/(ust|kernel)(/(uid|pid)(/[^/]+(/(32|64)-bit)?)?)?)+)+$"
+)
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Traces that become one run.
+
+    Attributes:
+        paths: that have all of them below, and no others.
+        hosts: name of a host -> paths of its traces.
+    """
+
+    paths: Sequence[str | Path]
+    hosts: Mapping[str, Sequence[str | Path]]
+
+
+def session_folder(path: str | Path) -> Path:
+    """Return the folder of the session that a path of a trace, or of a part of one, belongs to."""
+    real = os.path.realpath(path)
+    return Path(_OF_LTTNG.sub("", real) or real)
+
+
+def find_recordings(
+    paths: Sequence[str | Path], hosts: Mapping[str, Sequence[str]], *, reader: str = "auto"
+) -> list[Recording]:
+    """Return the recordings below some paths, the first in time first.
+
+    Args:
+        paths: as `ingest` takes them.
+        hosts: name of a host -> paths; the traces below belong to that host.
+        reader: of the traces.
+
+    Raises:
+        TraceError: a path holds no trace, or none that can be read.
+        UsageError: `hosts` has a path with two names, or deeper ones leave it no trace.
+    """
+    roots = [Path(os.path.realpath(path)) for path in paths]
+    whole = [Recording(paths, hosts)]
+    archives = [root for root in roots if archive.is_archive(root)]
+    if archives:
+        is_one = len(set(roots)) == 1
+    else:
+        found = trace_package.discover(paths)
+        is_one = len({session_folder(location.path) for location in found}) == 1
+    if is_one:
+        return whole
+    with trace_package.open(paths, reader=reader) as opened:
+        traces = opened.traces
+    named = hostnames_of(traces, hosts)
+    sessions: dict[Path, list[TraceInfo]] = {}
+    for trace in traces:
+        above = (file for file in archives if trace.path.is_relative_to(file))
+        sessions.setdefault(next(above, session_folder(trace.path)), []).append(trace)
+    groups = _by_initialisation(_by_time(_by_trace(list(sessions.values()))))
+    if len(groups) == 1:
+        return whole
+    return [Recording(_paths(group, traces, roots), _hosts(group, named)) for group in groups]
+
+
+def _by_trace(groups: Sequence[list[TraceInfo]]) -> list[list[TraceInfo]]:
+    """Join the groups that have a trace in common."""
+    joined: list[list[TraceInfo]] = []
+    for group in groups:
+        uuids = {trace.uuid for trace in group} - {None}
+        alike = [other for other in joined if uuids & {trace.uuid for trace in other}]
+        joined = [other for other in joined if other not in alike]
+        joined.append([*itertools.chain(*alike), *group])
+    return joined
+
+
+def _by_time(groups: Sequence[list[TraceInfo]]) -> list[list[TraceInfo]]:
+    """Join the groups whose times overlap; one without any event goes with the first."""
+    joined: list[list[TraceInfo]] = []
+    latest = 0
+    for group in sorted(groups, key=_begin):
+        if joined and _begin(group) <= latest:
+            joined[-1] += group
+        else:
+            joined.append(list(group))
+        latest = max(latest, *(trace.end_ns or 0 for trace in group))
+    return joined
+
+
+def _by_initialisation(groups: Sequence[list[TraceInfo]]) -> list[list[TraceInfo]]:
+    """Join the groups that record no initialisation with the last one before that does.
+
+    Args:
+        groups: in order of time.
+    """
+    joined: list[list[TraceInfo]] = []
+    for group in groups:
+        clocks = {trace.clock_uuid for trace in group}
+        owners = [
+            other
+            for other in joined
+            if _records_initialisation(other) and clocks & {trace.clock_uuid for trace in other}
+        ]
+        if owners and not _records_initialisation(group):
+            owners[-1] += group
+        else:
+            joined.append(list(group))
+    return joined
+
+
+def _records_initialisation(group: Sequence[TraceInfo]) -> bool:
+    return any("ros2:rcl_node_init" in trace.event_names for trace in group)
+
+
+def _begin(group: Sequence[TraceInfo]) -> int:
+    begins = [trace.begin_ns for trace in group if trace.begin_ns is not None]
+    return min(begins, default=0)
+
+
+def _paths(
+    group: Sequence[TraceInfo], traces: Sequence[TraceInfo], roots: Collection[Path]
+) -> tuple[Path, ...]:
+    """Return the highest folders below the given ones that hold no other group.
+
+    A link in a given folder may lead out of it: then there is no such folder but that of the trace.
+    """
+    others = [trace.path for trace in traces if trace not in group]
+
+    def is_own(folder: Path) -> bool:
+        return any(map(folder.is_relative_to, roots)) and not any(
+            other.is_relative_to(folder) for other in others
+        )
+
+    def highest(folder: Path) -> Path:
+        return next((above for above in reversed(folder.parents) if is_own(above)), folder)
+
+    return tuple(dict.fromkeys(highest(trace.path) for trace in group))
+
+
+def _hosts(group: Sequence[TraceInfo], named: Mapping[int, str]) -> dict[str, list[Path]]:
+    hosts: dict[str, list[Path]] = {}
+    for trace in group:
+        if trace.index in named:
+            hosts.setdefault(named[trace.index], []).append(trace.path)
+    return hosts
