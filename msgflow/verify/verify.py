@@ -114,6 +114,7 @@ def verify(
     part: Slice,
     *,
     paths: Mapping[str, Mapping[str, Sequence[str]]] | None = None,
+    case: str = "first",
 ) -> Verification:
     """Return the verdicts on the requirements of a file.
 
@@ -123,6 +124,7 @@ def verify(
         part: one run, and the times to read.
         paths: for each named path of the requirements, its topics and nodes, or globs, by 'from',
             'to', 'via' and 'without'.
+        case: the arrivals of paths that count, as in the query flows.
 
     Raises:
         UsageError: no such run, time, topic, node, callback, service, action or process.
@@ -132,7 +134,7 @@ def verify(
     part = replace(part, run=one.run_id)
     window = part.window([one])
     _require_names(connection, targets, one)
-    work = _Work(connection, part, window, paths or {})
+    work = _Work(connection, part, window, paths or {}, case)
     rows = [row for target in targets.targets for row in work.rows(target)]
     # Failures come first; otherwise the order of the file stays.
     rows.sort(key=lambda row: _ORDER.index(row["verdict"]))
@@ -157,8 +159,10 @@ class _Work:
         part: Slice,
         window: Window,
         paths: Mapping[str, Mapping[str, Sequence[str]]],
+        case: str,
     ) -> None:
         self._connection = connection
+        self._case = case
         self._paths = paths
         self._part = part
         self._window = window
@@ -247,6 +251,8 @@ class _Work:
             own |= {word: ",".join(places[word]) for word in ("from", "to") if word in places}
         elif target.kind == PATH:
             own |= {"from": target.topics[0].value, "to": target.topics[-1].value}
+        if any(param.name == "case" for param in header.params):
+            own["case"] = self._case
         part = self._part if header.has_window else Slice(self._part.run)
         result = run_query(self._connection, around, own, part, internal=True)
         self.notes.update(dict.fromkeys(result.notes))
