@@ -107,10 +107,10 @@ class Comparison:
     skipped: float = 0.0
 
     def __str__(self) -> str:
-        return str(self.result)
+        return str(self.changes(only_different=False))
 
     def _repr_html_(self) -> str:
-        return self.result._repr_html_()
+        return self.changes(only_different=False)._repr_html_()
 
     def changes(self, *, only_different: bool = True) -> QueryResult:
         """Return a row for each path, callback or topic, the greatest change first.

@@ -494,6 +494,8 @@ def test_a_start_with_the_longest_values_is_named_and_left_out(fresh_database: P
         quick = database.compare("before", "after", what="callbacks", resamples=0)
     without = comparison.without_warm_up
     assert without is not None
+    # As text a comparison has what it compares.
+    assert "Timer(" in str(comparison)
     # In steps of half a second.
     assert without.skipped == 0.5
     assert without.without_warm_up is None
