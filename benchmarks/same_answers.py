@@ -73,7 +73,7 @@ TABLES = {
     "same_trail": "main.end_to_end_trail('same_flows', [1])",
     "same_callbacks": "(SELECT i.*, w.busy_min_ns, w.busy_max_ns FROM main.callback_instance AS i"
     " LEFT JOIN main.executor_wait AS w USING (callback_instance_id))",
-    "same_parts": "main.end_to_end_part([1], flow_case := 'longest', most_flows := 3)",
+    "same_parts": "main.end_to_end_part([1], flow_case := 'every_pair', most_flows := 3)",
     "same_vertices": "(SELECT 0 AS key, 'take' AS kind, take_id AS id, 0 AS depth FROM main.take)",
 }
 ROWS_SHOWN = 3

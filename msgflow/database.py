@@ -599,6 +599,7 @@ class Database:
         targets: str | Path,
         *,
         paths: str | Path = DEFAULT_PATHS,
+        case: str = "first",
         run: str | int | None = None,
         start: str | int | None = None,
         end: str | int | None = None,
@@ -609,6 +610,7 @@ class Database:
         Args:
             targets: YAML, see docs/verify.md.
             paths: the file with the named paths of `targets`.
+            case: the arrivals of paths that count: 'first', 'last', 'newest' or 'every_pair'.
             run, start, end, skip_first: what to read, see `msgflow.Slice`; one run.
 
         Returns:
@@ -625,7 +627,7 @@ class Database:
         connection = self.connection
         part = Slice(run, start, end, skip_first)
         places = self._ask(lambda: self._places(file, Path(paths), part))
-        return self._ask(lambda: verify(connection, file, part, paths=places))
+        return self._ask(lambda: verify(connection, file, part, paths=places, case=case))
 
     def _places(
         self, targets: TargetsFile, file: Path, part: Slice

@@ -1,12 +1,13 @@
 -- name: critical-path
 -- title: What the slowest flows waited for
 -- description: The flow that took longest, the N slowest, the one at a quantile of the latency, or
---     the longest that ends with a given take (see the query flows), piece by piece. Waits are
---     replaced by what they waited for, as far as the trace shows: what the executor ran meanwhile,
---     the timer that was not due yet, or the message that was still missing and how that came
---     about. The pieces add up to the latency exactly. Unless detail is full, pieces below 1 % of
---     the latency are summed up in one line, 'rest', and the layers of publishing are one piece.
---     Flows with a message that was stored until its subscription existed come after all others.
+--     the longest that ends with a given take (see the query flows), piece by piece. The slowest
+--     are those of `flows --slowest` with the same --case. Waits are replaced by what they waited
+--     for, as far as the trace shows: what the executor ran meanwhile, the timer that was not due
+--     yet, or the message that was still missing and how that came about. The pieces add up to the
+--     latency exactly. Unless detail is full, pieces below 1 % of the latency are summed up in one
+--     line, 'rest', and the layers of publishing are one piece. Flows with a message that was
+--     stored until its subscription existed come after all others.
 -- grain: one row per flow and piece, node or activity
 -- param: from VARCHAR = NULL  Topics or nodes where flows start: names or globs, separated by
 --     commas (default: any)
@@ -18,6 +19,8 @@
 --     latency
 -- param: flow BIGINT = NULL  Instead, the longest flow that ends with this take_id (see the query
 --     flows)
+-- param: case VARCHAR {first|last|newest|every_pair} = 'first'  Pairs of root and arrival that
+--     count: the first or last arrival of each root, the newest root of each arrival, or all
 -- param: by VARCHAR {piece|node|part} = 'piece'  One row for each piece, or totals by node or
 --     by activity
 -- param: detail VARCHAR {short|full} = 'short'  full: every piece and every layer of publishing
@@ -82,7 +85,7 @@ SELECT
     flow_id, run_id, path_id, root_kind, root_id, take_id, latency_ns, hop, position, part,
     from_ns, to_ns, duration_ns, callback_instance_id, publication_id
 FROM main.end_to_end_part(
-    $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns, 'longest',
+    $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns, $case,
     sink_take_id := $flow, max_depth := $max_depth, max_paths := $max_paths,
     most_flows := $slowest,
     at_quantile := CASE $at WHEN 'median' THEN 0.5 WHEN 'p90' THEN 0.9 WHEN 'p95' THEN 0.95

@@ -18,6 +18,12 @@
 -- column: wait_ns BIGINT [ns]       From there to the start of the callback
 -- column: busy_min_ns BIGINT [ns]   Executor busy with others meanwhile, at least
 -- column: busy_max_ns BIGINT [ns]   Executor busy with others meanwhile, at most
+-- column: held_max_ns BIGINT [ns]   No thread of an executor of several waited for work meanwhile,
+--     though not all ran callbacks: they were blocked by its lock, or looked for work
+-- column: reason VARCHAR            What took the most of the wait, if the message came at once:
+--     'executor busy' (it ran others; its threads are one, or when they waited is not known), 'all
+--     threads busy', 'excluded' (a callback ran that never runs beside this one) or 'network or
+--     idle'
 -- column: rest_min_ns BIGINT [ns]   Network, idle or overhead, at least
 -- column: rest_max_ns BIGINT [ns]   Network, idle or overhead, at most
 -- column: meanwhile VARCHAR         What ran meanwhile and for how long, the longest first, with
@@ -27,13 +33,14 @@
 -- column: callback_id BIGINT        Identity of the callback
 -- column: is_internal BOOLEAN       Infrastructure of ROS
 -- slowest: wait_ns
--- brief: start_ns, node, callback, wait_ns, busy_max_ns, meanwhile, busy_min_ns, since,
+-- brief: start_ns, node, callback, wait_ns, reason, busy_max_ns, meanwhile, busy_min_ns, since,
 --     rest_max_ns, rest_min_ns, callback_instance_id
 -- note: clocks
 WITH waited AS MATERIALIZED (
     SELECT
         run_id, callback_instance_id, callback_id, start_ns, since, wait_ns, busy_min_ns,
-        busy_max_ns, is_loss_affected, meanwhile_callback_ids, meanwhile_ns
+        busy_max_ns, blocked_max_ns, held_max_ns, is_loss_affected, meanwhile_callback_ids,
+        meanwhile_ns
     FROM main.executor_wait_explained($runs)
     WHERE start_ns >= $start_ns
         AND start_ns < $end_ns
@@ -70,7 +77,15 @@ SELECT
     w.wait_ns,
     w.busy_min_ns,
     w.busy_max_ns,
-    w.wait_ns - w.busy_max_ns AS rest_min_ns,
+    w.held_max_ns,
+    CASE
+        WHEN w.wait_ns IS NULL OR w.busy_max_ns IS NULL THEN NULL
+        WHEN 2 * (w.busy_max_ns + coalesce(w.held_max_ns, 0)) < w.wait_ns THEN 'network or idle'
+        WHEN 2 * w.blocked_max_ns > w.busy_max_ns + coalesce(w.held_max_ns, 0) THEN 'excluded'
+        WHEN w.held_max_ns IS NULL THEN 'executor busy'
+        ELSE 'all threads busy'
+    END AS reason,
+    w.wait_ns - w.busy_max_ns - coalesce(w.held_max_ns, 0) AS rest_min_ns,
     w.wait_ns - w.busy_min_ns AS rest_max_ns,
     m.names AS meanwhile,
     w.is_loss_affected,

@@ -2,8 +2,8 @@
 -- title: Which callbacks keep which others waiting
 -- description: For every pair of callbacks of one executor: how long one ran while the other
 --     waited. The literature calls this interference, or blocking if the one that ran should not
---     have come first; callbacks are never interrupted. Bounds are those of waits. Each
---     thread of an executor counts.
+--     have come first; callbacks are never interrupted. Bounds are those of waits. Threads
+--     of an executor that ran the other callback at once count once, but for thread_max.
 -- grain: one row per waiting callback and callback that ran meanwhile
 -- column: run_id BIGINT             Run
 -- column: node VARCHAR [node]  Node of the callback that waited
@@ -15,32 +15,30 @@
 -- column: overlap_min_ns BIGINT [ns]  How long it ran during waits, at least
 -- column: overlap_max_ns BIGINT [ns]  How long it ran during waits, at most
 -- column: worst_ns BIGINT [ns]      Longest time that it ran during one wait
+-- column: thread_max_ns BIGINT [ns]  Time of all threads that ran it during waits, at most
 -- column: share DOUBLE [share]      Share of all that ran while the callback waited, 0 to 1
 -- column: callback_id BIGINT        Identity of the callback that waited
 -- column: meanwhile_callback_id BIGINT  Identity of the callback that ran
 -- column: is_internal BOOLEAN       The callback that waited is infrastructure of ROS
 -- brief: node, meanwhile_node, worst_ns, share, callback, meanwhile_callback, waits,
 --     overlap_max_ns, overlap_min_ns, instances
-WITH together AS (
-    -- The messages of a burst wait for each other: pairs are far more than rows of the answer, and
-    -- nothing may keep them all. So they are summed up before anything is joined to them.
+WITH waited AS MATERIALIZED (
     SELECT
-        callback_instance_id,
-        meanwhile_callback_id,
-        count(*) AS instances,
-        sum(certain_ns)::BIGINT AS overlap_min_ns,
-        sum(overlap_ns)::BIGINT AS overlap_max_ns
-    FROM main.executor_interference
-    WHERE list_contains($runs, run_id)
-    GROUP BY callback_instance_id, meanwhile_callback_id
+        run_id, callback_instance_id, callback_id, meanwhile_callback_ids, meanwhile_ns,
+        meanwhile_certain_ns, meanwhile_thread_ns, meanwhile_instances
+    FROM main.executor_wait_explained($runs)
+    WHERE start_ns >= $start_ns AND start_ns < $end_ns
 ),
 pair AS (
     SELECT
-        w.run_id, w.callback_id, t.meanwhile_callback_id, t.instances, t.overlap_min_ns,
-        t.overlap_max_ns
-    FROM together AS t
-    JOIN main.callback_instance AS w ON t.callback_instance_id = w.callback_instance_id
-    WHERE list_contains($runs, w.run_id) AND w.start_ns >= $start_ns AND w.start_ns < $end_ns
+        run_id,
+        callback_id,
+        unnest(meanwhile_callback_ids) AS meanwhile_callback_id,
+        unnest(meanwhile_instances) AS instances,
+        unnest(meanwhile_certain_ns) AS overlap_min_ns,
+        unnest(meanwhile_ns) AS overlap_max_ns,
+        unnest(meanwhile_thread_ns) AS thread_max_ns
+    FROM waited
 ),
 measured AS (
     SELECT
@@ -51,7 +49,8 @@ measured AS (
         sum(instances)::BIGINT AS instances,
         sum(overlap_min_ns)::BIGINT AS overlap_min_ns,
         sum(overlap_max_ns)::BIGINT AS overlap_max_ns,
-        max(overlap_max_ns) AS worst_ns
+        max(overlap_max_ns) AS worst_ns,
+        sum(thread_max_ns)::BIGINT AS thread_max_ns
     FROM pair
     GROUP BY run_id, callback_id, meanwhile_callback_id
 )
@@ -66,6 +65,7 @@ SELECT
     m.overlap_min_ns,
     m.overlap_max_ns,
     m.worst_ns,
+    m.thread_max_ns,
     m.overlap_max_ns / sum(m.overlap_max_ns) OVER (PARTITION BY m.callback_id) AS share,
     m.callback_id,
     m.meanwhile_callback_id,

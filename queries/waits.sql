@@ -23,6 +23,8 @@
 --     one wait
 -- column: busy_total_min_ns BIGINT [ns]  Executor busy with others during all waits, at least
 -- column: busy_total_max_ns BIGINT [ns]  Executor busy with others during all waits, at most
+-- column: held_total_max_ns BIGINT [ns]  No thread of an executor of several waited for work
+--     meanwhile, though not all ran callbacks, at most
 -- column: rest_total_min_ns BIGINT [ns]  Network, idle or overhead, where known, at least
 -- column: rest_total_max_ns BIGINT [ns]  Network, idle or overhead, where known, at most
 -- column: meanwhile VARCHAR         What ran meanwhile: the three with the largest share, with
@@ -37,7 +39,7 @@
 WITH waited AS MATERIALIZED (
     SELECT
         run_id, callback_instance_id, callback_id, wait_ns, busy_min_ns, busy_max_ns,
-        is_loss_affected, meanwhile_callback_ids, meanwhile_ns
+        held_max_ns, is_loss_affected, meanwhile_callback_ids, meanwhile_ns
     FROM main.executor_wait_explained($runs)
     WHERE start_ns >= $start_ns AND start_ns < $end_ns
 ),
@@ -53,7 +55,8 @@ measured AS (
         max(busy_max_ns) AS busy_worst_ns,
         sum(busy_min_ns)::BIGINT AS busy_total_min_ns,
         sum(coalesce(busy_max_ns, busy_min_ns))::BIGINT AS busy_total_max_ns,
-        sum(wait_ns - busy_max_ns)::BIGINT AS rest_total_min_ns,
+        sum(CASE WHEN wait_ns IS NOT NULL THEN held_max_ns END)::BIGINT AS held_total_max_ns,
+        sum(wait_ns - busy_max_ns - coalesce(held_max_ns, 0))::BIGINT AS rest_total_min_ns,
         sum(wait_ns - busy_min_ns)::BIGINT AS rest_total_max_ns,
         count(*) - count(wait_ns) AS unknown,
         count(*) FILTER (WHERE is_loss_affected) AS loss_affected
@@ -108,6 +111,7 @@ SELECT
     m.busy_worst_ns,
     m.busy_total_min_ns,
     m.busy_total_max_ns,
+    m.held_total_max_ns,
     m.rest_total_min_ns,
     m.rest_total_max_ns,
     w.shares AS meanwhile,

@@ -63,7 +63,7 @@ def only_different_option(subject: str) -> Any:
     return typer.Option(
         "--only-different/--all",
         help=f"One row for each {subject}: those that differ, or all",
-        show_default="on a terminal those that differ; else every statistic",
+        show_default="on a terminal all; else every statistic",
         rich_help_panel=OUTPUT,
     )
 
@@ -118,7 +118,7 @@ def print_comparison(
     result = comparison.result
     is_table = form in (None, Format.TABLE) and output is None
     if only_different is not None or (is_table and not wide and is_screen()):
-        result = comparison.changes(only_different=only_different is not False)
+        result = comparison.changes(only_different=only_different is True)
     print_result(result, form, output, wide=wide, most_rows=_MOST_ROWS)
     failures = comparison.failures(fail_on)
     for failure in failures:

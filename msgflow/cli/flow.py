@@ -24,6 +24,7 @@ from msgflow.cli.options import (
 from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import UsageError
 from msgflow.sql.statement import internal_sql
+from msgflow.text.values import format_duration
 
 if TYPE_CHECKING:
     from msgflow.database import Database
@@ -99,6 +100,19 @@ def command(
             rich_help_panel=_START,
         ),
     ] = None,
+    case: Annotated[
+        str | None,
+        typer.Option(
+            "--case",
+            metavar="CASE",
+            help="With --slowest: the flows that count, as in the query flows: the first or last"
+            " arrival of each root, the newest root of each arrival, or all (first, last, newest,"
+            " every_pair)",
+            show_default="first",
+            autocompletion=lambda: ["first", "last", "newest", "every_pair"],
+            rich_help_panel=_START,
+        ),
+    ] = None,
     from_: Annotated[
         list[str] | None,
         typer.Option(
@@ -169,8 +183,8 @@ def command(
         raise UsageError(f"a page has a name that ends with .html — {html}", "--html FILE.html")
     if html is not None and (output is not None or form is not None):
         raise UsageError("--html goes without --format and -o", "ask twice")
-    if slowest is None and (from_ or to):
-        raise UsageError("--from and --to choose among the slowest flows", "--slowest 1")
+    if slowest is None and (from_ or to or case):
+        raise UsageError("--from, --to and --case choose among the slowest flows", "--slowest 1")
     if slowest is not None and slowest > 1 and (html is not None or form is FlowFormat.JSON):
         raise UsageError(f"a file has one flow — --slowest {slowest}", "--slowest 1, or a tree")
     with Database(database, memory_limit=memory_limit) as opened:
@@ -183,13 +197,14 @@ def command(
             "request_id": request,
             "response_id": response,
         }
-        found = [starts | {"run": run}]
+        found, rows = [starts | {"run": run}], []
         if slowest is not None:
             if named := [name for name, value in starts.items() if value is not None]:
                 raise UsageError(
                     f"--slowest chooses the message itself — {named[0]}", "leave out one of them"
                 )
-            ends = _slowest_takes(opened, slowest, from_, to, run, internal)
+            rows = _slowest(opened, slowest, from_, to, case, run, internal)
+            ends = dict.fromkeys(row["take_id"] for row in rows)
             found = [{"take_id": number} for number in ends]
         if slowest is not None and direction is None:
             direction = "backward"
@@ -212,27 +227,35 @@ def command(
             ),
             output,
         )
+    for rank, row in enumerate(rows, start=1):
+        print_note(
+            f"slowest flow {rank}: {format_duration(row['latency_ns'])} to take {row['take_id']},"
+            f" {row['path']}"
+        )
     for note in dict.fromkeys(note for flow in flows for note in flow.notes):
         print_note(note)
 
 
-def _slowest_takes(
+def _slowest(
     database: Database,
     number: int,
     from_: list[str] | None,
     to: list[str] | None,
+    case: str | None,
     run: str | None,
     internal: bool,
-) -> list[int]:
-    """Return the take_id at the end of each of the slowest flows, the slowest first."""
+) -> list[dict[str, Any]]:
+    """Return the rows of the slowest flows, the slowest first, as the query flows has them."""
     words: dict[str, Any] = {
         "from_": ",".join(from_ or []) or None,
         "to": ",".join(to or []) or None,
     }
-    rows = database.query("flows", run=run, internal=internal, slowest=number, **words)
-    ends = [row["take_id"] for row in rows.to_arrow().to_pylist() if row["take_id"] is not None]
-    if not ends:
+    if case is not None:
+        words["case"] = case
+    found = database.query("flows", run=run, internal=internal, slowest=number, **words)
+    rows = [row for row in found.to_arrow().to_pylist() if row["take_id"] is not None]
+    if not rows:
         raise UsageError(
             "no flow arrived at the end of a path", "msgflow query e2e-latency lists the paths"
         )
-    return list(dict.fromkeys(ends))
+    return rows

@@ -57,6 +57,17 @@ def command(
             help="The file with the paths that have names",
         ),
     ] = Path(DEFAULT_PATHS),
+    case: Annotated[
+        str,
+        typer.Option(
+            "--case",
+            metavar="CASE",
+            help="Flows that count for latencies of paths, as in the query flows: the first or last"
+            " arrival of each root, the newest root of each arrival, or all (first, last, newest,"
+            " every_pair)",
+            autocompletion=lambda: ["first", "last", "newest", "every_pair"],
+        ),
+    ] = "first",
     allow_not_measured: Annotated[
         bool,
         typer.Option(
@@ -82,7 +93,7 @@ def command(
     from msgflow.export.formats import Format
 
     with Database(database) as opened:
-        verification = opened.verify(targets, paths=paths, **asdict(part))
+        verification = opened.verify(targets, paths=paths, case=case, **asdict(part))
     if form is None and output is not None and output.suffix.lower() == ".xml":
         form = VerifyFormat.JUNIT
     if form is VerifyFormat.JUNIT:

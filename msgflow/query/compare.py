@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
+from collections import Counter
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -37,6 +38,16 @@ _CONDITION = re.compile(
 )
 _UNIT_NS = {"ns": 1, "us": 1_000, "µs": 1_000, "ms": 1_000_000, "s": 1_000_000_000}
 _UNITS = {"paths": "flows", "callbacks": "callback instances", "topics": "takes"}
+# What a verdict adds to a failure: the measured values decide, and these may be chance.
+_CHANCE = {
+    "no difference shown": "; it may be chance",
+    "too few values": "; too few values to exclude chance",
+    "too few independent values": "; too few independent values to exclude chance",
+    "too few runs": "; too few runs to exclude chance",
+    "not estimated": "; one value of each, it may be chance",
+}
+# Warm-up is left out in steps of half a second.
+_STEP_NS = 500_000_000
 _LOST = """
 SELECT run_id, sum(discarded_event_count)::BIGINT
 FROM main.trace
@@ -85,17 +96,21 @@ class Comparison:
         result: one row per path (callback, topic) and statistic, see `main.comparison`.
         run_a: the baseline.
         run_b: the run that is compared with it.
+        without_warm_up: the same without the warm-up, where the longest values are at the start.
+        skipped: seconds that were left out at the start of each run.
     """
 
     result: QueryResult
     run_a: Run
     run_b: Run
+    without_warm_up: Comparison | None = None
+    skipped: float = 0.0
 
     def __str__(self) -> str:
-        return str(self.result)
+        return str(self.changes(only_different=False))
 
     def _repr_html_(self) -> str:
-        return self.result._repr_html_()
+        return self.changes(only_different=False)._repr_html_()
 
     def changes(self, *, only_different: bool = True) -> QueryResult:
         """Return a row for each path, callback or topic, the greatest change first.
@@ -110,9 +125,20 @@ class Comparison:
     def failures(self, conditions: Iterable[str]) -> list[Failure]:
         """Return what exceeds run A by more than conditions such as 'p95>5%' or 'median>2ms' allow.
 
-        As `failures` of this module says.
+        As `failures` of this module says. A reason also says what is left of it without warm-up.
         """
-        return failures(self.result, conditions)
+        conditions = list(conditions)
+        found = failures(self.result, conditions)
+        if self.without_warm_up is None:
+            return found
+        later = self.without_warm_up.failures(conditions)
+        left = {(each.condition, each.subject): each.reason for each in later}
+        when = f"without the first {self.without_warm_up.skipped:g} s"
+        return [
+            replace(each, reason=f"{each.reason}; {when}: {left.get(key, 'within the limit')}")
+            for each in found
+            for key in [(each.condition, each.subject)]
+        ]
 
 
 def failures(
@@ -143,7 +169,7 @@ def failures(
             hint,
         )
     return [
-        Failure(condition.text, row["subject"], reason)
+        Failure(condition.text, row["subject"], reason + _chance(condition, row))
         for condition in wanted
         for row in rows
         if row["statistic"]
@@ -200,6 +226,12 @@ def _excess(condition: Condition, row: dict[str, Any]) -> str | None:
     return None
 
 
+def _chance(condition: Condition, row: dict[str, Any]) -> str:
+    if condition.statistic == SHARE or row["b_ns"] is None:
+        return ""
+    return _CHANCE.get(row["verdict"], "")
+
+
 def _shortfall(condition: Condition, a_share: float | None, b_share: float | None) -> str | None:
     if a_share is None:
         return None
@@ -227,17 +259,66 @@ def compare(
     both: dict[str, Value] = {"run_a": first.run_id, "run_b": second.run_id}
     asked = bind(internal_sql().header("comparison"), given | both, "msgflow compare")
     _require_sense(asked)
+    compared = _compared(connection, asked, first, second)
+    skip = _warm_up(compared)
+    if not skip or not asked["resamples"]:
+        return compared
+    without = _compared(connection, asked | {"skip_first": skip}, first, second, is_strict=False)
+    compared.result.notes.append(_without(compared, without))
+    return replace(compared, without_warm_up=without)
+
+
+def _compared(
+    connection: duckdb.DuckDBPyConnection,
+    asked: dict[str, Any],
+    first: Run,
+    second: Run,
+    *,
+    is_strict: bool = True,
+) -> Comparison:
     what = str(asked["what"])
     for run in (first, second):
         require_places(connection, [run], {"from": asked["from"], "to": asked["to"]})
     with query_errors("the comparison", "the comparison failed: {}"):
         table = internal_sql().run(connection, "comparison", asked).to_arrow_table()
     result = QueryResult(table, _header(), (first, second))
-    result.notes.extend(_one_sided(result, what, first, second))
+    if is_strict:
+        result.notes.extend(_one_sided(result, what, first, second))
     result.notes.extend(_doubts(connection, result, what, first, second))
     if len(result):
         result.notes.extend(clock_notes(connection, list(dict.fromkeys((first, second)))))
-    return Comparison(result, first, second)
+    return Comparison(result, first, second, skipped=asked["skip_first"])
+
+
+def _warm_up(compared: Comparison) -> float:
+    """Return the seconds after which no run has the longest values of its start; 0 if none has."""
+    table = compared.result.table
+    ends = [*table.column("a_warm_up_ns").to_pylist(), *table.column("b_warm_up_ns").to_pylist()]
+    end = max((end for end in ends if end is not None), default=None)
+    return 0.0 if end is None else (end // _STEP_NS + 1) * _STEP_NS / 1e9
+
+
+def _without(compared: Comparison, without: Comparison) -> str:
+    """Say which run starts slowly, and what differs without its start."""
+    table = compared.result.table
+    slow = [
+        run.title
+        for side, run in (("a", compared.run_a), ("b", compared.run_b))
+        if table.column(f"{side}_warm_up_ns").null_count < len(table)
+    ]
+    changes = Counter(without.changes(only_different=False).table["change"].to_pylist())
+    shown = changes.pop("none shown", 0)
+    if changes:
+        parts = [f"{shown} with no difference shown"] if shown else []
+        parts += [f"{number} {change}" for change, number in sorted(changes.items())]
+        found = ", ".join(parts)
+    else:
+        found = "no difference is shown"
+    seconds = f"{without.skipped:g}"
+    return (
+        f"run {' and run '.join(slow)} may warm up: its longest values lie at its start. Without"
+        f" the first {seconds} s: {found} (--skip-first {seconds})"
+    )
 
 
 @cache

@@ -44,8 +44,7 @@ def changes(result: QueryResult, only_different: bool) -> QueryResult:
         else:
             names = " and ".join(run.name for run in result.runs)
             between = f" between {names}" if names else ""
-            said = text if parts[1:] or not none else f"{subjects} compared, --all lists them"
-            when_empty = f"no difference found{between}: {said}"
+            when_empty = f"no difference is shown{between}: {text}"
     return replace(result, table=table, header=_header(), notes=notes, when_empty=when_empty)
 
 

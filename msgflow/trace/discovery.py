@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
+from msgflow.name_suggestions import meant_or, nearest
 from msgflow.trace import metadata_frame
 from msgflow.trace.archive import is_archive
 from msgflow.trace.model import TraceLocation
@@ -81,6 +82,18 @@ def irregular_files(directory: Path) -> list[tuple[Path, str]]:
     return [(entry, kind) for entry, kind in found if kind is not None]
 
 
+def _nearby(path: Path) -> str:
+    """Return a hint: names beside the missing one that are like it, or where sessions are."""
+    try:
+        near = nearest(path.name, [entry.name for entry in path.parent.iterdir()])
+    except OSError:
+        near = []
+    return meant_or(
+        [str(path.with_name(name)) for name in near],
+        "ros2 trace writes its sessions below ~/.ros/tracing",
+    )
+
+
 def _check_exists(path: Path) -> None:
     kind = irregular(path)
     if kind is not None:
@@ -89,9 +102,7 @@ def _check_exists(path: Path) -> None:
             hint=metadata_frame.DIRECTORY_HINT,
         )
     if not path.exists():
-        raise TraceError(
-            f"no such file or directory — {path}", hint=f"ls {shlex.quote(str(path.parent))}"
-        )
+        raise TraceError(f"no such file or directory — {path}", hint=_nearby(path))
     if path.is_file():
         if (
             path.name == metadata_frame.FILE_NAME

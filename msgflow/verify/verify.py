@@ -114,6 +114,7 @@ def verify(
     part: Slice,
     *,
     paths: Mapping[str, Mapping[str, Sequence[str]]] | None = None,
+    case: str = "first",
 ) -> Verification:
     """Return the verdicts on the requirements of a file.
 
@@ -123,17 +124,24 @@ def verify(
         part: one run, and the times to read.
         paths: for each named path of the requirements, its topics and nodes, or globs, by 'from',
             'to', 'via' and 'without'.
+        case: the arrivals of paths that count, as in the query flows.
 
     Raises:
-        UsageError: no such run, time, topic, node, callback, service, action or process.
+        UsageError: no such run or time.
         QueryError: the database could not run a query.
     """
     one = part.one_run(connection, "a verification")
     part = replace(part, run=one.run_id)
     window = part.window([one])
-    _require_names(connection, targets, one)
-    work = _Work(connection, part, window, paths or {})
-    rows = [row for target in targets.targets for row in work.rows(target)]
+    vanished = _vanished(connection, targets, one)
+    work = _Work(connection, part, window, paths or {}, case)
+    rows = [
+        row
+        for place, target in enumerate(targets.targets)
+        for row in (
+            work.missing(target, vanished[place]) if place in vanished else work.rows(target)
+        )
+    ]
     # Failures come first; otherwise the order of the file stays.
     rows.sort(key=lambda row: _ORDER.index(row["verdict"]))
     import pyarrow as pa
@@ -157,8 +165,10 @@ class _Work:
         part: Slice,
         window: Window,
         paths: Mapping[str, Mapping[str, Sequence[str]]],
+        case: str,
     ) -> None:
         self._connection = connection
+        self._case = case
         self._paths = paths
         self._part = part
         self._window = window
@@ -247,6 +257,8 @@ class _Work:
             own |= {word: ",".join(places[word]) for word in ("from", "to") if word in places}
         elif target.kind == PATH:
             own |= {"from": target.topics[0].value, "to": target.topics[-1].value}
+        if any(param.name == "case" for param in header.params):
+            own["case"] = self._case
         part = self._part if header.has_window else Slice(self._part.run)
         result = run_query(self._connection, around, own, part, internal=True)
         self.notes.update(dict.fromkeys(result.notes))
@@ -290,6 +302,11 @@ class _Work:
             "reason": reason,
         }
 
+    def missing(self, target: Target, reason: str) -> Iterator[dict[str, Any]]:
+        """Yield 'not measured' for each requirement on something that the run does not have."""
+        for requirement in target.requirements:
+            yield self._missing(target, requirement) | {"reason": reason}
+
     @staticmethod
     def _verdict(target: Target, requirement: Requirement) -> dict[str, Any]:
         return {
@@ -307,8 +324,8 @@ class _Work:
         return worst_case_of(list(rows[0].values())) if rows else None
 
 
-def _require_names(connection: duckdb.DuckDBPyConnection, file: TargetsFile, run: Run) -> None:
-    """Raise for the first name or pattern of the file that nothing in the run has."""
+def _vanished(connection: duckdb.DuckDBPyConnection, file: TargetsFile, run: Run) -> dict[int, str]:
+    """Return why targets cannot be measured, by place: a name that nothing in the run has."""
     topics = SUBJECTS["topic"].filters["topic"]
     known: dict[str, list[str]] = {}
 
@@ -318,21 +335,24 @@ def _require_names(connection: duckdb.DuckDBPyConnection, file: TargetsFile, run
             known[sql] = sorted(name for (name,) in rows if name is not None)
         return known[sql]
 
-    def require(text: Text, sql: str, what: str, *, is_exact: bool) -> None:
+    found: dict[int, str] = {}
+
+    def require(place: int, text: Text, sql: str, what: str, *, is_exact: bool) -> None:
         there = names(sql)
         if text.value in there:
             return
         if not is_exact and any(fnmatchcase(name, text.value) for name in there):
             return
         hint = did_you_mean(text.value, there, _some(what, there))
-        file.file.fail(text.line, f"the run has no such {what} — {text.value}", hint)
+        found.setdefault(place, f"the run has no such {what} — {text.value}; {hint}")
 
-    for target in file.targets:
+    for place, target in enumerate(file.targets):
         for topic in target.topics:
-            require(topic, topics.names, topics.what, is_exact=True)
+            require(place, topic, topics.names, topics.what, is_exact=True)
         for field, text in target.chosen.items():
             one = SUBJECTS[target.kind].filters[field]
-            require(text, one.names, one.what, is_exact=False)
+            require(place, text, one.names, one.what, is_exact=False)
+    return found
 
 
 def _some(what: str, names: list[str]) -> str:

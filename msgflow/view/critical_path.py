@@ -47,6 +47,8 @@ def critical_path(
         "from": from_topic or end["from_topic"],
         "to": end["to_topic"],
         "flow": end["take_id"],
+        # Whatever was picked has a flow, also one that is not the first arrival of its root.
+        "case": "every_pair",
         "detail": "full",
     }
     header = load_query("critical-path")

@@ -228,15 +228,18 @@ class Pages:
         # A note does not repeat what a finding says.
         is_said = any(found["name"] in _OF_CLOCKS for found in findings)
         notes = [] if is_said else clock_notes(connection, [extent.run])
-        return encode(table, meta={"notes": notes, "command": "msgflow check"})
+        return encode(table, meta={
+            "notes": notes, "command": f"msgflow check --run {shlex.quote(extent.run.name)}",
+        })  # fmt: skip
 
     def _compare(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
         extent = self.extent(connection, params)
         # Intervals take longest: the page first shows what was measured, then asks for them.
         is_quick = bool(params.get("quick"))
+        what = str(params.get("what", "paths"))
         comparison = compare(
             connection, str(_whole(params, "other")), str(extent.run.run_id),
-            what=str(params.get("what", "paths")), resamples=0 if is_quick else None,
+            what=what, resamples=0 if is_quick else None,
         )  # fmt: skip
         result = comparison.result
         return encode(
@@ -252,6 +255,7 @@ class Pages:
                 },
                 "command": shlex.join(
                     ["msgflow", "compare", comparison.run_a.name, comparison.run_b.name]
+                    + ["--what", what] * (what != "paths")
                 ),
             },
             units=result.units,

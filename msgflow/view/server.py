@@ -309,7 +309,10 @@ class Shared:
 
 
 def _identity(path: Path) -> Identity:
-    stat = path.stat()
+    try:
+        stat = path.stat()
+    except FileNotFoundError:
+        raise DatabaseError(f"no database — {path}", "msgflow ingest TRACE") from None
     return Identity(stat.st_dev, stat.st_ino, stat.st_mtime_ns, stat.st_size)
 
 

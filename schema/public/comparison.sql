@@ -55,6 +55,10 @@
 -- column: a_loss_affected BIGINT  How many of those roots, callback instances or takes have a gap
 --     in their time, so that their values may be wrong
 -- column: b_loss_affected BIGINT  The same for run B
+-- column: a_warm_up_ns BIGINT [ns]  Time from the start of run A to the last of its longest values,
+--     if at least three of its first quarter exceed all later ones, as in a system that warms up;
+--     else NULL
+-- column: b_warm_up_ns BIGINT [ns]  The same for run B
 -- column: is_cut BOOLEAN  Paths were left out beyond max_depth or max_paths
 -- column: subject VARCHAR  Path, callback, or topic and receiving node
 CREATE OR REPLACE MACRO main.comparison(
@@ -175,6 +179,8 @@ centred AS MATERIALIZED (
         row_number() OVER (
             PARTITION BY s.side, s.subject ORDER BY s.at_ns, s.id, s.value_ns
         ) - 1 AS position,
+        s.at_ns,
+        s.value_ns,
         s.value_ns - m.mean_ns AS mean_part,
         (s.value_ns > m.quantiles[1])::BIGINT AS median_part,
         (s.value_ns > m.quantiles[2])::BIGINT AS p95_part,
@@ -183,6 +189,23 @@ centred AS MATERIALIZED (
     JOIN measured AS m ON s.side = m.side AND s.subject = m.subject
     JOIN dominance AS e ON s.subject = e.subject
     WHERE s.value_ns IS NOT NULL AND m.number >= 20
+),
+-- By chance, three values are the longest and all of the first quarter in 1 of 64 cases.
+warm_up AS (
+    SELECT e.side, e.subject, max(e.at_ns) - any_value(r.start_ns) AS warm_up_ns
+    FROM centred AS e
+    JOIN (
+        SELECT side, subject, max(value_ns) AS longest_ns
+        FROM centred
+        WHERE 4 * position >= number
+        GROUP BY side, subject
+    ) AS later
+        ON e.side = later.side AND e.subject = later.subject
+    JOIN side AS s ON e.side = s.side
+    JOIN main.run AS r ON s.run_id = r.run_id
+    WHERE 4 * e.position < e.number AND e.value_ns > later.longest_ns
+    GROUP BY e.side, e.subject
+    HAVING count(*) >= 3
 ),
 block AS (
     FROM derive.block_length('centred')
@@ -197,6 +220,7 @@ value AS (
         m.number,
         m.share,
         m.loss_affected,
+        w.warm_up_ns,
         m.is_cut,
         unnest(['median', 'mean', 'p95', 'p99', 'max']) AS statistic,
         unnest([0.5, NULL, 0.95, 0.99, 1.0]) AS quantile,
@@ -206,6 +230,7 @@ value AS (
         m.number / unnest(list_append(k.times, NULL)) AS independent
     FROM measured AS m
     LEFT JOIN block AS k ON m.side = k.side AND m.subject = k.subject
+    LEFT JOIN warm_up AS w ON m.side = w.side AND m.subject = w.subject
 ),
 paired AS (
     SELECT
@@ -222,6 +247,8 @@ paired AS (
         b.share AS b_share,
         a.loss_affected AS a_loss_affected,
         b.loss_affected AS b_loss_affected,
+        a.warm_up_ns AS a_warm_up_ns,
+        b.warm_up_ns AS b_warm_up_ns,
         coalesce(a.is_cut, false) OR coalesce(b.is_cut, false) AS is_cut
     FROM (SELECT * FROM value WHERE side = 'a') AS a
     FULL JOIN (SELECT * FROM value WHERE side = 'b') AS b
@@ -230,7 +257,8 @@ paired AS (
 judged AS (
     SELECT
         p.subject, p.statistic, p.a_ns, p.b_ns, p.a_count, p.b_count, p.a_independent,
-        p.b_independent, p.a_share, p.b_share, p.a_loss_affected, p.b_loss_affected, p.is_cut,
+        p.b_independent, p.a_share, p.b_share, p.a_loss_affected, p.b_loss_affected, p.a_warm_up_ns,
+        p.b_warm_up_ns, p.is_cut,
         CASE WHEN least(p.a_count, p.b_count) >= 20 THEN e.cliffs_delta END AS cliffs_delta,
         CASE
             WHEN p.a_count = 0 AND p.b_count = 0 THEN 'too few values'
@@ -281,6 +309,8 @@ SELECT
     round(b_share, 4) AS b_share,
     a_loss_affected,
     b_loss_affected,
+    a_warm_up_ns,
+    b_warm_up_ns,
     is_cut,
     subject
 FROM judged

@@ -18,7 +18,7 @@
 -- param: window_start_ns BIGINT = NULL  Start of the time window of roots, epoch ns; NULL: any
 -- param: window_end_ns BIGINT = NULL  End of the time window of roots, epoch ns, exclusive;
 --     NULL: any
--- param: sink_take_id BIGINT = NULL  Longest flow that ends with this take; NULL: of all
+-- param: sink_take_id BIGINT = NULL  Only flows that end with this take; NULL: all
 -- param: max_depth INTEGER = 32  Longest chain, in topics
 -- param: max_paths INTEGER = 1000  Maximum number of paths, shortest first; also the limit on
 --     chains of each length
@@ -26,6 +26,8 @@
 -- param: at_quantile DOUBLE = NULL  In their place the flow with this quantile of the latency,
 --     0 to 1
 -- param: path_ids BIGINT[] = NULL  Only flows of these paths; NULL: all
+-- param: flow_case VARCHAR = 'first'  Pairs of root and arrival that count: 'first', 'last',
+--     'newest' or 'every_pair'
 -- column: run_id BIGINT  Run
 -- column: path_id BIGINT  Path, as main.flow_path numbers it for the same arguments
 -- column: root_kind VARCHAR  'callback_instance' or 'publication'
@@ -52,7 +54,7 @@ CREATE OR REPLACE MACRO main.critical_path(
     runs, from_topic := NULL, to_topic := NULL, from_event := 'callback_start',
     to_event := 'callback_end', window_start_ns := NULL, window_end_ns := NULL,
     sink_take_id := NULL, max_depth := 32, max_paths := 1000, most_flows := 1, at_quantile := NULL,
-    path_ids := NULL
+    path_ids := NULL, flow_case := 'first'
 ) AS TABLE
 WITH flow_part AS MATERIALIZED (
     SELECT
@@ -60,7 +62,7 @@ WITH flow_part AS MATERIALIZED (
         from_ns, to_ns, duration_ns, callback_instance_id, publication_id
     FROM main.end_to_end_part(
         runs, from_topic, to_topic, from_event, to_event, window_start_ns, window_end_ns,
-        'longest', sink_take_id := sink_take_id, max_depth := max_depth, max_paths := max_paths,
+        flow_case, sink_take_id := sink_take_id, max_depth := max_depth, max_paths := max_paths,
         most_flows := most_flows, at_quantile := at_quantile, path_ids := path_ids
     )
 )

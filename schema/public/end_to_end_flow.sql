@@ -16,15 +16,15 @@
 -- param: window_end_ns BIGINT = NULL  End of the time window of roots, epoch ns, exclusive;
 --     NULL: any
 -- param: flow_case VARCHAR = 'first'  Pairs of root and arrival: 'first', 'last', 'newest',
---     'every_pair', or
---     'longest', the one flow of all that took longest
+--     or
+--     'every_pair'
 -- param: sink_take_id BIGINT = NULL  Only flows that end with this take
 -- param: max_depth INTEGER = 32  Longest chain, in topics
 -- param: max_paths INTEGER = 1000  Maximum number of paths, shortest first; also the limit on
 --     chains of each length
--- param: most_flows INTEGER = 1  Of 'longest', how many
--- param: at_quantile DOUBLE = NULL  Of 'longest', in its place the flow with this quantile of the
---     latency, 0 to 1
+-- param: most_flows INTEGER = NULL  How many of these, the slowest first; NULL: all
+-- param: at_quantile DOUBLE = NULL  In their place the flow with this quantile of the latency,
+--     0 to 1
 -- param: path_ids BIGINT[] = NULL  Only these paths; NULL: all
 -- column: flow_id BIGINT  Number of the flow in this result
 -- column: run_id BIGINT  Run
@@ -40,8 +40,8 @@
 CREATE OR REPLACE MACRO main.end_to_end_flow(
     runs, from_topic := NULL, to_topic := NULL, from_event := 'callback_start',
     to_event := 'callback_end', window_start_ns := NULL, window_end_ns := NULL,
-    flow_case := 'first', sink_take_id := NULL, max_depth := 32, max_paths := 1000, most_flows := 1,
-    at_quantile := NULL, path_ids := NULL
+    flow_case := 'first', sink_take_id := NULL, max_depth := 32, max_paths := 1000, most_flows :=
+    NULL, at_quantile := NULL, path_ids := NULL
 ) AS TABLE
 SELECT
     row_number() OVER (
@@ -53,9 +53,7 @@ FROM main.end_to_end(
     runs, from_topic, to_topic, from_event, to_event, window_start_ns, window_end_ns,
     max_depth := max_depth, max_paths := max_paths
 ) AS e
-WHERE derive.known_word(
-        'flow_case', flow_case, ['first', 'last', 'newest', 'every_pair', 'longest']
-    )
+WHERE derive.known_word('flow_case', flow_case, ['first', 'last', 'newest', 'every_pair'])
     AND e.status = 'reached'
     AND coalesce(e.take_id = sink_take_id, true)
     AND CASE flow_case
@@ -68,12 +66,12 @@ WHERE derive.known_word(
 -- The quantile is one that occurred: so many flows took no longer. Flows of stored messages come
 -- last: they have no latency in main.end_to_end.
 QUALIFY CASE
-    WHEN flow_case <> 'longest' THEN true
-    WHEN at_quantile IS NULL THEN row_number() OVER (
+    WHEN at_quantile IS NOT NULL THEN row_number() OVER (
+        ORDER BY e.latency_ns NULLS LAST, e.path_id, e.root_ns, e.root_kind, e.root_id, e.take_id
+    ) = greatest(1, ceil(at_quantile * count(e.latency_ns) OVER ()))
+    WHEN most_flows IS NOT NULL THEN row_number() OVER (
         ORDER BY e.latency_ns DESC NULLS LAST, e.path_id, e.root_ns, e.root_kind, e.root_id,
             e.take_id
     ) <= most_flows
-    ELSE row_number() OVER (
-        ORDER BY e.latency_ns NULLS LAST, e.path_id, e.root_ns, e.root_kind, e.root_id, e.take_id
-    ) = greatest(1, ceil(at_quantile * count(e.latency_ns) OVER ()))
+    ELSE true
 END

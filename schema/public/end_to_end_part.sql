@@ -18,15 +18,15 @@
 -- param: window_end_ns BIGINT = NULL  End of the time window of roots, epoch ns, exclusive;
 --     NULL: any
 -- param: flow_case VARCHAR = 'first'  Pairs of root and arrival: 'first', 'last', 'newest',
---     'every_pair', or
---     'longest', the one flow of all that took longest
+--     or
+--     'every_pair'
 -- param: sink_take_id BIGINT = NULL  Only flows that end with this take
 -- param: max_depth INTEGER = 32  Longest chain, in topics
 -- param: max_paths INTEGER = 1000  Maximum number of paths, shortest first; also the limit on
 --     chains of each length
--- param: most_flows INTEGER = 1  Of 'longest', how many
--- param: at_quantile DOUBLE = NULL  Of 'longest', in its place the flow with this quantile of the
---     latency, 0 to 1
+-- param: most_flows INTEGER = NULL  How many of these, the slowest first; NULL: all
+-- param: at_quantile DOUBLE = NULL  In their place the flow with this quantile of the latency,
+--     0 to 1
 -- param: path_ids BIGINT[] = NULL  Only these paths; NULL: all
 -- column: run_id BIGINT  Run
 -- column: path_id BIGINT  Path, as main.flow_path numbers it for the same arguments
@@ -58,8 +58,8 @@
 CREATE OR REPLACE MACRO main.end_to_end_part(
     runs, from_topic := NULL, to_topic := NULL, from_event := 'callback_start',
     to_event := 'callback_end', window_start_ns := NULL, window_end_ns := NULL,
-    flow_case := 'first', sink_take_id := NULL, max_depth := 32, max_paths := 1000, most_flows := 1,
-    at_quantile := NULL, path_ids := NULL
+    flow_case := 'first', sink_take_id := NULL, max_depth := 32, max_paths := 1000, most_flows :=
+    NULL, at_quantile := NULL, path_ids := NULL
 ) AS TABLE
 WITH flow AS MATERIALIZED (
     SELECT

@@ -25,6 +25,9 @@
 --     callback ran that never runs beside this one
 -- column: idle_ns BIGINT [ns]  Executor waiting for work from earliest_ns on; NULL: not known
 -- column: is_loss_affected BOOLEAN  A gap of the trace lies in it
+-- column: held_max_ns BIGINT [ns]  From earliest_ns on, no thread of an executor of several waited
+--     for work, though not all ran callbacks: they were blocked by its lock, or looked for work.
+--     Not part of busy_max_ns. NULL: not known, or one thread
 WITH executor AS (
     SELECT executor_id, NULL::BIGINT AS until_ns FROM derive.executor_size
 ),
@@ -38,5 +41,5 @@ ready AS (
 SELECT
     run_id, callback_instance_id, executor_id, thread_id, callback_id, since, origin_ns,
     earliest_ns, latest_ns, start_ns, wait_ns, busy_min_ns, busy_max_ns, blocked_max_ns, idle_ns,
-    is_loss_affected
+    is_loss_affected, held_max_ns
 FROM derive.executor_waits('ready')

@@ -24,10 +24,16 @@
 --     callback ran that never runs beside this one
 -- column: idle_ns BIGINT [ns]  Executor waiting for work from earliest_ns on; NULL: not known
 -- column: is_loss_affected BOOLEAN  A gap of the trace lies in it
+-- column: held_max_ns BIGINT [ns]  From earliest_ns on, no thread of an executor of several waited
+--     for work, though not all ran callbacks: they were blocked by its lock, or looked for work.
+--     Not part of busy_max_ns. NULL: not known, or one thread
 -- column: meanwhile_callback_ids BIGINT[]  Callbacks that ran meanwhile, the longest first;
 --     NULL: none
--- column: meanwhile_ns BIGINT[] [ns]  How long each of them did, from earliest_ns on (from
---     latest_ns if that is unknown); those on several threads may lie side by side
+-- column: meanwhile_ns BIGINT[] [ns]  For how long each of them did, from earliest_ns on (from
+--     latest_ns if that is unknown). Several threads that ran one at once count once
+-- column: meanwhile_certain_ns BIGINT[] [ns]  The same from latest_ns on
+-- column: meanwhile_thread_ns BIGINT[] [ns]  The same as meanwhile_ns, of all threads added up
+-- column: meanwhile_instances BIGINT[]  How many callback instances of each that were
 CREATE OR REPLACE MACRO main.executor_wait_explained(runs) AS TABLE
 WITH executor AS (
     SELECT executor_id, NULL::BIGINT AS until_ns
@@ -44,24 +50,68 @@ ready AS MATERIALIZED (
 -- Of bursts there are far more pairs than waits: nothing may keep them all.
 together AS (
     SELECT
-        callback_instance_id, meanwhile_callback_id AS callback_id,
-        sum(overlap_ns)::BIGINT AS overlap_ns
+        callback_instance_id, any_value(executor_id) AS executor_id,
+        meanwhile_callback_id AS callback_id, count(*) AS instances,
+        sum(overlap_ns)::BIGINT AS thread_ns, sum(certain_ns)::BIGINT AS certain_ns
     FROM derive.executor_meanwhile('ready')
     WHERE overlap_ns > 0
     GROUP BY callback_instance_id, meanwhile_callback_id
+),
+-- With several threads: for how long at least one of them had run the callback, up to a moment.
+moment AS (
+    SELECT
+        t.callback_instance_id, t.executor_id, t.callback_id,
+        unnest(['from', 'latest', 'start']) AS which,
+        unnest([coalesce(r.earliest_ns, r.latest_ns), r.latest_ns, r.start_ns]) AS at_ns
+    FROM together AS t
+    JOIN ready AS r ON t.callback_instance_id = r.callback_instance_id
+    WHERE r.thread_count > 1
+),
+ran AS (
+    SELECT
+        m.callback_instance_id, m.callback_id, m.which,
+        coalesce(s.before_ns + least(m.at_ns, s.end_ns) - s.start_ns, 0) AS until_ns
+    FROM moment AS m
+    ASOF LEFT JOIN derive.callback_running AS s
+        ON m.executor_id = s.executor_id AND m.callback_id = s.callback_id
+            AND m.at_ns >= s.start_ns
+),
+once AS (
+    SELECT
+        callback_instance_id,
+        callback_id,
+        max(until_ns) FILTER (WHERE which = 'start') - max(until_ns) FILTER (WHERE which = 'from')
+            AS overlap_ns,
+        max(until_ns) FILTER (WHERE which = 'start') - max(until_ns) FILTER (WHERE which = 'latest')
+            AS certain_ns
+    FROM ran
+    GROUP BY callback_instance_id, callback_id
+),
+told AS (
+    SELECT
+        t.callback_instance_id, t.callback_id, t.instances, t.thread_ns,
+        coalesce(o.overlap_ns, t.thread_ns) AS overlap_ns,
+        coalesce(o.certain_ns, t.certain_ns) AS certain_ns
+    FROM together AS t
+    LEFT JOIN once AS o
+        ON t.callback_instance_id = o.callback_instance_id AND t.callback_id = o.callback_id
 ),
 listed AS (
     SELECT
         callback_instance_id,
         list(callback_id ORDER BY overlap_ns DESC, callback_id) AS meanwhile_callback_ids,
-        list(overlap_ns ORDER BY overlap_ns DESC, callback_id) AS meanwhile_ns
-    FROM together
+        list(overlap_ns ORDER BY overlap_ns DESC, callback_id) AS meanwhile_ns,
+        list(certain_ns ORDER BY overlap_ns DESC, callback_id) AS meanwhile_certain_ns,
+        list(thread_ns ORDER BY overlap_ns DESC, callback_id) AS meanwhile_thread_ns,
+        list(instances ORDER BY overlap_ns DESC, callback_id) AS meanwhile_instances
+    FROM told
     GROUP BY callback_instance_id
 )
 SELECT
     w.run_id, w.callback_instance_id, w.executor_id, w.thread_id, w.callback_id, w.since,
     w.origin_ns, w.earliest_ns, w.latest_ns, w.start_ns, w.wait_ns, w.busy_min_ns, w.busy_max_ns,
     w.blocked_max_ns, w.idle_ns, w.is_loss_affected,
-    m.meanwhile_callback_ids, m.meanwhile_ns
+    w.held_max_ns, m.meanwhile_callback_ids, m.meanwhile_ns, m.meanwhile_certain_ns,
+    m.meanwhile_thread_ns, m.meanwhile_instances
 FROM derive.executor_waits('ready') AS w
 LEFT JOIN listed AS m ON w.callback_instance_id = m.callback_instance_id

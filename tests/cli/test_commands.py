@@ -244,6 +244,7 @@ def test_db_upgrade_of_old_views(msgflow: Msgflow, small_database: Path) -> None
         "db upgrade",
         "export parquet out",
         "export csv out",
+        "ui --no-browser",
     ],
 )
 def test_a_missing_database_has_code_4(msgflow: Msgflow, command: str) -> None:

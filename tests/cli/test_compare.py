@@ -51,7 +51,8 @@ def test_the_exit_code_tells_whether_a_condition_holds(msgflow: Msgflow, databas
     assert worse.stdout
     errors = [line for line in worse.stderr.splitlines() if line.startswith("error: ")]
     assert errors == [
-        "error: p95>5%: 25 % more (0.0004 ms to 0.0005 ms) — /camera → /image → /viewer"
+        "error: p95>5%: 25 % more (0.0004 ms to 0.0005 ms); too few values to exclude chance"
+        " — /camera → /image → /viewer"
     ]
 
 

@@ -9,6 +9,7 @@ from typer.testing import Result
 
 from msgflow import Database
 from msgflow.query.flow import MOST_VERTICES
+from msgflow.text.values import format_duration
 
 Msgflow = Callable[..., Result]
 
@@ -65,6 +66,7 @@ def test_json_and_files(msgflow: Msgflow, small_database: Path, tmp_path: Path) 
         (("--publication", "1", "--to", "/chatter"), "--to"),
         (("--slowest", "2", "--format", "json"), "--slowest 2"),
         (("--slowest", "1"), "no flow arrived"),
+        (("--case", "last"), "choose among the slowest"),
         (("--slowest", "1", "--to", "/nothing"), "/nothing"),
     ],
 )
@@ -86,11 +88,17 @@ def test_the_slowest_flows_are_those_of_the_query(
     with Database(demo) as database:
         rows = database.query("flows", to="/control/cmd", slowest=2).to_arrow()
         takes = rows["take_id"].to_pylist()
+        latency = rows["latency_ns"].to_pylist()[1]
         trees = [str(database.flow(take_id=take, direction="backward")) for take in takes]
     result = msgflow("flow", "--slowest", 2, "--to", "/control/cmd")
     assert result.exit_code == 0
     assert result.stdout == "\n\n".join(trees) + "\n"
     assert result.stdout.startswith(f"take {takes[0]}, /control/cmd")
+    assert (
+        f"note: slowest flow 2: {format_duration(latency)} to take {takes[1]}, /" in result.stderr
+    )
+    every = msgflow("flow", "--slowest", 1, "--to", "/control/cmd", "--case", "every_pair")
+    assert "note: slowest flow 1: " in every.stderr
     forward = msgflow("flow", "--slowest", 1, "--to", "/control/cmd", "--direction", "forward")
     assert forward.stdout.splitlines()[1:] != result.stdout.splitlines()[1:]
 

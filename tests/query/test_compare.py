@@ -478,3 +478,37 @@ def test_a_database_without_runs_says_so(fresh_database: Path) -> None:
         pytest.raises(UsageError, match="holds no run yet"),
     ):
         database.compare(1, 2)
+
+
+def test_a_start_with_the_longest_values_is_named_and_left_out(fresh_database: Path) -> None:
+    _fill(fresh_database, shift_ns=0, callbacks=1)
+    with duckdb.connect(str(fresh_database)) as connection:
+        # Twenty values until 0.2 s of the second run; an interval of p95 needs a hundred.
+        connection.execute(
+            "UPDATE store.callback_instance SET end_ns = end_ns + 5000000"
+            " WHERE run_id = 2 AND start_ns <= 200_000_000"
+        )
+    with msgflow.open_db(fresh_database) as database:
+        comparison = database.compare("before", "after", what="callbacks")
+        reverse = database.compare("after", "before", what="callbacks")
+        quick = database.compare("before", "after", what="callbacks", resamples=0)
+    without = comparison.without_warm_up
+    assert without is not None
+    # As text a comparison has what it compares.
+    assert "Timer(" in str(comparison)
+    # In steps of half a second.
+    assert without.skipped == 0.5
+    assert without.without_warm_up is None
+    assert comparison.result.notes[-1] == (
+        "run after (2) may warm up: its longest values lie at its start. Without the first 0.5 s:"
+        " no difference is shown (--skip-first 0.5)"
+    )
+    assert reverse.result.notes[-1] == comparison.result.notes[-1]
+    mean, *_ = (row for row in without.result.to_arrow().to_pylist() if row["statistic"] == "mean")
+    assert (mean["a_count"], mean["verdict"]) == (VALUES - 49, "no difference shown")
+    (p95,) = comparison.failures(["p95>50%"])
+    assert p95.reason.endswith("; without the first 0.5 s: within the limit")
+    (mean_fails,) = comparison.failures(["mean>0.01ns"])
+    assert "; without the first 0.5 s: " in mean_fails.reason
+    # Without intervals there is nothing to say again.
+    assert quick.without_warm_up is None

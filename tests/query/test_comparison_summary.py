@@ -47,6 +47,7 @@ def test_a_row_for_each_that_differs_the_greatest_change_first() -> None:
     assert rows[2]["b_median_ns"] == 1_100
     assert rows[2]["median_percent"] == 10.0
     assert rows[1]["separation"] == "large"
+    assert (rows[1]["median_verdict"], rows[1]["p95_verdict"]) == ("B is shorter", "B is longer")
     assert found.notes == ["4 compared, 1 with no difference shown: --all lists them", "a note"]
     assert found.when_empty == "no rows"
 
@@ -62,10 +63,10 @@ def test_no_difference_says_how_much_was_compared_and_what_could_not_be() -> Non
     found = changes(result, only_different=True)
     assert not len(found)
     assert found.when_empty == (
-        "no difference found between before and after: 3 compared, 1 with no difference shown,"
+        "no difference is shown between before and after: 3 compared, 1 with no difference shown,"
         " 1 with too few independent values, 1 with too few values: --all lists them"
     )
-    assert "note: no difference found" in str(found)
+    assert "note: no difference is shown" in str(found)
     every = changes(result, only_different=False).to_arrow().to_pylist()
     assert {row["path"]: row["change"] for row in every} == {
         "/same": "none shown",
@@ -76,17 +77,22 @@ def test_no_difference_says_how_much_was_compared_and_what_could_not_be() -> Non
 
 def test_all_of_them() -> None:
     found = changes(RESULT, only_different=False)
-    assert {row["path"]: row["change"] for row in found.to_arrow().to_pylist()}["/same"] == (
-        "none shown"
-    )
+    rows = found.to_arrow().to_pylist()
+    # The greatest change of a median comes last: it is not shown to differ.
+    assert [row["path"] for row in rows] == ["/gone", "/both", A_TO_B, "/same"]
+    assert (rows[3]["change"], rows[3]["of"]) == ("none shown", "median")
+    assert rows[3]["p95_verdict"] == "too few values"
+    assert rows[3]["max_verdict"] is None
     assert found.notes == ["a note"]
     assert found.columns == tuple(column.name for column in (found.header or 0).columns)  # type: ignore[union-attr]
 
 
-def test_where_all_was_measured_the_words_are_few() -> None:
-    runs = (Run(1, "before", 0), Run(2, "after", 0))
-    rows = compared("/same", {"median": "no difference shown"}, 0)
-    found = changes(QueryResult(pa.Table.from_pylist(rows), runs=runs), only_different=True)
-    assert found.when_empty == (
-        "no difference found between before and after: 1 compared, --all lists them"
+def test_the_maximum_has_values_and_a_word() -> None:
+    rows = compared("/max", {"median": "no difference shown", "max": "not estimated"}, 100)
+    (row,) = (
+        changes(QueryResult(pa.Table.from_pylist(rows)), only_different=False)
+        .to_arrow()
+        .to_pylist()
     )
+    assert (row["a_max_ns"], row["b_max_ns"], row["max_percent"]) == (1_000, 1_100, 10.0)
+    assert row["max_verdict"] == "not estimated"

@@ -152,7 +152,7 @@ def test_the_critical_path_and_the_breakdown_agree(
     ((whole, busy_min, busy_max),) = con.execute(
         "SELECT sum(duration_ns), sum(coalesce(busy_min_ns, 0)), "
         "sum(coalesce(busy_max_ns, duration_ns)) "
-        f"FROM end_to_end_part({arguments}, 'longest', sink_take_id := ?) "
+        f"FROM end_to_end_part({arguments}, 'first', sink_take_id := ?, most_flows := 1) "
         "LEFT JOIN executor_wait USING (callback_instance_id) "
         "WHERE part IN ('publish_to_take', 'request_to_take')",
         [take_id],
@@ -206,3 +206,20 @@ def measured(
         run_query(con, load_query(query), {}, Slice(start=start)).to_arrow().to_pylist()
     )
     return rows
+
+
+@pytest.mark.parametrize("case", ["first", "last", "newest", "every_pair"])
+def test_the_slowest_flow_is_one_of_those_that_count(
+    recordings: Callable[[str], Ingested], case: str
+) -> None:
+    con = recordings("periodic_async_jazzy24").connection
+    (row,) = con.execute(
+        "SELECT (SELECT max(latency_ns) FROM end_to_end_flow([1], flow_case := $case)), "
+        "(SELECT any_value(latency_ns) FROM critical_path([1], flow_case := $case)), "
+        "(SELECT max(latency_ns) FROM end_to_end_flow([1], flow_case := 'every_pair'))",
+        {"case": case},
+    ).fetchall()
+    slowest, of_critical_path, of_all = row
+    assert of_critical_path == slowest
+    # A timer publishes some inputs twice: their first arrivals are earlier.
+    assert (slowest < of_all) == (case == "first")

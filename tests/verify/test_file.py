@@ -76,8 +76,14 @@ def test_a_file_that_is_none(tmp_path: Path) -> None:
 def test_names_that_the_run_does_not_have(
     check: Callable[[str], Verification], text: str, line: int, message: str, hint: str
 ) -> None:
-    with pytest.raises(UsageError) as error:
-        check(text)
-    assert f", line {line}: the run has no such" in error.value.message
-    assert message in error.value.message
-    assert hint in (error.value.hint or "")
+    """It is not measured, and says why; the others are judged."""
+    verification = check(text + "\n  - topic: /a\n    rate: '> 0 Hz'")
+    rows = verification.result.to_arrow().to_pylist()
+    (missing,) = (row for row in rows if "no such" in (row["reason"] or ""))
+    passed = [row for row in rows if row["verdict"] == "passed"]
+    assert missing["verdict"] == "not measured"
+    assert missing["line"] >= line
+    assert message in missing["reason"]
+    assert hint in missing["reason"]
+    assert passed
+    assert "the run has no such" in verification.to_junit()

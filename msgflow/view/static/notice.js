@@ -23,6 +23,10 @@ export function command(text) {
   return text ? h("p", { className: "command" }, "the same numbers: ", h("code", {}, text)) : null;
 }
 
+// A text as one word of a shell, and as a text in SQL.
+export const quoted = (text) => `'${text.replaceAll("'", `'"'"'`)}'`;
+export const sqlText = (text) => `'${text.replaceAll("'", "''")}'`;
+
 // The mark of a duration between clocks that are not synchronised, and what it means.
 const DOUBT = "between hosts whose clocks are not synchronised: the difference of the clocks is in it";
 export function doubt() {

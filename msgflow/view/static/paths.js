@@ -4,7 +4,7 @@ import { h, clear, color, breakable } from "./dom.js";
 import { address, current, replace } from "./address.js";
 import { PALE, PART_COLORS, PATH_HELP, count, duration, partTitle, pathText, percent } from "./labels.js";
 import { dataTable, besides } from "./table.js";
-import { command, doubt, doubtHelp, failed, notes, waiting } from "./notice.js";
+import { command, doubt, doubtHelp, failed, notes, quoted, sqlText, waiting } from "./notice.js";
 import { chart, redrawCharts } from "./chart.js";
 import { doubted, pathNumbers } from "./overview.js";
 
@@ -70,7 +70,7 @@ export class PathsPage {
     const [histogram, shares, points, slowest] = await Promise.all(
       ["path_histogram", "path_share", "path_point", "path_slowest"].map((name) => app.fetch(name, { path })));
     const parts = h("div", {}, waiting("taking the latency apart …"));
-    app.query("path-breakdown").then((breakdown) => clear(parts, this.breakdown(breakdown, path)))
+    app.query("path-breakdown").then((breakdown) => clear(parts, this.breakdown(breakdown, path, table.path[row])))
       .catch((error) => clear(parts, failed(error)));
     const bins = this.bins = evenBins(histogram);
     const toFlow = (source, at) => address({ page: "timeline", path: null, from: null, to: null, source: begin,
@@ -120,7 +120,7 @@ export class PathsPage {
       track, legend, table.reasons[row] && h("p", { className: "soft" }, `Reasons: ${table.reasons[row]}`)];
   }
 
-  breakdown(breakdown, path) {
+  breakdown(breakdown, path, name) {
     const rows = [];
     for (let row = 0; row < breakdown.rows; row++) if (breakdown.path_id[row] === path) rows.push(row);
     if (!rows.length) return h("p", {}, "No flow reached the end of this path.");
@@ -147,7 +147,7 @@ export class PathsPage {
     return [h("p", { className: "soft" }, "The mean of each part, in the order in which a flow goes through them. Where a message waited for a callback, the trace may not tell whether the network or a busy executor was the reason: that is undecided."),
       stack, legend, dataTable(breakdown, { only: (row) => breakdown.path_id[row] === path, label: "breakdown",
       columns: ["hop", "part", "node", "what", "median_ns", "mean_ns", "p95_ns", "max_ns", "share", "flows", "overlaps"] }),
-    most === 0 && h("p", {}, "All parts are zero."), notes(breakdown.meta.notes), command(breakdown.meta.command)];
+    most === 0 && h("p", {}, "All parts are zero."), notes(breakdown.meta.notes), command(`${breakdown.meta.command} --where ${quoted(`path = ${sqlText(name)}`)}`)];
   }
 
   recolor() { if (this.row !== undefined) { redrawCharts(); this.choose(this.row, false); } }

@@ -151,7 +151,8 @@ measured AS (
             WHEN r.earliest_ns >= r.wait_start_ns THEN r.wait_end_ns - r.earliest_ns
             ELSE r.wait_end_ns - r.wait_start_ns
                 + coalesce(r.wait_before_ns - p.idle_earliest_ns, 0)
-        END AS idle_ns
+        END AS idle_ns,
+        r.thread_count
     FROM ready AS r
     LEFT JOIN passed AS p ON r.callback_instance_id = p.callback_instance_id
     LEFT JOIN waiting AS w ON r.executor_id = w.executor_id
@@ -172,7 +173,13 @@ SELECT
     r.busy_start_ns - r.busy_earliest_ns + r.blocked_max_ns AS busy_max_ns,
     CASE WHEN r.earliest_ns IS NOT NULL THEN r.blocked_max_ns END AS blocked_max_ns,
     r.idle_ns,
-    r.is_loss_affected
+    r.is_loss_affected,
+    -- An excluded callback may wait while a thread is idle: then more was held than this says.
+    CASE WHEN r.thread_count > 1 AND r.idle_ns IS NOT NULL THEN greatest(
+        r.start_ns - r.earliest_ns - r.idle_ns
+        - (r.busy_start_ns - r.busy_earliest_ns + r.blocked_max_ns),
+        0
+    ) END AS held_max_ns
 FROM measured AS r
 JOIN store.thread AS t ON r.thread_id = t.thread_id
 JOIN derive.process_clock AS c ON t.process_id = c.process_id
