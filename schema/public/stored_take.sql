@@ -1,9 +1,13 @@
--- name: derive.stored_take
+-- name: main.stored_take
 -- description: Takes of messages that were published before their subscription existed, and were
 --     stored until then (a publisher that is transient local: latched). The creation of the
 --     subscription decides, so a message that was only sent before the two were connected is not
 --     among them. Between clocks the distance has to be more than the errors of both.
 -- grain: one row per such take
+-- column: run_id BIGINT  Run that the row belongs to
+-- column: take_id BIGINT  Identity of the take
+-- column: created_ns BIGINT [epoch ns]  Creation of its subscription
+-- column: stored_ns BIGINT [ns]  From the end of the publication until then
 WITH clock AS (
     SELECT
         c.clock_id, c.reference_clock_id,
@@ -20,17 +24,17 @@ place AS (
 ),
 -- Most publications are later than all creations: only the others are looked up.
 latest AS (
-    SELECT run_id, max(created_ns) AS created_ns FROM store.subscription GROUP BY run_id
+    SELECT run_id, max(created_ns) AS created_ns FROM main.subscription GROUP BY run_id
 ),
 sent AS (
     SELECT b.publication_id, b.process_id, b.end_ns
-    FROM store.publication AS b
+    FROM main.publication AS b
     JOIN latest AS n ON b.run_id = n.run_id AND b.end_ns < n.created_ns
 )
 SELECT l.run_id, l.take_id, s.created_ns, s.created_ns - b.end_ns AS stored_ns
 FROM store.link_transport AS l
 JOIN sent AS b ON l.publication_id = b.publication_id
-JOIN store.subscription AS s ON l.subscription_id = s.subscription_id
+JOIN main.subscription AS s ON l.subscription_id = s.subscription_id
 JOIN place AS f ON b.process_id = f.process_id
 JOIN place AS o ON s.process_id = o.process_id
 WHERE s.created_ns - b.end_ns > CASE
