@@ -39,8 +39,8 @@
 CREATE OR REPLACE MACRO main.end_to_end_flow(
     runs, from_topic := NULL, to_topic := NULL, from_event := 'callback_start',
     to_event := 'callback_end', window_start_ns := NULL, window_end_ns := NULL,
-    flow_case := 'first', sink_take_id := NULL, max_depth := 32, max_paths := 1000, most_flows :=
-    NULL, at_quantile := NULL, path_ids := NULL
+    flow_case := 'first', sink_take_id := NULL, max_depth := 32, max_paths := 1000,
+    most_flows := NULL, at_quantile := NULL, path_ids := NULL
 ) AS TABLE
 SELECT
     row_number() OVER (
