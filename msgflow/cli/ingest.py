@@ -125,8 +125,11 @@ def command(
         from msgflow.cli.output import print_note
         from msgflow.cli.progress import ingest_progress
         from msgflow.database import Database
+        from msgflow.db.runs import require_run_name
         from msgflow.ingest.recordings import Recording, find_recordings
 
+        if name is not None:
+            require_run_name(name)
         with (
             Database(database, memory_limit=memory_limit) as opened,
             ingest_progress(quiet) as progress,

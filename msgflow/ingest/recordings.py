@@ -65,6 +65,8 @@ def find_recordings(
     """
     roots = [Path(os.path.realpath(path)) for path in paths]
     whole = [Recording(paths, hosts)]
+    if "" in paths:  # An ingest refuses it; here it would be the current directory.
+        return whole
     archives = [root for root in roots if archive.is_archive(root)]
     if archives:
         is_one = len(set(roots)) == 1

@@ -217,5 +217,6 @@ def test_one_name_for_two_paths_is_one_host(
         raise UsageError("enough")
 
     monkeypatch.setattr(Database, "ingest", ingest)
-    msgflow("ingest", tmp_path, "--host", "one=box-1", "--host", "one=box-2", "--host", "x=y")
+    hosts = ("--host", "one=box-1", "--host", "one=box-2", "--host", "x=y")
+    msgflow("ingest", tmp_path, "--together", *hosts)
     assert given == [{"one": ["box-1", "box-2"], "x": ["y"]}]
