@@ -137,7 +137,7 @@ reached (path_id, root_key, take_id) AS (
 stored (path_id, root_key, take_id) AS (
     SELECT r.path_id, r.root_key, r.take_id
     FROM reached AS r
-    JOIN main.stored_take AS z ON r.take_id = z.take_id
+    JOIN derive.stored_take AS z ON r.take_id = z.take_id
     WHERE list_contains(runs, z.run_id)
     UNION
     SELECT p.path_id, z.root_key, s.take_id

@@ -260,7 +260,7 @@ message AS (
     LEFT JOIN callback AS r
         ON f.root_id = r.callback_instance_id AND f.root_kind = 'callback_instance'
     LEFT JOIN turn AS w ON h.flow_id = w.flow_id AND h.hop = w.hop
-    LEFT JOIN main.stored_take AS z ON h.take_id = z.take_id
+    LEFT JOIN derive.stored_take AS z ON h.take_id = z.take_id
 ),
 -- `lead` is the number of its parts before the layers of publishing, `place` that of all parts of
 -- the flow before it.

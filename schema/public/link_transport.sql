@@ -28,4 +28,4 @@ SELECT
 FROM store.link_transport AS l
 JOIN main.publication AS b ON l.publication_id = b.publication_id
 JOIN main.take AS t ON l.take_id = t.take_id
-LEFT JOIN main.stored_take AS z ON l.take_id = z.take_id
+LEFT JOIN derive.stored_take AS z ON l.take_id = z.take_id
