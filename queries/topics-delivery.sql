@@ -25,7 +25,7 @@
 -- column: orphan_reasons VARCHAR    Why publications are not known, with counts
 -- column: subscription_id BIGINT    Identity of the subscription
 -- column: is_internal BOOLEAN       ROS uses the topic for itself
--- brief: topic_name, subscriber, delivered, dropped, lost, delivered_percent, unknown,
+-- brief: topic_name, subscriber, delivered, dropped, lost, unknown, delivered_percent,
 --     lost_percent, published, reasons, not_connected, orphans, orphan_reasons
 -- answer: delivered, dropped, lost, unknown
 WITH outcome AS (

@@ -102,7 +102,7 @@ def test_deferred_responses_before_kilted(recordings: Callable[[str], Ingested])
 
 
 def test_a_join_that_the_other_input_triggers(recordings: Callable[[str], Ingested]) -> None:
-    """After the first twelve, /rear_tf is always last: the node ends flows from /front, nothing cuts them."""
+    """After the first twelve, /rear_tf is always last: the node ends flows from /front."""
     recording = recordings("real_reference/ust")
     counts = recording.rows(
         "SELECT e.status, count(*) FROM end_to_end([1], '/front', '/ground') AS e "
