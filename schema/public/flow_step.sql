@@ -15,8 +15,8 @@
 -- column: depth INTEGER  Steps from the start; negative: backward
 -- column: from_kind VARCHAR  Cause that the link comes from, as kind
 -- column: from_id BIGINT  Identity of the cause
--- column: link_kind VARCHAR  'transport', 'callback', 'service' or the kind of the causal link; to a
---     subscription that did not take the message: its status there, as in main.stat_delivery
+-- column: link_kind VARCHAR  'transport', 'callback', 'service' or the kind of the causal link; to
+--     a subscription that did not take the message: its status, as in main.stat_delivery
 -- column: wait_ns BIGINT [ns]  Time between cause and effect; NULL where the effect is part of the
 --     cause
 -- column: candidate_count BIGINT  Number of causes that are possible
