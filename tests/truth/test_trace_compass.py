@@ -81,7 +81,7 @@ def trace(session: Session) -> Iterator[Ingested]:
 def test_the_two_commands(session: Session) -> None:
     """The answer, and not a byte of the trace changes."""
     (row,) = [row for row in session.answer if row["roots"] == 2_031]
-    assert (row["reached"], row["cut_by_recording"], row["lost"], row["superseded"]) == (
+    assert (row["reached"], row["not_connected"], row["lost"], row["superseded"]) == (
         1_986,
         45,
         0,
@@ -176,12 +176,12 @@ def test_flows(trace: Ingested) -> None:
     """2,031 roots: what became of each, and how long those took that arrived."""
     assert trace.rows(
         f"SELECT e.status, count(*) FROM {FLOWS} WHERE {MAIN_PATH} GROUP BY ALL ORDER BY ALL"
-    ) == [("cut_by_recording", 45), ("reached", 1_986)]
+    ) == [("not_connected", 45), ("reached", 1_986)]
     assert trace.rows(
         f"SELECT count(*) FILTER (e.root_ns < first), count(*) FILTER (e.root_ns > last) "
         f"FROM (SELECT *, min(root_ns) FILTER (status = 'reached') OVER () AS first, "
         f"max(root_ns) FILTER (status = 'reached') OVER () AS last "
-        f"FROM {FLOWS} WHERE {MAIN_PATH}) AS e WHERE e.status = 'cut_by_recording'"
+        f"FROM {FLOWS} WHERE {MAIN_PATH}) AS e WHERE e.status = 'not_connected'"
     ) == [(5, 40)]
     assert trace.rows(
         "SELECT min(latency_ns), quantile_disc(latency_ns, 0.5), max(latency_ns) "

@@ -10,7 +10,7 @@
 -- column: roots BIGINT             Flows that began
 -- column: reached BIGINT           Roots that reached the end of the path
 -- column: superseded BIGINT        Roots replaced by a newer input before they were used
--- column: dropped BIGINT           Roots that ended in a full queue: newer messages took their place
+-- column: dropped BIGINT           Roots that ended in a full queue: newer messages came instead
 -- column: lost BIGINT              Roots that were lost on the way
 -- column: no_output BIGINT         Roots that ended at a node that did not publish
 -- column: not_connected BIGINT     Roots that ended before or after a publisher and a subscription
@@ -77,7 +77,9 @@ affected AS (
 ),
 reason AS (
     SELECT
-        label_group, path, string_agg(reason || ' ' || number, ', ' ORDER BY number DESC, reason) AS reasons
+        label_group,
+        path,
+        string_agg(reason || ' ' || number, ', ' ORDER BY number DESC, reason) AS reasons
     FROM (
         SELECT label_group, path, reason, count(*) AS number
         FROM arrival
