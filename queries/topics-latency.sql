@@ -4,8 +4,8 @@
 --     includes the time for which the receiving executor was busy with other callbacks. A trace
 --     does not say when a message arrived, so this time is given as bounds, those of waits;
 --     the rest was the network or an idle executor. A negative latency means that the clocks of two
---     hosts are apart. Takes without a known publication are counted, but not measured, and neither are
---     messages that were stored until their subscription existed.
+--     hosts are apart. Takes without a known publication are counted, but not measured, and
+--     neither are messages that were stored until their subscription existed.
 -- grain: one row per topic, receiving node and subscription
 -- column: run_id BIGINT             Run
 -- column: topic_name VARCHAR [topic]  Topic

@@ -70,7 +70,8 @@ WHERE derive.known_word(
 QUALIFY CASE
     WHEN flow_case <> 'longest' THEN true
     WHEN at_quantile IS NULL THEN row_number() OVER (
-        ORDER BY e.latency_ns DESC NULLS LAST, e.path_id, e.root_ns, e.root_kind, e.root_id, e.take_id
+        ORDER BY
+            e.latency_ns DESC NULLS LAST, e.path_id, e.root_ns, e.root_kind, e.root_id, e.take_id
     ) <= most_flows
     ELSE row_number() OVER (
         ORDER BY e.latency_ns NULLS LAST, e.path_id, e.root_ns, e.root_kind, e.root_id, e.take_id
