@@ -12,8 +12,8 @@
 -- column: subscriber VARCHAR [node]  Node that received
 -- column: takes BIGINT              Messages received in the time window
 -- column: linked BIGINT             Takes whose publication is known
--- column: stored BIGINT             Links left out of the latencies: the message was published before
---     the subscription existed, and stored until then
+-- column: stored BIGINT             Links left out of the latencies: the message was published
+--     before the subscription existed, and stored until then
 -- column: ambiguous BIGINT          Links with more than one candidate
 -- column: negative BIGINT           Links with negative latency
 -- column: min_ns BIGINT [ns]        Shortest latency

@@ -13,28 +13,39 @@ WITH clock AS (
     GROUP BY c.clock_id, c.reference_clock_id, c.uncertainty_ns
 ),
 place AS (
-    SELECT p.process_id, c.clock_id, c.reference_clock_id, c.uncertainty_ns
-    FROM store.process AS p
-    JOIN store.host AS h ON p.host_id = h.host_id
-    JOIN clock AS c ON h.clock_id = c.clock_id
+    SELECT
+        p.process_id, c.clock_id, c.reference_clock_id, c.uncertainty_ns, p.offset_ns, p.drift_ppb,
+        p.reference_ns
+    FROM derive.process_clock AS p
+    JOIN clock AS c ON p.clock_id = c.clock_id
+),
+created AS (
+    SELECT
+        s.run_id, s.subscription_id, p.clock_id, p.reference_clock_id, p.uncertainty_ns,
+        derive.corrected_ns(s.created_ns, p.offset_ns, p.drift_ppb, p.reference_ns) AS created_ns
+    FROM store.subscription AS s
+    JOIN place AS p ON s.process_id = p.process_id
 ),
 -- Most publications are later than all creations: only the others are looked up.
 latest AS (
-    SELECT run_id, max(created_ns) AS created_ns FROM main.subscription GROUP BY run_id
+    SELECT run_id, max(created_ns) AS created_ns FROM created GROUP BY run_id
 ),
 sent AS (
-    SELECT b.publication_id, b.process_id, b.end_ns
-    FROM main.publication AS b
-    JOIN latest AS n ON b.run_id = n.run_id AND b.end_ns < n.created_ns
+    SELECT
+        b.publication_id, p.clock_id, p.reference_clock_id, p.uncertainty_ns,
+        derive.corrected_ns(b.end_ns, p.offset_ns, p.drift_ppb, p.reference_ns) AS end_ns
+    FROM store.publication AS b
+    JOIN place AS p ON b.process_id = p.process_id
+    JOIN latest AS n
+        ON b.run_id = n.run_id
+        AND derive.corrected_ns(b.end_ns, p.offset_ns, p.drift_ppb, p.reference_ns) < n.created_ns
 )
 SELECT l.run_id, l.take_id, s.created_ns, s.created_ns - b.end_ns AS stored_ns
 FROM store.link_transport AS l
 JOIN sent AS b ON l.publication_id = b.publication_id
-JOIN main.subscription AS s ON l.subscription_id = s.subscription_id
-JOIN place AS f ON b.process_id = f.process_id
-JOIN place AS o ON s.process_id = o.process_id
+JOIN created AS s ON l.subscription_id = s.subscription_id
 WHERE s.created_ns - b.end_ns > CASE
-        WHEN f.clock_id = o.clock_id THEN 0
-        WHEN f.reference_clock_id = o.reference_clock_id
-            THEN f.uncertainty_ns + o.uncertainty_ns
+        WHEN b.clock_id = s.clock_id THEN 0
+        WHEN b.reference_clock_id = s.reference_clock_id
+            THEN b.uncertainty_ns + s.uncertainty_ns
     END
