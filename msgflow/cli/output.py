@@ -125,7 +125,8 @@ def _print_for_screen(result: QueryResult, is_chosen: bool, most_rows: int | Non
     shown = lay_out(result, width, most_rows=most_rows, is_chosen=is_chosen)
     print_lines(screen_lines(shown, width))
     if shown.not_shown is not None:
-        typer.secho(_shown(shown.not_shown), err=True, dim=True)
+        is_plain = os.environ.get("NO_COLOR")
+        typer.secho(_shown(shown.not_shown), err=True, dim=None if is_plain else True)
     for note in shown.notes:
         print_note(note)
 
