@@ -63,7 +63,7 @@ WHERE columns.database_name = current_database() AND columns.schema_name = 'main
 ORDER BY columns.table_name, columns.column_index
 """
 _VIEWS = """
-SELECT view_name AS view, column_count AS columns, comment AS description
+SELECT view_name AS view, column_count AS columns, split_part(comment, '. ', 1) AS description
 FROM duckdb_views()
 WHERE database_name = current_database() AND schema_name = 'main' AND NOT internal
 ORDER BY view_name
@@ -739,7 +739,7 @@ class Database:
             raise in_words(error, self.path) or sql_error(error) from error
 
     def views(self) -> QueryResult:
-        """Return the public views, a row each, with the number of columns and the meaning."""
+        """Return the public views, a row each, with the number of columns and a sentence."""
         connection = self.connection
         return self._ask(lambda: QueryResult(connection.sql(_VIEWS).to_arrow_table()))
 

@@ -198,7 +198,8 @@ def test_db_schema_lists_the_views_or_the_columns_of_one(
     result = msgflow("db", "schema", "--db", small_database, "--format", "jsonl")
     views = {row["view"]: row for row in map(json.loads, result.stdout.splitlines())}
     assert {"take", "message", "callback_run"} < views.keys() < set(public_names())
-    assert views["take"]["description"].startswith("Messages at the moment")
+    sentence = "Messages at the moment they were handed over to a subscription"
+    assert views["take"]["description"] == sentence
     result = msgflow("db", "schema", "take", "--db", small_database, "--format", "jsonl")
     columns = [json.loads(line) for line in result.stdout.splitlines()]
     assert len(columns) == views["take"]["columns"]
