@@ -16,7 +16,6 @@ RULES = (
     "standing_difference",
     "close_pair",
     "sharp_difference",
-    "clock_setting",
     "stamp_pair",
     "stamp_clock",
     "publication_beside_gap",
@@ -33,10 +32,6 @@ CREATE TABLE published (run_id BIGINT DEFAULT 1, clock_id BIGINT DEFAULT 1,
 CREATE TABLE message (run_id BIGINT DEFAULT 1, topic_name VARCHAR DEFAULT '/a',
     source_timestamp_ns BIGINT, only_subscription_id BIGINT DEFAULT 0, clock_id BIGINT DEFAULT 1,
     taken_ns BIGINT);
--- A subscription of each topic on each clock.
-CREATE VIEW received AS
-    SELECT *, row_number() OVER () AS take_id,
-        hash(topic_name, only_subscription_id, clock_id) AS subscription_id FROM message;
 CREATE TABLE store.stamp_clock (run_id BIGINT DEFAULT 1, clock_id BIGINT DEFAULT 1, at_ns BIGINT,
     start_ns BIGINT, end_ns BIGINT, difference_ns BIGINT DEFAULT 0, drift_ppb BIGINT DEFAULT 0,
     message_count BIGINT DEFAULT 100, segment BIGINT DEFAULT 0, is_sharp BOOLEAN DEFAULT true);
@@ -48,7 +43,7 @@ CREATE VIEW store.publication AS
     SELECT publication_id, 1 AS trace_id, written_ns AS start_ns, written_ns AS end_ns,
         next_event_ns FROM published;
 CREATE MACRO derive.unstamped_publication(only_run) AS TABLE FROM published WHERE run_id = only_run;
-CREATE MACRO derive.unstamped_take(only_run) AS TABLE FROM received WHERE run_id = only_run;
+CREATE MACRO derive.unstamped_message(only_run) AS TABLE FROM message WHERE run_id = only_run;
 """
 # Likewise of what messages say of two clocks.
 CLOCKS = ("clock_drift_limit", "clock_hull", "clock_line", "clock_line_error", "clock_pair")

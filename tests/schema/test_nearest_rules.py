@@ -47,16 +47,11 @@ def publish(
 
 
 def take(
-    con: duckdb.DuckDBPyConnection,
-    *stamps: int,
-    topic: str = "/a",
-    taken: int = 100 * SECOND,
-    clock_id: int = 1,
+    con: duckdb.DuckDBPyConnection, *stamps: int, topic: str = "/a", taken: int = 100 * SECOND
 ) -> None:
     con.executemany(
-        "INSERT INTO message (source_timestamp_ns, topic_name, taken_ns, clock_id) "
-        "VALUES (?, ?, ?, ?)",
-        [(stamp, topic, taken, clock_id) for stamp in stamps],
+        "INSERT INTO message (source_timestamp_ns, topic_name, taken_ns) VALUES (?, ?, ?)",
+        [(stamp, topic, taken) for stamp in stamps],
     )
 
 
@@ -545,100 +540,6 @@ def test_after_a_clock_was_set_back_publications_of_one_side_do_not_hide_others(
     take(rules, early + 900, taken=early + back + MILLISECOND)
     found = nearest(rules)
     assert (found[early + 500], found[early + 900]) == ((1, 1), (2, 1))
-
-
-BACK = 40 * MILLISECOND
-BEFORE = SECOND - 20 * MILLISECOND
-STAMP = BEFORE + MICROSECOND
-BOTH = (None, 2)
-FIVE = 5 * MILLISECOND
-
-
-def set_back(con: duckdb.DuckDBPyConnection) -> None:
-    """By 40 ms at a second; the second publication would have the stamp of the first one then."""
-    clock(con, (0, 100, 0), (-BACK, 100, 1))
-    publish(con, 1, BEFORE, BEFORE + MILLISECOND)
-    publish(con, 2, BEFORE + BACK, BEFORE + BACK + MILLISECOND)
-
-
-def beside(con: duckdb.DuckDBPyConnection, stamped: int, taken: int, clock_id: int = 1) -> None:
-    """A message that fits before the jump only, as its publication is far from all others."""
-    publish(con, 5, stamped - MICROSECOND, stamped + MILLISECOND, publisher=ord("a"))
-    take(con, stamped, taken=taken, clock_id=clock_id)
-
-
-@pytest.mark.parametrize(
-    ("stamped", "taken", "expected"),
-    [
-        pytest.param(STAMP + FIVE + 1, 200, (2, 1), id="taken_behind_a_later_one"),
-        pytest.param(STAMP + FIVE, 200, BOTH, id="hardly_later"),
-        pytest.param(STAMP + BACK - FIVE - 1, 400, (1, 1), id="taken_before_an_earlier_one"),
-        pytest.param(STAMP + BACK - FIVE, 400, BOTH, id="hardly_earlier"),
-    ],
-)
-def test_messages_were_stamped_in_the_order_in_which_they_are_taken(
-    rules: duckdb.DuckDBPyConnection, stamped: int, taken: int, expected: tuple[int | None, int]
-) -> None:
-    """But for five milliseconds, where threads of one subscription are held up."""
-    set_back(rules)
-    take(rules, STAMP, taken=300 * SECOND)
-    beside(rules, stamped, taken * SECOND)
-    assert nearest(rules)[STAMP] == expected
-
-
-def test_each_subscription_has_its_own_order(rules: duckdb.DuckDBPyConnection) -> None:
-    set_back(rules)
-    take(rules, STAMP, taken=300 * SECOND)
-    beside(rules, STAMP + BACK // 2, 200 * SECOND, clock_id=2)
-    assert nearest(rules)[STAMP] == BOTH
-
-
-def test_messages_that_may_be_on_either_side_do_not_tell(rules: duckdb.DuckDBPyConnection) -> None:
-    set_back(rules)
-    for number, later in ((3, 0), (4, BACK)):
-        written = BEFORE + BACK // 4 + later
-        publish(rules, number, written, written + MILLISECOND)
-    take(rules, STAMP, taken=200 * SECOND)
-    take(rules, STAMP + BACK // 4, taken=300 * SECOND)
-    assert set(nearest(rules).values()) == {BOTH}
-
-
-def test_a_clock_that_did_not_jump_needs_no_order(rules: duckdb.DuckDBPyConnection) -> None:
-    clock(rules, (0, 100, 0), (0, 100, 0))
-    publish(rules, 1, 0, MILLISECOND)
-    publish(rules, 2, SECOND, SECOND + MILLISECOND)
-    take(rules, MICROSECOND, taken=300 * SECOND)
-    take(rules, SECOND + MICROSECOND, taken=200 * SECOND)
-    assert nearest(rules) == {MICROSECOND: (1, 1), SECOND + MICROSECOND: (2, 1)}
-
-
-@pytest.mark.parametrize(
-    ("before", "behind", "expected"),
-    [
-        pytest.param(BACK, None, (1, 1), id="as_it_had_not_jumped"),
-        pytest.param(BACK - 1, None, BOTH, id="as_it_had_not_jumped_a_moment_before"),
-        pytest.param(None, 0, (2, 1), id="as_it_had_jumped"),
-        pytest.param(None, 1, BOTH, id="as_it_had_jumped_a_moment_later"),
-        pytest.param(BACK, 0, BOTH, id="which_contradict_each_other"),
-    ],
-)
-def test_messages_of_other_topics_tell_when_a_clock_jumped(
-    rules: duckdb.DuckDBPyConnection,
-    before: int | None,
-    behind: int | None,
-    expected: tuple[int | None, int],
-) -> None:
-    """Those that fit one side of it alone."""
-    set_back(rules)
-    take(rules, STAMP)
-    half = SECOND // 2
-    others = (("/b", before, 0), ("/c", behind, -BACK), ("/d", -half, 0), ("/e", half, -BACK))
-    for number, (topic, since, difference) in enumerate(others, 5):
-        if since is not None:
-            written = BEFORE + since
-            publish(rules, number, written, written + MILLISECOND, topic)
-            take(rules, written + difference + MICROSECOND, topic=topic)
-    assert nearest(rules)[STAMP] == expected
 
 
 def test_an_unknown_side_of_a_jump_tells_nothing(rules: duckdb.DuckDBPyConnection) -> None:

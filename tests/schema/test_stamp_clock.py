@@ -381,53 +381,7 @@ def test_a_clock_that_is_set_by_hours_while_only_others_take_its_messages(
     rows = step(rules, 4 * STRETCH_NS, by_ns)
     found = [(round(difference / SECOND), segment) for _, _, difference, _, segment in rows]
     assert set(found) == {(0, 0), (by_ns // SECOND, 1)}
-    assert 0 <= next(row[0] for row in rows if row[4] == 1) - 4 * STRETCH_NS < PERIOD_NS
-
-
-@pytest.mark.parametrize("clock", [1, 2])
-def test_a_clock_that_is_set_back_by_seconds(rules: duckdb.DuckDBPyConnection, clock: int) -> None:
-    """It shows two seconds twice. The segments before and behind are counted on."""
-    record(rules, width_ns=2_000, delay_ns=1_000, ppm=0, count=800)
-    rules.execute("UPDATE message SET clock_id = ?", [clock])
-    for since, by in ((2, 40_000_000), (4, -2 * SECOND), (6, 40_000_000)):
-        rules.execute(
-            "UPDATE message SET source_timestamp_ns = source_timestamp_ns + ? WHERE taken_ns >= ?",
-            [by, since * SECOND],
-        )
-    rows = step(rules, 100 * SECOND, 0)
-    found = {segment: round(difference / 1e7) for _, _, difference, _, segment in rows}
-    assert found == {0: 0, 1: 4, 2: -196, 3: -192}
-    for segment in range(1, 4):
-        begin = min(row[0] for row in rows if row[4] == segment)
-        assert abs(begin - segment * 2 * SECOND) < 100_000_000
-
-
-@pytest.mark.parametrize(("longer_ns", "known"), [(500_000, {True}), (700_000, {False, True})])
-def test_a_clock_that_was_set_is_near_what_its_messages_show(
-    rules: duckdb.DuckDBPyConnection, longer_ns: int, known: set[bool]
-) -> None:
-    """Up to half a millisecond beside it, and as far as a clock drifts in a stretch.
-
-    The timer is never late and only others take its messages, so that these fit any period. From
-    when the clock was set, they are longer on their way.
-    """
-    rules.execute(
-        "INSERT INTO published (publication_id, written_ns, next_event_ns) "
-        "SELECT n, n * $period, n * $period + 2000 FROM range(800) AS r(n)",
-        {"period": PERIOD_NS},
-    )
-    rules.execute(
-        "INSERT INTO message (source_timestamp_ns, taken_ns, clock_id) "
-        "SELECT written_ns + 500, written_ns + 200000 + CASE WHEN publication_id >= 400 "
-        "THEN $longer ELSE 0 END, 2 FROM published",
-        {"longer": longer_ns},
-    )
-    step(rules, 4 * SECOND, -2_003_000_000)
-    rows = rules.execute(
-        "SELECT message_count > 0, difference_ns FROM derive.stamp_clock(1) ORDER BY start_ns"
-    ).fetchall()
-    assert {is_known for is_known, _ in rows} == known
-    assert {difference for is_known, difference in rows if is_known} == {-500, -2_003_000_500}
+    assert next(row[0] for row in rows if row[4] == 1) <= 4 * STRETCH_NS
 
 
 @pytest.mark.parametrize(("here", "is_known"), [(10, True), (7, True), (6, False), (0, False)])

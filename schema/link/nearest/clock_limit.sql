@@ -17,9 +17,6 @@ CREATE OR REPLACE MACRO derive.clock_limit() AS {
     -- A message belongs to one of so many publications: the last ones before it was taken, or those
     -- on either side of its stamp. That covers several periods, and bursts of a callback.
     'reach': 24,
-    -- A message may seem to come so much sooner than all before it because those had waited. If the
-    -- clock was set forward by less, that shows by its messages' differences alone.
-    'set_ns': 100000000,
     -- A thread that is never seen to go on has written its message after this time. Longer times
     -- are expected only of publishers that usually need them.
     'write_ns': 5000000,

@@ -9,11 +9,9 @@
 --     it was published; of those within a burst, to the one with most messages, of equal ones to
 --     the greatest. If messages were taken on other clocks, nothing says which of several
 --     differences is right. If messages taken on this clock could as well be those of later
---     publications, the clock may have jumped by a period, and nothing is known. A clock that was
---     set is only about known, and so begins a little further off.
+--     publications, the clock may have jumped by a period, and nothing is known.
 -- grain: one row per clock and stretch of time; message_count is 0 where nothing is known
--- param: regions VARCHAR  Rows as of derive.agreed_difference, and is_taken_here, stretch_ns,
---     is_set
+-- param: regions VARCHAR  Rows as of derive.agreed_difference, and is_taken_here, stretch_ns
 CREATE OR REPLACE MACRO derive.followed_difference(regions) AS TABLE
 WITH RECURSIVE preferred AS (
     SELECT
@@ -51,7 +49,6 @@ ballot AS MATERIALIZED (
         CASE WHEN any_value(r.is_taken_here)
             THEN min(r.difference_ns) + derive.clock_limit().burst_ns END AS latest_ns,
         any_value(r.most_count) AS most_count,
-        CASE WHEN any_value(r.is_set) THEN derive.clock_limit().burst_ns ELSE 0 END AS begin_ns,
         list(
             struct_pack(
                 vote_count := r.vote_count,
@@ -111,7 +108,6 @@ followed (
                         lambda r: greatest(
                             r.least_ns - f.difference_ns, f.difference_ns - r.greatest_ns
                         ) <= (b.stretch - f.since_stretch + 1) * b.wander_ns
-                            + CASE WHEN f.is_begun THEN 0 ELSE b.begin_ns END
                             AND (
                                 r.vote_count >= derive.clock_limit().quorum
                                 OR NOT f.is_begun

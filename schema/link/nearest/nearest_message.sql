@@ -81,19 +81,18 @@ located AS (
 -- publications on both sides is ambiguous. Where the clock was set back, stamps from before and
 -- after the jump mix: one side is not to hide the other.
 sided AS (
-    SELECT state.segment AS segment, *, difference_ns AS then_ns FROM located
+    SELECT state.segment % 3 AS side, *, difference_ns AS then_ns FROM located
     WHERE state.is_known
     UNION ALL
-    SELECT before.segment, *, before.difference_ns FROM located
+    SELECT before.segment % 3, *, before.difference_ns FROM located
     WHERE before.segment < state.segment AND before.is_known
     UNION ALL
-    SELECT after.segment, *, after.difference_ns FROM located
+    SELECT after.segment % 3, *, after.difference_ns FROM located
     WHERE after.segment > state.segment AND after.is_known
 ),
 published AS MATERIALIZED (
     SELECT
-        segment % 3 AS side, segment, clock_id, topic_name, publisher_id, thread_id,
-        publication_id, written_ns, then_ns,
+        side, clock_id, topic_name, publisher_id, thread_id, publication_id, written_ns,
         written_ns + then_ns AS opens_ns,
         next_event_ns + then_ns AS closes_ns,
         next_event_ns IS NOT NULL AND NOT has_break AS goes_on,
@@ -105,7 +104,7 @@ published AS MATERIALIZED (
             false
         ) AS is_crowded
     FROM sided
-    WINDOW on_topic AS (PARTITION BY segment % 3, topic_name ORDER BY written_ns, publication_id)
+    WINDOW on_topic AS (PARTITION BY side, topic_name ORDER BY written_ns, publication_id)
 ),
 -- The times in which the clocks stood in one relation: from one jump to the next.
 segment AS (
@@ -125,21 +124,11 @@ segment AS (
 publisher AS (
     SELECT DISTINCT run_id, clock_id, topic_name, publisher_id FROM located
 ),
-take AS MATERIALIZED (
-    FROM derive.unstamped_take(only_run)
-),
--- All takes of one message have its topic and stamp.
 message AS MATERIALIZED (
     SELECT
         m.run_id, m.topic_name, m.source_timestamp_ns, m.only_subscription_id, p.publisher_id,
         min(CASE WHEN m.clock_id = p.clock_id THEN m.taken_ns END) AS taken_ns
-    FROM (
-        SELECT
-            run_id, topic_name, source_timestamp_ns, only_subscription_id, clock_id,
-            min(taken_ns) AS taken_ns
-        FROM take
-        GROUP BY run_id, topic_name, source_timestamp_ns, only_subscription_id, clock_id
-    ) AS m
+    FROM derive.unstamped_message(only_run) AS m
     JOIN publisher AS p ON m.run_id = p.run_id AND m.topic_name = p.topic_name
     GROUP BY
         m.run_id, m.topic_name, m.source_timestamp_ns, m.only_subscription_id, p.publisher_id
@@ -153,11 +142,15 @@ looked_for AS (
     JOIN (SELECT DISTINCT publisher_id, thread_id, side FROM published) AS p
         ON m.publisher_id = p.publisher_id
 ),
-fitting AS MATERIALIZED (
+within AS MATERIALIZED (
     SELECT
         m.topic_name, m.publisher_id, m.source_timestamp_ns, m.only_subscription_id,
-        p.publication_id, p.clock_id, p.segment, p.goes_on, p.is_crowded, p.written_ns, p.opens_ns,
-        m.source_timestamp_ns - p.then_ns AS stamped_ns
+        p.publication_id, p.clock_id, p.goes_on, p.is_crowded,
+        m.source_timestamp_ns - p.opens_ns AS delay_ns,
+        row_number() OVER (
+            PARTITION BY p.publication_id, p.side, m.only_subscription_id
+            ORDER BY m.source_timestamp_ns
+        ) AS place
     FROM looked_for AS m
     ASOF JOIN published AS p
         ON m.publisher_id = p.publisher_id
@@ -166,97 +159,6 @@ fitting AS MATERIALIZED (
         AND m.source_timestamp_ns >= p.opens_ns
     WHERE coalesce(m.source_timestamp_ns < p.closes_ns, true)
         AND coalesce(p.written_ns < m.taken_ns, true)
-),
--- A subscription takes the messages of a publisher in the order in which they were stamped. If
--- stamps go back, the clock was set back meanwhile: a message cannot have been stamped before one
--- that was taken earlier, nor behind one that was taken later.
-stamped AS (
-    SELECT
-        topic_name, source_timestamp_ns, only_subscription_id, publisher_id,
-        min(stamped_ns) AS first_ns, max(stamped_ns) AS last_ns,
-        count(*) OVER (PARTITION BY topic_name, source_timestamp_ns, only_subscription_id) = 1
-            AS is_only
-    FROM fitting
-    WHERE clock_id IN (
-        SELECT clock_id FROM course GROUP BY clock_id HAVING count(DISTINCT state.segment) > 1
-    )
-    GROUP BY topic_name, source_timestamp_ns, only_subscription_id, publisher_id
-),
-ordered AS (
-    SELECT
-        topic_name, source_timestamp_ns, only_subscription_id, publisher_id,
-        max(earlier_ns) - derive.clock_limit().write_ns AS earliest_ns,
-        min(later_ns) + derive.clock_limit().write_ns AS latest_ns
-    FROM (
-        SELECT
-            s.topic_name, s.source_timestamp_ns, s.only_subscription_id, s.publisher_id,
-            max(CASE WHEN s.is_only THEN s.first_ns END) OVER (
-                in_order ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING
-            ) AS earlier_ns,
-            min(CASE WHEN s.is_only THEN s.last_ns END) OVER (
-                in_order ROWS BETWEEN 1 FOLLOWING AND UNBOUNDED FOLLOWING
-            ) AS later_ns
-        FROM stamped AS s
-        JOIN take AS t
-            ON s.topic_name = t.topic_name
-            AND s.source_timestamp_ns = t.source_timestamp_ns
-            AND s.only_subscription_id = t.only_subscription_id
-        WINDOW in_order AS (
-            PARTITION BY t.subscription_id, s.publisher_id ORDER BY t.taken_ns, t.take_id
-        )
-    )
-    GROUP BY topic_name, source_timestamp_ns, only_subscription_id, publisher_id
-),
-possible AS MATERIALIZED (
-    SELECT f.*
-    FROM fitting AS f
-    LEFT JOIN ordered AS o
-        ON f.publisher_id = o.publisher_id
-        AND f.source_timestamp_ns = o.source_timestamp_ns
-        AND f.only_subscription_id = o.only_subscription_id
-    WHERE coalesce(f.stamped_ns >= o.earliest_ns, true)
-        AND coalesce(f.stamped_ns <= o.latest_ns, true)
-),
--- Messages that fit one side of a jump alone show when it was.
-turn AS (
-    SELECT
-        clock_id, segment,
-        max(last_ns) OVER (
-            by_segment ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING
-        ) AS begin_ns,
-        min(first_ns) OVER (by_segment ROWS BETWEEN CURRENT ROW AND UNBOUNDED FOLLOWING)
-            AS since_ns,
-        max(last_ns) OVER (by_segment ROWS UNBOUNDED PRECEDING) AS until_ns,
-        min(first_ns) OVER (
-            by_segment ROWS BETWEEN 1 FOLLOWING AND UNBOUNDED FOLLOWING
-        ) AS end_ns
-    FROM (
-        SELECT clock_id, segment, min(first_ns) AS first_ns, max(last_ns) AS last_ns
-        FROM (
-            SELECT
-                any_value(clock_id) AS clock_id, any_value(segment) AS segment,
-                min(written_ns) AS first_ns, max(written_ns) AS last_ns
-            FROM possible
-            GROUP BY topic_name, source_timestamp_ns, only_subscription_id
-            HAVING count(DISTINCT (clock_id, segment)) = 1
-        )
-        GROUP BY clock_id, segment
-    )
-    WINDOW by_segment AS (PARTITION BY clock_id ORDER BY segment)
-),
-within AS MATERIALIZED (
-    SELECT
-        p.topic_name, p.publisher_id, p.source_timestamp_ns, p.only_subscription_id,
-        p.publication_id, p.clock_id, p.segment, p.goes_on, p.is_crowded,
-        p.source_timestamp_ns - p.opens_ns AS delay_ns,
-        row_number() OVER (
-            PARTITION BY p.publication_id, p.segment % 3, p.only_subscription_id
-            ORDER BY p.source_timestamp_ns
-        ) AS place
-    FROM possible AS p
-    LEFT JOIN turn AS t ON p.clock_id = t.clock_id AND p.segment = t.segment
-    WHERE coalesce(t.begin_ns >= t.since_ns OR p.written_ns > t.begin_ns, true)
-        AND coalesce(t.until_ns >= t.end_ns OR p.written_ns < t.end_ns, true)
 ),
 -- A message that came while none of the known publishers wrote is of another one, or its
 -- publication was lost. Where nothing is lost, there is another one.

@@ -32,9 +32,6 @@ extent AS (
     SELECT
         clock_id,
         any_value(run_id) AS run_id,
-        any_value(trace_clock_id) AS trace_clock_id,
-        any_value(set_ns) AS set_ns,
-        any_value(is_set) AS is_set,
         any_value(start_ns) AS start_ns,
         any_value(stretch_ns) AS stretch_ns
     FROM pair
@@ -70,7 +67,7 @@ origin AS (
 region AS MATERIALIZED (
     SELECT
         a.clock_id, a.stretch, a.least_ns, a.greatest_ns, a.difference_ns, a.vote_count,
-        a.most_count, o.is_taken_here, x.stretch_ns, x.is_set
+        a.most_count, o.is_taken_here, x.stretch_ns
     FROM agreed AS a
     JOIN origin AS o ON a.clock_id = o.clock_id AND a.stretch = o.stretch
     JOIN extent AS x ON a.clock_id = x.clock_id
@@ -156,21 +153,6 @@ stepped AS (
         WINDOW on_clock AS (PARTITION BY clock_id ORDER BY stretch)
     )
 ),
--- Jumps are counted from one time to the next.
-number AS (
-    SELECT
-        x.clock_id, x.trace_clock_id, x.set_ns,
-        coalesce(
-            sum(1 + max(f.segment) - min(f.segment)) OVER (
-                PARTITION BY x.trace_clock_id ORDER BY x.clock_id
-                ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING
-            ),
-            0
-        )::BIGINT - min(f.segment) AS segment
-    FROM stepped AS f
-    JOIN extent AS x ON f.clock_id = x.clock_id
-    GROUP BY x.clock_id, x.trace_clock_id, x.set_ns
-),
 -- Messages that one difference alone explains show until when a clock stood before a step, and
 -- since when behind it.
 step AS MATERIALIZED (
@@ -229,37 +211,31 @@ side AS (
     )
 )
 SELECT
-    d.run_id,
-    n.trace_clock_id AS clock_id,
-    d.first + (d.last - d.first) // 2 AS at_ns,
-    d.first AS start_ns,
-    d.last AS end_ns,
-    n.set_ns + CASE WHEN d.is_before THEN d.before_ns ELSE d.standing_ns END AS difference_ns,
+    run_id, clock_id, first + (last - first) // 2 AS at_ns, first AS start_ns, last AS end_ns,
+    CASE WHEN is_before THEN before_ns ELSE standing_ns END AS difference_ns,
     0::BIGINT AS drift_ppb,
-    d.message_count,
-    n.segment + CASE WHEN d.is_before THEN d.segment - 1 ELSE d.segment END AS segment,
+    message_count,
+    CASE WHEN is_before THEN segment - 1 ELSE segment END AS segment,
     true AS is_sharp
-FROM side AS d
-JOIN number AS n ON d.clock_id = n.clock_id
-WHERE d.first < d.last
+FROM side
+WHERE first < last
 UNION ALL
 SELECT
     x.run_id,
-    n.trace_clock_id AS clock_id,
+    f.clock_id,
     x.start_ns + f.stretch * x.stretch_ns + x.stretch_ns // 2 AS at_ns,
     x.start_ns + f.stretch * x.stretch_ns AS start_ns,
     x.start_ns + (f.stretch + 1) * x.stretch_ns AS end_ns,
-    n.set_ns + coalesce(f.standing_ns, s.offset_ns, f.difference_ns) AS difference_ns,
+    coalesce(f.standing_ns, s.offset_ns, f.difference_ns) AS difference_ns,
     CASE WHEN f.standing_ns IS NULL THEN coalesce(s.drift_ppb, 0) ELSE 0 END::BIGINT AS drift_ppb,
     f.message_count,
-    n.segment + f.segment AS segment,
+    f.segment,
     -- A drift needs two stretches to show. A stretch that is not sharp spoils those nearby.
     f.standing_ns IS NOT NULL OR coalesce(
         min(s.is_sharp) OVER nearby AND count_if(f.message_count > 0) OVER nearby > 1, false
     ) AS is_sharp
 FROM stepped AS f
 JOIN extent AS x ON f.clock_id = x.clock_id
-JOIN number AS n ON f.clock_id = n.clock_id
 LEFT JOIN sharp AS s ON f.clock_id = s.clock_id AND f.stretch = s.stretch
 ANTI JOIN turn AS t
     ON f.clock_id = t.clock_id AND f.stretch BETWEEN t.stretch - 1 AND t.stretch
