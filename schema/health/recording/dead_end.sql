@@ -32,6 +32,7 @@ output AS (
     FROM (
         SELECT node_id, derive.first_three(output_topic) || ' ' || cause AS published
         FROM dead_end
+        WHERE is_likely
         GROUP BY node_id, cause
     )
     GROUP BY node_id
