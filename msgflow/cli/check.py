@@ -94,7 +94,7 @@ def _report(
 
     if output is None and form in (None, Format.TABLE):
         print_lines(_text(findings, run_labels))
-        if table is not None:
+        if table is not None and len(table):
             print_lines([""] if findings else [])
             print_result(table, None, None)
     else:

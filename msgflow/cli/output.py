@@ -126,7 +126,8 @@ def _print_for_screen(result: QueryResult, is_chosen: bool, most_rows: int | Non
     print_lines(screen_lines(shown, width))
     if shown.not_shown is not None:
         is_plain = os.environ.get("NO_COLOR")
-        typer.secho(_shown(shown.not_shown), err=True, dim=None if is_plain else True)
+        text = "\n".join(_fitting(_shown(shown.not_shown), " " * len("not shown: ")))
+        typer.secho(text, err=True, dim=None if is_plain else True)
     for note in shown.notes:
         print_note(note)
 

@@ -271,11 +271,11 @@ class Shared:
                 self._opened = None
             try:
                 self._opened = self._open()
-            except FileNotFoundError:
-                raise ReplacedError(
-                    f"the database is no longer there — {self.path}", "msgflow ui --db FILE"
-                ) from None
             except DatabaseError as error:
+                if not self.path.exists():
+                    raise ReplacedError(
+                        f"the database is no longer there — {self.path}", "msgflow ui --db FILE"
+                    ) from None
                 raise UnopenedError(error.message, error.hint) from None
             self.generation += 1
         assert self._opened is not None
@@ -284,7 +284,7 @@ class Shared:
     def _is_same(self, opened: Opened | None) -> bool:
         try:
             return opened is not None and opened.identity == _identity(self.path)
-        except OSError:
+        except (OSError, DatabaseError):
             return False
 
     def _end_questions(self) -> None:

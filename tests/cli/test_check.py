@@ -157,11 +157,11 @@ def test_broken_rules_of_the_database_are_shown_alike(
     assert lines[0] == "1. error: A row refers to one that does not exist (relation_is_kept)"
     assert lines[1] == "   gap.trace_id — identities that are no row of trace"
     assert "2. error: A word is not of the vocabulary (vocabulary_is_closed)" in lines
-    assert result.stderr == "2 errors, 0 warnings\n"
+    assert result.stderr == "2 errors, 1 warning\n"
     rows = json.loads(
         msgflow("check", "--detail", "--format", "json", "--db", fresh_database).stdout
     )
-    assert [(row["number"], row["phase"], row["count"]) for row in rows] == [
+    assert [(row["number"], row["phase"], row["count"]) for row in rows[:2]] == [
         (1, "database", 1),
         (2, "database", 1),
     ]

@@ -255,7 +255,7 @@ def test_a_table_fits_the_terminal(
     lines = on_terminal(command(*arguments, "--db", small_database), width).decode().splitlines()
     assert max(map(len, lines), default=0) <= width
     wide = on_terminal(command(*arguments, "--wide", "--db", small_database), width)
-    assert wide == piped(*arguments, "--db", small_database)
+    assert wide == piped(*arguments, "--wide", "--db", small_database)
 
 
 @pytest.mark.parametrize("width", few([60, 80, 100], 60))

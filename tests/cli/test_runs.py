@@ -256,6 +256,6 @@ def test_a_label_with_escape_codes_and_quotes_is_text(msgflow: Msgflow, database
     value = "\x1b[31m'; DROP TABLE run; --\n"
     assert msgflow("runs", "label", 1, f"x={value}", "--db", database).exit_code == 0
     assert labels(msgflow, database) == [[f"x={value}"], None]
-    shown = msgflow("runs", "list", "--db", database).stdout
+    shown = msgflow("runs", "list", "--wide", "--db", database).stdout
     assert "\x1b" not in shown
     assert "DROP TABLE run; --\\n" in shown

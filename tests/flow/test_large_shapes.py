@@ -72,7 +72,7 @@ def test_a_burst(empty_database: Path, tmp_path: Path) -> None:
     analysis = Analysis(empty_database, tmp_path)
     con = analysis.build(system).connection
     limit(con, "450MB")
-    full = {"detail": "full"}
+    full = {"detail": "full", "case": "every_pair"}
     parts = run_query(con, load_query("critical-path"), full).to_arrow().to_pylist()
     (pair,) = run_query(con, load_query("waits-pair"), {}).to_arrow().to_pylist()
     waits = run_query(con, load_query("waits-instance"), {}).to_arrow().to_pylist()

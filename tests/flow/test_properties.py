@@ -211,7 +211,7 @@ def test_random_systems_are_worth_it(analysis: Analysis) -> None:
             "SELECT count(*) FROM callback_instance WHERE end_ns IS NULL"
         )
     assert max(depths) >= 2
-    assert {"reached", "lost", "not_connected", "cut_by_recording"} <= statuses
+    assert {"reached", "lost", "not_connected", "no_output", "unknown"} <= statuses
     assert open_callbacks
 
 

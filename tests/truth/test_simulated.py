@@ -224,7 +224,8 @@ def test_latency_of_messages_on_one_clock(simulated: Ingested) -> None:
     assert simulated.differences(
         "SELECT take_rmw_ns, take_rmw_ns - publication_rmw_ns FROM truth_transport "
         "WHERE method = 'rmw' AND publication_id NOT IN (FROM ambiguous)",
-        "SELECT taken_ns, latency_ns FROM link_transport AS l JOIN take USING (take_id) "
+        "SELECT taken_ns, taken_ns - end_ns FROM link_transport AS l JOIN take USING (take_id) "
+        "JOIN publication USING (publication_id) "
         "WHERE l.method = 'exact' AND candidate_count = 1",
     ) == ([], [])
 
