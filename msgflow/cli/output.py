@@ -125,9 +125,8 @@ def _print_for_screen(result: QueryResult, is_chosen: bool, most_rows: int | Non
     shown = lay_out(result, width, most_rows=most_rows, is_chosen=is_chosen)
     print_lines(screen_lines(shown, width))
     if shown.not_shown is not None:
-        is_plain = os.environ.get("NO_COLOR")
         text = "\n".join(_fitting(_shown(shown.not_shown), " " * len("not shown: ")))
-        typer.secho(text, err=True, dim=None if is_plain else True)
+        typer.echo(text if os.environ.get("NO_COLOR") else typer.style(text, dim=True), err=True)
     for note in shown.notes:
         print_note(note)
 
