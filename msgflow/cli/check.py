@@ -54,11 +54,14 @@ def command(
     line says how far their times can be compared.
     """
     from msgflow.database import Database
+    from msgflow.export.formats import Format
     from msgflow.run.choice import choose_runs
 
     with Database(database, memory_limit=memory_limit) as opened:
         findings = opened.findings(run=run, detail=detail)
-        quality = opened.query("info", section="quality", run=run) if detail else None
+        is_text = output is None and form in (None, Format.TABLE)
+        is_explained = detail and is_text
+        quality = opened.query("info", section="quality", run=run) if is_explained else None
         every = opened.runs()
         runs = every if detail else choose_runs(every, run)
         verdicts = opened.clock_verdicts(run=run, only_several=True)

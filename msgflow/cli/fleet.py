@@ -18,6 +18,7 @@ from msgflow.cli.options import (
     ReaderOption,
     WideOption,
     bytes_of,
+    case_option,
 )
 from msgflow.errors import ExitCode, UsageError
 
@@ -302,11 +303,7 @@ def compare(
     ] = None,
     case: Annotated[
         str,
-        typer.Option(
-            "--case",
-            metavar="first|last|newest|every_pair",
-            help="First or last arrival of each root, newest root of each arrival, or all pairs",
-        ),
+        case_option("Flows that count"),
     ] = "first",
     confidence: Annotated[
         float, typer.Option("--confidence", help="Confidence level of the intervals")

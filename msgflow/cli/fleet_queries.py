@@ -15,6 +15,7 @@ from msgflow.cli.options import (
     LakeWhereOption,
     OutputOption,
     WideOption,
+    case_option,
     output_option,
 )
 from msgflow.cli.row_options import LimitOption, SortOption, row_option
@@ -55,12 +56,7 @@ def query(
     ] = None,
     case: Annotated[
         str | None,
-        typer.Option(
-            "--case",
-            metavar="first|last|newest|every_pair",
-            help="Pairs of root and arrival that count, of e2e-latency",
-            show_default="first",
-        ),
+        case_option("With e2e-latency: flows that count"),
     ] = None,
     node: Annotated[list[str] | None, row_option("node", "NAME", "Name or glob")] = None,
     topic: Annotated[list[str] | None, row_option("topic", "NAME", "Name or glob")] = None,

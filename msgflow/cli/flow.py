@@ -18,6 +18,7 @@ from msgflow.cli.options import (
     MemoryLimitOption,
     OutputOption,
     RunOption,
+    case_option,
     format_option,
     path_of,
 )
@@ -102,16 +103,7 @@ def command(
     ] = None,
     case: Annotated[
         str | None,
-        typer.Option(
-            "--case",
-            metavar="CASE",
-            help="With --slowest: the flows that count, as in the query flows: the first or last"
-            " arrival of each root, the newest root of each arrival, or all (first, last, newest,"
-            " every_pair)",
-            show_default="first",
-            autocompletion=lambda: ["first", "last", "newest", "every_pair"],
-            rich_help_panel=_START,
-        ),
+        case_option("With --slowest: flows that count", rich_help_panel=_START),
     ] = None,
     from_: Annotated[
         list[str] | None,

@@ -7,14 +7,21 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from msgflow.cli.options import DatabaseOption, FormatOption, OutputOption, RunOption, WideOption
+from msgflow.cli.options import (
+    DatabaseOption,
+    FormatOption,
+    OutputOption,
+    RunOption,
+    WideOption,
+    with_default,
+)
 from msgflow.default_files import DEFAULT_DATABASE
 
 if TYPE_CHECKING:
     from msgflow.database import Database
     from msgflow.links import AppliedLinks
 
-app = typer.Typer()
+app = typer.Typer(cls=with_default("list"))
 
 
 @app.command("apply")
@@ -51,18 +58,15 @@ def print_applied(opened: Database, one: AppliedLinks) -> None:
         print_note(f"{finding['name']} ({finding['count']}): {finding['detail']}")
 
 
-@app.callback(invoke_without_command=True)
+@app.command("list")
 def list_links(
-    context: typer.Context,
     run: RunOption = None,
     form: FormatOption = None,
     wide: WideOption = False,
     output: OutputOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
-    """List the declared links and what they explain (the query links), or declare others."""
-    if context.invoked_subcommand is not None:
-        return
+    """List the declared links and what they explain (the query links)."""
     from msgflow.cli.output import print_result
     from msgflow.database import Database
 

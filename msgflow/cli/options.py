@@ -16,6 +16,7 @@ from typer.core import TyperGroup
 
 from msgflow.cli.completion import complete
 from msgflow.export.formats import Format
+from msgflow.query.selection import CASES
 from msgflow.query.times import Times
 
 SELECTION = "Which part of the data"
@@ -78,6 +79,18 @@ def memory_limit_option(
 def format_option(help: str, **more: Any) -> Any:
     """Return the option for the format of what is written."""
     return typer.Option("--format", help=help, rich_help_panel=OUTPUT, **more)
+
+
+def case_option(help: str, **more: Any) -> Any:
+    """Return the option for the arrivals of flows that count."""
+    return typer.Option(
+        "--case",
+        metavar="|".join(CASES),
+        help=f"{help}: first or last arrival of each root, newest root of each arrival, or all",
+        show_default=CASES[0],
+        autocompletion=lambda: list(CASES),
+        **more,
+    )
 
 
 def output_option(

@@ -119,7 +119,7 @@ def targets(
     """Write requirements that a good run meets, as a file to review.
 
     It covers paths, timers, topics, services and actions with at least 20 values. A note and a
-    comment in the file name topics of which less than 99 % was delivered.
+    comment in the file name topics that delivered less than 99 % of their messages.
     """
     from msgflow.cli.output import print_note, print_text
     from msgflow.database import Database

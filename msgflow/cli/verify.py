@@ -14,6 +14,7 @@ from msgflow.cli.options import (
     DatabaseOption,
     OutputOption,
     WideOption,
+    case_option,
     format_option,
     path_of,
 )
@@ -59,14 +60,7 @@ def command(
     ] = Path(DEFAULT_PATHS),
     case: Annotated[
         str,
-        typer.Option(
-            "--case",
-            metavar="CASE",
-            help="Flows that count for latencies of paths, as in the query flows: the first or last"
-            " arrival of each root, the newest root of each arrival, or all (first, last, newest,"
-            " every_pair)",
-            autocompletion=lambda: ["first", "last", "newest", "every_pair"],
-        ),
+        case_option("Flows that count for latencies of paths"),
     ] = "first",
     allow_not_measured: Annotated[
         bool,

@@ -14,7 +14,7 @@ from msgflow.fleet.lake_connection import Choice, Reading, choose
 from msgflow.name_suggestions import meant_or, nearest
 from msgflow.query.compare import STATISTICS, Failure, failures
 from msgflow.query.result import QueryResult
-from msgflow.query.selection import CUT_COLUMN
+from msgflow.query.selection import CASES, CUT_COLUMN
 from msgflow.sql.statement import internal_sql
 
 if TYPE_CHECKING:
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
     from msgflow.fleet.lake import Lake
 
-CASES = ("first", "last", "newest", "every_pair")
 # With fewer runs on one side and many on the other, intervals are too narrow: docs/fleet.md.
 LEAST_RUNS = 6
 _TABLES = ("flow", "e2e_latency")

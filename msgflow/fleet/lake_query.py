@@ -77,20 +77,19 @@ def header_of(name: str, given: Mapping[str, Value] | None = None) -> Header:
 
     Args:
         name: of the query.
-        given: parameters by name, one of which may choose a variant.
+        given: parameters by name; the one that chooses a variant counts.
 
     Raises:
         UsageError: there is no such query or variant, or a lake cannot answer it.
     """
     given = given or {}
-    known = [load_query(each).words for each in names()]
-    there_are = ", ".join(known)
     try:
         query = choose_query(name, given)
     except UsageError:
+        known = _words()
         raise UsageError(
             f"there is no such query — {name}",
-            did_you_mean(name, known, f"a lake answers {there_are}"),
+            did_you_mean(name, known, f"a lake answers {', '.join(known)}"),
         ) from None
     variant = query.variant
     if variant is not None and variant.name in given:
@@ -99,12 +98,16 @@ def header_of(name: str, given: Mapping[str, Value] | None = None) -> Header:
     if query.name not in names():
         raise UsageError(
             f"a lake does not hold what this query needs — {query.words}",
-            f"it answers {there_are}; for others: msgflow fleet open RUN, then"
+            f"it answers {', '.join(_words())}; for others: msgflow fleet open RUN, then"
             f" msgflow query {query.words}",
         )
     header = statements().header(query.name.replace("-", "_"))
     params = header.params if variant is None else (variant, *header.params)
     return replace(header, chosen=query.words, params=params, variant=variant)
+
+
+def _words() -> list[str]:
+    return [load_query(each).words for each in names()]
 
 
 def fleet_query(

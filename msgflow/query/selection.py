@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 
 # Kinds of names in columns: headers of queries have them in place of a unit.
 KINDS = ("node", "topic", "callback", "host")
+# Pairs of root and arrival that count: those of the first or last arrival of each root, of the
+# newest root of each arrival, or all.
+CASES = ("first", "last", "newest", "every_pair")
 PATH = "path"
 INTERNAL_COLUMN = "is_internal"
 CUT_COLUMN = "is_cut"

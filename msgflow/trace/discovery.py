@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
-from msgflow.name_suggestions import meant_or, nearest
 from msgflow.trace import metadata_frame
 from msgflow.trace.archive import is_archive
 from msgflow.trace.model import TraceLocation
@@ -82,18 +81,6 @@ def irregular_files(directory: Path) -> list[tuple[Path, str]]:
     return [(entry, kind) for entry, kind in found if kind is not None]
 
 
-def _nearby(path: Path) -> str:
-    """Return a hint: names beside the missing one that are like it, or where sessions are."""
-    try:
-        near = nearest(path.name, [entry.name for entry in path.parent.iterdir()])
-    except OSError:
-        near = []
-    return meant_or(
-        [str(path.with_name(name)) for name in near],
-        "ros2 trace writes its sessions below ~/.ros/tracing",
-    )
-
-
 def _check_exists(path: Path) -> None:
     kind = irregular(path)
     if kind is not None:
@@ -102,7 +89,10 @@ def _check_exists(path: Path) -> None:
             hint=metadata_frame.DIRECTORY_HINT,
         )
     if not path.exists():
-        raise TraceError(f"no such file or directory — {path}", hint=_nearby(path))
+        raise TraceError(
+            f"no such file or directory — {path}",
+            hint="ros2 trace writes its sessions below ~/.ros/tracing",
+        )
     if path.is_file():
         if (
             path.name == metadata_frame.FILE_NAME

@@ -15,7 +15,7 @@
 -- column: no_output BIGINT         Roots that ended at a node that did not publish
 -- column: not_connected BIGINT     Roots that ended before or after a publisher and a subscription
 --     were connected
--- column: unknown BIGINT           Roots of which the trace does not tell where they ended
+-- column: unknown BIGINT           Roots that end where the trace does not show
 -- column: cut_by_recording BIGINT  Roots too close to the start or end of a recording to know
 -- column: loss_affected BIGINT     Roots with a gap of a trace in their time
 -- column: pairs BIGINT             Pairs of root and arrival that the latencies are computed from

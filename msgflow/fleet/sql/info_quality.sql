@@ -1,6 +1,7 @@
 -- name: fleet.info_quality
 -- title: Data quality: what is missing, and in how many runs
--- description: As the query info --section quality says it of one run, added up over traces and processes;
+-- description: As the query info --section quality says it of one run, added up over traces and
+--     processes;
 --     topics have a row each.
 -- grain: one row per scope, topic, measure and group of runs
 -- column: label_group BIGINT     Group of runs
