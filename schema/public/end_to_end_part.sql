@@ -17,8 +17,7 @@
 -- param: window_start_ns BIGINT = NULL  Start of the time window of roots, epoch ns; NULL: any
 -- param: window_end_ns BIGINT = NULL  End of the time window of roots, epoch ns, exclusive;
 --     NULL: any
--- param: flow_case VARCHAR = 'first'  Pairs of root and arrival: 'first', 'last', 'newest',
---     or
+-- param: flow_case VARCHAR = 'first'  Pairs of root and arrival: 'first', 'last', 'newest', or
 --     'every_pair'
 -- param: sink_take_id BIGINT = NULL  Only flows that end with this take
 -- param: max_depth INTEGER = 32  Longest chain, in topics
