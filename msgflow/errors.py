@@ -56,6 +56,12 @@ class TraceError(MsgflowError):
     exit_code = ExitCode.TRACE
 
 
+class RecordingError(MsgflowError):
+    """A recording cannot begin or go on: LTTng, its daemon, the disk, or a program is missing."""
+
+    exit_code: ExitCode = ExitCode.FAILED
+
+
 class DatabaseError(MsgflowError):
     """A database is missing, locked, foreign, or of another schema revision."""
 

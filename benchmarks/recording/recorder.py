@@ -14,21 +14,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow import trace
+from msgflow.live.daemon import session_daemon
+from msgflow.live.session import Channel, recording_session
 from recording.tracetools import build_tracetools
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
 _NODES = Path(__file__).with_name("nodes.py")
-_SESSION = "msgflow-real"
-# Settings of ros2_tracing, with larger sub-buffers: nothing may be lost.
-_SET_UP = (
-    ("enable-channel", "--userspace", "--subbuf-size=1M", "--num-subbuf=4", "ros2"),
-    ("enable-event", "--userspace", "--channel=ros2", "ros2:*"),
-    ("enable-event", "--userspace", "--channel=ros2", "my_pkg:*"),
-    ("add-context", "--userspace", "--type=vpid", "--type=vtid", "--type=procname"),
-    ("start",),
-)
 # Those who hear go last. Seconds.
 _APART = 0.2
 _LONGEST = 60
@@ -44,7 +37,7 @@ def systems(python: Path) -> dict[str, list[str]]:
     run = subprocess.run(
         [python, "-c", code],
         cwd=_NODES.parent,
-        env=_environment(python),
+        env=ros_environment(python),
         capture_output=True,
         text=True,
         check=True,
@@ -77,11 +70,12 @@ def record(python: Path, system: str, seconds: float, directory: Path) -> tuple[
 
     Raises:
         NotPossibleError: see `require`.
-        subprocess.CalledProcessError: LTTng or a node failed.
+        subprocess.CalledProcessError: a node failed.
+        RecordingError: LTTng failed.
     """
     require(python)
     library = build_tracetools(_made(directory / "library"))
-    environment = _environment(python) | {"LD_PRELOAD": str(library)}
+    environment = ros_environment(python) | {"LD_PRELOAD": str(library)}
     parts = _made(directory / "truth")
     recorded = directory / "trace"
     with session(recorded):
@@ -118,47 +112,31 @@ def record(python: Path, system: str, seconds: float, directory: Path) -> tuple[
 
 @contextlib.contextmanager
 def session(directory: Path) -> Iterator[None]:
-    """Trace what happens in the block, and start a session daemon if none runs.
+    """Trace what happens in the block.
 
-    A machine has one daemon of root: others wait.
+    Raises:
+        RecordingError: LTTng fails.
     """
-    lock = Path(tempfile.gettempdir()) / f"{_SESSION}.lock"
-    with tempfile.TemporaryDirectory() as home, lock.open("w") as one_at_a_time:
-        fcntl.flock(one_at_a_time, fcntl.LOCK_EX)
-        environment = os.environ | {"LTTNG_HOME": home}
-        command = ["lttng-sessiond", "--no-kernel", "--quiet"]
-        daemon = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL)
-
-        def lttng(*arguments: str) -> None:
-            command = ["lttng", "--no-sessiond", *arguments]
-            subprocess.run(command, env=environment, stdout=subprocess.DEVNULL, check=True)
-
-        try:
-            _wait_for_daemon(environment)
-            lttng("create", _SESSION, f"--output={directory}")
-            try:
-                for arguments in _SET_UP:
-                    lttng(*arguments)
-                yield
-                lttng("stop")
-            finally:
-                lttng("destroy", _SESSION)
-        finally:
-            daemon.terminate()
-            daemon.wait()
+    directory.mkdir(parents=True)
+    channel = Channel(("ros2:*", "my_pkg:*"), "1M", 4)
+    with (
+        one_at_a_time(),
+        session_daemon(with_kernel=False, note=print),
+        recording_session("msgflow-real", directory, channel, with_kernel=False),
+    ):
+        yield
 
 
-def _wait_for_daemon(environment: dict[str, str]) -> None:
-    end = time.monotonic() + _LONGEST
-    while time.monotonic() < end:
-        command = ["lttng", "--no-sessiond", "list"]
-        if not subprocess.run(command, env=environment, capture_output=True).returncode:
-            return
-        time.sleep(0.1)
-    raise NotPossibleError("lttng-sessiond does not start")
+@contextlib.contextmanager
+def one_at_a_time() -> Iterator[None]:
+    """Wait for other blocks of this machine: it has one session daemon of the root user."""
+    with (Path(tempfile.gettempdir()) / "msgflow-real.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
 
 
-def _environment(python: Path) -> dict[str, str]:
+def ros_environment(python: Path) -> dict[str, str]:
+    """Return the environment in which nodes of rclpy run."""
     return os.environ | {
         "AMENT_PREFIX_PATH": str(python.parent.parent),
         "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp",

@@ -18,6 +18,7 @@ from msgflow.sql.interrupt import Terminated
 from msgflow.version import __version__
 
 COMMANDS = {
+    "record": "Record a ROS 2 system with LTTng, then print how long messages took.",
     "ingest": "Read LTTng traces of a ROS 2 system into a database, each recording as a run.",
     "query": "Run a named query; `msgflow query NAME --help` explains it.",
     "flow": "Print the flow of one message: what caused it, and what it caused.",

@@ -79,6 +79,18 @@ def entries(stream_file: Path) -> dict[int, IndexEntry]:
     return found
 
 
+def content_bytes(index: Path) -> int:
+    """Return the bytes of all packets in an index, without what fills them up; 0 if it is damaged.
+
+    The index may still grow.
+    """
+    try:
+        content = read_regular(index, None)
+    except OSError:
+        return 0
+    return sum(entry.content_bits for entry in _entries(content)) // 8
+
+
 class DiscardCounters:
     """Counters of lost events, which continue through the directories of a recording.
 

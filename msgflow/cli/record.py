@@ -1,0 +1,167 @@
+"""`msgflow record`: a recording, from the checks before it to the first answer."""
+
+from __future__ import annotations
+
+import time
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from msgflow.cli.options import DatabaseOption, output_option, path_of
+from msgflow.default_files import DEFAULT_DATABASE
+from msgflow.errors import ExitCode
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from msgflow.live import Status
+
+# Of ROS 2; of an instrumented DDS; of CARET.
+_EVENTS = ("ros2:*", "dds:*", "ros2_caret:*")
+
+
+def command(
+    program: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[-- COMMAND...]",
+            help="What to start and record, such as `-- ros2 launch …`; it ends with the recording",
+            show_default="record until Ctrl-C",
+        ),
+    ] = None,
+    directory: Annotated[
+        Path | None,
+        output_option("DIR", "Directory to record into", show_default="the name, here"),
+    ] = None,
+    name: Annotated[
+        str | None,
+        typer.Option(
+            "--name",
+            help="Name of the LTTng session, and of the run",
+            show_default="recording-DATE-TIME",
+        ),
+    ] = None,
+    duration: Annotated[
+        float | None,
+        typer.Option("--duration", metavar="SECONDS", min=0.1, help="How long to record"),
+    ] = None,
+    kernel: Annotated[
+        bool,
+        typer.Option(
+            "--kernel", help="Also record the scheduler, with LTTng or perf: why a thread waits"
+        ),
+    ] = False,
+    events: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--events",
+            metavar="PATTERN",
+            help="Also record and load your own tracepoints, such as 'my_pkg:*'; may be repeated",
+        ),
+    ] = None,
+    sub_buffer_size: Annotated[
+        str,
+        typer.Option(
+            "--subbuf-size", metavar="SIZE", help="Size of a sub-buffer of LTTng, per CPU"
+        ),
+    ] = "1M",
+    sub_buffers: Annotated[
+        int, typer.Option("--num-subbuf", min=2, help="Number of sub-buffers, per CPU")
+    ] = 4,
+    links: Annotated[
+        Path | None,
+        typer.Option(
+            "--links", metavar="FILE", parser=path_of, help="Indirect links to declare, as YAML"
+        ),
+    ] = None,
+    ingest: Annotated[
+        bool, typer.Option("--ingest/--no-ingest", help="Read the recording into the database")
+    ] = True,
+    database: DatabaseOption = DEFAULT_DATABASE,
+) -> None:
+    """Record a ROS 2 system with LTTng, then print what is wrong and how long messages took.
+
+    Start the nodes after the recording, best as COMMAND: what starts earlier has no names. Ctrl-C
+    ends the recording, then COMMAND.
+    """
+    from msgflow.cli.output import print_note, print_status
+    from msgflow.db.runs import require_run_name
+    from msgflow.live import Channel, record
+
+    name = name or time.strftime("recording-%Y%m%d-%H%M%S")
+    require_run_name(name)
+    target = directory or Path(name)
+    with _status_line() as show:
+        recorded = record(
+            target.absolute(),
+            name=name,
+            channel=Channel((*_EVENTS, *(events or [])), sub_buffer_size, sub_buffers),
+            program=program or (),
+            seconds=duration,
+            kernel=kernel,
+            note=print_note,
+            show=show,
+        )
+    print_status(f"recorded into {target}: {_words(recorded.last)}")
+    if program and recorded.exit_code:
+        print_note(f"{program[0]} ended with exit code {recorded.exit_code}")
+    if ingest:
+        _answer(target, name, events or [], links, database)
+    if recorded.exit_code:
+        raise typer.Exit(ExitCode.FAILED)
+
+
+@contextmanager
+def _status_line() -> Iterator[Callable[[Status], None]]:
+    """Yield the function that shows how the recording goes, on a terminal only."""
+    from rich.console import Console
+
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield lambda status: None
+        return
+    from rich.status import Status as Line
+
+    with Line("starting LTTng", console=console) as line:
+        yield lambda status: line.update(f"recording (Ctrl-C ends it): {_words(status)}")
+
+
+def _words(status: Status) -> str:
+    from msgflow.live import BYTES_OF_EVENT
+
+    events = status.event_bytes / BYTES_OF_EVENT
+    words = [
+        f"{status.seconds:.0f} s",
+        f"some {events:,.0f} events written ({events / max(status.seconds, 1):,.0f}/s)",
+        f"{status.discarded:,} discarded",
+        f"{status.free_bytes / 1e9:,.0f} GB free",
+    ]
+    return ", ".join(words)
+
+
+def _answer(
+    directory: Path, name: str, events: list[str], links: Path | None, database: Path
+) -> None:
+    """Read the recording into the database, and print what a user wants to know first."""
+    from msgflow.cli import check, ingest
+    from msgflow.cli.output import print_result, print_status
+    from msgflow.database import Database
+
+    # What is wrong is printed by check.
+    ingest.command(
+        [str(directory)],
+        name=name,
+        together=True,
+        events=events,
+        links=links,
+        quiet=True,
+        database=database,
+    )
+    print_status(f"read into {database} as run {name}")
+    # The exit code of errors in the recording, which it has printed.
+    with suppress(typer.Exit):
+        check.command(database=database)
+    with Database(database) as opened:
+        print_result(opened.query("e2e-latency"), None, None)

@@ -1,0 +1,8 @@
+"""Recordings that are made now: LTTng sessions, from checks before to the last packet."""
+
+from __future__ import annotations
+
+from msgflow.live.recording import BYTES_OF_EVENT, Recorded, Status, record
+from msgflow.live.session import Channel
+
+__all__ = ["BYTES_OF_EVENT", "Channel", "Recorded", "Status", "record"]

@@ -1,0 +1,138 @@
+"""The program `lttng`: what it says, through its machine interface."""
+
+from __future__ import annotations
+
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+from xml.etree import ElementTree
+
+from msgflow.errors import RecordingError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+# What lttng says where no session daemon runs.
+_NO_DAEMON = "No session daemon is available"
+# Seconds.
+_LONGEST = 60.0
+
+
+@dataclass(frozen=True, slots=True)
+class Session:
+    """A recording session of the session daemon.
+
+    Attributes:
+        name: unique in the daemon.
+        directory: where it writes; None where it writes over the network or keeps a snapshot.
+        is_snapshot: it keeps the last events in memory, and writes them when asked.
+    """
+
+    name: str
+    directory: Path | None
+    is_snapshot: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Provider:
+    """A process that has tracepoints.
+
+    Attributes:
+        pid: its number.
+        program: its command line, as the kernel has it.
+        tracepoints: their names.
+    """
+
+    pid: int
+    program: str
+    tracepoints: frozenset[str]
+
+    @property
+    def is_ros(self) -> bool:
+        """Whether it has the tracepoints of ROS 2."""
+        return any(name.startswith("ros2:") for name in self.tracepoints)
+
+
+def lttng(*arguments: str) -> ElementTree.Element:
+    """Run `lttng` with the arguments and return what it says; it never starts a daemon.
+
+    Raises:
+        RecordingError: the program is missing or fails; with its own words.
+    """
+    command = ["lttng", "--no-sessiond", "--mi", "xml", *arguments]
+    try:
+        # Ctrl-C of the terminal must not end it: what it began would stay.
+        run = subprocess.run(
+            command, capture_output=True, text=True, start_new_session=True, timeout=_LONGEST
+        )
+    except subprocess.TimeoutExpired:
+        raise RecordingError(
+            f"lttng {arguments[0]} does not end: a process with tracepoints does not answer",
+            "lttng list --userspace shows these processes",
+        ) from None
+    except FileNotFoundError:
+        raise RecordingError("lttng is not installed", "apt-get install lttng-tools") from None
+    if run.returncode:
+        text = (run.stderr or run.stdout).strip().splitlines()
+        reason = next((line for line in text if "Error" in line), "no reason given")
+        raise RecordingError(
+            f"lttng {arguments[0]} failed: {reason.removeprefix('Error: ').rstrip('.')}",
+            f"lttng {' '.join(arguments)}",
+        )
+    return ElementTree.fromstring(run.stdout)
+
+
+def is_daemon_running() -> bool:
+    """Tell whether a session daemon answers; it may be that of the root user.
+
+    Raises:
+        RecordingError: the program is missing, or a daemon runs and does not answer.
+    """
+    try:
+        lttng("list")
+    except RecordingError as error:
+        if _NO_DAEMON in error.message:
+            return False
+        raise
+    return True
+
+
+def sessions() -> list[Session]:
+    """Return all recording sessions of the daemon."""
+    return [
+        Session(
+            _text(session, "name"),
+            Path(path) if (path := _text(session, "path")).startswith("/") else None,
+            _text(session, "snapshot_mode") == "1",
+        )
+        for session in lttng("list").iterfind(".//{*}session")
+    ]
+
+
+def providers() -> list[Provider]:
+    """Return the processes with tracepoints that are connected to the daemon."""
+    return [
+        Provider(
+            int(_text(process, "id")),
+            _text(process, "name"),
+            frozenset(_text(event, "name") for event in process.iterfind(".//{*}event")),
+        )
+        for process in lttng("list", "--userspace").iterfind(".//{*}pid")
+        if process.find("{*}id") is not None
+    ]
+
+
+def losses(session: str) -> int:
+    """Return how many events the channels of a session have discarded so far."""
+    return sum(_numbers(lttng("list", session), "discarded_events"))
+
+
+def _numbers(element: ElementTree.Element, name: str) -> Iterator[int]:
+    for found in element.iterfind(f".//{{*}}{name}"):
+        yield int(found.text or 0)
+
+
+def _text(element: ElementTree.Element, name: str) -> str:
+    found = element.find(f"{{*}}{name}")
+    return "" if found is None else found.text or ""

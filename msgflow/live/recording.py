@@ -1,0 +1,221 @@
+"""Records a ROS 2 system: from the checks before to the last packet on the disk."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from msgflow.errors import RecordingError
+from msgflow.live.daemon import session_daemon
+from msgflow.live.lttng import losses, providers
+from msgflow.live.program import Program, require_program
+from msgflow.live.scheduling import recorded_with_perf, why_perf_cannot_record
+from msgflow.live.session import (
+    Channel,
+    can_trace_kernel,
+    recording_session,
+    remove_leftovers,
+    require_new,
+)
+from msgflow.live.written import recorded_bytes
+from msgflow.sql.interrupt import Terminated, noted_interrupts
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from pathlib import Path
+
+BYTES_OF_EVENT = 45
+"""The usual size of an event of ROS 2 with its contexts."""
+
+_LEAST_FREE_BYTES = 100_000_000
+# 100,000 events per second, for ten minutes.
+_USUAL_BYTES_PER_SECOND = 100_000 * BYTES_OF_EVENT
+_USUAL_SECONDS = 600.0
+# Seconds.
+_BETWEEN_LOOKS = 0.5
+_UNTIL_FIRST_NODE = 5.0
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """How a recording goes.
+
+    Attributes:
+        seconds: since it began.
+        event_bytes: bytes of all events on the disk; others are still in the buffers.
+        discarded: events for which the buffers were too small.
+        free_bytes: of the disk.
+    """
+
+    seconds: float
+    event_bytes: int
+    discarded: int
+    free_bytes: int
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """What was recorded.
+
+    Attributes:
+        directory: of the trace.
+        last: how it was at the last look.
+        exit_code: of the program that was recorded, if it ended by itself; None without one.
+    """
+
+    directory: Path
+    last: Status
+    exit_code: int | None
+
+
+def record(
+    directory: Path,
+    *,
+    name: str,
+    channel: Channel,
+    program: Sequence[str] = (),
+    seconds: float | None = None,
+    kernel: bool = False,
+    note: Callable[[str], None],
+    show: Callable[[Status], None],
+) -> Recorded:
+    """Record until Ctrl-C, until the program ends, or for some seconds.
+
+    Args:
+        directory: to write to; it must not exist, or be empty.
+        name: of the LTTng session.
+        channel: which events, in which buffers.
+        program: to start once all is ready, and to end afterwards; with its arguments.
+        seconds: how long to record; None: without a limit.
+        kernel: also record what the scheduler does.
+        note: gets sentences about what is wrong with the recording.
+        show: gets the status twice a second.
+
+    Raises:
+        UsageError: there is no such program.
+        RecordingError: LTTng is missing or refuses, the directory is in use, or the disk is full.
+        KeyboardInterrupt: Ctrl-C before it began; or Terminated: SIGTERM at any time. Nothing of
+            the recording stays but what is written.
+    """
+    if program:
+        require_program(program[0])
+    _require_room(directory, note, seconds)
+    with noted_interrupts() as interrupts, ExitStack() as stack:
+        stack.enter_context(session_daemon(with_kernel=kernel, note=note))
+        for left in remove_leftovers():
+            note(f"the session of a recording that was killed is removed: {left}")
+        require_new(name)
+        _note_running(note)
+        directory.mkdir(parents=True, exist_ok=True)
+        by_lttng = kernel and can_trace_kernel()
+        if kernel and not by_lttng:
+            if (reason := why_perf_cannot_record()) is None:
+                stack.enter_context(recorded_with_perf(directory))
+            else:
+                note(f"the scheduler is not recorded: LTTng cannot trace this kernel, and {reason}")
+        watch = _Watch(name, directory, note, show, expects_nodes=bool(program))
+        with ExitStack() as running:
+            started = None
+            with recording_session(name, directory, channel, with_kernel=by_lttng):
+                interrupts.check()
+                if program:
+                    started = Program(program)
+                    # Behind the session: what happens while nodes end is not recorded.
+                    running.callback(started.end)
+                try:
+                    while not watch.is_over(started, seconds):
+                        interrupts.check()
+                        time.sleep(_BETWEEN_LOOKS)
+                except Terminated:
+                    raise
+                except KeyboardInterrupt:
+                    pass
+            ended_with = None if started is None else started.exit_code
+        # All buffers are written now.
+        last = replace(watch.status, event_bytes=recorded_bytes(directory))
+    return Recorded(directory, last, ended_with)
+
+
+class _Watch:
+    """Looks at a recording that runs, and says what goes wrong as soon as it does."""
+
+    def __init__(
+        self,
+        name: str,
+        directory: Path,
+        note: Callable[[str], None],
+        show: Callable[[Status], None],
+        *,
+        expects_nodes: bool,
+    ) -> None:
+        self._name = name
+        self._directory = directory
+        self._note = note
+        self._show = show
+        self._expects_nodes = expects_nodes
+        self._begin = time.monotonic()
+        self.status = Status(0.0, 0, 0, shutil.disk_usage(directory).free)
+
+    def is_over(self, program: Program | None, seconds: float | None) -> bool:
+        """Look, and tell whether the recording has to end."""
+        self._look()
+        if self.status.free_bytes < _LEAST_FREE_BYTES:
+            self._note("the disk is full: the recording ends here; remove files, or use -o DIR")
+            return True
+        if program is not None and program.exit_code is not None:
+            return True
+        return seconds is not None and self.status.seconds >= seconds
+
+    def _look(self) -> None:
+        before = self.status
+        passed = time.monotonic() - self._begin
+        self.status = Status(
+            passed,
+            recorded_bytes(self._directory),
+            losses(self._name),
+            shutil.disk_usage(self._directory).free,
+        )
+        if self.status.discarded and not before.discarded:
+            self._note(
+                "events are being discarded, the buffers are too small: record again with"
+                " --subbuf-size 8M or more"
+            )
+        if self._expects_nodes and passed >= _UNTIL_FIRST_NODE:
+            self._expects_nodes = False
+            if not any(provider.is_ros for provider in providers()):
+                self._note(
+                    f"after {passed:.0f} s no process has the tracepoints of ROS 2: is tracing"
+                    " built in (ros2 run tracetools status), are nodes running?"
+                )
+
+
+def _require_room(directory: Path, note: Callable[[str], None], seconds: float | None) -> None:
+    if directory.exists() and (not directory.is_dir() or any(directory.iterdir())):
+        raise RecordingError(f"the directory is in use — {directory}", "another one: -o DIR")
+    existing = next(path for path in (directory, *directory.absolute().parents) if path.exists())
+    free = shutil.disk_usage(existing).free
+    if free < _LEAST_FREE_BYTES:
+        raise RecordingError(
+            f"the disk of {existing} is full: {free / 1e6:.0f} MB are free",
+            "remove files, or name a directory on another disk: -o DIR",
+        )
+    needed = _USUAL_BYTES_PER_SECOND * (_USUAL_SECONDS if seconds is None else seconds)
+    if free < needed:
+        note(
+            f"{free / 1e9:.1f} GB are free on the disk of {existing}: a robot with 100,000 events"
+            f" per second fills them in {free / _USUAL_BYTES_PER_SECOND / 60:.0f} min"
+        )
+
+
+def _note_running(note: Callable[[str], None]) -> None:
+    running = [provider for provider in providers() if provider.is_ros]
+    if running:
+        first = f"{running[0].program} ({running[0].pid})"
+        others = f" and {len(running) - 1} more" if len(running) > 1 else ""
+        note(
+            f"{first}{others} of ROS 2 run already: the names of their nodes and topics are not"
+            " recorded; begin to record before they start"
+        )

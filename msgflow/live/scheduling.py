@@ -1,0 +1,69 @@
+"""What the kernel's scheduler does, recorded with `perf` where LTTng has no kernel modules."""
+
+from __future__ import annotations
+
+import shutil
+import signal
+import subprocess
+import tempfile
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from msgflow.errors import RecordingError
+from msgflow.live.daemon import started
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+_EVENTS = (
+    "sched_switch",
+    "sched_waking",
+    "sched_wakeup_new",
+    "sched_migrate_task",
+    "sched_process_fork",
+    "sched_process_exit",
+)
+# The clock of LTTng; pages of memory of each CPU.
+_RECORD = ("perf", "record", "--all-cpus", "--clockid=CLOCK_MONOTONIC", "--mmap-pages=8192")
+_TRACE = "perf"
+
+
+def why_perf_cannot_record() -> str | None:
+    """Return why perf cannot record the scheduler here; None where it can."""
+    if shutil.which("perf") is None:
+        return "perf is not installed (apt-get install linux-perf)"
+    with tempfile.NamedTemporaryFile(prefix="msgflow-") as target:
+        trial = _command(target.name)
+        run = subprocess.run([*trial, "--", "true"], capture_output=True, text=True)
+    if run.returncode:
+        lines = [line for line in run.stderr.splitlines() if line.strip(" :")]
+        return f"perf may not: {lines[-1].strip()}" if lines else "perf fails"
+    return None
+
+
+@contextmanager
+def recorded_with_perf(directory: Path) -> Iterator[None]:
+    """Record the scheduler during the block, as a CTF trace below the directory.
+
+    Raises:
+        RecordingError: perf fails; what it recorded stays.
+    """
+    data = directory / "perf.data"
+    with tempfile.TemporaryFile("w+") as words:
+        perf = started([*_command(str(data)), "--quiet"], words, end="INT")
+        try:
+            yield
+        finally:
+            perf.send_signal(signal.SIGINT)
+            perf.wait()
+    convert = ["perf", "data", "convert", f"--to-ctf={directory / _TRACE}", f"--input={data}"]
+    run = subprocess.run(convert, capture_output=True, text=True, start_new_session=True)
+    if run.returncode:
+        said = run.stderr.strip().splitlines() or ["no reason given"]
+        raise RecordingError(f"perf cannot write its data as CTF: {said[-1]}", " ".join(convert))
+    data.unlink()
+
+
+def _command(target: str) -> list[str]:
+    return [*_RECORD, *(f"--event=sched:{name}" for name in _EVENTS), f"--output={target}"]

@@ -1,0 +1,157 @@
+"""A recording session of LTTng that is ours: from its first event to its last packet."""
+
+from __future__ import annotations
+
+import json
+import os
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from msgflow.errors import RecordingError
+from msgflow.live.lttng import lttng, sessions
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+CONTEXTS = ("vpid", "vtid", "procname")
+KERNEL_EVENTS = ("sched_switch", "sched_waking", "sched_process_fork", "sched_process_exec")
+KERNEL_CONTEXTS = ("pid", "vpid", "vtid", "procname")
+_CHANNEL = "ros2"
+# In the directory of a recording while it is made.
+_OWNER = "msgflow-record.json"
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """How a session records events of programs.
+
+    Attributes:
+        events: names, or patterns of them, such as `ros2:*`.
+        sub_buffer_size: of each CPU, in the words of LTTng, such as `1M`.
+        sub_buffers: their number.
+    """
+
+    events: tuple[str, ...]
+    sub_buffer_size: str
+    sub_buffers: int
+
+
+@contextmanager
+def recording_session(
+    name: str, directory: Path, channel: Channel, *, with_kernel: bool
+) -> Iterator[None]:
+    """Record into a directory during the block; afterwards everything is written.
+
+    Args:
+        name: of the session; no other may have it.
+        directory: an empty directory.
+        channel: what to record of programs.
+        with_kernel: also record scheduling, with LTTng.
+
+    Raises:
+        RecordingError: LTTng refuses.
+    """
+    owner = directory / _OWNER
+    try:
+        owner.write_text(json.dumps({"pid": os.getpid(), "started": _started(os.getpid())}))
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise RecordingError(
+            f"cannot write to {directory}: {reason}", "another directory: -o DIR"
+        ) from None
+    try:
+        lttng("create", name, f"--output={directory}")
+    except RecordingError:
+        owner.unlink()
+        raise
+    try:
+        _set_up(name, channel)
+        if with_kernel:
+            _set_up_kernel(name, channel)
+        lttng("start", name)
+        yield
+    finally:
+        # It stops the session, and waits until all is written. Where it fails, the owner stays
+        # named: the next recording removes the session.
+        lttng("destroy", name)
+        owner.unlink()
+
+
+def remove_leftovers() -> list[str]:
+    """Destroy the sessions of recordings whose process is gone, and return their names."""
+    left = [session for session in sessions() if _is_left(session.directory)]
+    for session in left:
+        lttng("destroy", session.name)
+        assert session.directory is not None
+        (session.directory / _OWNER).unlink()
+    return [session.name for session in left]
+
+
+def require_new(name: str) -> None:
+    """Refuse the name of a session that exists.
+
+    Raises:
+        RecordingError: there is one.
+    """
+    if any(session.name == name for session in sessions()):
+        raise RecordingError(
+            f"LTTng has a session of this name — {name}",
+            f"another --name; or, if nobody needs it: lttng destroy {name}",
+        )
+
+
+def can_trace_kernel() -> bool:
+    """Tell whether the session daemon can trace the kernel."""
+    try:
+        lttng("list", "--kernel")
+    except RecordingError:
+        return False
+    return True
+
+
+def _set_up(name: str, channel: Channel) -> None:
+    to_channel = ("--userspace", f"--session={name}", f"--channel={_CHANNEL}")
+    _enable_channel("--userspace", name, channel)
+    for event in channel.events:
+        lttng("enable-event", *to_channel, event)
+    lttng("add-context", *to_channel, *(f"--type={context}" for context in CONTEXTS))
+
+
+def _set_up_kernel(name: str, channel: Channel) -> None:
+    to_channel = ("--kernel", f"--session={name}", f"--channel={_CHANNEL}")
+    _enable_channel("--kernel", name, channel)
+    lttng("enable-event", *to_channel, ",".join(KERNEL_EVENTS))
+    lttng("add-context", *to_channel, *(f"--type={context}" for context in KERNEL_CONTEXTS))
+
+
+def _enable_channel(domain: str, name: str, channel: Channel) -> None:
+    lttng(
+        "enable-channel",
+        domain,
+        f"--session={name}",
+        f"--subbuf-size={channel.sub_buffer_size}",
+        f"--num-subbuf={channel.sub_buffers}",
+        _CHANNEL,
+    )
+
+
+def _is_left(directory: Path | None) -> bool:
+    if directory is None:
+        return False
+    try:
+        owner = json.loads((directory / _OWNER).read_text())
+        return bool(owner["started"] != _started(owner["pid"]))
+    except (OSError, ValueError, KeyError, TypeError):
+        return False
+
+
+def _started(pid: int) -> str | None:
+    """Return when a process started, in ticks since the boot; None where there is none."""
+    try:
+        stat = Path(f"/proc/{pid:d}/stat").read_text()
+    except OSError:
+        return None
+    # Behind the name of the program, which may have any character: the 22nd field of all.
+    return stat.rpartition(")")[2].split()[19]

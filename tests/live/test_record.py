@@ -1,0 +1,246 @@
+"""`msgflow record` with the real LTTng: what it records, what it says, and that nothing stays."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from recording.recorder import NotPossibleError, one_at_a_time, require, ros_environment
+from recording.tracetools import build_tracetools
+
+# `make` installs the wheels of ROS 2 there.
+ROS = Path(sys.prefix) / "ros" / "bin" / "python"
+NODE = """
+import sys
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from std_msgs.msg import UInt64
+
+rclpy.init()
+camera, detector = Node("camera"), Node("detector")
+image = camera.create_publisher(UInt64, "/image", 10)
+objects = detector.create_publisher(UInt64, "/objects", 10)
+detector.create_subscription(UInt64, "/image", objects.publish, 10)
+camera.create_timer(float(sys.argv[1]), lambda: image.publish(UInt64()))
+executor = rclpy.executors.SingleThreadedExecutor()
+executor.add_node(camera)
+executor.add_node(detector)
+try:
+    executor.spin()
+except (ExternalShutdownException, KeyboardInterrupt):
+    pass
+"""
+
+
+@dataclass
+class Ended:
+    """A command that is over."""
+
+    exit_code: int
+    out: str
+    err: str
+
+
+Record = Callable[..., Ended]
+
+
+@pytest.fixture(autouse=True)
+def _alone() -> Iterator[None]:
+    if shutil.which("lttng-sessiond") is None:
+        pytest.skip("no LTTng")
+    with one_at_a_time():
+        yield
+        assert daemons() == []
+
+
+@pytest.fixture
+def record(tmp_path: Path) -> Record:
+    """Runs the command in an empty directory, and sends it a signal after some seconds."""
+
+    def run(*words: str, after: float | None = None, number: int = signal.SIGINT, **more) -> Ended:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "msgflow", "record", *words],
+            cwd=tmp_path,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            **more,
+        )
+        if after is not None:
+            time.sleep(after)
+            process.send_signal(number)
+        try:
+            out, err = process.communicate(timeout=120)
+        finally:
+            process.kill()
+        return Ended(process.returncode, out, err)
+
+    return run
+
+
+@pytest.fixture
+def robot(tmp_path: Path) -> list[str]:
+    """Start of a command: two nodes, which have tracepoints, of a period to name."""
+    try:
+        require(ROS)
+    except NotPossibleError as error:
+        pytest.skip(f"cannot record: {error}")
+    (tmp_path / "library").mkdir()
+    library = build_tracetools(tmp_path / "library")
+    environment = ros_environment(ROS) | {"LD_PRELOAD": str(library)}
+    changed = {name: value for name, value in environment.items() if value != os.environ.get(name)}
+    return ["env", *(f"{name}={value}" for name, value in changed.items()), str(ROS), "-c", NODE]
+
+
+@pytest.fixture
+def daemon() -> Iterator[None]:
+    """A session daemon that someone else started."""
+    process = subprocess.Popen(["lttng-sessiond", "--no-kernel", "--quiet"])
+    end = time.monotonic() + 20
+    while lttng("list").returncode and time.monotonic() < end:
+        time.sleep(0.1)
+    yield
+    process.terminate()
+    process.wait()
+
+
+def lttng(*words: str) -> subprocess.CompletedProcess[str]:
+    command = ["lttng", "--no-sessiond", *words]
+    return subprocess.run(command, capture_output=True, text=True)
+
+
+def daemons() -> list[str]:
+    """Return the numbers of session daemons, once those that end have ended."""
+    end = time.monotonic() + 10
+    while found := subprocess.run(
+        ["pgrep", "-x", "-r", "D,R,S", "lttng-sessiond"], capture_output=True, text=True
+    ).stdout.split():
+        if time.monotonic() > end:
+            break
+        time.sleep(0.1)
+    return found
+
+
+def test_from_a_robot_to_an_answer(record: Record, robot: list[str], tmp_path: Path) -> None:
+    ended = record(
+        *("--duration", "6", "--name", "drive", "-o", "trace"),
+        *("--", *robot, "0.05"),
+    )
+    assert ended.exit_code == 0, ended.err
+    assert "/camera → /image → /detector → /objects" in ended.out
+    assert "process_without_rclcpp" in ended.out
+    assert "run: drive (1)" in ended.err
+    assert " 0 discarded" in ended.err
+    # Only what LTTng wrote.
+    assert [path.name for path in (tmp_path / "trace").iterdir()] == ["ust"]
+
+
+def test_discarded_events_are_said_at_once(record: Record, robot: list[str]) -> None:
+    ended = record(
+        *("--duration", "4", "--subbuf-size", "4K", "--num-subbuf", "2", "--no-ingest"),
+        *("--", *robot, "0.0001"),
+    )
+    assert ended.exit_code == 0, ended.err
+    assert "record again with --subbuf-size 8M" in ended.err
+
+
+def test_a_program_without_tracepoints_is_noticed(record: Record) -> None:
+    ended = record("--duration", "6", "--no-ingest", "--", "sleep", "60")
+    assert ended.exit_code == 0
+    assert "no process has the tracepoints of ROS 2" in ended.err
+
+
+def test_all_that_a_program_started_ends_with_it(record: Record, tmp_path: Path) -> None:
+    program = "sleep 1000 & echo $! > child; wait"
+    ended = record("--duration", "1", "--no-ingest", "--", "sh", "-c", program)
+    assert ended.exit_code == 0
+    child = int((tmp_path / "child").read_text())
+    assert not Path(f"/proc/{child}").exists()
+
+
+@pytest.mark.parametrize("seconds", [0.2, 0.9, 1.4, 1.9, 3.5])
+def test_ctrl_c_leaves_nothing(record: Record, seconds: float) -> None:
+    """Whether LTTng starts, the session begins, or events are recorded."""
+    ended = record("--no-ingest", "--", "sleep", "1000", after=seconds)
+    assert ended.exit_code in (0, 130), ended.err
+    assert subprocess.run(["pgrep", "-r", "D,R,S", "-f", "^sleep 1000"]).returncode
+
+
+def test_sigterm_leaves_nothing(record: Record) -> None:
+    ended = record("--", "sleep", "1000", after=4, number=signal.SIGTERM)
+    assert ended.exit_code == 143
+
+
+def test_sigkill_ends_the_daemon_too(record: Record) -> None:
+    assert record(after=4, number=signal.SIGKILL).exit_code == -signal.SIGKILL
+
+
+@pytest.mark.usefixtures("daemon")
+class TestForeignDaemon:
+    """Another one owns the daemon: it stays, with the sessions of others."""
+
+    @pytest.fixture(autouse=True)
+    def _other_session(self, tmp_path: Path, daemon: None) -> Iterator[None]:
+        lttng("create", "other", f"--output={tmp_path / 'other'}")
+        yield
+        assert "other" in lttng("list").stdout
+
+    def test_a_session_of_a_killed_recording_is_removed(self, record: Record) -> None:
+        record("--name", "first", after=4, number=signal.SIGKILL)
+        assert "first" in lttng("list").stdout
+        ended = record("--name", "second", "--no-ingest", "--duration", "0.5")
+        assert "the session of a recording that was killed is removed: first" in ended.err
+        assert "first" not in lttng("list").stdout
+
+    def test_a_name_in_use_is_refused(self, record: Record, tmp_path: Path) -> None:
+        ended = record("--name", "other", "--duration", "0.5")
+        assert ended.exit_code == 1
+        assert "lttng destroy other" in ended.err
+        assert not list(tmp_path.glob("recording*"))
+
+
+def test_a_directory_in_use_is_refused(record: Record, tmp_path: Path) -> None:
+    (tmp_path / "used").mkdir()
+    (tmp_path / "used" / "file").touch()
+    ended = record("-o", "used", "--duration", "0.5")
+    assert (ended.exit_code, "the directory is in use" in ended.err) == (1, True)
+
+
+def test_a_missing_program_is_refused_before_anything_starts(record: Record) -> None:
+    ended = record("--", "no-such-program")
+    assert ended.exit_code == 2
+    assert "there is no such program — no-such-program" in ended.err
+
+
+def test_a_program_that_fails_at_once_is_named(record: Record) -> None:
+    ended = record("--", "false")
+    assert ended.exit_code == 3
+    assert "false ended with exit code 1" in ended.err
+    assert "no ROS 2 event was recorded" in ended.err
+
+
+def test_without_lttng(record: Record, tmp_path: Path) -> None:
+    ended = record(env=os.environ | {"PATH": str(tmp_path)})
+    assert ended.exit_code == 1
+    assert "apt-get install lttng-tools" in ended.err
+
+
+def test_a_daemon_that_cannot_start_says_why(record: Record, tmp_path: Path) -> None:
+    program = tmp_path / "bin" / "lttng-sessiond"
+    program.parent.mkdir()
+    program.write_text("#!/bin/sh\necho 'Error: no room for buffers' >&2; exit 1\n")
+    program.chmod(0o755)
+    path = f"{program.parent}:{os.environ['PATH']}"
+    ended = record("--duration", "1", env=os.environ | {"PATH": path})
+    assert ended.exit_code == 1
+    assert "the session daemon of LTTng does not start: no room for buffers" in ended.err
