@@ -53,6 +53,14 @@ def command(
             "--kernel", help="Also record the scheduler, with LTTng or perf: why a thread waits"
         ),
     ] = False,
+    dual: Annotated[
+        str | None,
+        typer.Option(
+            "--dual",
+            metavar="SESSION",
+            help="Also write what this snapshot session has: how nodes that run already began",
+        ),
+    ] = None,
     events: Annotated[
         list[str] | None,
         typer.Option(
@@ -101,6 +109,7 @@ def command(
             program=program or (),
             seconds=duration,
             kernel=kernel,
+            snapshot=dual,
             note=print_note,
             show=show,
         )

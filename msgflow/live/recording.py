@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING
 
 from msgflow.errors import RecordingError
 from msgflow.live.daemon import session_daemon
-from msgflow.live.lttng import losses, providers
+from msgflow.live.lttng import losses, providers, sessions
 from msgflow.live.program import Program, require_program
 from msgflow.live.scheduling import recorded_with_perf, why_perf_cannot_record
 from msgflow.live.session import (
     Channel,
     can_trace_kernel,
+    record_snapshot,
     recording_session,
     remove_leftovers,
     require_new,
@@ -79,6 +80,7 @@ def record(
     program: Sequence[str] = (),
     seconds: float | None = None,
     kernel: bool = False,
+    snapshot: str | None = None,
     note: Callable[[str], None],
     show: Callable[[Status], None],
 ) -> Recorded:
@@ -91,6 +93,8 @@ def record(
         program: to start once all is ready, and to end afterwards; with its arguments.
         seconds: how long to record; None: without a limit.
         kernel: also record what the scheduler does.
+        snapshot: a snapshot session that has the initialisation of nodes that run already; what it
+            has is written too.
         note: gets sentences about what is wrong with the recording.
         show: gets the status twice a second.
 
@@ -108,14 +112,20 @@ def record(
         for left in remove_leftovers():
             note(f"the session of a recording that was killed is removed: {left}")
         require_new(name)
-        _note_running(note)
+        if snapshot is None:
+            _note_running(note)
         directory.mkdir(parents=True, exist_ok=True)
+        if snapshot is not None:
+            record_snapshot(snapshot, directory / "snapshot")
         by_lttng = kernel and can_trace_kernel()
         if kernel and not by_lttng:
             if (reason := why_perf_cannot_record()) is None:
                 stack.enter_context(recorded_with_perf(directory))
             else:
-                note(f"the scheduler is not recorded: LTTng cannot trace this kernel, and {reason}")
+                note(
+                    f"the scheduler is not recorded: LTTng cannot trace this kernel (it"
+                    f" needs its modules, and root or the group tracing), and {reason}"
+                )
         watch = _Watch(name, directory, note, show, expects_nodes=bool(program))
         with ExitStack() as running:
             started = None
@@ -215,7 +225,9 @@ def _note_running(note: Callable[[str], None]) -> None:
     if running:
         first = f"{running[0].program} ({running[0].pid})"
         others = f" and {len(running) - 1} more" if len(running) > 1 else ""
+        kept = next((session.name for session in sessions() if session.is_snapshot), None)
+        cure = "begin to record before they start" if kept is None else f"--dual {kept} has them"
         note(
             f"{first}{others} of ROS 2 run already: the names of their nodes and topics are not"
-            " recorded; begin to record before they start"
+            f" recorded; {cure}"
         )

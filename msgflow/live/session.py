@@ -79,6 +79,21 @@ def recording_session(
         owner.unlink()
 
 
+def record_snapshot(name: str, directory: Path) -> None:
+    """Write what a snapshot session has in its buffers into a new directory.
+
+    Raises:
+        RecordingError: there is no such snapshot session.
+    """
+    known = [session.name for session in sessions() if session.is_snapshot]
+    if name not in known:
+        raise RecordingError(
+            f"LTTng has no snapshot session of this name — {name}",
+            f"one of: {', '.join(known)}" if known else "lttng create --snapshot makes one",
+        )
+    lttng("snapshot", "record", f"--session={name}", f"file://{directory}")
+
+
 def remove_leftovers() -> list[str]:
     """Destroy the sessions of recordings whose process is gone, and return their names."""
     left = [session for session in sessions() if _is_left(session.directory)]

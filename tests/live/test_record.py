@@ -202,6 +202,28 @@ class TestForeignDaemon:
         assert "the session of a recording that was killed is removed: first" in ended.err
         assert "first" not in lttng("list").stdout
 
+    def test_dual_adds_the_names_of_nodes_that_run_already(
+        self, record: Record, robot: list[str]
+    ) -> None:
+        lttng("create", "start", "--snapshot")
+        lttng("enable-event", "--userspace", "ros2:*", "--session=start")
+        types = [f"--type={name}" for name in ("vpid", "vtid", "procname")]
+        lttng("add-context", "--userspace", "--session=start", *types)
+        lttng("start", "start")
+        with subprocess.Popen([*robot, "0.05"]) as node:
+            try:
+                time.sleep(4)
+                without = record("--duration", "1", "--name", "first", "--db", "a.duckdb")
+                ended = record(
+                    "--duration", "2", "--name", "second", "--db", "b.duckdb", "--dual", "start"
+                )
+            finally:
+                node.kill()
+                lttng("destroy", "start")
+        assert "--dual start has them" in without.err
+        assert "/image" not in without.out
+        assert "/camera → /image → /detector" in ended.out
+
     def test_a_name_in_use_is_refused(self, record: Record, tmp_path: Path) -> None:
         ended = record("--name", "other", "--duration", "0.5")
         assert ended.exit_code == 1
