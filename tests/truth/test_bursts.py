@@ -42,7 +42,9 @@ def test_no_message_is_taken_for_the_next(tmp_path: Path, system: str, recording
 @pytest.mark.parametrize(
     ("offset_ns", "slew_ppm", "factor", "least"),
     [
-        thorough(7_000_000, 150, 0.3, 4_100),
+        # In 7 ms, the relay publishes up to 36 messages, and 24 on either side of a stamp come into
+        # question: too few agree for its drift to be known, and its 2,975 messages have no link.
+        thorough(7_000_000, 150, 0.3, 1_100),
         (300_000, -150, 0.1, 1_200),
         thorough(5_509_365, -170, 0.2, 700),
     ],
