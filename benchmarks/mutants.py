@@ -56,7 +56,12 @@ RULES = (
             "schema/test_pair_rules.py",
             "schema/test_clock_rules.py",
             "schema/test_stamp_clock.py",
+            "schema/cases/derive.clock_set_back",
         ),
+    ),
+    (
+        "link/transport/link_transport_nearest.sql",
+        ("schema/cases/derive.link_transport_nearest",),
     ),
     ("link/causal/answer_doubtful.sql", ("schema/test_answer_doubtful.py",)),
     ("link/causal/approximate_set.sql", ("schema/cases/derive.link_causal_indirect",)),

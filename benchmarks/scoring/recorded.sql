@@ -82,7 +82,16 @@ SELECT
     CASE kind WHEN 'request' THEN 'request_sent' ELSE 'publication' END, id, seen = 1
 FROM pub
 -- What clients do with a response is in no callback that is traced.
-WHERE kind <> 'response' AND cb IN (SELECT id FROM callback WHERE kind <> 'client')
+WHERE kind <> 'response'
+    AND cb IN (SELECT id FROM callback WHERE kind <> 'client' AND "start" IS NOT NULL)
+UNION ALL
+-- rclpy has no events of callbacks: there, a message causes what its thread publishes next. What a
+-- timer publishes has no cause.
+SELECT 'take_adjacent', 'take', k.id, 'publication', b.id, k.seen = 1 AND b.seen = 1
+FROM take AS k
+JOIN callback AS c ON k.cb = c.id
+JOIN pub AS b ON b.cb = c.id
+WHERE k.kind = 'topic' AND b.kind = 'topic' AND c."start" IS NULL
 UNION ALL
 SELECT
     CASE type WHEN 'service' THEN 'link_response' ELSE type END, 'callback_instance', cb,

@@ -230,6 +230,22 @@ twin AS (
             IS DISTINCT FROM (b.publisher_handle, b.host, b.pid, b.tid)
     GROUP BY a.publication_id
 ),
+-- Or it was stamped while another thread wrote as well, as far as the trace shows: threads of rclpy
+-- have no event until they take the next message.
+rivalled AS (
+    SELECT DISTINCT a.publication_id
+    FROM simulated_publication AS a
+    JOIN (
+        SELECT p.topic_name, p.host, p.pid, p.tid, p.rmw_ns, e.ts_ns AS next_ns
+        FROM simulated_publication AS p
+        ASOF JOIN (FROM truth_event WHERE is_recorded) AS e
+            ON p.host = e.host AND p.pid = e.pid AND p.tid = e.tid AND p.rmw_ns < e.ts_ns
+    ) AS b
+        ON a.topic_name = b.topic_name
+        AND a.host = b.host
+        AND (a.pid, a.tid) IS DISTINCT FROM (b.pid, b.tid)
+        AND a.rmw_ns BETWEEN b.rmw_ns AND b.next_ns
+),
 asked AS (
     SELECT
         t.publication_id, t.take_id, t.publication_host,
@@ -264,6 +280,7 @@ asked AS (
                         )
                     )
                 ELSE t.publication_id NOT IN (SELECT publication_id FROM twin)
+                    AND t.publication_id NOT IN (FROM rivalled)
                     AND (t.publication_host, t.publication_pid)
                         NOT IN (SELECT (host, pid) FROM unknown_process)
                     AND (t.take_host, t.take_pid)

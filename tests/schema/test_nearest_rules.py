@@ -337,8 +337,9 @@ UNUSUAL = 9 * PERIOD + 100_000
         pytest.param({"stranger": -1}, True, id="nobody_else_while_it_was_recorded"),
         pytest.param({"stranger": 19 * PERIOD + 50 * MILLISECOND}, True, id="nor_behind"),
         pytest.param({"taken": 20}, True, id="each_publication_has_one"),
-        pytest.param({"others": [100_000] * 90}, True, id="usual_where_nobody_else_publishes"),
-        pytest.param({"others": [99_999] * 90}, False, id="longer_than_is_usual_there"),
+        pytest.param({"others": [100_000] * 100}, True, id="usual_where_nobody_else_publishes"),
+        pytest.param({"others": [99_999] * 100}, False, id="longer_than_is_usual_there"),
+        pytest.param({"others": [30_000] * 99}, True, id="too_few_to_say_what_is_usual_there"),
     ],
 )
 def test_a_message_of_somebody_else_may_take_the_place_of_one_that_nobody_took(

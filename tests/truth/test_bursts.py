@@ -42,7 +42,9 @@ def test_no_message_is_taken_for_the_next(tmp_path: Path, system: str, recording
 @pytest.mark.parametrize(
     ("offset_ns", "slew_ppm", "factor", "least"),
     [
-        thorough(7_000_000, 150, 0.3, 4_100),
+        # In 7 ms, the relay publishes up to 36 messages, and 24 on either side of a stamp come into
+        # question: too few agree for its drift to be known, and its 2,975 messages have no link.
+        thorough(7_000_000, 150, 0.3, 1_100),
         (300_000, -150, 0.1, 1_200),
         thorough(5_509_365, -170, 0.2, 700),
     ],
@@ -122,17 +124,36 @@ def test_a_clock_that_is_set_back_by_milliseconds_makes_none_wrong(
     assert transport.recall > (0.97 if system == "pipeline" else 0.7)
 
 
-def test_a_clock_that_is_set_back_by_seconds_makes_few_wrong(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("hosts", "steps", "least"),
+    [
+        pytest.param(
+            (0, 1), ((2 * SECOND, -12_000_000), (5 * SECOND, -3 * SECOND)), 900, id="both"
+        ),
+        # Only the other host takes what this one publishes: which difference is right then is not
+        # known.
+        thorough((1,), ((3 * SECOND, -2 * SECOND),), 1_400),
+    ],
+)
+def test_a_clock_that_is_set_back_by_seconds_makes_none_wrong(
+    tmp_path: Path, hosts: tuple[int, ...], steps: tuple[tuple[int, int], ...], least: int
+) -> None:
     """What is stamped then looks as if it had been published seconds before.
 
-    The order of the takes shows it, where a later publication is known.
+    The order of the takes shows it.
     """
-    recording = Recording(realtime_steps=((2 * SECOND, -12_000_000), (5 * SECOND, -3 * SECOND)))
-    simulation = simulate(
-        "two_hosts", tmp_path / "trace", factor=0.7, layout="humble", recording=recording
+    known = scenarios()["two_hosts"]
+    recording = Recording(realtime_steps=steps)
+    scenario = replace(
+        known,
+        hosts=tuple(
+            replace(host, recording=recording) if number in hosts else host
+            for number, host in enumerate(known.hosts)
+        ),
     )
+    simulation = simulate(scenario, tmp_path / "trace", factor=0.7, layout="humble")
     path = tmp_path / "run.duckdb"
     ingest_one(simulation.directory, path).connection.close()
     score = {score.kind: score for score in compare_simulated(path, simulation.truth)[0]}
-    assert score["transport"].wrong <= 1
-    assert score["transport"].found > 900
+    assert score["transport"].wrong == 0
+    assert score["transport"].found > least

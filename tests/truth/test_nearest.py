@@ -47,8 +47,13 @@ CHANGES = {
         "(SELECT min(publisher_id) FROM store.publisher WHERE topic_name = '/x')"
     ),
 }
-# If several processes publish on one topic at the same moment, some messages have no publisher.
-LEAST_RECALL = {"publisher_not_traced": 0.99}
+LEAST_RECALL = {
+    # If several processes publish on one topic at the same moment, some messages have no publisher.
+    "publisher_not_traced": 0.99,
+    # A publication that is missing though nothing was lost is one of a publisher that was not
+    # traced. Then what is stamped later than is usual may be of that one.
+    "publications_missing": 0.999,
+}
 
 
 @pytest.fixture(scope="module")

@@ -167,6 +167,21 @@ def test_what_was_wrong_is_right(
     assert steps == ([("1 jump, the largest 0.008 ms",)] if name == "clock_step" else [])
 
 
+def test_answers_of_rclpy_are_right_and_its_timers_are_marked(
+    recordings: Callable[[str], Ingested], shared_traces: Path
+) -> None:
+    """No callback of rclpy has events, so none is missing; 517 publications are of timers."""
+    ingested = recordings("rclpy_timer")
+    path = Path(ingested.rows("SELECT path FROM duckdb_databases() WHERE NOT internal")[0][0])
+    scores = compare_recorded(path, shared_traces / "rclpy_timer" / "truth.jsonl.gz")
+    assert {(score.precision, score.recall, score.doubted) for score in scores} == {(1, 1, 0)}
+    assert {score.kind: (score.decided, score.misguessed) for score in scores} == {
+        "direct": (373, 0),
+        "take_adjacent": (1118, 517),
+        "transport": (2811, 0),
+    }
+
+
 @pytest.mark.thorough
 @pytest.mark.parametrize("name", ["lossy_intra_mt", "intra_lost", "snapshots_intra"])
 def test_nothing_is_wrong_where_events_were_lost(

@@ -98,6 +98,18 @@ def test_takes_without_an_event_are_no_loss(tmp_path, layout, share):
     assert reasons["no_stamp"] > 100
 
 
+def test_of_writes_that_go_on_at_the_same_time_none_is_decided(tmp_path):
+    """Threads of rclpy share a publisher, and have no event until they take the next message."""
+    simulation = simulate("python_timers", tmp_path / "trace", layout="humble", factor=0.1)
+    path = tmp_path / "run.duckdb"
+    ingest_one(simulation.directory, path).connection.close()
+    scores, drops = compare_simulated(path, simulation.truth)
+    (score,) = (score for score in scores if score.kind == "transport")
+    assert (score.wrong, score.missing) == (0, 0)
+    assert 0 < score.decided < score.found < score.happened
+    assert [drop for drop in drops if not drop.undecided and not drop.is_right] == []
+
+
 def test_a_link_that_is_gone_is_missing(simulation, database):
     before = _scores(simulation, database)
     _change(

@@ -221,12 +221,14 @@ usual_of_clock AS (
         clock_id,
         quantile_disc(delay_ns, derive.clock_limit().usual_quantile) AS usual_ns,
         quantile_disc(delay_ns, 1 - derive.clock_limit().usual_quantile) AS least_ns,
-        -- What is usual where nobody else publishes.
-        coalesce(
-            quantile_disc(delay_ns, derive.clock_limit().usual_quantile)
-                FILTER (topic_name NOT IN (FROM strange)),
-            derive.clock_limit().median_factor * median(delay_ns)
-        ) AS familiar_ns
+        -- What is usual where nobody else publishes, if there are enough messages to say so.
+        CASE
+            WHEN count(*) FILTER (topic_name NOT IN (FROM strange))
+                * (1 - derive.clock_limit().usual_quantile) >= 1
+                THEN quantile_disc(delay_ns, derive.clock_limit().usual_quantile)
+                    FILTER (topic_name NOT IN (FROM strange))
+            ELSE derive.clock_limit().median_factor * median(delay_ns)
+        END AS familiar_ns
     FROM within
     WHERE place = 1 AND goes_on
     GROUP BY clock_id
