@@ -45,7 +45,7 @@ demo: $(VENV)/.installed
 	@echo '  msgflow check                                    what is wrong with the recording'
 	@echo '  msgflow query critical-path --to /control/cmd    why the slowest command was late'
 	@echo '  msgflow query waits --by pair                   which callbacks keep which waiting'
-	@echo '  msgflow flow --topic /camera/image               one message: its causes and effects'
+	@echo '  msgflow flow /camera/image               one message: its causes and effects'
 	@echo 'see it: $(BIN)/msgflow ui --db $(DEMO)/msgflow.duckdb'
 
 quick: $(VENV)/.developed

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
@@ -35,6 +36,8 @@ if TYPE_CHECKING:
     from msgflow.ingest import IngestProgress, IngestReport
     from msgflow.links import AppliedLinks, LinkSuggestions
     from msgflow.query.compare import Comparison
+    from msgflow.query.flow import Start
+    from msgflow.query.why import Explanation
     from msgflow.run.choice import Run
     from msgflow.sql.header import Header
     from msgflow.sql.value import Value
@@ -402,9 +405,36 @@ class Database:
         named.require(self.connection, part.runs(self.connection), path)
         return path.words()
 
+    def why(
+        self,
+        place: str | None = None,
+        *,
+        run: str | int | None = None,
+        start: str | int | None = None,
+        end: str | int | None = None,
+        skip_first: float | None = None,
+    ) -> Explanation:
+        """Return why flows are late that end at a topic or node, from the named queries.
+
+        Args:
+            place: the topic or node, or a glob; the path with the slowest flow of all when None.
+            run, start, end, skip_first: what to read, see `msgflow.Slice`; one run.
+
+        Raises:
+            UsageError: not exactly one run, no such place or time, or no flow arrives there.
+            QueryError: the database could not run a query.
+            DatabaseError: the file cannot be opened.
+        """
+        from msgflow.query.why import explain
+
+        connection = self.connection
+        one = self._ask(lambda: Slice(run).one_run(connection, "an explanation"))
+        ask = partial(self.query, run=one.run_id, start=start, end=end, skip_first=skip_first)
+        return explain(ask, one, place)
+
     def flow(
         self,
-        topic: str | None = None,
+        place: str | None = None,
         *,
         at: str | int | None = None,
         publication_id: int | None = None,
@@ -421,7 +451,8 @@ class Database:
         """Return the causes and effects of one message; `print` draws them as a tree.
 
         Args:
-            topic: start at the first message published on it at or after `at`; else give an id.
+            place: start at the first message on this topic, or at what this node did first, at or
+                after `at`; else give an id.
             at: epoch ns, an offset from the run's start such as '2.5s', or ISO time; the begin of
                 the run when None.
             publication_id: id of a publication.
@@ -429,7 +460,7 @@ class Database:
             callback_instance_id: id of a callback instance.
             request_id: id of a request to a service.
             response_id: id of a response of a service.
-            run: a name or an id, for `topic` only; the latest run when None.
+            run: a name or an id, for `place` only; the latest run when None.
             direction: 'forward' (effects), 'backward' (causes) or 'both'.
             depth: most messages in a row, each way.
             limit: most publications, takes, callback instances, requests and responses.
@@ -441,40 +472,57 @@ class Database:
             DatabaseError: the file cannot be opened.
         """
         from msgflow.export.flow import read_flow
-        from msgflow.query.flow import Start, find_start
 
-        given = {
-            "publication": publication_id,
-            "take": take_id,
-            "callback_instance": callback_instance_id,
-            "request": request_id,
-            "response": response_id,
-        }
-        starts = [Start(kind, number) for kind, number in given.items() if number is not None]
-        if len(starts) + (topic is not None) != 1:
-            raise UsageError(
-                "a flow starts from one thing: a topic, a publication, a take, a callback "
-                "instance, a request or a response",
-                "msgflow flow --topic /chatter --at 2.5s, or msgflow flow --publication 1",
-            )
-        if starts and not at is run is None:
-            raise UsageError(
-                "an identity tells run and time already", "leave out --run and --at, or use --topic"
-            )
+        given = (publication_id, take_id, callback_instance_id, request_id, response_id)
         connection = self.connection
-
-        def read() -> Flow:
-            start = starts[0] if topic is None else find_start(connection, topic, at, run)
-            return read_flow(
+        return self._ask(
+            lambda: read_flow(
                 connection,
-                start,
+                _start(connection, place, given, at, run),
                 direction=direction,
                 depth=depth,
                 limit=limit,
                 internal=internal,
             )
+        )
 
-        return self._ask(read)
+    def flow_why(
+        self,
+        place: str | None = None,
+        *,
+        at: str | int | None = None,
+        publication_id: int | None = None,
+        take_id: int | None = None,
+        callback_instance_id: int | None = None,
+        run: str | int | None = None,
+        case: str = "every_pair",
+        internal: bool = False,
+    ) -> QueryResult:
+        """Return what a message waited for: the query critical-path for the flow up to its take.
+
+        Of a publication with several takes, the one with the longest latency counts.
+
+        Args:
+            place, at, publication_id, take_id, callback_instance_id, run: the message, as `flow`
+                takes them.
+            case: the flows to the take that count; the longest of them is shown.
+            internal: count messages on ROS's own topics, too.
+
+        Raises:
+            UsageError: not exactly one message, or one that does not exist or was not taken.
+            QueryError: the database could not run it.
+            DatabaseError: the file cannot be opened.
+        """
+        from msgflow.query.flow import find_take
+
+        given = (publication_id, take_id, callback_instance_id, None, None)
+        connection = self.connection
+        number, topic, run_id = self._ask(
+            lambda: find_take(connection, _start(connection, place, given, at, run))
+        )
+        return self.query(
+            "critical-path", run=run_id, take=number, to=topic, case=case, internal=internal
+        )
 
     def flow_page(self, flow: Flow, path: str | Path) -> int:
         """Write the timeline of a flow into one file that any browser opens; return its bytes.
@@ -987,3 +1035,29 @@ def open_db(path: str | Path, *, memory_limit: str | None = None) -> Database:
         memory_limit: for DuckDB, such as '2GB'; chosen by msgflow when None.
     """
     return Database(path, memory_limit=memory_limit)
+
+
+def _start(
+    connection: duckdb.DuckDBPyConnection,
+    place: str | None,
+    ids: Sequence[int | None],
+    at: str | int | None,
+    run: str | int | None,
+) -> Start:
+    """Return the start of a flow: a place and a time, or one of the ids, in the order of KINDS."""
+    from msgflow.query.flow import KINDS, Start, find_start
+
+    starts = [
+        Start(kind, number) for kind, number in zip(KINDS, ids, strict=True) if number is not None
+    ]
+    if len(starts) + (place is not None) != 1:
+        raise UsageError(
+            "a flow starts from one thing: a topic or node, a publication, a take, a callback "
+            "instance, a request or a response",
+            "msgflow flow /chatter --at 2.5s, or msgflow flow --publication 1",
+        )
+    if starts and not at is run is None:
+        raise UsageError(
+            "an identity tells run and time already", "leave out --run and --at, or name a topic"
+        )
+    return starts[0] if place is None else find_start(connection, place, at, run)

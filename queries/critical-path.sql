@@ -1,36 +1,31 @@
 -- name: critical-path
 -- title: What the slowest flows waited for
--- description: The flow that took longest, the N slowest, the one at a quantile of the latency, or
---     the longest that ends with a given take (see the query flows), piece by piece. The slowest
---     are those of `flows --slowest` with the same --case. Waits are replaced by what they waited
---     for, as far as the trace shows: what the executor ran meanwhile, the timer that was not due
---     yet, or the message that was still missing and how that came about. The pieces add up to the
---     latency exactly. Unless detail is full, pieces below 1 % of the latency are summed up in one
---     line, 'rest', and the layers of publishing are one piece. Flows with a message that was
---     stored until its subscription existed come after all others.
+-- description: The slowest flows, piece by piece; msgflow flow --why shows that of one message.
+--     Waits are replaced by what they waited for, as far as the trace shows: what the executor ran
+--     meanwhile, the timer that was not due yet, or the message that was still missing and how that
+--     came about. The pieces add up to the latency. Unless detail is full, pieces below 1 %
+--     of the latency are summed up in one line, 'rest', and the layers of publishing are one piece.
+--     Flows with a message that was stored until its subscription existed come after all others.
 -- grain: one row per flow and piece, node or activity
--- param: from VARCHAR = NULL  Topics or nodes where flows start: names or globs, separated by
---     commas (default: any)
--- param: to VARCHAR = NULL  Topics or nodes where flows end, in the same form (default: any)
--- param: via VARCHAR = NULL  Only flows through all of these topics, nodes and services
+-- param: from VARCHAR = NULL  Topics or nodes where flows start: globs, with commas between
+-- param: to VARCHAR = NULL  Topics or nodes where flows end, likewise
+-- param: via VARCHAR = NULL  Only flows through all of these topics or nodes
 -- param: without VARCHAR = NULL  Only flows through none of these
 -- param: slowest BIGINT {1..} = 1  Number of flows, the slowest first
--- param: at VARCHAR {median|p90|p95|p99|max} = NULL  Instead, the flow at this quantile of the
---     latency
--- param: flow BIGINT = NULL  Instead, the longest flow that ends with this take_id (see the query
---     flows)
--- param: case VARCHAR {first|last|newest|every_pair} = 'first'  Pairs of root and arrival that
---     count: the first or last arrival of each root, the newest root of each arrival, or all
+-- param: quantile VARCHAR {median|p90|p95|p99|max} = NULL  Instead, the flow at this quantile of
+--     the latency
+-- param: take BIGINT = NULL  Instead, the longest flow that ends with this take_id
+-- param: case VARCHAR {first|last|newest|every_pair} = 'first'  Arrivals that count: the
+--     first or last of each root, that of the newest root, or all
 -- param: by VARCHAR {piece|node|part} = 'piece'  One row for each piece, or totals by node or
 --     by activity
--- param: detail VARCHAR {short|full} = 'short'  full: every piece and every layer of publishing
+-- param: detail VARCHAR {short|full} = 'short'  full: every piece and layer of publishing
 -- param: from_event VARCHAR {callback_start|publish} = 'callback_start'  Event that starts
 --     the clock
 -- param: to_event VARCHAR {take|callback_start|callback_end} = 'callback_end'  Event that
 --     stops it
 -- param: max_depth BIGINT {1..} = 32     Longest path, in topics
--- param: max_paths BIGINT {1..} = 1000   Maximum number of paths, shortest first; also the limit on
---     chains of each length
+-- param: max_paths BIGINT {1..} = 1000   Most paths, shortest first, and chains of a length
 -- column: run_id BIGINT            Run
 -- column: rank BIGINT              Number of the flow, the slowest first
 -- column: at_ns BIGINT [ns]        Start, since the start of the flow; empty for several pieces
@@ -86,9 +81,9 @@ SELECT
     from_ns, to_ns, duration_ns, callback_instance_id, publication_id
 FROM main.end_to_end_part(
     $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns, $case,
-    sink_take_id := $flow, max_depth := $max_depth, max_paths := $max_paths,
+    sink_take_id := $take, max_depth := $max_depth, max_paths := $max_paths,
     most_flows := $slowest,
-    at_quantile := CASE $at WHEN 'median' THEN 0.5 WHEN 'p90' THEN 0.9 WHEN 'p95' THEN 0.95
+    at_quantile := CASE $quantile WHEN 'median' THEN 0.5 WHEN 'p90' THEN 0.9 WHEN 'p95' THEN 0.95
         WHEN 'p99' THEN 0.99 WHEN 'max' THEN 1.0 END,
     path_ids := CASE WHEN $via IS NOT NULL OR $without IS NOT NULL
         THEN (SELECT coalesce(list(path_id), []) FROM path) END

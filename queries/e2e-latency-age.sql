@@ -5,15 +5,13 @@
 --     until the next output. Their age right before that is the highest that they reach: the peak
 --     age. The time window applies to outputs.
 -- grain: one row per path
--- param: from VARCHAR = NULL  Topics or nodes where flows start: names or globs, separated by
---     commas (default: any)
--- param: to VARCHAR = NULL  Topics or nodes where flows end, in the same form (default: any)
+-- param: from VARCHAR = NULL  Topics or nodes where flows start: globs, with commas between
+-- param: to VARCHAR = NULL  Topics or nodes where flows end, likewise
 -- param: from_event VARCHAR {callback_start|publish} = 'callback_start'  Event that is the input
 -- param: to_event VARCHAR {take|callback_start|callback_end} = 'callback_end'  Event that is the
 --     output
 -- param: max_depth BIGINT {1..} = 32     Longest path, in topics
--- param: max_paths BIGINT {1..} = 1000   Maximum number of paths, shortest first; also the limit on
---     chains of each length
+-- param: max_paths BIGINT {1..} = 1000   Most paths, shortest first, and chains of a length
 -- column: run_id BIGINT            Run
 -- column: outputs BIGINT           Outputs in the time window
 -- column: loss_affected BIGINT     Outputs with a gap of a trace in the time since their input

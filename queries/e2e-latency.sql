@@ -10,18 +10,16 @@
 -- variant: measure VARCHAR {latency|age|reaction|response} = 'latency'  What is measured: from
 --     the start of a flow to its end, how old the data behind an output are, how long at most
 --     until an event shows, or the response times of CARET
--- param: from VARCHAR = NULL  Topics or nodes where flows start: names or globs, separated by
---     commas (default: any)
--- param: to VARCHAR = NULL  Topics or nodes where flows end, in the same form (default: any)
+-- param: from VARCHAR = NULL  Topics or nodes where flows start: globs, with commas between
+-- param: to VARCHAR = NULL  Topics or nodes where flows end, likewise
 -- param: from_event VARCHAR {callback_start|publish} = 'callback_start'  Event that starts
 --     the clock
 -- param: to_event VARCHAR {take|callback_start|callback_end} = 'callback_end'  Event that
 --     stops it
--- param: case VARCHAR {first|last|newest|every_pair} = 'first'  Pairs of root and arrival that
---     count: the first or last arrival of each root, the newest root of each arrival, or all
+-- param: case VARCHAR {first|last|newest|every_pair} = 'first'  Arrivals that count: the
+--     first or last of each root, that of the newest root, or all
 -- param: max_depth BIGINT {1..} = 32     Longest path, in topics
--- param: max_paths BIGINT {1..} = 1000   Maximum number of paths, shortest first; also the limit on
---     chains of each length
+-- param: max_paths BIGINT {1..} = 1000   Most paths, shortest first, and chains of a length
 -- column: run_id BIGINT            Run
 -- column: roots BIGINT             Flows that began in the time window
 -- column: reached BIGINT           Roots that reached the end of the path

@@ -3,18 +3,16 @@
 -- description: Every flow: when the callback or publication that begins it (its root) started, and
 --     when the end of the path was reached and how long that took, or why it was not.
 -- grain: one row per path and root, or per pair of root and arrival
--- param: from VARCHAR = NULL  Topics or nodes where flows start: names or globs, separated by
---     commas (default: any)
--- param: to VARCHAR = NULL  Topics or nodes where flows end, in the same form (default: any)
+-- param: from VARCHAR = NULL  Topics or nodes where flows start: globs, with commas between
+-- param: to VARCHAR = NULL  Topics or nodes where flows end, likewise
 -- param: from_event VARCHAR {callback_start|publish} = 'callback_start'  Event that starts
 --     the clock
 -- param: to_event VARCHAR {take|callback_start|callback_end} = 'callback_end'  Event that
 --     stops it
--- param: case VARCHAR {first|last|newest|every_pair} = 'first'  Pairs of root and arrival that
---     count: the first or last arrival of each root, the newest root of each arrival, or all
+-- param: case VARCHAR {first|last|newest|every_pair} = 'first'  Arrivals that count: the
+--     first or last of each root, that of the newest root, or all
 -- param: max_depth BIGINT {1..} = 32     Longest path, in topics
--- param: max_paths BIGINT {1..} = 1000   Maximum number of paths, shortest first; also the limit on
---     chains of each length
+-- param: max_paths BIGINT {1..} = 1000   Most paths, shortest first, and chains of a length
 -- column: run_id BIGINT            Run
 -- column: root_kind VARCHAR        'callback_instance' or 'publication'
 -- column: root_id BIGINT           Identity of the root

@@ -21,6 +21,7 @@ COMMANDS = {
     "record": "Record a ROS 2 system with LTTng, then print how long messages took.",
     "ingest": "Read LTTng traces of a ROS 2 system into a database, each recording as a run.",
     "query": "Run a named query; `msgflow query NAME --help` explains it.",
+    "why": "Explain why a topic is late: its slowest path, where the time goes, what to ask next.",
     "flow": "Print the flow of one message: what caused it, and what it caused.",
     "graph": "Write the graph of nodes, topics, services and actions, with rates and latencies.",
     "ui": "Show the database in the browser: timeline, paths, graph, executors, comparison.",
@@ -119,7 +120,7 @@ app = typer.Typer(
     cls=RootGroup,
     help="ROS 2 traces as a relational database: where every message went, what it caused, and"
     " where the time was lost.",
-    epilog="Begin with: msgflow ingest TRACE, then: msgflow query e2e-latency",
+    epilog="Begin with: msgflow ingest TRACE, then: msgflow why",
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )

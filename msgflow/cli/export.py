@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 app = typer.Typer()
 
-_DirectoryArgument = Annotated[Path, typer.Argument(metavar="DIR", help="Created if missing")]
+_DirectoryOption = Annotated[Path, output_option("DIR", "Directory, created if missing")]
 _ViewsArgument = Annotated[
     list[str] | None,
     typer.Argument(
@@ -55,8 +55,8 @@ _ForceOption = Annotated[bool, typer.Option("--force", help="Replace an earlier 
 @app.command("parquet")
 @with_slice(run=_RunOption)
 def parquet(
-    directory: _DirectoryArgument,
     views: _ViewsArgument = None,
+    directory: _DirectoryOption = Path("msgflow-parquet"),
     part: Slice = ALL_RUNS,
     force: _ForceOption = False,
     memory_limit: MemoryLimitOption = None,
@@ -85,8 +85,8 @@ def parquet(
 @app.command("csv")
 @with_slice(run=_RunOption)
 def csv(
-    directory: _DirectoryArgument,
     views: _ViewsArgument = None,
+    directory: _DirectoryOption = Path("msgflow-csv"),
     part: Slice = ALL_RUNS,
     force: _ForceOption = False,
     memory_limit: MemoryLimitOption = None,
@@ -145,9 +145,8 @@ def perfetto(
 @with_slice()
 def series(
     output: Annotated[
-        Path,
-        typer.Argument(metavar="FILE", help="FILE.csv or FILE.parquet; replaced if it exists"),
-    ],
+        Path, output_option(help="FILE.csv or FILE.parquet, to write or replace")
+    ] = Path("msgflow-series.csv"),
     what: Annotated[
         What,
         typer.Option(

@@ -51,9 +51,9 @@ def ingest(
         str | None,
         typer.Option(
             "--ray",
-            metavar="ADDRESS|auto|local",
-            help="Let the nodes of a Ray cluster do the work; local: one of this machine",
-            show_default="this process, one after the other",
+            metavar="ADDRESS",
+            help="Ray cluster that does the work: its address, auto, or local",
+            show_default="this process",
         ),
     ] = None,
     replace: Annotated[
@@ -84,7 +84,7 @@ def ingest(
             "--scratch",
             metavar="DIR",
             parser=os.path.expanduser,
-            help="Folder of each worker for what it needs meanwhile",
+            help="Folder of each worker",
             show_default="that of the system",
         ),
     ] = None,
@@ -101,9 +101,7 @@ def ingest(
         ),
     ] = "none",
     reader: ReaderOption = Reader.AUTO,
-    strict: Annotated[
-        bool, typer.Option("--strict", help="Refuse damaged traces, as msgflow ingest does")
-    ] = False,
+    strict: Annotated[bool, typer.Option("--strict", help="Refuse damaged traces")] = False,
     ignore: Annotated[
         list[str] | None,
         typer.Option("--ignore", metavar="PATTERN", help="Skip events with these names"),
@@ -113,11 +111,11 @@ def ingest(
         typer.Option(
             "--events",
             metavar="PATTERN",
-            help="Also load events of your own tracepoints, as msgflow ingest does",
+            help="Load events of your own tracepoints",
         ),
     ] = None,
     quiet: Annotated[
-        bool, typer.Option("--quiet", "-q", help="Print only errors, and what did not go in")
+        bool, typer.Option("--quiet", "-q", help="Print only errors and failures")
     ] = False,
 ) -> None:
     """Ingest many recordings into a lake, each as one run.

@@ -20,7 +20,6 @@ from msgflow.cli.options import (
     RunOption,
     case_option,
     format_option,
-    path_of,
 )
 from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import UsageError
@@ -34,24 +33,32 @@ _START = "Which message"
 
 
 class FlowFormat(StrEnum):
-    """Formats of a flow: a tree for people, nodes and edges for programs."""
+    """Formats of a flow: a tree, nodes and edges for programs, a timeline for a browser."""
 
     TABLE = "table"
     JSON = "json"
+    HTML = "html"
+
+
+_SUFFIXES = {
+    ".txt": FlowFormat.TABLE,
+    ".json": FlowFormat.JSON,
+    ".html": FlowFormat.HTML,
+    ".htm": FlowFormat.HTML,
+}
 
 
 _DECLARED = {param.name: param for param in internal_sql().header("flow_steps").params}
 
 
 def command(
-    topic: Annotated[
+    place: Annotated[
         str | None,
-        typer.Option(
-            "--topic",
-            metavar="NAME",
-            help="Topic",
-            autocompletion=complete("topic"),
-            rich_help_panel=_START,
+        typer.Argument(
+            metavar="[TOPIC|NODE]",
+            help="Topic of the message, or node; or one of the options below",
+            show_default=False,
+            autocompletion=complete("place"),
         ),
     ] = None,
     at: Annotated[
@@ -59,9 +66,8 @@ def command(
         typer.Option(
             "--at",
             metavar="TIME",
-            help="First message on the topic at or after TIME: seconds from the start of the run,"
-            " ISO time, or epoch ns (16 digits or more)",
-            show_default="its first message",
+            help="The first one at or after: seconds from the start of the run, ISO time, or ns",
+            show_default="the first one",
             rich_help_panel=_START,
         ),
     ] = None,
@@ -101,6 +107,15 @@ def command(
             rich_help_panel=_START,
         ),
     ] = None,
+    why: Annotated[
+        bool,
+        typer.Option(
+            "--why",
+            help="What the message waited for up to its take, piece by piece, in place of the tree:"
+            " the query critical-path for this flow",
+            rich_help_panel=OUTPUT,
+        ),
+    ] = False,
     case: Annotated[
         str | None,
         case_option("With --slowest: flows that count", rich_help_panel=_START),
@@ -141,20 +156,11 @@ def command(
     form: Annotated[
         FlowFormat | None,
         format_option(
-            "A tree, or nodes and edges", show_default="by the suffix of FILE, else table"
+            "A tree, nodes and edges, or a page with its timeline",
+            show_default="by the suffix of FILE, else table",
         ),
     ] = None,
     output: OutputOption = None,
-    html: Annotated[
-        Path | None,
-        typer.Option(
-            "--html",
-            metavar="FILE.html",
-            parser=path_of,
-            help="Write its timeline to one file for any browser, and print nothing",
-            rich_help_panel=OUTPUT,
-        ),
-    ] = None,
     memory_limit: MemoryLimitOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
@@ -165,23 +171,40 @@ def command(
 
     Times count from the first line. NA means that the trace does not show it.
     """
-    from msgflow.cli.output import print_drawing, print_note, print_runs, print_status, print_text
+    from msgflow.cli.output import (
+        print_drawing,
+        print_note,
+        print_result,
+        print_runs,
+        print_status,
+        print_text,
+    )
     from msgflow.database import Database
-    from msgflow.export.formats import by_suffix
+    from msgflow.export.formats import Format, by_suffix
 
     if form is None and output is not None and output.suffix:
-        form = by_suffix(output, {".txt": FlowFormat.TABLE, ".json": FlowFormat.JSON})
-    if html is not None and html.suffix.lower() not in (".html", ".htm"):
-        raise UsageError(f"a page has a name that ends with .html — {html}", "--html FILE.html")
-    if html is not None and (output is not None or form is not None):
-        raise UsageError("--html goes without --format and -o", "ask twice")
+        form = by_suffix(output, _SUFFIXES)
+    if form is FlowFormat.HTML and output is None:
+        output = Path("flow.html")
     if slowest is None and (from_ or to or case):
         raise UsageError("--from, --to and --case choose among the slowest flows", "--slowest 1")
-    if slowest is not None and slowest > 1 and (html is not None or form is FlowFormat.JSON):
+    if why:
+        unfit: dict[str, object] = {"direction": direction, "depth": depth, "limit": limit}
+        unfit |= {"request": request, "response": response, "absolute": absolute or None}
+        if refused := [name for name, value in unfit.items() if value is not None]:
+            raise UsageError(f"--why goes without --{refused[0]}", "leave out one of them")
+        if form is FlowFormat.HTML:
+            raise UsageError("--why writes rows, no page", "--format table or json")
+    if slowest is not None and slowest > 1 and why:
+        raise UsageError(
+            f"--why is about one flow — --slowest {slowest}",
+            f"msgflow query critical-path --slowest {slowest}",
+        )
+    if slowest is not None and slowest > 1 and form in (FlowFormat.JSON, FlowFormat.HTML):
         raise UsageError(f"a file has one flow — --slowest {slowest}", "--slowest 1, or a tree")
     with Database(database, memory_limit=memory_limit) as opened:
         starts: dict[str, Any] = {
-            "topic": topic,
+            "place": place,
             "at": at,
             "publication_id": publication,
             "take_id": take,
@@ -198,16 +221,24 @@ def command(
             rows = _slowest(opened, slowest, from_, to, case, run, internal)
             ends = dict.fromkeys(row["take_id"] for row in rows)
             found = [{"take_id": number} for number in ends]
+        if why:
+            ids = ("request_id", "response_id")
+            start = {name: value for name, value in found[0].items() if name not in ids}
+            counted = case or ("every_pair" if slowest is None else "first")
+            result = opened.flow_why(**start, case=counted, internal=internal)
+            print_result(result, None if form is None else Format(form.value), output)
+            return
         if slowest is not None and direction is None:
             direction = "backward"
         given = {"direction": direction, "depth": depth, "limit": limit}
         asked: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
         flows = [opened.flow(**start, internal=internal, **asked) for start in found]
-        size = None if html is None else opened.flow_page(flows[0], html)
+        if form is FlowFormat.HTML and output is not None:
+            size = opened.flow_page(flows[0], output)
+            print_runs([flows[0].run])
+            print_status(f"{size:,} bytes written to {output}: open it in a browser")
+            return
     print_runs([flows[0].run])
-    if size is not None:
-        print_status(f"{size:,} bytes written to {html}: open it in a browser")
-        return
     if form is FlowFormat.JSON:
         print_text(flows[0].to_json(), output)
     else:

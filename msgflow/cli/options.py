@@ -115,7 +115,7 @@ DatabaseOption = Annotated[
 MemoryLimitOption = Annotated[
     str | None,
     memory_limit_option(
-        "Maximum memory for the database, such as 2GB; what does not fit goes to disk",
+        "Memory of the database, such as 2GB",
         "four fifths of the machine",
     ),
 ]
@@ -179,9 +179,9 @@ LakeOption = Annotated[
     typer.Option(
         "--lake",
         envvar="MSGFLOW_LAKE",
-        metavar="PATH|s3://BUCKET/PREFIX",
+        metavar="PATH",
         parser=os.path.expanduser,
-        help="The lake: a folder or a bucket",
+        help="The lake: a folder, or s3://BUCKET/PREFIX",
     ),
 ]
 LakeWhereOption = Annotated[
@@ -200,8 +200,9 @@ LakePageOption = Annotated[
     str | None,
     typer.Option(
         "--lake",
-        metavar="PATH|s3://BUCKET/PREFIX",
+        metavar="PATH",
         parser=os.path.expanduser,
-        help="A lake, in place of a database: paths of its runs by label over time",
+        help="A lake (a folder, or s3://BUCKET/PREFIX), in place of a database: paths by label"
+        " over time",
     ),
 ]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from msgflow.cli.query_command import build_command, refuse_list
+from msgflow.cli.query_command import build_command, print_options_of_every_query, refuse_list
 from msgflow.query.catalogue import choose_query, load_queries, load_query, query_names
 
 if TYPE_CHECKING:
@@ -28,6 +28,11 @@ class QueryGroup(TyperGroup):
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of all queries."""
         return list(query_names())
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Print the help of Typer, then the options that every query has."""
+        super().format_help(ctx, formatter)
+        print_options_of_every_query()
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return the command of a query without options; an unknown name is a UsageError."""

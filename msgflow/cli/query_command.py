@@ -25,9 +25,12 @@ from msgflow.cli.show.layout import MOST_ROWS
 from msgflow.cli.slice_options import SLICE_OPTIONS, set_parameters
 from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import UsageError
+from msgflow.query.catalogue import load_query
 from msgflow.query.selection import KINDS
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from msgflow.query.result import QueryResult
     from msgflow.sql.header import Header
 
@@ -57,6 +60,14 @@ COMMON_OPTIONS = frozenset(
 )
 # Options that `Database.query` takes under the same names.
 _SELECTING = (*KINDS, "via", "without", "path", "paths", "where", "sort", "limit", "slowest")
+# Their help stands once, in that of `msgflow query`.
+_OF_EVERY_QUERY = frozenset(
+    (
+        *SLICE_OPTIONS,
+        *("internal", "form", "output", "columns", "wide", "times", "show"),
+        *("memory_limit", "database", "help"),
+    )
+)
 _ShowOption = Annotated[
     bool,
     typer.Option("--show", help="Print the SQL and run nothing", rich_help_panel=OUTPUT),
@@ -180,9 +191,13 @@ def _command_class(header: Header) -> type[TyperCommand]:
         """A command whose help ends with the columns of the result."""
 
         def format_help(self, ctx: Any, formatter: Any) -> None:
-            """Print the help of Typer, then the columns."""
+            """Print the help of Typer, without what every query has, then the columns."""
+            # Completion still offers the options: they are hidden only here.
+            for param in self.params:
+                param.hidden = param.hidden or param.name in _OF_EVERY_QUERY
             super().format_help(ctx, formatter)
             _print_columns(header)
+            _print_common()
 
     return QueryCommand
 
@@ -193,16 +208,46 @@ def _help(header: Header) -> str:
 
 
 def _print_columns(header: Header) -> None:
+    _print_panel(
+        "Columns (--show prints all that is said of them)",
+        [
+            (
+                column.name,
+                f"[{column.unit}] {column.description}" if column.unit else column.description,
+            )
+            for column in header.columns
+        ],
+    )
+
+
+def _print_common() -> None:
+    typer.echo(
+        " Every query also has --run, --start, --end, --skip-first, --internal,\n"
+        " --format, -o, --columns, --wide, --times, --show, --db, --memory-limit:\n"
+        " msgflow query --help explains them"
+    )
+
+
+def print_options_of_every_query() -> None:
+    """Print the options that every query has, with their help."""
+    params = build_command(load_query("info")).params
+    _print_panel(
+        "Options of every query",
+        [(", ".join(param.opts), param.help) for param in params if param.name in _OF_EVERY_QUERY],
+        is_brief=False,
+    )
+
+
+def _print_panel(title: str, rows: Sequence[tuple[str, str]], *, is_brief: bool = True) -> None:
+    """Print names and what they mean in a frame, each in one line if brief."""
     from rich.console import Console
     from rich.panel import Panel
     from rich.table import Table
     from rich.text import Text
 
     grid = Table.grid(padding=(0, 2))
-    for column in header.columns:
-        grid.add_row(
-            Text(column.name, style="bold cyan"),
-            Text(column.type, style="bold yellow"),
-            Text(f"{column.description} [{column.unit}]" if column.unit else column.description),
-        )
-    Console().print(Panel(grid, title="Columns", title_align="left", border_style="dim"))
+    grid.add_column(no_wrap=True, min_width=max(len(name) for name, _ in rows))
+    grid.add_column(no_wrap=is_brief, overflow="ellipsis" if is_brief else "fold")
+    for name, meaning in rows:
+        grid.add_row(Text(name, style="bold cyan"), Text(meaning))
+    Console().print(Panel(grid, title=title, title_align="left", border_style="dim"))

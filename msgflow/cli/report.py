@@ -40,10 +40,10 @@ def command(
             rich_help_panel=SELECTION,
         ),
     ] = None,
-    path: Annotated[
+    through: Annotated[
         str | None,
         typer.Option(
-            "--path",
+            "--through",
             metavar="TEXT",
             help="Only paths that contain this text: a topic, or a node",
             rich_help_panel=SELECTION,
@@ -74,7 +74,7 @@ def command(
         raise UsageError(f"a report is a page: its name ends with .html — {output}", "-o FILE.html")
     size = read_size(max_size)
     if lake is not None:
-        if part != LATEST or not compare is path is None:
+        if part != LATEST or not compare is through is None:
             raise UsageError(
                 "the page of a lake is of all its runs", "--where chooses some of them"
             )
@@ -94,7 +94,7 @@ def command(
             compare=compare,
             start=part.start,
             end=part.end,
-            path_text=path,
+            path_text=through,
             max_size=size,
         )
     print_runs([report.run])

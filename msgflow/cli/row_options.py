@@ -65,7 +65,7 @@ def row_options(header: Header) -> dict[str, Any]:
         row_option(
             "paths",
             "FILE",
-            "The file with named paths",
+            "File of named paths",
             hidden=not has_ends,
             show_default=DEFAULT_PATHS,
             parser=path_of,

@@ -9,7 +9,6 @@ from typing import Annotated
 
 import typer
 
-from msgflow.cli.completion import complete
 from msgflow.cli.options import (
     DatabaseOption,
     OutputOption,
@@ -34,18 +33,7 @@ class VerifyFormat(StrEnum):
     JUNIT = "junit"
 
 
-_RunArgument = Annotated[
-    str | None,
-    typer.Argument(
-        metavar="[RUN]",
-        help="Name or id of the run",
-        show_default="the latest",
-        autocompletion=complete("run"),
-    ),
-]
-
-
-@with_slice(run=_RunArgument)
+@with_slice()
 def command(
     targets: Annotated[Path, typer.Argument(metavar="TARGETS", help="Requirements, as YAML")],
     part: Slice = LATEST,

@@ -241,10 +241,13 @@ def _publishing(node: Row) -> str:
 
 
 def _waits(edge: Row) -> str:
-    kind = str(edge["link_kind"])
+    kind, wait_ns, stored_ns = str(edge["link_kind"]), edge["wait_ns"], edge["stored_ns"]
     text = "publish to take" if kind == "transport" else kind
-    if edge["wait_ns"] is not None:
-        text += f" {format_duration(edge['wait_ns'])}"
+    if stored_ns is not None and wait_ns is not None:
+        text = f"stored {format_duration(stored_ns)}, then {text}"
+        wait_ns -= stored_ns
+    if wait_ns is not None:
+        text += f" {format_duration(wait_ns)}"
     doubts = []
     if (edge["candidate_count"] or 1) > 1:
         doubts.append(f"one of {edge['candidate_count']} candidates")

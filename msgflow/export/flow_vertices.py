@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 Key = tuple[str, int]
 Row = dict[str, Any]
 
-_LINK = ("link_kind", "wait_ns", "candidate_count", "is_loss_affected")
+_LINK = ("link_kind", "wait_ns", "stored_ns", "candidate_count", "is_loss_affected")
 _NODE = (
     "kind",
     "id",
@@ -53,7 +53,8 @@ class FlowVertices:
             `main.executor_wait` for how long the executor was busy (busy_min_ns, busy_max_ns), and
             when the thread of a publication went on at the latest (until_ns), and the user's events
             in a callback instance: name, event_count, first_ns (user_events), and what its node
-            publishes for other reasons, if all its messages end there (otherwise_published).
+            publishes for other reasons, if all its messages end there (otherwise_published), and
+            how long a message was stored until its subscription existed (stored_ns).
         notes: what the rows do not say, a sentence each.
     """
 

@@ -26,19 +26,49 @@ KINDS = ("publication", "take", "callback_instance", "request", "response")
 STEPS_PER_MESSAGE = 3
 MOST_VERTICES = 10_000
 
+# A topic and a node may have the same name: then it means the topic.
 _FIRST = """
-SELECT b.publication_id
-FROM main.publication AS b
-JOIN main.publisher AS p ON b.publisher_id = p.publisher_id
-WHERE b.run_id = $run_id AND p.topic_name = $topic AND b.start_ns >= $at_ns
-ORDER BY b.start_ns, b.publication_id
+WITH named AS (
+    SELECT
+        'publication' AS kind, b.publication_id AS id, b.start_ns,
+        p.topic_name = $place AS is_topic
+    FROM main.publication AS b
+    JOIN main.publisher AS p ON b.publisher_id = p.publisher_id
+    LEFT JOIN main.node AS n ON p.node_id = n.node_id
+    WHERE b.run_id = $run_id
+        AND (p.topic_name = $place OR n.full_name = $place AND NOT p.is_internal)
+    UNION ALL
+    SELECT 'callback_instance', i.callback_instance_id, i.start_ns, false
+    FROM main.callback_instance AS i
+    JOIN main.callback_label AS l ON i.callback_id = l.callback_id
+    WHERE i.run_id = $run_id AND l.node = $place AND NOT l.is_internal
+),
+meant AS (
+    SELECT kind, id, start_ns
+    FROM named
+    WHERE is_topic OR NOT (SELECT bool_or(is_topic) FROM named)
+)
+SELECT kind, id, start_ns, (SELECT max(start_ns) FROM meant) AS last_ns
+FROM meant
+WHERE start_ns >= $at_ns
+UNION ALL
+SELECT NULL, NULL, NULL, max(start_ns) FROM meant
+ORDER BY start_ns NULLS LAST, kind DESC, id
 LIMIT 1
 """
-_LAST = """
-SELECT max(b.start_ns)
-FROM main.publication AS b
-JOIN main.publisher AS p ON b.publisher_id = p.publisher_id
-WHERE b.run_id = $run_id AND p.topic_name = $topic
+_TAKE = """
+SELECT t.take_id, s.topic_name, t.run_id
+FROM main.take AS t
+JOIN main.subscription AS s ON t.subscription_id = s.subscription_id
+LEFT JOIN main.link_transport AS l ON t.take_id = l.take_id
+LEFT JOIN main.callback_instance AS i ON t.take_id = i.take_id
+WHERE CASE $kind
+    WHEN 'take' THEN t.take_id
+    WHEN 'publication' THEN l.publication_id
+    WHEN 'callback_instance' THEN i.callback_instance_id
+END = $id
+ORDER BY l.latency_ns DESC NULLS LAST, t.take_id
+LIMIT 1
 """
 
 
@@ -59,41 +89,59 @@ class Start:
 
 def find_start(
     connection: duckdb.DuckDBPyConnection,
-    topic: str,
+    place: str,
     at: str | int | None = None,
     run: str | int | None = None,
 ) -> Start:
-    """Return the first publication of a topic at or after a time.
+    """Return the first publication of a topic, or what a node did first, at or after a time.
 
     Args:
         connection: to a database with the public views.
-        topic: its name.
+        place: the topic or the node. Of a node, its first callback instance counts, or its first
+            publication where that is earlier.
         at: epoch ns, an offset from the run's start, or ISO time; the begin of the run when None.
         run: a name or an id; the latest run when None.
 
     Raises:
-        UsageError: no such run or topic, a time that cannot be read, or no message then.
+        UsageError: no such run or place, a time that cannot be read, or nothing happened then.
     """
     one = Slice(run).one_run(connection, "a message")
-    require_names(connection, (one,), "topic", [topic])
+    require_names(connection, (one,), "place", [place])
     at_ns = MINIMUM_NS if at is None else time_point(at, (one,), "--at")
-    bindings = {"run_id": one.run_id, "topic": topic}
-    found = connection.execute(_FIRST, bindings | {"at_ns": at_ns}).fetchall()
-    if not found:
-        ((last_ns,),) = connection.execute(_LAST, bindings).fetchall()
-        if last_ns is None:
-            raise UsageError(
-                f"the trace shows no message that was published on the topic — {topic}",
-                f"msgflow query topics --run {one.run_id}",
-            )
+    bindings = {"run_id": one.run_id, "place": place, "at_ns": at_ns}
+    ((kind, number, _, last_ns),) = connection.execute(_FIRST, bindings).fetchall()
+    if last_ns is None:
         raise UsageError(
-            f"no message was published on {topic} at or after that time — {at}",
+            f"the trace shows no message that was published there — {place}",
+            f"msgflow query topics --run {one.run_id}",
+        )
+    if kind is None:
+        raise UsageError(
+            f"nothing was published on {place} at or after that time — {at}",
             f"the last one was at {_place(last_ns, one)}",
         )
     start_ns = one.start_ns
     is_early = at is not None and start_ns is not None and at_ns < start_ns
-    note = "the time of --at is before the run: this is the first message on the topic"
-    return Start("publication", found[0][0], (note,) if is_early else ())
+    note = f"the time of --at is before the run: this is the first of {place}"
+    return Start(kind, number, (note,) if is_early else ())
+
+
+def find_take(connection: duckdb.DuckDBPyConnection, start: Start) -> tuple[int, str, int]:
+    """Return the take that a start means, its topic, and the id of its run.
+
+    Of a publication it is the take with the longest latency.
+
+    Raises:
+        UsageError: it was not taken, or is no message of a topic.
+    """
+    found = connection.execute(_TAKE, {"kind": start.kind, "id": start.id}).fetchall()
+    if not found:
+        raise UsageError(
+            f"no take of a message belongs to it — {start.kind} {start.id}",
+            "msgflow query flows lists takes at the ends of paths",
+        )
+    ((take_id, topic, run_id),) = found
+    return take_id, topic, run_id
 
 
 def require_start(connection: duckdb.DuckDBPyConnection, start: Start) -> Run:

@@ -46,7 +46,7 @@ _WORDS = {"place": "topic or node"}
 # Parameters that take an id, in every query: the view and column of it, and the command that lists
 # the ids.
 _IDS = {
-    "flow": ("take", "take_id", "msgflow query flows"),
+    "take": ("take", "take_id", "msgflow query flows"),
     "callback_id": ("callback", "callback_id", "msgflow query waits"),
 }
 _MISSING = """

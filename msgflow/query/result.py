@@ -107,6 +107,10 @@ class QueryResult:
         found = [column_named(name, self.columns) for name in names]
         return replace(self, table=self.table.select(list(dict.fromkeys(found))))
 
+    def first(self, number: int) -> QueryResult:
+        """Return the first rows, at most so many."""
+        return replace(self, table=self.table.slice(0, number))
+
     def to_arrow(self) -> pa.Table:
         """Return the rows as a pyarrow.Table."""
         return self.table

@@ -46,7 +46,7 @@ def critical_path(
     asked = {
         "from": from_topic or end["from_topic"],
         "to": end["to_topic"],
-        "flow": end["take_id"],
+        "take": end["take_id"],
         # Whatever was picked has a flow, also one that is not the first arrival of its root.
         "case": "every_pair",
         "detail": "full",
@@ -62,7 +62,7 @@ def critical_path(
         meta={
             "from": asked["from"],
             "to": asked["to"],
-            "take_id": asked["flow"],
+            "take_id": asked["take"],
             "notes": result.notes,
             "columns": {
                 column.name: column.description

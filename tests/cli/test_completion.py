@@ -123,8 +123,8 @@ def test_names_of_the_database(small_database: Path, tmp_path: Path) -> None:
         "query e2e-latency --run a": {"all"},
         "compare morning no": {"noon"},
         "runs rename no": {"noon"},
-        "flow --topic /ch": {"/chatter"},
-        "export parquet out callback_l": {"callback_label"},
+        "flow /ch": {"/chatter"},
+        "export parquet -o out callback_l": {"callback_label"},
     }
     lines = [line.split(" ") for line in expected]
     answers = ask_each(lines, tmp_path, database=small_database)
@@ -215,7 +215,7 @@ def test_hostile_names_are_left_out(named: Path, evil: Path, tmp_path: Path, she
         "fish": ["/plain", "/two words", "/ünï"],
     }
     assert lines == expected[shell]
-    asked = [["query", "e2e-latency", "--node", ""], ["flow", "--topic", ""]]
+    asked = [["query", "e2e-latency", "--node", ""], ["flow", ""]]
     for answer in ask_each(asked, tmp_path, database=evil):
         for line in answer:
             assert not set(line) & set("'\"$`\\;|!*?\x1b\n\t")

@@ -17,7 +17,7 @@ Msgflow = Callable[..., Result]
 def test_the_tree_goes_to_stdout_and_words_to_stderr(
     msgflow: Msgflow, small_database: Path
 ) -> None:
-    result = msgflow("flow", "--topic", "/chatter", "--at", "0.1s", "--db", small_database)
+    result = msgflow("flow", "/chatter", "--at", "0.1s", "--db", small_database)
     assert result.exit_code == 0
     with Database(small_database) as database:
         assert result.stdout == f"{database.flow('/chatter', at='0.1s')}\n"
@@ -54,18 +54,20 @@ def test_json_and_files(msgflow: Msgflow, small_database: Path, tmp_path: Path) 
     ("options", "message"),
     [
         ((), "a flow starts from one thing"),
-        (("--topic", "/chater"), "no such topic"),
-        (("--topic", "/chatter", "--at", "2s"), "at or after that time — 2s"),
+        (("/chater",), "no such topic or node"),
+        (("/chatter", "--at", "2s"), "at or after that time — 2s"),
         (("--publication", "1", "--limit", "0"), "--limit"),
         (("--publication", "1", "--direction", "up"), "--direction"),
-        (("--publication", "1", "--html", "a.txt"), ".html"),
         (("--publication", "1", "-o", "a.xlsx"), "no format has this suffix — a.xlsx"),
-        (("--publication", "1", "-o", "a.csv"), ".txt, .json"),
-        (("--publication", "1", "--html", "a.html", "--format", "json"), "--html"),
+        (("--publication", "1", "-o", "a.csv"), ".txt, .json, .html, .htm"),
+        (("/chatter", "--why", "-o", "a.html"), "no page"),
         (("--publication", "1", "--slowest", "1"), "publication_id"),
         (("--publication", "1", "--to", "/chatter"), "--to"),
         (("--slowest", "2", "--format", "json"), "--slowest 2"),
         (("--slowest", "1"), "no flow arrived"),
+        (("/chatter", "--why", "--depth", "3"), "--why goes without --depth"),
+        (("/chatter", "--why"), "no take of a message belongs to it"),
+        (("--slowest", "2", "--why"), "critical-path --slowest 2"),
         (("--case", "last"), "choose among the slowest"),
         (("--slowest", "1", "--to", "/nothing"), "/nothing"),
     ],
@@ -107,7 +109,7 @@ def test_a_page_is_written_in_place_of_the_tree(
     msgflow: Msgflow, small_database: Path, tmp_path: Path
 ) -> None:
     target = tmp_path / "flow.html"
-    result = msgflow("flow", "--publication", 1, "--html", target, "--db", small_database)
+    result = msgflow("flow", "--publication", 1, "-o", target, "--db", small_database)
     assert (result.exit_code, result.stdout) == (0, "")
     assert f"{target.stat().st_size:,} bytes written to {target}" in result.stderr
 
@@ -122,3 +124,49 @@ def test_an_option_that_cannot_be_names_what_can(msgflow: Msgflow, small_databas
         result = msgflow("flow", "--publication", 1, option, value, "--db", small_database)
         assert result.exit_code == 2
         assert f"error: {error}" in result.stderr
+
+
+def test_why_is_the_critical_path_of_the_flow(
+    msgflow: Msgflow, simulated: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    demo = simulated("demo", 0.1)
+    monkeypatch.setenv("MSGFLOW_DB", str(demo))
+    with Database(demo) as database:
+        expected = database.query("critical-path", to="/control/cmd").table
+        take = expected["take_id"][0].as_py()
+        ((publication,),) = (
+            database.sql(f"SELECT publication_id FROM link_transport WHERE take_id = {take}")
+            .table.to_pandas()
+            .to_numpy()
+            .tolist()
+        )
+        by_message = database.flow_why(publication_id=publication).table
+        instance = (
+            database.sql(
+                f"SELECT callback_instance_id FROM callback_instance WHERE take_id = {take}"
+            )
+            .table["callback_instance_id"][0]
+            .as_py()
+        )
+        by_instance = database.flow_why(callback_instance_id=instance).table
+    rows = msgflow("flow", "--slowest", 1, "--to", "/control/cmd", "--why", "--format", "json")
+    assert rows.exit_code == 0
+    assert [row["duration_ns"] for row in json.loads(rows.stdout)] == (
+        expected["duration_ns"].to_pylist()
+    )
+    assert by_message["take_id"][0].as_py() == take
+    assert sum(by_instance["duration_ns"].to_pylist()) == by_instance["latency_ns"][0].as_py()
+
+
+def test_a_node_means_what_it_did_first(msgflow: Msgflow, simulated: Callable[..., Path]) -> None:
+    demo = simulated("demo", 0.1)
+    with Database(demo) as database:
+        first, later = (
+            database.flow("/planning/planner"),
+            database.flow("/planning/planner", at="0.5s"),
+        )
+        nodes = [flow.nodes[flow.start_key] for flow in (first, later)]
+        image = database.flow("/camera/image", at="0.5s")
+    assert {node["node"] for node in nodes} == {"/planning/planner"}
+    assert nodes[0]["start_ns"] < nodes[1]["start_ns"]
+    assert nodes[1]["start_ns"] >= image.run.start_ns + 500_000_000

@@ -61,7 +61,7 @@ def test_events_of_ones_own_are_loaded_on_request(msgflow: Msgflow, tmp_path: Pa
     assert "user_event" not in found.stderr
     rows = msgflow("sql", "SELECT name, fields->>'$.label' AS label FROM user_event LIMIT 1")
     assert "my_pkg:frame_done  frame 0" in rows.stdout
-    flow = msgflow("flow", "--topic", "/image", "--at", "50ms")
+    flow = msgflow("flow", "/image", "--at", "50ms")
     assert "my_pkg:frame_done 2 times, first at +" in flow.stdout
 
 

@@ -87,7 +87,7 @@ def test_from_the_trace_to_every_kind_of_file(tmp_path: Path) -> None:
             ["check"],
             ["query", "e2e-latency", "-o", "latency.csv"],
             ["graph", "-o", "graph.svg"],
-            ["flow", "--topic", "/camera/image", "--html", "flow.html"],
+            ["flow", "/camera/image", "-o", "flow.html"],
             ["report", "-o", "report.html"],
             ["links"],
         ],

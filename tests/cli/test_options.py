@@ -38,7 +38,7 @@ def test_all_options_that_take_a_path_know_the_home_directory(
                 value = option.process_value(None, "~/x")
                 assert os.fspath(value) == f"{HOME}/x", (command.name, option.name)
                 expanded.update(option.opts)
-    assert expanded >= {"--db", "-o", "--html", "-f", "--links", "--keep-staging", "--clock-sync"}
+    assert expanded >= {"--db", "-o", "-f", "--links", "--keep-staging", "--clock-sync"}
     assert expanded >= {"--paths", "--lake", "--scratch"}
 
 

@@ -26,7 +26,7 @@ def demo(msgflow: Msgflow, simulated: Callable[..., Path]) -> Msgflow:
 def test_from_a_suggestion_to_verdicts(demo: Msgflow, tmp_path: Path) -> None:
     file = tmp_path / "targets.yaml"
     assert demo("suggest", "targets", "--run", "trace", "-o", file).exit_code == 0
-    result = demo("verify", file, "trace", "--format", "json")
+    result = demo("verify", file, "--run", "trace", "--format", "json")
     assert result.exit_code == 0
     assert result.stderr.splitlines()[0] == "run: trace (1)"
     assert result.stderr.splitlines()[-1].endswith(" passed, 0 failed, 0 not measured")
@@ -89,6 +89,6 @@ def test_several_runs_are_refused(demo: Msgflow, tmp_path: Path) -> None:
         )
     file = tmp_path / "targets.yaml"
     file.write_text('targets:\n  - process: "*"\n    utilisation: < 100 %\n')
-    result = demo("verify", file, "all")
+    result = demo("verify", file, "--run", "all")
     assert result.exit_code == 2
     assert "a verification is of one run" in result.stderr

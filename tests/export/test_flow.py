@@ -306,16 +306,16 @@ def test_the_message_is_the_first_at_or_after_a_time(small_database: Path) -> No
 def test_what_cannot_be_started_from_is_named(small_database: Path) -> None:
     with Database(small_database) as database:
         for given, message in (
-            ({"topic": "/chater"}, "no such topic"),
+            ({"place": "/chater"}, "no such topic or node"),
             ({}, "starts from one thing"),
-            ({"topic": "/chatter", "take_id": 1}, "starts from one thing"),
+            ({"place": "/chatter", "take_id": 1}, "starts from one thing"),
             ({"publication_id": 7}, "no such publication — 7"),
             ({"publication_id": 1, "at": "1s"}, "an identity tells"),
-            ({"topic": "/chatter", "run": "all"}, "a message is of one run"),
-            ({"topic": "/chatter", "at": "noon"}, "cannot read the time of --at"),
-            ({"topic": "/chatter", "direction": "up"}, "--direction has no such value"),
-            ({"topic": "/chatter", "depth": -1}, "depth"),
-            ({"topic": "/chatter", "limit": 0}, "limit"),
+            ({"place": "/chatter", "run": "all"}, "a message is of one run"),
+            ({"place": "/chatter", "at": "noon"}, "cannot read the time of --at"),
+            ({"place": "/chatter", "direction": "up"}, "--direction has no such value"),
+            ({"place": "/chatter", "depth": -1}, "depth"),
+            ({"place": "/chatter", "limit": 0}, "limit"),
         ):
             with pytest.raises(UsageError, match=message):
                 database.flow(**given)  # type: ignore[arg-type]
@@ -376,3 +376,17 @@ INSERT INTO store.link_causal BY NAME
         false AS is_loss_affected
     FROM range(1, 20000) AS r (n);
 """
+
+
+def test_a_stored_message_waits_from_when_its_subscription_existed(
+    empty_database: Path, tmp_path: Path
+) -> None:
+    stored = "../../../query/cases/path-breakdown/stored_messages"
+    with database_of(stored, empty_database, tmp_path) as database:
+        parts = database.query("path-breakdown").table.to_pylist()
+        flow = database.flow("/map")
+        (edge,) = [edge for edge in flow.edges if edge["stored_ns"]]
+    (longest,) = [part["max_ns"] for part in parts if part["part"] == "stored"]
+    assert edge["stored_ns"] == longest == 3_900
+    rest = edge["wait_ns"] - 3_900
+    assert f"stored 3.900 \u00b5s, then publish to take {rest} ns" in str(flow)

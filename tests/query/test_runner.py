@@ -229,15 +229,15 @@ def test_takes_that_no_run_has_are_refused(connection: duckdb.DuckDBPyConnection
     connection.execute("CREATE TABLE take (take_id BIGINT, run_id BIGINT)")
     connection.execute("INSERT INTO take VALUES (7, 1), (8, 2)")
     query = header(
-        "-- name: example\n-- description: x\n-- param: flow BIGINT = NULL  Take\n"
-        "SELECT $flow AS id, $runs AS runs\n"
+        "-- name: example\n-- description: x\n-- param: take BIGINT = NULL  Take\n"
+        "SELECT $take AS id, $runs AS runs\n"
     )
     for run, given in (("first", 7), ("all", 8), ("first", None)):
-        (row,) = run_query(connection, query, {"flow": given}, Slice(run)).to_arrow().to_pylist()
+        (row,) = run_query(connection, query, {"take": given}, Slice(run)).to_arrow().to_pylist()
         assert row["id"] == given
     for run, number, where in (("first", 8, "the run"), ("all", 9, "these runs")):
         with pytest.raises(UsageError) as raised:
-            run_query(connection, query, {"flow": number}, Slice(run))
+            run_query(connection, query, {"take": number}, Slice(run))
         assert raised.value.message == f"there is no such take in {where} — {number}"
         assert "msgflow query flows" in (raised.value.hint or "")
 

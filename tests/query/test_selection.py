@@ -293,11 +293,11 @@ def test_flows_through_and_by_their_end(database: Database) -> None:
     other = rows(database, "critical-path", without=["/camera/*", "/lidar/points"])
     assert other[0]["latency_ns"] == latencies(database, without=["/camera/*", "/lidar/points"])[0]
     (slowest,) = rows(database, "flows", slowest=1)
-    assert rows(database, "critical-path", flow=slowest["take_id"]) == rows(
+    assert rows(database, "critical-path", take=slowest["take_id"]) == rows(
         database, "critical-path"
     )
     with pytest.raises(UsageError, match="there is no such take in the run — 999999"):
-        database.query("critical-path", flow=999_999)
+        database.query("critical-path", take=999_999)
     with pytest.raises(UsageError, match="there is no such topic or node in the run"):
         database.query("critical-path", via="/lidar/drive")
 

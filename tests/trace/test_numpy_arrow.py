@@ -142,6 +142,6 @@ def test_an_ingest_and_a_query_import_nothing_that_takes_long(tmp_path: Path) ->
         ["ingest", tmp_path / "trace"],
         ["query", "e2e-latency"],
         ["query", "flows", "--limit", "3", "--format", "csv"],
-        ["export", "csv", tmp_path / "tables"],
+        ["export", "csv", "-o", tmp_path / "tables"],
     ):
         subprocess.run([sys.executable, "-c", script, *command, *database], check=True)

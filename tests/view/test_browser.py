@@ -93,7 +93,7 @@ def require_critical_path_of_the_query(page: Page, database: Path, run: int) -> 
             opened.query(
                 "critical-path", run=run,
                 **{"from": options["--from"], "to": options["--to"],
-                   "flow": int(options["--flow"]), "detail": options["--detail"]},
+                   "take": int(options["--take"]), "detail": options["--detail"]},
             )
             .to_arrow()
             .to_pylist()

@@ -1,0 +1,180 @@
+"""Why a topic is late: the answers of the named queries on the path of its slowest flow."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import groupby
+from typing import TYPE_CHECKING, Any
+
+from msgflow.errors import UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from msgflow.query.result import QueryResult
+    from msgflow.run.choice import Run
+
+    Ask = Callable[..., QueryResult]
+
+_PIECES = 5
+_WAITS = 3
+# By what took longest in the slowest flow: the query that shows more of it, by node or by topic.
+_BY_NODE = {
+    "callback": ("callbacks", "--each", "--slowest", "5"),
+    "executor_busy": ("waits", "--by", "instance", "--slowest", "5"),
+    "blocked": ("waits", "--by", "instance", "--slowest", "5"),
+    "undecided": ("waits", "--by", "instance", "--slowest", "5"),
+    "take_to_callback": ("waits", "--by", "instance", "--slowest", "5"),
+    "timer": ("timers",),
+    "service": ("service-latency",),
+}
+_BY_TOPIC = {"network_or_idle": ("topics", "--measure", "latency")}
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """Why messages that arrive somewhere are late.
+
+    Attributes:
+        run: what was read.
+        place: the topic or node at which flows end; None: wherever they end.
+        paths: rows of `e2e-latency`, the path with the slowest flow first.
+        nodes: share of the time of that path by node, and what most of it was; the largest first.
+        slowest_flow: rows of `critical-path`: the longest pieces of its slowest flow, in order.
+        waits: rows of `waits --by pair`: what kept the callbacks of the path waiting longest.
+        losses: rows of `topics --measure delivery` on its topics with messages not delivered.
+        steps: commands that show more, as words behind `msgflow`.
+        notes: a sentence each.
+    """
+
+    run: Run
+    place: str | None
+    paths: QueryResult
+    nodes: QueryResult
+    slowest_flow: QueryResult
+    waits: QueryResult
+    losses: QueryResult
+    steps: tuple[tuple[str, ...], ...]
+    notes: tuple[str, ...]
+
+    @property
+    def sections(self) -> dict[str, QueryResult]:
+        """The results, by the names of the attributes."""
+        names = ("paths", "nodes", "slowest_flow", "waits", "losses")
+        return {name: getattr(self, name) for name in names}
+
+
+def explain(ask: Ask, run: Run, place: str | None) -> Explanation:
+    """Return why flows are late that end at a topic or node.
+
+    Args:
+        ask: runs a named query in the run and the times that are wanted.
+        run: that run.
+        place: a topic or node, or a glob; the path with the slowest flow of all when None.
+
+    Raises:
+        UsageError: there is no such place, or no flow arrives there.
+    """
+    ends = {} if place is None else {"to": place}
+    flow = ask("critical-path", **ends)
+    pieces = flow.table.to_pylist()
+    if not pieces:
+        raise UsageError(
+            "no flow arrives at the end of a path"
+            if place is None
+            else f"no flow arrives — {place}",
+            "msgflow check says where flows break off",
+        )
+    path = pieces[0]["path"]
+    places = path.split(" → ")
+    paths = ask("e2e-latency", **ends)
+    parts = _chosen(ask("path-breakdown", **ends), lambda row: row["path"] == path)
+    callbacks = {(row["node"], row["what"]) for row in parts.table.to_pylist()}
+    waits = _chosen(
+        ask("waits-pair"), lambda row: (row["node"], row["callback"]) in callbacks, _WAITS
+    )
+    losses = _chosen(
+        ask("topics-delivery"),
+        lambda row: (
+            row["topic_name"] in places
+            and row["subscriber"] in places
+            and row["delivered"] < row["published"]
+        ),
+    )
+    return Explanation(
+        run=run,
+        place=place,
+        paths=_slowest_first(paths, path),
+        nodes=_by_node(parts),
+        slowest_flow=_longest(flow),
+        waits=waits,
+        losses=losses,
+        steps=tuple(_steps(pieces, losses)),
+        notes=tuple(dict.fromkeys([*paths.notes, *flow.notes])),
+    )
+
+
+def _chosen(
+    result: QueryResult, is_wanted: Callable[[dict[str, Any]], bool], most: int | None = None
+) -> QueryResult:
+    rows = result.table.to_pylist()
+    return _taken(result, [place for place, row in enumerate(rows) if is_wanted(row)][:most])
+
+
+def _taken(result: QueryResult, places: Sequence[int]) -> QueryResult:
+    import pyarrow
+
+    return replace(result, table=result.table.take(pyarrow.array(places, pyarrow.int64())))
+
+
+def _slowest_first(paths: QueryResult, first: str) -> QueryResult:
+    rows = paths.table.to_pylist()
+    places = sorted(
+        range(len(rows)),
+        key=lambda place: (rows[place]["path"] != first, -(rows[place]["max_ns"] or 0)),
+    )
+    return _taken(paths, places)
+
+
+def _by_node(parts: QueryResult) -> QueryResult:
+    """Return the share of each node, and the largest of its parts."""
+    import pyarrow
+
+    rows = sorted(parts.table.to_pylist(), key=lambda row: str(row["node"]))
+    nodes = []
+    for node, group in groupby(rows, key=lambda row: row["node"]):
+        own = list(group)
+        largest = max(own, key=lambda row: row["total_ns"])
+        nodes.append(
+            {
+                "node": node,
+                "share": sum(row["share"] or 0 for row in own),
+                "total_ns": sum(row["total_ns"] for row in own),
+                "part": largest["part"],
+                "what": largest["what"],
+                "median_ns": largest["median_ns"],
+                "max_ns": largest["max_ns"],
+            }
+        )
+    nodes.sort(key=lambda row: -row["total_ns"])
+    fields = [parts.table.schema.field(name) for name in nodes[0]]
+    return replace(parts, table=pyarrow.Table.from_pylist(nodes, pyarrow.schema(fields)))
+
+
+def _longest(flow: QueryResult) -> QueryResult:
+    rows = flow.table.to_pylist()
+    longest = sorted(range(len(rows)), key=lambda place: -rows[place]["duration_ns"])[:_PIECES]
+    return _taken(flow, sorted(longest))
+
+
+def _steps(pieces: Sequence[dict[str, Any]], losses: QueryResult) -> Iterator[tuple[str, ...]]:
+    """Yield the commands that show more: of the longest piece, the flow, and lost messages."""
+    longest = max(pieces, key=lambda row: row["duration_ns"])
+    if query := _BY_NODE.get(longest["activity"]):
+        yield ("query", *query, "--node", longest["node"])
+    elif query := _BY_TOPIC.get(longest["activity"]):
+        yield ("query", *query, "--topic", longest["what"])
+    yield ("flow", "--take", str(pieces[0]["take_id"]), "--why")
+    if len(losses):
+        topics = sorted(set(losses.table["topic_name"].to_pylist()))
+        yield ("query", "topics", "--measure", "unmatched", "--topic", ",".join(topics))

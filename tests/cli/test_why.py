@@ -1,0 +1,98 @@
+from __future__ import annotations
+
+import json
+import shlex
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from rich.cells import cell_len
+from typer.testing import Result
+
+from msgflow import Database
+
+Msgflow = Callable[..., Result]
+
+
+@pytest.fixture
+def demo(simulated: Callable[..., Path], monkeypatch: pytest.MonkeyPatch) -> Path:
+    path = simulated("demo", 0.1)
+    monkeypatch.setenv("MSGFLOW_DB", str(path))
+    return path
+
+
+def test_the_numbers_are_those_of_the_queries(demo: Path) -> None:
+    with Database(demo) as database:
+        why = database.why("/control/cmd")
+        ((flow,),) = [database.query("flows", to="/control/cmd", slowest=1).table.to_pylist()]
+        paths = database.query("e2e-latency", to="/control/cmd").table.to_pylist()
+        parts = database.query("path-breakdown", to="/control/cmd").table.to_pylist()
+        losses = database.query("topics-delivery").table.to_pylist()
+    first = why.paths.table.to_pylist()[0]
+    assert first["path"] == flow["path"]
+    assert first["max_ns"] == flow["latency_ns"]
+    assert sorted(why.paths.table["path"].to_pylist()) == sorted(p["path"] for p in paths)
+    own = [part for part in parts if part["path"] == flow["path"]]
+    assert sum(why.nodes.table["total_ns"].to_pylist()) == sum(part["total_ns"] for part in own)
+    shares = why.nodes.table["share"].to_pylist()
+    assert shares == sorted(shares, reverse=True)
+    assert sum(shares) == pytest.approx(1, abs=0.01)
+    pieces = why.slowest_flow.table.to_pylist()
+    assert len(pieces) <= 5
+    assert {piece["take_id"] for piece in pieces} == {flow["take_id"]}
+    assert why.slowest_flow.header is not None
+    places = flow["path"].split(" → ")
+    for row in why.losses.table.to_pylist():
+        assert row in losses
+        assert row["topic_name"] in places
+        assert row["published"] > row["delivered"]
+    nodes = {(part["node"], part["what"]) for part in own}
+    assert 0 < len(why.waits) <= 3
+    for row in why.waits.table.to_pylist():
+        assert (row["node"], row["callback"]) in nodes
+
+
+def test_without_a_place_it_is_the_path_of_the_slowest_flow(demo: Path) -> None:
+    with Database(demo) as database:
+        longest = max(row["max_ns"] or 0 for row in database.query("e2e-latency").table.to_pylist())
+        why = database.why()
+    assert why.place is None
+    assert why.paths.table["max_ns"].to_pylist()[0] == longest
+
+
+@pytest.mark.parametrize("width", [80, 100])
+def test_it_fits_and_its_next_steps_run(
+    msgflow: Msgflow, demo: Path, monkeypatch: pytest.MonkeyPatch, width: int
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(width))
+    result = msgflow("why", "/control/cmd", "--skip-first", "0.1")
+    assert result.exit_code == 0
+    assert max(map(cell_len, result.stdout.splitlines())) <= width
+    for title in ("PATHS", "TIME BY NODE", "ITS SLOWEST FLOW", "WAITING", "NOT DELIVERED"):
+        assert title in result.stdout
+    steps = [line for line in result.stderr.splitlines() if line.startswith("next: msgflow ")]
+    assert len(steps) >= 2
+    assert any(line.endswith(f"--skip-first 0.1 --db {demo}") for line in steps)
+    if width == 80:
+        for line in steps:
+            again = msgflow(*shlex.split(line.removeprefix("next: msgflow ")))
+            assert again.exit_code == 0, line
+            assert again.stdout
+
+
+def test_formats(msgflow: Msgflow, demo: Path) -> None:
+    result = msgflow("why", "-o", "why.json")
+    assert result.stdout == ""
+    found = json.loads(Path("why.json").read_text())
+    assert list(found) == ["paths", "nodes", "slowest_flow", "waits", "losses"]
+    assert "median_ns" in found["paths"][0]
+    assert "sink_event" in msgflow("why", "--wide").stdout
+    assert msgflow("why", "--format", "markdown").stdout.startswith("## Paths\n\n|")
+
+
+def test_a_place_where_no_flow_arrives(msgflow: Msgflow, small_database: Path) -> None:
+    result = msgflow("why", "/chatter", "--db", small_database)
+    assert result.exit_code == 2
+    assert "no flow arrives — /chatter" in result.stderr
+    assert "hint: msgflow check" in result.stderr
+    assert "no such topic or node" in msgflow("why", "/chater", "--db", small_database).stderr
