@@ -732,6 +732,8 @@ class Database:
         *,
         run: str | int | None = None,
         compare: str | int | None = None,
+        targets: str | Path | None = None,
+        paths: str | Path = DEFAULT_PATHS,
         start: str | int | None = None,
         end: str | int | None = None,
         path_text: str | None = None,
@@ -740,9 +742,12 @@ class Database:
         """Write the pages of a run, with their data, into one file that any browser opens.
 
         Args:
-            path: the file; one that exists is replaced.
+            path: the file; one that exists is replaced. If its name ends with .md, it gets the
+                summary alone, as Markdown.
             run, start, end: what to read, see `msgflow.Slice`; one run.
             compare: another run to compare it with.
+            targets: requirements, as YAML: the summary has the verdicts on them.
+            paths: the file with the named paths of `targets`.
             path_text: only paths with this text in them: a topic, or a node.
             max_size: most bytes of the file; the page says what it leaves out to fit.
 
@@ -755,12 +760,16 @@ class Database:
 
         connection = self.connection
         part = Slice(run, start, end)
+        verification = None
+        if targets is not None:
+            verification = self.verify(targets, paths=paths, run=run, start=start, end=end)
         return self._ask(
             lambda: write_report(
                 connection,
                 Path(path),
                 part,
                 compare=compare,
+                verification=verification,
                 through=path_text,
                 max_size=max_size,
             ),

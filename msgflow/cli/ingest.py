@@ -201,9 +201,9 @@ def _print_report(report: IngestReport, database: Path) -> None:
 
 def _print_next(report: IngestReport, database: Path) -> None:
     from msgflow.cli.output import print_status
+    from msgflow.db.finding import next_command
 
-    is_sound = all(finding.severity == "info" for finding in report.findings)
-    words = ["msgflow", *(("query", "e2e-latency") if is_sound else ("check",))]
+    words = next_command(report.findings).split()
     if database != DEFAULT_DATABASE:
         words += ["--db", str(database)]
     print_status(f"next: {shlex.join(words)}")

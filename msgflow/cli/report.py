@@ -1,4 +1,4 @@
-"""`msgflow report`: the pages of a run in one file, to keep or to mail."""
+"""`msgflow report`: the pages of a run in one file, or its summary as Markdown."""
 
 from __future__ import annotations
 
@@ -16,10 +16,11 @@ from msgflow.cli.options import (
     MemoryLimitOption,
     bytes_of,
     output_option,
+    path_of,
 )
 from msgflow.cli.slice_options import with_slice
 from msgflow.cli.ui import require_no_where
-from msgflow.default_files import DEFAULT_DATABASE
+from msgflow.default_files import DEFAULT_DATABASE, DEFAULT_PATHS
 from msgflow.errors import UsageError
 from msgflow.run.slice import LATEST, Slice
 
@@ -29,7 +30,7 @@ _MOST = 1_000_000_000
 
 @with_slice("run", "start", "end")
 def command(
-    output: Annotated[Path, output_option("FILE.html")] = Path("msgflow.html"),
+    output: Annotated[Path, output_option("FILE.html|FILE.md")] = Path("msgflow.html"),
     part: Slice = LATEST,
     compare: Annotated[
         str | None,
@@ -60,21 +61,44 @@ def command(
     ] = "20MB",
     lake: LakePageOption = None,
     where: LakeWhereOption = None,
+    targets: Annotated[
+        Path | None,
+        typer.Option(
+            "--targets",
+            metavar="FILE",
+            parser=path_of,
+            help="Requirements, as YAML: the summary has the verdicts on them",
+        ),
+    ] = None,
+    paths: Annotated[
+        Path,
+        typer.Option(
+            "--paths",
+            metavar="FILE",
+            parser=path_of,
+            help="The file with the paths that have names, for --targets",
+        ),
+    ] = Path(DEFAULT_PATHS),
     memory_limit: MemoryLimitOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
     """Write the pages of a run to one file that any browser opens, without a server.
 
+    The first page is a summary. A file that ends with .md gets the summary alone, as Markdown.
     With --lake: a page of the paths of all its runs by label over time, outliers, failures.
     """
     from msgflow.cli.output import count, print_note, print_runs, print_status
     from msgflow.database import Database
 
-    if output.suffix.lower() not in (".html", ".htm"):
-        raise UsageError(f"a report is a page: its name ends with .html — {output}", "-o FILE.html")
+    is_page = output.suffix.lower() in (".html", ".htm")
+    if not is_page and (lake is not None or output.suffix.lower() != ".md"):
+        raise UsageError(
+            f"a report is a page, or Markdown: its name ends with .html or .md — {output}",
+            "-o FILE.html",
+        )
     size = read_size(max_size)
     if lake is not None:
-        if part != LATEST or not compare is through is None:
+        if part != LATEST or not compare is through is targets is None:
             raise UsageError(
                 "the page of a lake is of all its runs", "--where chooses some of them"
             )
@@ -92,6 +116,8 @@ def command(
             output,
             run=part.run,
             compare=compare,
+            targets=targets,
+            paths=paths,
             start=part.start,
             end=part.end,
             path_text=through,
@@ -100,7 +126,8 @@ def command(
     print_runs([report.run])
     for note in report.notes:
         print_note(note)
-    print_status(f"{report.size:,} bytes written to {report.path}: open it in a browser")
+    what = ": open it in a browser" if is_page else ""
+    print_status(f"{report.size:,} bytes written to {report.path}{what}")
 
 
 def read_size(text: str) -> int:

@@ -176,6 +176,12 @@ def read_findings(
     return sorted((each for each in findings if info or each.severity != "info"), key=_order)
 
 
+def next_command(findings: Sequence[Finding]) -> str:
+    """Return the command that comes next: first for what is wrong, then for latencies."""
+    is_sound = all(finding.severity == "info" for finding in findings)
+    return "msgflow query e2e-latency" if is_sound else "msgflow check"
+
+
 def broken_rules(con: duckdb.DuckDBPyConnection, run_id: int | None = None) -> list[Finding]:
     """Return the broken rules of the database, in the order of `read_findings`.
 

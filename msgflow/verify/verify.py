@@ -76,10 +76,12 @@ class Verification:
     Attributes:
         result: one row per requirement and measured thing; its header describes the columns.
         run: the run.
+        file: the name of the file with the requirements.
     """
 
     result: QueryResult
     run: Run
+    file: str
 
     def __str__(self) -> str:
         return str(self.result)
@@ -153,7 +155,7 @@ def verify(
     if lost:
         notes.append(f"the trace lost {lost:,} events, so that values may be wrong: msgflow check")
     table = pa.Table.from_pylist(rows, schema=schema)
-    return Verification(QueryResult(table, _HEADER, (one,), notes), one)
+    return Verification(QueryResult(table, _HEADER, (one,), notes), one, str(targets.file.path))
 
 
 class _Work:

@@ -6,13 +6,13 @@ import json
 import shlex
 import threading
 from collections import OrderedDict
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import duckdb
 import pyarrow as pa
 
-from msgflow.db.finding import read_findings
+from msgflow.db.finding import next_command, read_findings
 from msgflow.errors import UsageError
 from msgflow.query.catalogue import load_query
 from msgflow.query.clock_notes import clock_notes
@@ -22,18 +22,30 @@ from msgflow.run.slice import Slice
 from msgflow.run.window import WHOLE, Window
 from msgflow.view.critical_path import critical_path
 from msgflow.view.page_query import page_query, run_page_query
+from msgflow.view.summary import (
+    MOST_PATHS,
+    Section,
+    area_section,
+    blame_section,
+    query_section,
+    slice_of,
+    window_words,
+)
 from msgflow.view.table_encoding import encode
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
+    from msgflow.query.compare import Comparison
+    from msgflow.query.result import QueryResult
     from msgflow.run.choice import Run
 
 Params = dict[str, Any]
 
 # Named queries that pages show, with the numbers of `msgflow query`.
 NAMED = (
-    "e2e-latency", "path-breakdown", "e2e-latency-reaction", "e2e-latency-age", "executor-usage",
+    "callbacks", "e2e-latency", "path-breakdown", "e2e-latency-reaction", "e2e-latency-age",
+    "executor-usage",
     "waits", "waits-pair", "topics-rate", "topics-latency", "service-latency",
     "action-latency", "links", "topics-delivery", "info-hosts", "info-processes", "topics",
     "clocks",
@@ -196,9 +208,8 @@ class Pages:
             raise UsageError(f"pages do not show such a query — {name}")
         header = load_query(name)
         extent = self.extent(connection, params)
-        part = Slice(extent.run.run_id)
-        if header.has_window and self._window != WHOLE:
-            part = replace(part, start=self._window.start_ns, end=self._window.end_ns)
+        window = self._window if header.has_window else WHOLE
+        part = slice_of(extent.run, window)
         result = run_query(connection, header, {}, part, internal=bool(params.get("internal")))
         return encode(
             result.to_arrow(),
@@ -207,11 +218,70 @@ class Pages:
                 "description": header.description,
                 "notes": result.notes,
                 "columns": {column.name: column.description for column in header.columns},
-                "command": f"msgflow query {header.words} --run {shlex.quote(extent.run.name)}",
+                "command": shlex.join(
+                    [
+                        "msgflow",
+                        "query",
+                        *header.words.split(),
+                        *window_words(window),
+                        "--run",
+                        extent.run.name,
+                    ]
+                ),
             },
             origin_ns=extent.origin_ns,
             units=result.units,
         )
+
+    def summary(
+        self, connection: duckdb.DuckDBPyConnection, extent: Extent, part: str, through: str = ""
+    ) -> Section:
+        """Return a section of the summary: 'paths', 'blame', 'drops' or 'threads'.
+
+        Args:
+            connection: to the database, of this thread alone.
+            extent: the run.
+            part: name of the section.
+            through: of 'blame' only paths with this text in them.
+
+        Raises:
+            UsageError: there is no such section.
+            QueryError: the database could not run it.
+        """
+        if part not in SUMMARY:
+            raise UsageError(f"the summary has no such section — {part}")
+        if part != "blame":
+            return query_section(connection, extent.run, self._window, part)
+        self.fill_flows(connection, extent)
+        flows = self.ask("path_slowest", {"run": extent.run.run_id, "limit": 1})
+        rows = run_page_query(connection, "path", {"run": extent.run.run_id}).to_pylist()
+        topics = {row["path_id"]: row["topics"] for row in rows if through in row["path"]}
+        order = [("latency", "descending"), ("path_id", "ascending")]
+        # Several paths may end with the same take: what is said of it once is enough.
+        chosen = {
+            flow["take_id"]: (names[0], names[-1], flow["take_id"])
+            for flow in reversed(flows.sort_by(order).to_pylist())
+            if (names := topics.get(flow["path_id"])) and flow["take_id"] is not None
+        }
+        slowest = list(reversed(chosen.values()))[:MOST_PATHS]
+        return blame_section(connection, extent.run, self._window, slowest)
+
+    def _summary(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
+        extent = self.extent(connection, params)
+        section = self.summary(connection, extent, str(params.get("part")))
+        return encoded_section(section, extent.origin_ns)
+
+    def _area(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
+        extent = self.extent(connection, params)
+        try:
+            of = json.loads(str(params.get("of")))
+        except ValueError:
+            of = None
+        if not isinstance(of, list) or not all(isinstance(one, str | int) for one in of):
+            raise UsageError(f"sums are of a list of names or identities — {params.get('of')}")
+        window = self.window(extent, params)
+        section = area_section(connection, extent.run, window, str(params.get("part")), of)
+        return encoded_section(section, extent.origin_ns)
 
     def _critical(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
         extent = self.extent(connection, params)
@@ -221,7 +291,8 @@ class Pages:
 
     def _finding(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
         extent = self.extent(connection, params)
-        findings = [asdict(found) for found in read_findings(connection, [extent.run.run_id])]
+        listed = read_findings(connection, [extent.run.run_id])
+        findings = [asdict(found) for found in listed]
         fields = ("name", "severity", "title", "subject", "count", "detail", "description",
                   "cause", "cure")  # fmt: skip
         table = pa.table({field: [found[field] for found in findings] for field in fields})
@@ -230,6 +301,7 @@ class Pages:
         notes = [] if is_said else clock_notes(connection, [extent.run])
         return encode(table, meta={
             "notes": notes, "command": f"msgflow check --run {shlex.quote(extent.run.name)}",
+            "next": f"{next_command(listed)} --run {shlex.quote(extent.run.name)}",
         })  # fmt: skip
 
     def _compare(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
@@ -241,25 +313,7 @@ class Pages:
             connection, str(_whole(params, "other")), str(extent.run.run_id),
             what=what, resamples=0 if is_quick else None,
         )  # fmt: skip
-        result = comparison.result
-        return encode(
-            result.to_arrow(),
-            meta={
-                "notes": result.notes,
-                "a": comparison.run_a.name,
-                "b": comparison.run_b.name,
-                "is_quick": is_quick,
-                "columns": {
-                    column.name: column.description
-                    for column in (result.header.columns if result.header else ())
-                },
-                "command": shlex.join(
-                    ["msgflow", "compare", comparison.run_a.name, comparison.run_b.name]
-                    + ["--what", what] * (what != "paths")
-                ),
-            },
-            units=result.units,
-        )
+        return encoded_comparison(comparison, what, is_quick=is_quick)
 
     def links(self, connection: duckdb.DuckDBPyConnection, values: Params, limit: int) -> pa.Table:
         """Return the arrows of a window, at most `limit`; its values are those of `frame`."""
@@ -348,6 +402,8 @@ ANSWERS: dict[str, Callable[[Pages, duckdb.DuckDBPyConnection, Params], bytes]] 
     "run": Pages._run,
     "query": Pages._query,
     "finding": Pages._finding,
+    "summary": Pages._summary,
+    "area": Pages._area,
     "compare": Pages._compare,
     "segments": Pages._segments,
     "links": Pages._links,
@@ -356,8 +412,60 @@ ANSWERS: dict[str, Callable[[Pages, duckdb.DuckDBPyConnection, Params], bytes]] 
 }
 """Methods of the answers that are no plain page query, by name."""
 
+# Sections of the summary that need nothing but the run.
+SUMMARY = ("paths", "blame", "drops", "threads")
 _PLAIN = ("row", "gap", "path", "executor_share", "executor_node", "neighbour")
 _OF_PATH = ("path_histogram", "path_share", "path_point", "path_slowest")
+
+
+def encoded_comparison(comparison: Comparison, what: str, *, is_quick: bool = False) -> bytes:
+    """Return a comparison of runs as bytes, for the page of the comparison.
+
+    Args:
+        comparison: its rows are by `what`.
+        what: 'paths', 'callbacks' or 'topics'.
+        is_quick: without intervals.
+    """
+    result = comparison.result
+    return encode(
+        result.to_arrow(),
+        meta={
+            "notes": result.notes,
+            "a": comparison.run_a.name,
+            "b": comparison.run_b.name,
+            "is_quick": is_quick,
+            "columns": _descriptions(result),
+            "command": shlex.join(
+                ["msgflow", "compare", comparison.run_a.name, comparison.run_b.name]
+                + ["--what", what] * (what != "paths")
+            ),
+        },
+        units=result.units,
+    )
+
+
+def encoded_section(section: Section, origin_ns: int) -> bytes:
+    """Return a section of the summary as bytes; points in time count from `origin_ns`."""
+    result = section.result
+    return encode(
+        result.to_arrow(),
+        meta={
+            "title": section.title,
+            "reading": section.reading,
+            "when_empty": section.when_empty,
+            "shown": section.columns,
+            "notes": result.notes,
+            "columns": _descriptions(result),
+            "commands": section.commands,
+        },
+        origin_ns=origin_ns,
+        units=result.units,
+    )
+
+
+def _descriptions(result: QueryResult) -> dict[str, str]:
+    columns = result.header.columns if result.header else ()
+    return {column.name: column.description for column in columns}
 
 
 def _units(name: str) -> dict[str, str]:

@@ -1,4 +1,4 @@
-"""The report: all pages in one file, with their data inside (`msgflow report`).
+"""The report (`msgflow report`): all pages in one file with their data, or the summary alone.
 
 What does not fit is left out by rules that the pages state: first single bars of the timeline, kept
 around the slowest flows of each path, with the whole run in bins beside them.
@@ -14,12 +14,24 @@ import pyarrow as pa
 from pyarrow import compute
 
 from msgflow.atomic import replacing
+from msgflow.db.finding import read_findings
 from msgflow.errors import UsageError
+from msgflow.query.compare import compare as compare_runs
 from msgflow.run.slice import Slice
 from msgflow.run.window import WHOLE, Window
+from msgflow.text.values import format_duration
 from msgflow.view.page_query import run_page_query
-from msgflow.view.pages import LEVEL_BINS, NAMED, Pages
+from msgflow.view.pages import (
+    LEVEL_BINS,
+    NAMED,
+    SUMMARY,
+    Pages,
+    encoded_comparison,
+    encoded_section,
+)
 from msgflow.view.single_page import Parts, single_page
+from msgflow.view.summary import change_section, verdict_section
+from msgflow.view.summary_markdown import markdown
 from msgflow.view.table_encoding import encode
 
 if TYPE_CHECKING:
@@ -28,8 +40,12 @@ if TYPE_CHECKING:
 
     import duckdb
 
+    from msgflow.query.compare import Comparison
     from msgflow.run.choice import Run
+    from msgflow.verify import Verification
+    from msgflow.view.summary import Section
 
+MARKDOWN = ".md"
 # Pictures of at most so many paths: of those with the slowest flows.
 MOST_PATHS = 200
 # The report has the critical paths of so many flows, the slowest ones.
@@ -63,17 +79,19 @@ def write_report(
     part: Slice,
     *,
     compare: str | int | None = None,
+    verification: Verification | None = None,
     through: str | None = None,
     max_size: int,
     progress: Callable[[str], None] = lambda step: None,
 ) -> Report:
-    """Write the pages of a run into one file that any browser opens.
+    """Write the pages of a run into one file that any browser opens, or its summary as Markdown.
 
     Args:
         connection: to a database with the public views.
-        path: the file; one that exists is replaced.
+        path: the file; one that exists is replaced. If its name ends with .md, it has the summary.
         part: one run, and the times to show.
         compare: another run to compare with; the page is left out when None.
+        verification: verdicts on the run, for the summary.
         through: only paths with this text in them, and the rows of the timeline on these.
         max_size: most bytes of the file.
         progress: called with what is being done.
@@ -85,8 +103,12 @@ def write_report(
     one = part.one_run(connection, "a report")
     window = part.window([one])
     maker = _Maker(connection, one.run_id, window, through, max_size, progress)
+    maker.verification = verification
     try:
-        content, notes = maker.make(compare)
+        if path.suffix.lower() == MARKDOWN:
+            content, notes = maker.make_markdown(compare)
+        else:
+            content, notes = maker.make(compare)
     finally:
         maker.pages.close()
     written = content.encode()
@@ -120,6 +142,7 @@ class _Maker:
         self.progress = progress
         self.notes: list[str] = []
         self.parts = Parts()
+        self.verification: Verification | None = None
 
     def answer(self, name: str, /, **params: Any) -> bytes:
         return self.pages.answer(self.connection, name, self.params | params)
@@ -129,6 +152,53 @@ class _Maker:
         self.parts.add(f"{name}?{known}", self.answer(name, **params))
 
     def make(self, compare: str | int | None) -> tuple[str, list[str]]:
+        shown = self.shown()
+        self.progress("tables")
+        other = None if compare is None else self.other(compare)
+        self.runs(other)
+        self.keep("finding")
+        for name in NAMED:
+            self.keep("query", name=name)
+        for name in ("row", "gap", "path", "executor_node", "executor_share"):
+            self.keep(name)
+        self.progress("paths")
+        chosen = self.paths()
+        comparison = None
+        if other is not None:
+            self.progress("comparison")
+            comparison = self.comparison(other)
+            self.compared(other, comparison, chosen)
+        sections = self.sections(comparison)
+        for section in sections:
+            content = encoded_section(section, self.extent.origin_ns)
+            self.parts.add(f"summary?part={section.name}", content)
+        self.progress("timeline")
+        head = self.timeline(shown, chosen)
+        head["summary"] = [section.name for section in sections]
+        head["absent"] = self.absent(other)
+        return single_page(self.parts, head), self.notes
+
+    def make_markdown(self, compare: str | int | None) -> tuple[str, list[str]]:
+        """Return the summary as Markdown, and what it leaves out."""
+        self.shown()
+        comparison = None if compare is None else self.comparison(self.other(compare))
+        run = self.extent.run
+        (row,) = [
+            row for row in run_page_query(self.connection, "run", {}).to_pylist()
+            if row["run_id"] == run.run_id
+        ]  # fmt: skip
+        facts = [
+            format_duration(row["length"]),
+            f"{row['event_count']:,} events",
+            f"{row['host_count']} {'host' if row['host_count'] == 1 else 'hosts'}",
+            f"msgflow {row['msgflow_version']}",
+            *(note.rstrip(".") for note in self.notes),
+        ]
+        findings = read_findings(self.connection, [run.run_id])
+        return markdown(run, facts, findings, self.sections(comparison)), self.notes
+
+    def shown(self) -> Window:
+        """Return the times that the report shows; note that they are not the whole run."""
         extent = self.extent
         begin = max(extent.origin_ns, self.window.start_ns)
         end = min(extent.origin_ns + extent.length_ns + 1, self.window.end_ns)
@@ -143,22 +213,30 @@ class _Maker:
                 f" {(end - extent.origin_ns) / 1e9:.3f} s of the run are in this report"
                 " (--start, --end)."
             )
-        self.progress("tables")
-        other = None if compare is None else self.other(compare)
-        self.runs(other)
-        self.keep("finding")
-        for name in NAMED:
-            self.keep("query", name=name)
-        for name in ("row", "gap", "path", "executor_node", "executor_share"):
-            self.keep(name)
-        self.progress("paths")
-        chosen = self.paths()
-        if other is not None:
-            self.progress("comparison")
-            self.compared(other, chosen)
-        self.progress("timeline")
-        head = self.timeline(Window(begin, end), chosen)
-        return single_page(self.parts, head), self.notes
+        return Window(begin, end)
+
+    def comparison(self, other: Run) -> Comparison:
+        """Compare the paths of the run with those of another."""
+        return compare_runs(self.connection, str(other.run_id), str(self.extent.run.run_id))
+
+    def sections(self, comparison: Comparison | None) -> list[Section]:
+        """Return the sections of the summary."""
+        through = self.through or ""
+        return [
+            *([] if self.verification is None else [verdict_section(self.verification)]),
+            *([] if comparison is None else [change_section(comparison)]),
+            *(self.pages.summary(self.connection, self.extent, part, through) for part in SUMMARY),
+        ]
+
+    def absent(self, other: Run | None) -> list[str]:
+        """Return the pages that would show nothing."""
+        needed = {"paths": "path", "executors": "executor_node", "graph": "row", "timeline": "row"}
+        empty = [
+            page
+            for page, name in needed.items()
+            if not run_page_query(self.connection, name, {"run": self.extent.run.run_id}).num_rows
+        ]
+        return [*empty, *([] if other else ["compare"])]
 
     def other(self, compare: str | int) -> Run:
         """Return the run to compare with."""
@@ -225,8 +303,11 @@ class _Maker:
             content = self.answer("critical", kind="take", id=take, **{"from": topic})
             self.parts.add(f"critical?id={take}&kind=take", content)
 
-    def compared(self, other: Run, chosen: list[int]) -> None:
-        for what in ("paths", "callbacks", "topics"):
+    def compared(self, other: Run, comparison: Comparison, chosen: list[int]) -> None:
+        """Keep what the page of the comparison shows."""
+        content = encoded_comparison(comparison, "paths")
+        self.parts.add(f"compare?other={other.run_id}&what=paths", content)
+        for what in ("callbacks", "topics"):
             self.keep("compare", other=other.run_id, what=what)
         params = {"run": other.run_id}
         extent = self.pages.extent(self.connection, params)

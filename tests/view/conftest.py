@@ -36,6 +36,12 @@ def demo(simulated: Callable[..., Path], tmp_path_factory: pytest.TempPathFactor
 
 
 @pytest.fixture(scope="session")
+def dropping(simulated: Callable[..., Path]) -> Path:
+    """A system whose queues are too short."""
+    return simulated("overload", 0.2)
+
+
+@pytest.fixture(scope="session")
 def systems(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Three runs: Autoware twice, with indirect links and another executor, and services."""
 

@@ -120,6 +120,11 @@ def test_graph(way: str, systems: Path, serve: Serve, report: Report, page: Page
     assert page.page.locator(".graph .group-box").count() >= 2
     first = rates[0]["topic_name"]
     page.page.locator(f".graph g[aria-label='{first}']").first.click()
+    # The graph stays, beside what goes in and out.
+    assert page.page.locator(".graph g[role=button]").count() == len(names)
+    side = page.page.locator(".side")
+    assert rates[0]["publisher"] in side.inner_text()
+    side.get_by_role("button", name="only what is beside it").click()
     assert page.page.locator(".graph g[role=button]").count() < len(names)
     assert f"q={first.replace('/', '%2F')}" in page.page.url
 
@@ -271,7 +276,7 @@ def test_compare_overlays_a_path(systems: Path, report: Report, page: Page) -> N
     assert "B: autoware" in labels
 
 
-def test_compare_needs_two(demo: Path, report: Report, page: Page) -> None:
-    page.open(report(demo))
+def test_compare_needs_two(demo: Path, serve: Serve, page: Page) -> None:
+    page.open(serve(demo).address)
     page.go("#/compare")
     assert "report --compare" in page.page.locator("main").inner_text()

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from msgflow.cli.show.layout import MOST_ROWS, lay_out, screen_width
 from msgflow.cli.show.screen import screen_lines
-from msgflow.export.table import cells
+from msgflow.query.cells import cells
 from msgflow.text.values import printable
 from msgflow.text.wrapping import wrap
 

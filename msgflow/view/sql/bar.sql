@@ -1,7 +1,8 @@
 -- name: bar
 -- description: What the timeline draws as a bar: callback instances, publications, takes, requests
 --     and responses of services, from sending to taking, what executor threads did, states of
---     managed nodes, and events of the user's own tracepoints, which have no length. Threads have their states as recorded, but
+--     managed nodes, and, without a length, events of the user's own tracepoints and messages that
+--     were not taken. Threads have their states as recorded, but
 --     for the time after the callback: main.executor_activity would take far longer for a window.
 -- grain: one row per bar
 -- kind: inline
@@ -10,13 +11,14 @@
 --     client, else of the service, else of the process
 -- column: kind UTINYINT  0 callback instance, 1 publication, 2 take, 3 request, 4 response; of
 --     a thread of an executor: 5 wait, 6 select, 7 take and callback, 9 blocked; 8 event of the
---     user; of a managed node: 10 active, 11 not active
+--     user; of a managed node: 10 active, 11 not active; 12 message that a subscription did not take,
+--     at the end of its publication
 -- column: id BIGINT  Identity of the thing within its kind; of threads the first callback instance
 --     in it, of events the one inside which they happened, -1: none
 -- column: start_ns BIGINT [epoch ns]  Begin
 -- column: end_ns BIGINT [epoch ns]  End; the begin where the end was not seen
 -- column: flags UTINYINT  1: lost events may hide a part; 2: an end was not seen; 4: called with
---     an intra-process message; 8: nested in another callback instance
+--     an intra-process message; 8: nested in another callback instance; 16: dropped, 32: lost, neither: not known
 SELECT
     i.run_id,
     CASE c.kind
@@ -89,3 +91,10 @@ UNION ALL
 SELECT
     run_id, -2 * node_id - 1, CASE WHEN state = 'active' THEN 10 ELSE 11 END, -1, start_ns, end_ns, 0
 FROM main.node_state
+UNION ALL
+SELECT
+    d.run_id, 8 * d.subscription_id + 1, 12, d.publication_id, p.end_ns, p.end_ns,
+    (CASE d.status WHEN 'dropped' THEN 16 WHEN 'lost' THEN 32 ELSE 0 END)::UTINYINT
+FROM main.stat_delivery AS d
+JOIN main.publication AS p ON d.publication_id = p.publication_id
+WHERE d.status IN ('dropped', 'lost', 'unknown')

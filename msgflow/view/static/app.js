@@ -77,7 +77,7 @@ class App {
   async start() {
     const runs = await this.source.fetch("run");
     this.runs = records(runs);
-    this.pages = Object.fromEntries(Object.entries(PAGES).filter(([page]) => (this.source.pages ? this.source.pages.includes(page) : !OTHER_PAGES.includes(page))));
+    this.pages = Object.fromEntries(Object.entries(PAGES).filter(([page]) => (this.source.pages ? this.source.pages.includes(page) : !OTHER_PAGES.includes(page) && !this.source.absent?.includes(page))));
     if (!location.hash && this.source.address) history.replaceState(null, "", this.source.address);
     this.main = document.querySelector("main");
     this.nav = document.querySelector("nav");
@@ -101,7 +101,7 @@ class App {
 
   header() {
     const runs = this.runs.length > 1
-      ? h("select", { "aria-label": "run", on: { change: (event) => go({ page: current().page, run: event.target.value, from: null, to: null, flow: null, path: null, hide: null }) } },
+      ? h("select", { "aria-label": "run", on: { change: (event) => go({ page: current().page, run: event.target.value, from: null, to: null, flow: null, path: null, hide: null, pin: null }) } },
         this.runs.map((run) => h("option", { value: String(run.run_id), selected: run === this.run }, run.name)))
       : h("span", { className: "run-name" }, this.run?.name ?? "no run");
     this.tabs = Object.entries(this.pages).map(([page, [title]]) => ({ page, link: h("a", {}, title) }));

@@ -23,7 +23,7 @@ export class ComparePage {
     const { app } = this;
     const others = app.runs.filter((run) => run !== app.run);
     if (!others.length) {
-      clear(this.root, h("section", {}, h("h2", {}, "Compare"), h("p", {}, app.source.isServed ? "There is only one run in this database: ingest another one to compare it with." : "This report is about one run: msgflow report --compare RUN adds another.")));
+      clear(this.root, h("section", {}, h("h2", {}, "Compare"), h("p", {}, "There is only one run in this database: ingest another one to compare it with.")));
       return;
     }
     const asked = current();

@@ -2,20 +2,25 @@
 
 import { h, svg, clear, color } from "./dom.js";
 import { address, current, replace } from "./address.js";
-import { brief, count, duration } from "./labels.js";
+import { count, duration, percent } from "./labels.js";
 import { dataTable, besides } from "./table.js";
 import { command, failed, notes, waiting } from "./notice.js";
+import { model } from "./graph_model.js";
+import { savePng, saveSvg } from "./picture_file.js";
+import { Zoom } from "./zoom.js";
 
 // What is laid out without being asked: beyond it the layout takes longer than one waits.
 const MOST_VERTICES = 260;
-// An edge whose median is so many times that of the middle edge is drawn as slow.
-const SLOW = 10;
-// What is smaller cannot be read: then one scrolls.
+// A line of nodes that would become smaller than this is laid out from top to bottom.
 const LEAST_SCALE = 0.8;
+// Names that are longer are cut; the panel has all of them.
+const LONGEST_NAME = 60;
+// Two lines above the nodes of an executor.
+const GROUP_HEAD = 24;
+// Of the edge with the most messages.
+const WIDEST = 6;
 // Hosts have a colour each, as far as there are some in the style sheet.
 const HOSTS = 5;
-// The services of an action are one vertex: the action.
-const OF_ACTION = "/_action/";
 const INDIRECT = { periodic_async: "8 4", partial_sync: "2 4", approximate_sync: "2 4" };
 
 export class GraphPage {
@@ -29,31 +34,71 @@ export class GraphPage {
   async build() {
     clear(this.root, waiting());
     const { app } = this;
-    const [rates, transports, services, actions, indirect, executors, rows] = await Promise.all([
+    const [rates, transports, services, actions, indirect, executors, callbacks, drops, blame] = await Promise.all([
       app.query("topics-rate"), app.query("topics-latency"), app.query("service-latency"), app.query("action-latency"),
-      app.query("links"), app.fetch("executor_node"), app.fetch("row"),
+      app.query("links"), app.fetch("executor_node"), app.query("callbacks"), app.query("topics-delivery"), app.fetch("summary", { part: "blame" }),
     ]);
     this.tables = { rates, transports, services, actions };
-    this.model = model({ rates, transports, services, actions, indirect, executors, rows });
+    this.model = model({ rates, transports, services, actions, indirect, executors, callbacks, drops, blame });
     this.search = h("input", { type: "search", placeholder: "node or topic …", value: current().q ?? "", "aria-label": "only what is beside nodes and topics with this text",
       on: { change: () => this.filter(this.search.value) } });
     const group = h("input", { type: "checkbox", checked: true, on: { change: () => { this.grouped = group.checked; this.draw(); } } });
+    this.side = h("aside", { className: "side", hidden: true, "aria-label": "what was clicked" });
+    const act = (label, text, action) => h("button", { type: "button", title: label, "aria-label": label, on: { click: action } }, text);
     this.picture = h("div", { className: "graph", tabIndex: 0, role: "region", "aria-label": "graph of nodes and topics" });
     this.said = h("p", { className: "status", role: "status" });
     clear(this.root,
-      h("div", { className: "tools" }, this.search, h("button", { type: "button", on: { click: () => this.filter("") } }, "all"), h("label", {}, group, "group by executor")),
-      this.said, this.picture,
+      h("div", { className: "tools" }, this.search, h("button", { type: "button", on: { click: () => this.filter("") } }, "all"), h("label", {}, group, "group by executor"),
+        h("span", { className: "group" }, act("Zoom in", "+", () => this.zoom.in()), act("Zoom out", "−", () => this.zoom.out()), act("Show all of it", "fit", () => this.zoom.all())),
+        h("span", { className: "group" }, act("Save as SVG", "SVG", () => saveSvg(this.drawing, "graph")), act("Save as PNG", "PNG", () => this.save()))),
+      this.said, h("div", { className: "stage" }, this.picture, this.side),
       h("div", { className: "legend" },
-        item("box", "node"), item("pill", "topic, with its rate"), item("diamond", "service, with its round trip"), actions.rows && item("action", "action, with the time from a goal to its result"),
+        item("box", "node"), item("pill", "topic, with its rate"), item("diamond", "service, with its round trip"), actions.rows > 0 && item("action", "action, with the time from a goal to its result"),
         h("span", { className: "legend-item" }, h("span", { className: "stroke color-transport" }), "published, received: median · p95 from publication to take"),
         h("span", { className: "legend-item" }, h("span", { className: "stroke dashed color-indirect" }), "published by an indirect link"),
-        this.model.edges.some((edge) => edge.median >= this.model.slow) && h("span", { className: "legend-item" }, h("span", { className: "stroke color-critical" }), `slow: a median of ${brief(this.model.slow)} or more, ${SLOW} times that of the middle one`),
+        h("span", { className: "legend-item" }, "the wider an arrow, the more messages; the darker a node, the longer its callbacks ran"),
+        this.model.edges.some((edge) => edge.missing) && h("span", { className: "legend-item" }, h("span", { className: "stroke color-error" }), "messages dropped or lost"),
+        [...this.model.vertices.values()].some((vertex) => vertex.slowest > 0) && h("span", { className: "legend-item" }, h("span", { className: "shape box slowest" }), "part of the slowest flow, with its share"),
         this.model.hosts.length > 1 && this.model.hosts.map((host, place) => h("span", { className: "legend-item" }, h("span", { className: `swatch host-mark host-${place % HOSTS}` }), `on ${host}`))),
       besides("topics and their publishers as a table", dataTable(rates, { label: "publication rates" }), command(rates.meta.command)),
       besides("receivers and their latencies as a table", dataTable(transports, { label: "latencies from publication to take" }), notes(transports.meta.notes), command(transports.meta.command)),
       services.rows ? besides("services as a table", dataTable(services, { label: "services" }), command(services.meta.command)) : null,
       actions.rows ? besides("actions as a table", dataTable(actions, { label: "actions" }), command(actions.meta.command)) : null);
+    this.zoom = new Zoom(this.picture);
     this.draw();
+  }
+
+  async save() {
+    try {
+      await savePng(this.drawing, "graph");
+    } catch (error) {
+      clear(this.said, failed(error));
+    }
+  }
+
+  // What goes in and out of a vertex; the graph stays as it is.
+  show(vertex) {
+    const { edges, vertices } = this.model;
+    const list = (title, found, end) => found.length > 0 && [h("h3", {}, title), h("ul", {}, found.map((edge) => h("li", {},
+      h("button", { type: "button", className: "pick", on: { click: () => this.show(vertices.get(edge[end])) } }, vertices.get(edge[end]).label),
+      edge.title.split("\n").map((line) => h("div", { className: "soft" }, line)))))];
+    this.side.hidden = false;
+    clear(this.side,
+      h("div", { className: "side-head" }, h("h2", { className: "path-title" }, vertex.label), h("button", { type: "button", "aria-label": "close", on: { click: () => this.closeSide() } }, "✕")),
+      h("p", { className: "soft" }, [vertex.kind, vertex.under, vertex.group && this.model.groups.get(vertex.group).lines.join(": ")].filter(Boolean).join(" · ")),
+      vertex.busy > 0 && h("p", {}, `Callbacks ran for ${duration(vertex.busy)} in all.`),
+      vertex.slowest > 0 && h("p", { className: "warn" }, `${percent(vertex.slowest)} of the slowest flow.`),
+      list("in", edges.filter((edge) => edge.to === vertex.key), "from"), list("out", edges.filter((edge) => edge.from === vertex.key), "to"),
+      h("p", {}, h("button", { type: "button", on: { click: () => this.filter(vertex.label) } }, "only what is beside it")));
+    this.zoom.refit();
+    for (const one of this.picture.querySelectorAll("g.is-picked")) one.classList.remove("is-picked");
+    this.picture.querySelector(`g[data-key="${CSS.escape(vertex.key)}"]`)?.classList.add("is-picked");
+  }
+
+  closeSide() {
+    this.side.hidden = true;
+    this.zoom.refit();
+    for (const one of this.picture.querySelectorAll("g.is-picked")) one.classList.remove("is-picked");
   }
 
   filter(text) {
@@ -83,10 +128,9 @@ export class GraphPage {
     clear(this.said, note, all > MOST_VERTICES && !this.everything && h("button", { type: "button", on: { click: () => { this.everything = true; this.draw(); } } }, "draw all of them, which takes long"));
     if (!chosen.size) { clear(this.picture, h("p", { className: "nothing" }, vertices.size ? "Nothing has this in its name." : "There are no nodes that publish, receive, or call.")); return; }
     try {
-      clear(this.picture, this.layout(chosen, edges.filter((edge) => chosen.has(edge.from) && chosen.has(edge.to))));
-      // Where the picture is larger than its place, what comes first is in the middle.
-      this.picture.scrollLeft = this.first.x - this.picture.clientWidth / 2;
-      this.picture.scrollTop = this.first.y - this.picture.clientHeight / 2;
+      this.drawing = this.layout(chosen, edges.filter((edge) => chosen.has(edge.from) && chosen.has(edge.to)));
+      clear(this.picture, this.drawing);
+      this.zoom.fit(this.drawing);
     } catch (error) {
       clear(this.picture, failed(error));
     }
@@ -97,18 +141,20 @@ export class GraphPage {
     let graph = this.place(chosen, edges, room < 700 ? "TB" : "LR");
     // Long chains are read from the top where a line of them would become too small.
     if (room >= 700 && (room - 4) / graph.graph().width < LEAST_SCALE) graph = this.place(chosen, edges, "TB");
-    return this.paint(graph, chosen, edges, room);
+    return this.paint(graph, chosen, edges);
   }
 
   place(chosen, edges, direction) {
     const dagre = globalThis.dagre;
     const graph = new dagre.graphlib.Graph({ compound: true, multigraph: true });
-    graph.setGraph({ rankdir: direction, nodesep: this.grouped ? 34 : 16, ranksep: direction === "TB" ? 22 : 34, edgesep: 10, marginx: 14, marginy: 22 });
+    graph.setGraph({ rankdir: direction, nodesep: this.grouped ? 34 : 16, ranksep: direction === "TB" ? 22 + (this.grouped ? GROUP_HEAD : 0) : 34, edgesep: 10, marginx: 14, marginy: GROUP_HEAD + 6 });
     graph.setDefaultEdgeLabel(() => ({}));
     for (const key of chosen) {
       const vertex = this.model.vertices.get(key);
-      const wide = Math.max(...[vertex.label, vertex.under].filter(Boolean).map((text) => Math.min(text.length, 34) * 7.6)) + 26;
-      graph.setNode(key, { width: Math.max(wide, 60), height: vertex.under ? 40 : 28 });
+      // What stands above a group has room over each of its nodes.
+      const above = this.grouped && vertex.group ? this.model.groups.get(vertex.group).lines : [];
+      const wide = Math.max(...above.map((line) => Math.min(line.length, LONGEST_NAME) * 6.8 - 26), ...[vertex.label, vertex.under, vertex.slowest > 0 && "100.0 % of the slowest flow"].filter(Boolean).map((text) => Math.min(text.length, LONGEST_NAME) * 7.6)) + 26;
+      graph.setNode(key, { width: Math.max(wide, 60), height: vertex.under || vertex.slowest > 0 ? 40 : 28 });
       if (this.grouped && vertex.group) {
         graph.setNode(vertex.group, {});
         graph.setParent(key, vertex.group);
@@ -119,31 +165,28 @@ export class GraphPage {
     return graph;
   }
 
-  paint(graph, chosen, edges, room) {
+  paint(graph, chosen, edges) {
     const { vertices, groups, hosts } = this.model;
     const used = new Set([...chosen].map((key) => vertices.get(key).group).filter((group) => this.grouped && group));
     const { width, height } = graph.graph();
-    // Made smaller to fit, but not beyond what can be read.
-    const scale = Math.min(1, Math.max((room - 4) / width, LEAST_SCALE));
-    const root = svg("svg", { width: Math.ceil(width * scale), height: Math.ceil(height * scale), viewBox: `0 0 ${Math.ceil(width)} ${Math.ceil(height)}`, role: "img", "aria-label": "graph of nodes and topics" });
-    root.append(svg("defs", {}, ["transport", "indirect", "service", "slow"].map((name) => svg("marker", { id: `tip-${name}`, viewBox: "0 0 8 8", refX: 7, refY: 4, markerWidth: name === "slow" ? 4 : 7, markerHeight: name === "slow" ? 4 : 7, orient: "auto" },
+    const most = Math.max(1, ...edges.map((edge) => edge.count || 0));
+    const root = svg("svg", { viewBox: `0 0 ${Math.ceil(width)} ${Math.ceil(height)}`, role: "img", "aria-label": "graph of nodes and topics" });
+    root.append(svg("defs", {}, ["transport", "indirect", "service", "missing"].map((name) => svg("marker", { id: `tip-${name}`, viewBox: "0 0 8 8", refX: 7, refY: 4, markerWidth: 9, markerHeight: 9, markerUnits: "userSpaceOnUse", orient: "auto" },
       svg("path", { d: "M0,0 L8,4 L0,8 z", class: `fill-${name}` })))));
-    const along = graph.graph().rankdir === "TB" ? "y" : "x";
-    const first = [...chosen].map((key) => graph.node(key)).reduce((a, b) => (b[along] < a[along] ? b : a));
-    this.first = { x: first.x * scale, y: first.y * scale };
     const names = [];
     for (const key of used) {
       const box = graph.node(key);
-      root.append(svg("rect", { x: box.x - box.width / 2, y: box.y - box.height / 2 - 10, width: box.width, height: box.height + 10, rx: 8, class: `group-box host-${hosts.indexOf(groups.get(key).host) % HOSTS}` }));
-      const { text } = groups.get(key);
-      names.push(svg("text", { x: box.x - box.width / 2 + 8, y: box.y - box.height / 2 + 3, class: "group-text" }, shortened(text, Math.max(Math.floor((box.width - 16) / 6.8), 8)), svg("title", {}, text)));
+      root.append(svg("rect", { x: box.x - box.width / 2, y: box.y - box.height / 2 - GROUP_HEAD, width: box.width, height: box.height + GROUP_HEAD, rx: 8, class: `group-box host-${hosts.indexOf(groups.get(key).host) % HOSTS}` }));
+      const { lines } = groups.get(key);
+      lines.forEach((line, place) => names.push(svg("text", { x: box.x - box.width / 2 + 8, y: box.y - box.height / 2 - 10 + 14 * place, class: "group-text" }, cut(line, LONGEST_NAME), svg("title", {}, lines.join(": ")))));
     }
     edges.forEach((edge, place) => {
       const line = graph.edge(edge.from, edge.to, String(place));
-      const isSlow = edge.median >= this.model.slow;
-      const style = isSlow ? "slow" : edge.indirect ? "indirect" : edge.kind === "service" ? "service" : "transport";
-      root.append(svg("path", { d: curve(line.points), class: `edge stroke-${style}`, "stroke-dasharray": INDIRECT[edge.indirect] ?? null, "marker-end": `url(#tip-${style})` }, svg("title", {}, edge.title)));
-      if (edge.label) names.push(svg("text", { x: line.x, y: line.y - 4, class: `edge-text${isSlow ? " slow-text" : ""}` }, edge.label, svg("title", {}, edge.title)));
+      const style = edge.missing ? "missing" : edge.indirect ? "indirect" : edge.kind === "service" ? "service" : "transport";
+      const arrow = svg("path", { d: curve(line.points), class: `edge stroke-${style}`, "stroke-dasharray": INDIRECT[edge.indirect] ?? null, "marker-end": `url(#tip-${style})` }, svg("title", {}, edge.title));
+      arrow.style.strokeWidth = `${1 + (WIDEST - 1) * Math.sqrt((edge.count || 0) / most)}px`;
+      root.append(arrow);
+      if (edge.label) names.push(svg("text", { x: line.x, y: line.y - 4, class: `edge-text${edge.missing ? " missing-text" : ""}` }, edge.missing ? `${edge.label} ✕${edge.missing.toLocaleString("en-US")}` : edge.label, svg("title", {}, edge.title)));
     });
     // What is written lies above all arrows.
     root.append(...names);
@@ -154,10 +197,13 @@ export class GraphPage {
       const shape = vertex.kind === "service" || vertex.kind === "action"
         ? svg("path", { d: `M${left + 12},${top} L${left + box.width - 12},${top} L${left + box.width},${box.y} L${left + box.width - 12},${top + box.height} L${left + 12},${top + box.height} L${left},${box.y} z`, class: `vertex ${vertex.kind}-shape` })
         : svg("rect", { x: left, y: top, width: box.width, height: box.height, rx: vertex.kind === "topic" ? box.height / 2 : 5, class: `vertex ${vertex.kind}-shape` });
-      const pick = () => this.filter(vertex.label);
-      root.append(svg("g", { class: "can-pick", tabindex: 0, role: "button", "aria-label": vertex.label, on: { click: pick, keydown: (event) => { if (event.key === "Enter") pick(); } } },
-        shape, svg("text", { x: box.x, y: box.y + (vertex.under ? -3 : 4), class: "vertex-text" }, cut(vertex.label, 34)),
-        vertex.under && svg("text", { x: box.x, y: box.y + 13, class: "under-text" }, cut(vertex.under, 34)), svg("title", {}, [vertex.label, vertex.under].filter(Boolean).join("\n"))));
+      if (vertex.kind === "node") shape.style.setProperty("--heat", `${Math.round(10 + 55 * vertex.heat)}%`);
+      if (vertex.slowest > 0) shape.classList.add("slowest");
+      const under = vertex.slowest > 0 ? `${percent(vertex.slowest)} of the slowest flow` : vertex.under;
+      const pick = () => this.show(vertex);
+      root.append(svg("g", { class: "can-pick", "data-key": vertex.key, tabindex: 0, role: "button", "aria-label": vertex.label, on: { click: pick, keydown: (event) => { if (event.key === "Enter") pick(); } } },
+        shape, svg("text", { x: box.x, y: box.y + (under ? -3 : 4), class: "vertex-text" }, cut(vertex.label, LONGEST_NAME)),
+        under && svg("text", { x: box.x, y: box.y + 13, class: "under-text" }, cut(under, LONGEST_NAME)), svg("title", {}, [vertex.label, under].filter(Boolean).join("\n"))));
     }
     return root;
   }
@@ -180,88 +226,6 @@ function curve(points) {
   return path;
 }
 
-function shortened(text, room) {
-  return text.length <= room ? text : `${text.slice(0, room - 1)}…`;
-}
-
 function cut(text, room) {
   return text.length <= room ? text : `…${text.slice(text.length - room + 1)}`;
-}
-
-function model({ rates, transports, services, actions, indirect, executors, rows }) {
-  const vertices = new Map();
-  const groups = new Map();
-  const edges = [];
-  const groupOf = new Map();
-  const kindsOf = new Map();
-  for (let row = 0; row < executors.rows; row++) {
-    const key = `executor ${executors.executor_id[row]}`;
-    groups.set(key, { host: executors.host[row], text: `${executors.process[row]} on ${executors.host[row]}: ${String(executors.executor_kind[row]).replace("_", "-")}, ${count(executors.threads[row], "thread")}` });
-    // A node of several executors belongs to none of them alone.
-    groupOf.set(executors.node[row], groupOf.has(executors.node[row]) ? null : key);
-  }
-  for (let row = 0; row < indirect.rows; row++) {
-    for (const topic of String(indirect.outputs[row] ?? "").split(/, */)) kindsOf.set(`${indirect.node[row]}>${topic}`, indirect.kind[row]);
-  }
-  const add = (kind, label, under) => {
-    const key = `${kind}:${label}`;
-    const known = vertices.get(key);
-    if (!known) vertices.set(key, { key, kind, label, under: under ?? null, group: kind === "node" ? groupOf.get(label) ?? null : null });
-    else if (under && !known.under) known.under = under;
-    return key;
-  };
-  const rate = new Map();
-  for (let row = 0; row < rates.rows; row++) {
-    const topic = rates.topic_name[row] ?? "?";
-    rate.set(topic, (rate.get(topic) ?? 0) + (Number.isNaN(rates.rate_hz[row]) ? 0 : rates.rate_hz[row]));
-  }
-  for (let row = 0; row < rates.rows; row++) {
-    const topic = rates.topic_name[row] ?? "?";
-    const node = rates.publisher[row];
-    const kind = kindsOf.get(`${node}>${topic}`) ?? null;
-    edges.push({ from: add("node", node), to: add("topic", topic, `${rate.get(topic).toLocaleString("en-US", { maximumFractionDigits: 1 })} Hz`),
-      kind: "publish", indirect: kind, count: rates.count[row], label: "",
-      title: `${node} published ${count(rates.count[row], "message")} on ${topic}${kind ? `, by an indirect link (${kind})` : ""}` });
-  }
-  for (let row = 0; row < transports.rows; row++) {
-    const topic = transports.topic_name[row] ?? "?";
-    const node = transports.subscriber[row];
-    const known = !Number.isNaN(transports.median_ns[row]);
-    edges.push({ from: add("topic", topic), to: add("node", node), kind: "receive", indirect: null, median: known ? transports.median_ns[row] : undefined, count: transports.takes[row],
-      label: known ? `${brief(transports.median_ns[row])} · ${brief(transports.p95_ns[row])}` : "",
-      title: `${node} received ${count(transports.takes[row], "message")} on ${topic}${known ? `: ${duration(transports.median_ns[row])} median, ${duration(transports.p95_ns[row])} p95` : ", none with a known publication"}` });
-  }
-  for (let row = 0; row < services.rows; row++) {
-    const name = services.service_name[row] ?? "?";
-    if (name.includes(OF_ACTION)) continue;
-    const under = Number.isNaN(services.round_trip_median_ns[row]) ? null : `${duration(services.round_trip_median_ns[row])} median`;
-    const service = add("service", name, under);
-    const said = `${count(services.requests[row], "request")}${under ? `, round trip ${under}, ${duration(services.round_trip_p95_ns[row])} p95` : ""}`;
-    if (services.client[row]) edges.push({ from: add("node", services.client[row]), to: service, kind: "service", count: services.requests[row], label: "", title: `${services.client[row]} called ${name}: ${said}` });
-    if (services.server[row]) edges.push({ from: service, to: add("node", services.server[row]), kind: "service", count: services.requests[row], label: "", title: `${services.server[row]} serves ${name}: ${said}` });
-  }
-  for (let row = 0; row < actions.rows; row++) {
-    const name = actions.action_name[row];
-    const under = Number.isNaN(actions.result_median_ns[row]) ? null : `${duration(actions.result_median_ns[row])} median`;
-    const action = add("action", name, under);
-    const said = `${count(actions.goals[row], "goal")}${under ? `, to the result ${under}, ${duration(actions.result_p95_ns[row])} p95` : ""}`;
-    if (actions.client[row]) edges.push({ from: add("node", actions.client[row]), to: action, kind: "service", count: actions.goals[row], label: "", title: `${actions.client[row]} sent to ${name}: ${said}` });
-    if (actions.server[row]) edges.push({ from: action, to: add("node", actions.server[row]), kind: "service", count: actions.goals[row], label: "", title: `${actions.server[row]} executes ${name}: ${said}` });
-  }
-  const medians = edges.map((edge) => edge.median).filter((median) => median > 0).sort((a, b) => a - b);
-  return { vertices, edges: merged(edges), groups, slow: medians.length ? SLOW * medians[medians.length >> 1] : Infinity,
-    hosts: [...new Set([...groups.values()].map(({ host }) => host))].sort() };
-}
-
-function merged(edges) {
-  const known = new Map();
-  for (const edge of edges) {
-    const key = `${edge.from}>${edge.to}`;
-    if (known.has(key)) {
-      const first = known.get(key);
-      first.count += edge.count;
-      if (!first.title.includes(edge.title)) first.title += `\n${edge.title}`;
-    } else known.set(key, edge);
-  }
-  return [...known.values()];
 }

@@ -1,12 +1,13 @@
 // Labels: names that people read, for columns of queries, statistics and kinds.
 
 export const KINDS = [
-  "callback instance", "publication", "take", "request", "response", "wait", "select", "take and callback", "event", "blocked", "node active", "node not active",
+  "callback instance", "publication", "take", "request", "response", "wait", "select", "take and callback", "event", "blocked", "node active", "node not active", "untaken message",
 ];
 export const EVENT = 8;
 export const BLOCKED = 9;
 export const ACTIVE = 10;
 export const INACTIVE = 11;
+export const MISSING = 12;
 export const KIND_NAMES = ["callback_instance", "publication", "take", "request", "response"];
 
 export const LINKS = {
@@ -109,6 +110,7 @@ export function count(number, thing) {
 }
 
 export function percent(share, digits = 1) {
+  if (share > 0 && share < 0.0005 && digits === 1) return "< 0.1 %";
   return share === null || Number.isNaN(share) ? "–" : `${(100 * share).toFixed(digits)} %`;
 }
 
@@ -133,6 +135,7 @@ export function cell(value, column) {
   if (column.name === "change_percent") return `${trimmed(value, 2)} %`;
   if (column.name === "part") return partTitle(value);
   if (column.name === "path") return pathText(value);
+  if (/^[pt]id$|_id$/.test(column.name)) return String(value);
   if (typeof value === "number") {
     if (/share$/.test(column.name)) return percent(value);
     return trimmed(value, 3);

@@ -5,6 +5,7 @@ import { address } from "./address.js";
 import { PATH_HELP, count, duration, pathText, wallClock } from "./labels.js";
 import { dataTable, besides } from "./table.js";
 import { command, doubt, doubtHelp, failed, notes, waiting } from "./notice.js";
+import { blame, summary, withoutRepeated } from "./summary.js";
 
 export class OverviewPage {
   constructor(app, root) {
@@ -22,17 +23,26 @@ export class OverviewPage {
     fact("length", duration(run.length));
     fact("events", (run.event_count ?? 0).toLocaleString("en-US"));
     const places = h("section", {}, h("h2", {}, "What was recorded"), facts);
+    // Requirements and changes: a report has them where it was given a file, or another run.
+    const given = (app.source.summary ?? []).filter((part) => part === "verdicts" || part === "change")
+      .map((part) => ({ part, ...section(part === "verdicts" ? "Requirements" : "What changed") }));
+    const next = h("p", { className: "command" });
     const wrong = section("What is wrong with it");
     const slow = section("The slowest paths");
+    const nodes = section("Where the time of the slowest flows went");
+    const drops = section("What was dropped or lost, and why");
+    const threads = section("Busiest threads");
     const topics = section("Topics");
     const processes = section("Processes");
-    clear(root, places, wrong.root, slow.root, topics.root, processes.root);
+    clear(root, places, given.map((one) => one.root), wrong.root, slow.root, nodes.root, drops.root, threads.root, topics.root, processes.root);
+    places.append(next);
     const hosts = app.query("info-hosts").then((table) => {
       const list = Array.from({ length: table.rows }, (_, row) => table.hostname[row]);
       fact(list.length === 1 ? "host" : "hosts", list.join(", "));
     }).catch((error) => places.append(failed(error)));
     const findings = fill(wrong, async () => {
       const table = await app.fetch("finding");
+      clear(next, "next: ", h("code", {}, table.meta.next));
       const kinds = new Map();
       for (let row = 0; row < table.rows; row++) {
         const name = table.name[row];
@@ -60,6 +70,13 @@ export class OverviewPage {
       const known = await app.fetch("path");
       const ids = pathNumbers(table, known);
       const isDoubted = doubted(table, known, ids);
+      let before = "";
+      const textOf = (row) => {
+        const path = pathText(table.path[row]);
+        const text = withoutRepeated(path, before);
+        before = path;
+        return h("span", { className: "path-text", title: path }, breakable(text));
+      };
       return [
         h("p", { className: "soft" }, `A path is a chain of nodes and topics that messages took. ${PATH_HELP} A click shows more.`),
         h("div", { className: "legend" }, [["bar-median", "median: half of its flows took no longer"], ["bar-p99", "p99: 99 % of them took no longer"]].map(([shade, text]) =>
@@ -68,13 +85,16 @@ export class OverviewPage {
           h("a", { href: address({ page: "paths", path: ids[row] }) },
             h("span", { className: "bar-track" }, bar(table.median_ns[row] / most, "bar-median"), bar(table.p99_ns[row] / most, "bar-p99")),
             h("span", { className: "numbers" }, `${duration(table.median_ns[row])} median · ${duration(table.p99_ns[row])} p99`, isDoubted(row) && doubt()),
-            h("span", { className: "path-text" }, breakable(pathText(table.path[row]))))))),
+            textOf(row))))),
         order.slice(0, 10).some(isDoubted) && doubtHelp(),
         order.length > 10 && h("p", {}, h("a", { href: address({ page: "paths" }) }, `all ${count(order.length, "path")}`)),
         notes(table.meta.notes), command(table.meta.command),
       ];
     });
     const others = [
+      ...given.map((one) => fill(one, async () => summary(await app.fetch("summary", { part: one.part })))),
+      fill(nodes, async () => blame(await app.fetch("summary", { part: "blame" }))),
+      ...[[drops, "drops"], [threads, "threads"]].map(([place, part]) => fill(place, async () => summary(await app.fetch("summary", { part })))),
       fill(topics, async () => {
         const table = await app.query("topics");
         return [dataTable(table, { label: "topics", shown: 12, nothing: "no topics" }), notes(table.meta.notes), command(table.meta.command)];

@@ -2,7 +2,8 @@
 
 import { color } from "./dom.js";
 import { lowerBound } from "./timeline_rows.js";
-import { ACTIVE, BLOCKED, EVENT, INACTIVE, PALE, PART_COLORS, duration, partTitle } from "./labels.js";
+import { Crosses } from "./missing.js";
+import { ACTIVE, BLOCKED, EVENT, INACTIVE, MISSING, PALE, PART_COLORS, duration, partTitle } from "./labels.js";
 
 export const AXIS = 30;
 const BAR_TOP = 3;
@@ -12,7 +13,7 @@ export function palette() {
   const names = [
     "ink", "soft", "faint", "page", "panel", "line", "stripe", "timer", "subscription", "service",
     "publication", "take", "call", "wait", "process", "execute", "blocked", "event", "active", "stored", "transport", "direct", "indirect",
-    "critical", "gap", "pick", "focus",
+    "critical", "gap", "pick", "focus", "error",
   ];
   return Object.fromEntries(names.map((name) => [name, color(name)]));
 }
@@ -133,7 +134,7 @@ export class Renderer {
       mark(c, lane.kind, left - 8, y + lane.height / 2);
       left += 2;
     }
-    c.fillStyle = lane.type === "row" && lane.isInternal ? colors.soft : colors.ink;
+    c.fillStyle = lane.type === "row" && (lane.isInternal || lane.isBeside) ? colors.soft : colors.ink;
     const room = this.labelWidth - left - 6;
     c.fillText(fit(c, lane.label, room, lane.type !== "process" && lane.kind !== "thread"), left, y + lane.height / 2);
     c.fillStyle = colors.line;
@@ -160,6 +161,7 @@ export class Renderer {
       case BLOCKED: return colors.blocked;
       case EVENT: return colors.event;
       case ACTIVE: return colors.active;
+      case MISSING: return colors.error;
       default: return colors.execute;
     }
   }
@@ -169,7 +171,7 @@ export class Renderer {
   drawRow(lane) {
     const range = this.bars?.ranges.get(lane.key);
     if (!range) return;
-    const { context: c } = this;
+    const { context: c, colors } = this;
     const { table, reach } = this.bars;
     const { start_at: starts, length: lengths, kind: kinds, count: counts, busy, flags, id } = table;
     const { from, to } = this.view;
@@ -178,7 +180,8 @@ export class Renderer {
     const full = lane.height - 2 * BAR_TOP;
     const end = lowerBound(starts, range[0], range[1], to);
     let at = lowerBound(reach, range[0], end, from);
-    const shares = new Float64Array(12);
+    const shares = new Float64Array(13);
+    const crosses = new Crosses(c, colors);
     let column = -1;
     const flush = () => {
       if (column < 0) return;
@@ -205,7 +208,10 @@ export class Renderer {
       const several = counts ? counts[at] > 1 || Number.isNaN(id[at]) : false;
       const x0 = (begin - from) * scale;
       const wide = length * scale;
-      if (several) {
+      if (kind === MISSING) {
+        crosses.draw(this.labelWidth + x0 + (several ? wide / 2 : 0), top + full / 2, flags ? flags[at] : 0);
+        this.drawn.bars++;
+      } else if (several) {
         // A bin: as high as the share of its time that is busy.
         flush();
         const share = length > 0 ? Math.min(busy[at] / length, 1) : 1;
@@ -464,12 +470,17 @@ export class Renderer {
     if (!this.measure) return;
     const { context: c, colors } = this;
     const [x0, x1] = [this.x(this.measure.from), this.x(this.measure.to)];
+    const { top, bottom } = this.measure;
+    // Rows are part of it where it was drawn over several of them.
+    const isArea = Math.abs(bottom - top) >= 8;
+    const y = isArea ? AXIS + Math.min(top, bottom) - this.scroll : AXIS;
+    const high = isArea ? Math.abs(bottom - top) : this.tall;
     c.fillStyle = colors.focus;
     c.globalAlpha = 0.12;
-    c.fillRect(Math.min(x0, x1), AXIS, Math.abs(x1 - x0), this.tall);
+    c.fillRect(Math.min(x0, x1), y, Math.abs(x1 - x0), high);
     c.globalAlpha = 1;
-    c.fillRect(x0, AXIS, 1, this.tall);
-    c.fillRect(x1, AXIS, 1, this.tall);
+    c.fillRect(x0, y, 1, high);
+    c.fillRect(x1, y, 1, high);
     const text = duration(Math.abs(this.measure.to - this.measure.from));
     c.font = "600 13px system-ui, sans-serif";
     const width = c.measureText(text).width + 12;
@@ -534,6 +545,7 @@ export class Renderer {
 const leastHeight = (kind, full) => (kind === 5 ? 0 : kind === EVENT ? full : 4);
 const HEIGHT_HALF = 10;
 // Drawn from below: what an executor does for callbacks first.
+// Messages that were not taken are crosses, not columns.
 const ORDER = [7, BLOCKED, 6, 0, 1, 2, 3, 4, 5, EVENT, ACTIVE, INACTIVE];
 const LINK_STYLE = [
   { color: "transport" }, { color: "direct" }, { color: "indirect", dash: [6, 3] },

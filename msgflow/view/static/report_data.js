@@ -45,6 +45,9 @@ export class EmbeddedSource {
     // Of one flow alone: the pages there are, and what is on the first one.
     this.pages = head.pages;
     this.address = head.address;
+    // Pages that would show nothing, and the sections of the summary.
+    this.absent = head.absent ?? [];
+    this.summary = head.summary;
     this.decoded = new Map();
   }
 

@@ -2,7 +2,12 @@
 
 import { h, clear } from "./dom.js";
 import { current, go, replace } from "./address.js";
-import { EVENT, KINDS, KIND_NAMES, LINKS, count, duration, moment, partTitle, pathText, wallClock, percent } from "./labels.js";
+import { inArea, lanesBetween, showArea } from "./area.js";
+import { Minimap } from "./minimap.js";
+import { missingWords } from "./missing.js";
+import { helpDialog } from "./help.js";
+import { shortSymbol } from "./symbols.js";
+import { EVENT, KINDS, KIND_NAMES, LINKS, MISSING, count, duration, moment, partTitle, pathText, wallClock, percent } from "./labels.js";
 import { Renderer, AXIS } from "./renderer.js";
 import { ROW_KINDS, indexBars, layout } from "./timeline_rows.js";
 import { buildFlow, extent, markCritical } from "./flow.js";
@@ -20,7 +25,7 @@ export class TimelinePage {
   constructor(app, root) {
     this.app = app;
     this.root = root;
-    this.state = { hidden: new Set(), folded: new Set(), kinds: new Set() };
+    this.state = { hidden: new Set(), folded: new Set(), kinds: new Set(), pinned: new Set() };
     this.gathered = true;
     this.withExecutors = false;
     this.requests = 0;
@@ -40,10 +45,13 @@ export class TimelinePage {
     this.status = h("p", { className: "status", role: "status" });
     this.side = h("aside", { className: "side", hidden: true, "aria-label": "picked flow" });
     this.beside = h("div");
+    this.area = h("div", { className: "area", role: "region", "aria-label": "sums of the selected area" });
+    this.help = helpDialog();
+    this.minimap = new Minimap(this.length, (from, to) => this.setView(from, to));
     this.tools();
-    clear(this.root, this.bar,
+    clear(this.root, this.bar, this.help,
       h("div", { className: "stage" }, h("div", { className: "canvas-frame" }, this.canvas, this.tooltip), this.side),
-      this.status, this.legend(), this.beside);
+      this.minimap.canvas, this.status, this.area, this.legend(), this.beside);
     this.listen();
     this.setView(number(asked.from, 0), number(asked.to, this.length), false);
     this.isOpening = !asked.from && !asked.to && !asked.flow;
@@ -52,6 +60,7 @@ export class TimelinePage {
     this.state.internal = asked.internal === "1";
     this.internal.checked = this.state.internal;
     for (const key of (asked.hide ?? "").split(",").filter(Boolean)) this.hideKey(key);
+    for (const key of (asked.pin ?? "").split(",").filter(Boolean)) this.state.pinned.add(Number(key));
     const [rows, gaps] = await Promise.all([
       this.app.fetch("row"), this.app.fetch("gap"),
     ]);
@@ -64,6 +73,7 @@ export class TimelinePage {
     this.gapsCut = gaps.rows ? gaps.total[0] - gaps.rows : 0;
     this.relayout();
     await this.load();
+    this.overview();
     this.source = asked.source;
     if (asked.flow) await this.pickText(asked.flow, !asked.from);
     // Where only one flow is at hand there is no other one to go to.
@@ -96,7 +106,7 @@ export class TimelinePage {
       h("span", { className: "group" },
         button("Previous bar of this row (P)", "‹ previous", () => this.step(-1)),
         button("Next bar of this row (N)", "next ›", () => this.step(1))),
-      this.measuring, this.worst,
+      this.measuring, this.worst, button("Help (?)", "?", () => this.help.showModal()),
       h("details", { className: "menu" }, h("summary", {}, "rows"),
         h("div", { className: "menu-body" }, this.kindBoxes.map(({ label }) => label),
           h("label", {}, this.internal, "what ROS does for itself"), this.unhide)));
@@ -111,7 +121,7 @@ export class TimelinePage {
       item("execute", "executor thread: take and callback"), item("blocked", "blocked: waits for the executor's lock"), item("process", "select: looks for work"), item("wait", "wait: for work"), item("event", "event of your own"), item("active", "managed node: active"), item("wait", "not active"),
       item("transport", "publish to take", "stroke"), item("direct", "direct link", "stroke"),
       item("indirect", "indirect link", "stroke dashed"), item("critical", "critical path", "stroke"),
-      item("gap", "not recorded"), h("span", { className: "legend-item" }, "low columns: several bars, as high as their share of the time; hatched: lost events may hide a part"));
+      item("gap", "not recorded"), h("span", { className: "legend-item" }, h("b", { className: "color-error" }, "✕"), "message dropped or lost; grey: not known"), h("span", { className: "legend-item" }, "low columns: several bars, as high as their share of the time; hatched: lost events may hide a part"));
   }
 
   remember() {
@@ -119,6 +129,7 @@ export class TimelinePage {
       page: "timeline", from: Math.round(this.renderer.view.from), to: Math.round(this.renderer.view.to),
       q: this.state.query, internal: this.state.internal ? "1" : null,
       hide: [...this.state.hidden, ...[...this.state.kinds].map((kind) => `kind:${kind}`), ...this.state.folded].join(","),
+      pin: [...this.state.pinned].join(","),
       flow: this.picked ? `${this.picked.kind}:${this.picked.id}` : null,
       source: this.picked ? this.source : null,
     });
@@ -244,6 +255,14 @@ export class TimelinePage {
     }
   }
 
+  async overview() {
+    try {
+      this.minimap.fill(await this.app.fetch("segments", { start: 0, end: this.length + 1 }));
+    } catch (error) {
+      clear(this.status, failed(error));
+    }
+  }
+
   // A long run opens where its longest callback is. Tells whether the window is another one now.
   openOn(table) {
     const { count: bars, start, end } = table.meta;
@@ -286,6 +305,7 @@ export class TimelinePage {
       this.frame = 0;
       const before = performance.now();
       this.renderer.draw();
+      this.minimap.draw(this.renderer.view);
       this.app.drawn(performance.now() - before);
     });
   }
@@ -341,7 +361,7 @@ export class TimelinePage {
       }
       const measure = event.shiftKey || this.isMeasuring;
       drag = { x, y, view: { ...renderer.view }, scroll: renderer.scroll, measure, axis: y < AXIS, moved: false };
-      if (measure) renderer.measure = { from: renderer.time(x), to: renderer.time(x) };
+      if (measure) renderer.measure = { from: renderer.time(x), to: renderer.time(x), top: 0, bottom: 0 };
     });
     canvas.addEventListener("pointermove", (event) => {
       const [x, y] = place(event);
@@ -357,7 +377,9 @@ export class TimelinePage {
         if (Math.hypot(x - drag.x, y - drag.y) > 4) drag.moved = true;
         if (!drag.moved) return;
         if (drag.measure || drag.axis) {
-          renderer.measure = { from: renderer.time(drag.x), to: renderer.time(x) };
+          const height = (at) => at - AXIS + renderer.scroll;
+          const rows = drag.axis ? [0, 0] : [height(drag.y), height(y)];
+          renderer.measure = { from: renderer.time(drag.x), to: renderer.time(x), top: rows[0], bottom: rows[1] };
         } else {
           const by = ((drag.x - x) / renderer.plotWidth) * (drag.view.to - drag.view.from);
           this.scrollTo(drag.scroll + drag.y - y);
@@ -378,7 +400,8 @@ export class TimelinePage {
         const { from, to } = renderer.measure;
         renderer.measure = null;
         this.setView(Math.min(from, to), Math.max(from, to));
-      } else if (!ended.moved && event.type === "pointerup") this.click(x, y);
+      } else if (ended.measure && ended.moved) this.sumUp();
+      else if (!ended.moved && event.type === "pointerup") this.click(x, y);
     };
     canvas.addEventListener("pointerup", up);
     canvas.addEventListener("pointercancel", up);
@@ -421,7 +444,7 @@ export class TimelinePage {
       "+": () => this.zoom(0.5), "=": () => this.zoom(0.5), w: () => this.zoom(0.5),
       "-": () => this.zoom(2), s: () => this.zoom(2),
       f: () => this.setView(0, this.length), n: () => this.step(1), p: () => this.step(-1),
-      m: () => this.toggleMeasure(), "/": () => this.search.focus(), Escape: () => this.letGo(),
+      m: () => this.toggleMeasure(), "/": () => this.search.focus(), "?": () => this.help.showModal(), b: () => this.pin(), Escape: () => this.letGo(),
     };
     const isArrow = event.key.startsWith("Arrow");
     if (isArrow && document.activeElement !== this.canvas && document.activeElement !== document.body) return;
@@ -434,11 +457,18 @@ export class TimelinePage {
   toggleMeasure() {
     this.isMeasuring = !this.isMeasuring;
     this.measuring.setAttribute("aria-pressed", String(this.isMeasuring));
-    if (!this.isMeasuring) { this.renderer.measure = null; this.redraw(); }
+    if (!this.isMeasuring) { this.renderer.measure = null; clear(this.area); this.redraw(); }
+  }
+
+  // What was measured is summed up: the callbacks and threads of its rows, in its time.
+  sumUp() {
+    const { from, to, top, bottom } = this.renderer.measure;
+    const lanes = lanesBetween(this.renderer.lanes, top, bottom);
+    showArea(this.area, this.app, { from: Math.max(Math.min(from, to), 0), to: Math.min(Math.max(from, to), this.length), ...inArea(lanes, this.rows) });
   }
 
   letGo() {
-    if (this.renderer.measure) { this.renderer.measure = null; this.redraw(); return; }
+    if (this.renderer.measure) { this.renderer.measure = null; clear(this.area); this.redraw(); return; }
     this.drop();
   }
 
@@ -453,10 +483,13 @@ export class TimelinePage {
     clear(this.tooltip, hit.piece === undefined ? this.describe(hit, x) : this.describePiece(hit.piece));
     this.tooltip.hidden = false;
     const box = this.tooltip.getBoundingClientRect();
-    const left = Math.min(x + 14, this.renderer.width - box.width - 6);
-    const below = y + 18 + box.height < this.renderer.tall;
-    this.tooltip.style.left = `${Math.max(left, 2)}px`;
-    this.tooltip.style.top = `${below ? y + 18 : Math.max(y - box.height - 10, 2)}px`;
+    // Below the row or above it, never over its bars; where neither has room, beside the pointer.
+    const row = AXIS + hit.lane.y - this.renderer.scroll;
+    const [above, below] = [row - box.height - 4, row + hit.lane.height + 4];
+    const isBelow = below + box.height <= this.renderer.tall || above < 0;
+    const left = Math.max(Math.min(x + 14, this.renderer.width - box.width - 6), 2);
+    this.tooltip.style.left = `${left}px`;
+    this.tooltip.style.top = `${isBelow ? below : above}px`;
   }
 
   describePiece(row) {
@@ -481,7 +514,8 @@ export class TimelinePage {
       lines.push(h("span", {}, `${count(hit.count, KINDS[hit.kind])} in ${duration(hit.length)}, ${duration(hit.busy)} in all (${percent(hit.busy / hit.length)})`));
     } else {
       const end = hit.flags & 2 ? "end not seen" : duration(hit.length);
-      if (hit.kind === EVENT) lines.push(h("span", {}, hit.id >= 0 ? `event in callback instance ${hit.id}` : "event in no callback"));
+      if (hit.kind === MISSING) lines.push(h("span", { className: "warn" }, `message ${hit.id} ${missingWords(hit.flags)}`));
+      else if (hit.kind === EVENT) lines.push(h("span", {}, hit.id >= 0 ? `event in callback instance ${hit.id}` : "event in no callback"));
       else lines.push(h("span", {}, `${KINDS[hit.kind]}${hit.id >= 0 ? ` ${hit.id}` : ""}: ${end}`));
       if (hit.together > 1) lines.push(h("span", {}, `one of ${hit.together} in this column`));
     }
@@ -509,7 +543,7 @@ export class TimelinePage {
     }
     if (hit.kind === undefined) return;
     if (hit.isBin) { this.setView(hit.at, hit.at + hit.length); return; }
-    const kind = hit.kind >= 5 ? "callback_instance" : KIND_NAMES[hit.kind];
+    const kind = hit.kind === MISSING ? "publication" : hit.kind >= 5 ? "callback_instance" : KIND_NAMES[hit.kind];
     if (hit.id < 0) return;
     this.source = null;
     this.pick({ kind, id: hit.id }, false);
@@ -593,6 +627,16 @@ export class TimelinePage {
   centerAt(at, length) {
     const span = Math.max(length * 1.5, 1000);
     this.setView(at - (span - length) / 2, at + length + (span - length) / 2);
+  }
+
+  // A pinned row stays at the top, so that it can be compared with rows far below.
+  pin() {
+    const key = this.renderer.hover?.lane?.key;
+    if (typeof key !== "number") { this.say("Point at a row first: B pins it to the top."); return; }
+    if (this.state.pinned.has(key)) this.state.pinned.delete(key); else this.state.pinned.add(key);
+    this.remember();
+    this.relayout();
+    this.redraw();
   }
 
   drop() {
@@ -737,9 +781,4 @@ function eventLines(events, from) {
 function number(text, fallback) {
   const value = Number(text);
   return text === undefined || text === "" || !Number.isFinite(value) ? fallback : value;
-}
-
-export function shortSymbol(symbol) {
-  const text = symbol.length > 160 ? `${symbol.slice(0, 157)}…` : symbol;
-  return text;
 }

@@ -9,7 +9,7 @@ export const ROW_KINDS = {
 };
 
 // Options: internal, query, hidden (Set of row keys), folded (Set of header keys), kinds (Set that
-// is hidden), only (Set of row keys, or null), critical (whether there is a critical path).
+// is hidden), pinned (Set of row keys that come first), only (Set of row keys, or null), critical (whether there is a critical path).
 export function layout(rows, options) {
   const lanes = [];
   let y = 0;
@@ -17,22 +17,27 @@ export function layout(rows, options) {
   let [hostFolded, processFolded, nodeFolded] = [false, false, false];
   let hiddenCount = 0;
   const query = (options.query ?? "").trim().toLowerCase();
+  const found = query ? search(rows, query) : null;
   const push = (lane) => {
     lane.y = y;
     lane.height = HEIGHTS[lane.type];
     y += lane.height;
     lanes.push(lane);
   };
+  const isPinned = (row) => options.pinned?.has(rows.row_key[row]);
+  for (let row = 0; row < rows.rows; row++) {
+    if (isPinned(row)) push({ type: "row", key: rows.row_key[row], kind: rows.kind[row], label: `${rows.label[row]} · ${rows.node[row] ?? rows.process[row]}`, isPinned: true, row });
+  }
   if (options.critical) push({ type: "critical", key: "critical", label: "critical path" });
   for (let row = 0; row < rows.rows; row++) {
     const key = rows.row_key[row];
     const kind = rows.kind[row];
     const isAsked = options.only ? options.only.has(key) : true;
-    if (!isAsked) continue;
+    if (!isAsked || isPinned(row)) continue;
     if (!options.only) {
       if (rows.is_internal[row] && !options.internal) { hiddenCount++; continue; }
       if (options.hidden.has(key) || options.kinds.has(kind)) { hiddenCount++; continue; }
-      if (query && !matches(rows, row, query)) { hiddenCount++; continue; }
+      if (found && !found.has(row)) { hiddenCount++; continue; }
     }
     const hostKey = `host:${rows.host[row]}`;
     const processKey = `process:${rows.process_id[row]}`;
@@ -59,9 +64,29 @@ export function layout(rows, options) {
       if (nodeKey !== null) push({ type: "node", key: nodeKey, label, folded: nodeFolded, row });
     }
     if (nodeFolded) continue;
-    push({ type: "row", key, kind, label: rows.label[row], isInternal: rows.is_internal[row], row });
+    push({ type: "row", key, kind, label: rows.label[row], isInternal: rows.is_internal[row], isBeside: found?.get(row) === "beside", row });
   }
   return { lanes, height: y, hiddenCount };
+}
+
+// Rows with a text, and beside them what exchanges messages with them: rows of the same topic or
+// service; of what has the text itself also the other rows of its node.
+const EXCHANGED = new Set(["publisher", "subscription", "service", "client"]);
+export function search(rows, query) {
+  const found = new Map();
+  const [names, nodes] = [new Set(), new Set()];
+  const nodeOf = (row) => `${rows.process_id[row]} ${rows.node[row]}`;
+  for (let row = 0; row < rows.rows; row++) {
+    if (!matches(rows, row, query)) continue;
+    found.set(row, "found");
+    if (EXCHANGED.has(rows.kind[row])) names.add(rows.label[row]);
+    if (rows.node[row] && rows.label[row]?.toLowerCase().includes(query)) nodes.add(nodeOf(row));
+  }
+  for (let row = 0; row < rows.rows; row++) {
+    const isBeside = (EXCHANGED.has(rows.kind[row]) && names.has(rows.label[row])) || (rows.node[row] && nodes.has(nodeOf(row)));
+    if (isBeside && !found.has(row)) found.set(row, "beside");
+  }
+  return found;
 }
 
 export function matches(rows, row, query) {

@@ -1,0 +1,238 @@
+"""The summary of a run: what somebody reads who opens only that.
+
+Each section is the answer of a command, cut to its first rows, so that the page, the Markdown and
+the command line have the same numbers.
+"""
+
+from __future__ import annotations
+
+import shlex
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import pyarrow as pa
+
+from msgflow.errors import UsageError
+from msgflow.query.catalogue import load_query
+from msgflow.query.result import QueryResult
+from msgflow.query.runner import run_query
+from msgflow.query.selection import Selection
+from msgflow.run.slice import Slice
+from msgflow.run.window import WHOLE, Window
+from msgflow.sql.quoting import literal
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import duckdb
+
+    from msgflow.query.compare import Comparison
+    from msgflow.run.choice import Run
+    from msgflow.verify import Verification
+
+# The slowest paths whose latency is taken apart.
+MOST_PATHS = 3
+_MOST_ROWS = 5
+_QUERIES = {
+    "paths": ("e2e-latency", Selection(where="pairs > 0", sort=("max_ns:desc",), limit=MOST_PATHS)),
+    "drops": (
+        "topics-delivery",
+        Selection(where="dropped + lost > 0", sort=("delivered_percent",), limit=_MOST_ROWS),
+    ),
+    "threads": (
+        "executor-usage",
+        Selection(where="callbacks > 0", sort=("callback_share:desc",), limit=_MOST_ROWS),
+    ),
+}
+# Sums of a part of the timeline: of the nodes or threads in it, whose identities are conditions.
+_AREA = {
+    "callbacks": ("callbacks", "total_ns:desc"),
+    "usage": ("executor-usage", "callback_ns:desc"),
+}
+_TITLES = {
+    "callbacks": "Callbacks that began in it",
+    "usage": "What threads did in it",
+    "paths": "Slowest paths",
+    "blame": "Where the time of the slowest flows went",
+    "drops": "What was dropped or lost, and why",
+    "threads": "Busiest threads",
+    "verdicts": "Requirements",
+    "change": "What changed",
+}
+_COLUMNS = {
+    "callbacks": ("node", "callback", "count", "total_ns", "median_ns", "max_ns"),
+    "usage": ("process", "tid", "callback_share", "callback_ns", "take_ns", "select_ns", "wait_ns",
+              "blocked_ns", "unknown_ns"),
+    "paths": ("path", "median_ns", "p99_ns", "max_ns", "reached", "roots"),
+    "blame": ("path", "latency_ns", "node", "duration_ns", "share"),
+    "drops": ("topic_name", "subscriber", "published", "delivered", "dropped", "lost", "reasons"),
+    "threads": ("process", "tid", "callback_share", "callback_ns", "callbacks"),
+    "verdicts": ("verdict", "target", "subject", "metric", "condition", "measured", "reason",
+                 "worst_ns"),
+    "change": ("path", "change", "a_median_ns", "b_median_ns", "median_percent", "p95_percent",
+               "max_percent"),
+}  # fmt: skip
+_WHEN_EMPTY = {
+    "callbacks": "No callback of these nodes began in it.",
+    "usage": "Nothing is known of these threads in it.",
+    "paths": "No flow reached the end of a path.",
+    "blame": "No flow reached the end of a path.",
+    "drops": "Nothing was dropped or lost, as far as the trace tells.",
+    "threads": "No thread of an executor ran a callback.",
+    "verdicts": "The file has no requirements.",
+    "change": "No path differs.",
+}
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of the summary.
+
+    Attributes:
+        name: 'paths', 'blame', 'drops', 'threads', 'verdicts' or 'change'; of a part of the
+            timeline 'callbacks' or 'usage'.
+        result: its rows.
+        commands: print the same numbers.
+        reading: a line before the rows.
+    """
+
+    name: str
+    result: QueryResult
+    commands: tuple[str, ...]
+    reading: str = ""
+
+    @property
+    def title(self) -> str:
+        """What it is about."""
+        return _TITLES[self.name]
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Columns that matter most."""
+        return _COLUMNS[self.name]
+
+    @property
+    def when_empty(self) -> str:
+        """What to say where there are no rows."""
+        return _WHEN_EMPTY[self.name]
+
+
+def window_words(window: Window) -> list[str]:
+    """Return the options that choose the window, none for a whole run."""
+    start = ["--start", str(window.start_ns)] if window.start_ns != WHOLE.start_ns else []
+    end = ["--end", str(window.end_ns)] if window.end_ns != WHOLE.end_ns else []
+    return start + end
+
+
+def slice_of(run: Run, window: Window) -> Slice:
+    """Return the run and the window as a part to read."""
+    start = None if window.start_ns == WHOLE.start_ns else window.start_ns
+    end = None if window.end_ns == WHOLE.end_ns else window.end_ns
+    return Slice(run.run_id, start, end)
+
+
+def query_section(
+    connection: duckdb.DuckDBPyConnection, run: Run, window: Window, name: str
+) -> Section:
+    """Return 'paths', 'drops' or 'threads' of a run.
+
+    Raises:
+        QueryError: the database could not run the query.
+    """
+    query, selection = _QUERIES[name]
+    header = load_query(query)
+    result = run_query(connection, header, {}, slice_of(run, window), selection=selection)
+    words = ["msgflow", "query", *header.words.split(), "--where", selection.where or ""]
+    words += ["--sort", *selection.sort, "--limit", str(selection.limit)]
+    command = shlex.join([*words, *window_words(window), "--run", run.name])
+    return Section(name, result, (command,))
+
+
+def area_section(
+    connection: duckdb.DuckDBPyConnection,
+    run: Run,
+    window: Window,
+    name: str,
+    of: Sequence[str | int],
+) -> Section:
+    """Return sums of a part of the timeline.
+
+    Args:
+        connection: to a database with the public views.
+        run: the run.
+        window: the times.
+        name: 'callbacks' of nodes, or 'usage' of threads.
+        of: names of the nodes, or identities of the threads.
+
+    Raises:
+        UsageError: there is no such section, or no such node.
+        QueryError: the database could not run the query.
+    """
+    if name not in _AREA:
+        raise UsageError(f"there are no such sums — {name}", f"one of {', '.join(_AREA)}")
+    query, sort = _AREA[name]
+    column = "node" if name == "callbacks" else "thread_id"
+    wanted = ", ".join(literal(each) if isinstance(each, str) else str(int(each)) for each in of)
+    where = f"{column} IN ({wanted})"
+    header = load_query(query)
+    selection = Selection(where=where, sort=(sort,))
+    result = run_query(connection, header, {}, slice_of(run, window), selection=selection)
+    words = ["msgflow", "query", *header.words.split(), "--where", where, "--sort", sort]
+    command = shlex.join([*words, *window_words(window), "--run", run.name])
+    return Section(name, result, (command,))
+
+
+def blame_section(
+    connection: duckdb.DuckDBPyConnection,
+    run: Run,
+    window: Window,
+    flows: Sequence[tuple[str, str, int]],
+) -> Section:
+    """Return how long each node took of each flow, the slowest flow first.
+
+    Args:
+        connection: to a database with the public views.
+        run: the run.
+        window: of the beginnings of flows.
+        flows: of each its first topic, its last one and its take_id, the slowest first.
+
+    Raises:
+        QueryError: the database could not run the query.
+    """
+    header = load_query("critical-path")
+    results, commands = [], []
+    for rank, (first, last, take) in enumerate(flows, 1):
+        given = {"from": first, "to": last, "flow": take, "by": "node"}
+        result = run_query(connection, header, given, slice_of(run, window))
+        table = result.table
+        ranks = pa.array([rank] * len(result), pa.int64())
+        results.append(table.set_column(table.column_names.index("rank"), "rank", ranks))
+        options = [word for name, value in given.items() for word in (f"--{name}", str(value))]
+        commands.append(
+            shlex.join(["msgflow", "query", "critical-path", *options, *window_words(window),
+                        "--run", run.name])
+        )  # fmt: skip
+    if not results:
+        return Section("blame", QueryResult(pa.table({"rank": pa.array([], pa.int64())})), ())
+    return Section("blame", replace(result, table=pa.concat_tables(results)), tuple(commands))
+
+
+def verdict_section(verification: Verification) -> Section:
+    """Return the verdicts on requirements, those that are not met first."""
+    numbers = [
+        f"{verification.count(verdict)} {verdict}"
+        for verdict in ("failed", "not measured", "passed")
+    ]
+    command = shlex.join(["msgflow", "verify", verification.file, verification.run.name])
+    return Section("verdicts", verification.result, (command,), ", ".join(numbers))
+
+
+def change_section(comparison: Comparison) -> Section:
+    """Return the paths that differ between two runs."""
+    a, b = comparison.run_a.name, comparison.run_b.name
+    changes = comparison.changes()
+    command = shlex.join(["msgflow", "compare", a, b, "--only-different"])
+    reading = f"{b} compared with {a}"
+    if not len(changes):
+        reading = changes.when_empty
+    return Section("change", changes, (command,), reading)

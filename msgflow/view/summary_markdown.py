@@ -1,0 +1,102 @@
+"""The summary of a run as Markdown, for a pull request or an issue."""
+
+from __future__ import annotations
+
+from itertools import groupby
+from typing import TYPE_CHECKING
+
+from msgflow.query.cells import cells
+from msgflow.text.markdown import code, markdown_line, rule_line
+from msgflow.text.values import format_cell
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from msgflow.db.finding import Finding
+    from msgflow.run.choice import Run
+    from msgflow.view.summary import Section
+
+# Of each kind of finding; `msgflow check` lists all of them.
+_MOST_PLACES = 3
+
+
+def markdown(
+    run: Run, facts: Sequence[str], findings: Sequence[Finding], sections: Sequence[Section]
+) -> str:
+    """Return the summary.
+
+    Args:
+        run: the run.
+        facts: what was recorded, a few words each.
+        findings: those of `check`, errors first.
+        sections: the others, in their order; requirements and changes come before findings.
+    """
+    before = [section for section in sections if section.name in ("verdicts", "change")]
+    after = [section for section in sections if section.name not in ("verdicts", "change")]
+    lines = [f"# {code(run.name)}", "", ", ".join(facts), ""]
+    for section in before:
+        lines += _section(section)
+    lines += _findings(findings)
+    for section in after:
+        lines += _section(section)
+    return "\n".join(lines)
+
+
+def _section(section: Section) -> Iterator[str]:
+    yield f"## {section.title}"
+    yield ""
+    if section.reading:
+        yield from (f"{section.reading}.", "")
+    if len(section.result):
+        yield from _flows(section) if section.name == "blame" else _table(section)
+    elif not section.reading:
+        yield from (section.when_empty, "")
+    for command in section.commands:
+        yield f"    {command}"
+    if section.commands:
+        yield ""
+
+
+def _table(section: Section) -> Iterator[str]:
+    result = section.result.with_columns(section.columns)
+    names, columns, right = cells(result)
+    yield markdown_line(names)
+    yield rule_line(right)
+    for row in zip(*columns, strict=True):
+        # Names come from the trace: as code they are neither markup nor mentions.
+        yield markdown_line(
+            text if is_right or text == format_cell(None) else code(text)
+            for text, is_right in zip(row, right, strict=True)
+        )
+    yield ""
+
+
+def _flows(section: Section) -> Iterator[str]:
+    """Yield a line for each flow, and below it one for each node, the longest first."""
+    rows = section.result.table.to_pylist()
+    for _, group in groupby(rows, key=lambda row: row["rank"]):
+        nodes = list(group)
+        latency = format_cell(nodes[0]["latency_ns"], unit="ns")
+        yield f"- **{latency}**: {code(format_cell(nodes[0]['path']))}"
+        for node in nodes:
+            took = format_cell(node["duration_ns"], unit="ns")
+            share = format_cell(node["share"], unit="share")
+            yield f"  - {code(format_cell(node['node']))} {took}, {share} of it"
+    yield ""
+
+
+def _findings(findings: Sequence[Finding]) -> Iterator[str]:
+    yield from ("## Findings", "")
+    if not findings:
+        yield from ("Nothing is wrong with the recording.", "")
+        return
+    for _, group in groupby(findings, key=lambda finding: finding.name):
+        places = list(group)
+        first = places[0]
+        yield f"- **{first.severity}**: {first.title}"
+        for place in places[:_MOST_PLACES]:
+            yield f"  - {code(format_cell(place.subject))}: {code(format_cell(place.detail))}"
+        if len(places) > _MOST_PLACES:
+            yield f"  - and {len(places) - _MOST_PLACES} more"
+        yield f"  - Cure: {first.cure}"
+    yield from ("", "    msgflow check", "")

@@ -1,0 +1,150 @@
+"""The summary: on the first page, and as Markdown."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from hostile import HOSTILE, renamed
+from served import Page, shown
+from typer.testing import CliRunner
+
+from msgflow.cli.app import app
+from msgflow.database import open_db
+from msgflow.errors import UsageError
+from msgflow.run.window import Window
+from msgflow.view.pages import SUMMARY, Pages
+from msgflow.view.summary import Section, query_section
+
+Report = Callable[..., str]
+_TARGETS = "targets:\n  - topic: '*'\n    loss: < 1 %\n  - topic: /nowhere\n    rate: 1 Hz ± 5 %\n"
+
+
+def section(database: Path, part: str) -> Section:
+    """Return a section of the summary of the only run."""
+    pages = Pages()
+    with open_db(database) as opened:
+        found = pages.summary(opened.connection, pages.extent(opened.connection, {}), part)
+    pages.close()
+    return found
+
+
+def printed(command: str, database: Path) -> list[dict[str, object]]:
+    """Return the rows that a command of the summary prints."""
+    words = shlex.split(command)
+    assert words[0] == "msgflow"
+    result = CliRunner().invoke(app, [*words[1:], "--format", "json", "--db", str(database)])
+    assert result.exit_code == 0, result.stderr
+    rows: list[dict[str, object]] = json.loads(result.stdout)
+    return rows
+
+
+@pytest.mark.parametrize("part", SUMMARY)
+def test_its_numbers_are_those_of_the_command_beside_them(part: str, dropping: Path) -> None:
+    found = section(dropping, part)
+    rows = [row for command in found.commands for row in printed(command, dropping)]
+    own = found.result.table.to_pylist()
+    if part == "blame":
+        # Each command is of one flow, and ranks it first.
+        assert [row.pop("rank") for row in own] == sorted(
+            place for place, command in enumerate(found.commands, 1)
+            for _ in printed(command, dropping)
+        )  # fmt: skip
+        assert {row.pop("rank") for row in rows} == {1}
+    assert rows == json.loads(json.dumps(own))
+    assert rows
+
+
+def test_flows_of_the_summary_are_the_slowest(dropping: Path) -> None:
+    rows = section(dropping, "blame").result.table.to_pylist()
+    with open_db(dropping) as opened:
+        flows = opened.query("flows").to_arrow().to_pylist()
+    slowest = max(flow["latency_ns"] for flow in flows if flow["latency_ns"] is not None)
+    assert rows[0]["latency_ns"] == slowest
+    for rank in {row["rank"] for row in rows}:
+        of_flow = [row for row in rows if row["rank"] == rank]
+        assert sum(row["duration_ns"] for row in of_flow) == of_flow[0]["latency_ns"]
+    takes = [row["take_id"] for row in rows if row["path"] is not None]
+    assert len(takes) == len(set(takes))
+
+
+def test_a_window_is_in_the_command(dropping: Path) -> None:
+    with open_db(dropping) as opened:
+        (run,) = opened.runs()
+        assert run.start_ns is not None
+        window = Window(run.start_ns, run.start_ns + 100_000_000)
+        found = query_section(opened.connection, run, window, "threads")
+    (command,) = found.commands
+    assert f"--start {window.start_ns} --end {window.end_ns}" in command
+    assert printed(command, dropping) == found.result.table.to_pylist()
+
+
+def test_markdown_has_verdicts_findings_paths_and_drops(dropping: Path, tmp_path: Path) -> None:
+    targets = tmp_path / "targets.yaml"
+    targets.write_text(_TARGETS, encoding="utf-8")
+    output = tmp_path / "summary.md"
+    result = CliRunner().invoke(
+        app,
+        ["report", "-o", str(output), "--targets", str(targets), "--db", str(dropping)],
+    )
+    assert result.exit_code == 0, result.stderr
+    assert "browser" not in result.stderr
+    text = output.read_text(encoding="utf-8")
+    with open_db(dropping) as opened:
+        verification = opened.verify(targets)
+        lost = opened.query("topics-delivery", where="dropped > 0").to_arrow().to_pylist()
+        findings = opened.findings()
+    assert f"{verification.count('failed')} failed, 1 not measured" in text
+    assert verification.count("failed") > 0
+    assert text.index("## Requirements") < text.index("## Findings") < text.index("## Slowest")
+    for row in lost:
+        assert f"| `{row['topic_name']}` | `{row['subscriber']}` | {row['published']:,}" in (
+            text.replace(f"{row['published']}", f"{row['published']:,}")
+        )
+    for finding in findings:
+        assert finding.title in text
+    assert "the run has no such topic — /nowhere" in text
+
+
+def test_names_in_markdown_are_only_ever_text(systems: Path, tmp_path: Path) -> None:
+    path = renamed(systems, tmp_path / "hostile.duckdb", HOSTILE)
+    output = tmp_path / "summary.md"
+    with open_db(path) as opened:
+        opened.report(output, run=1)
+    for line in output.read_text(encoding="utf-8").splitlines():
+        if not line.startswith("    "):
+            # Nothing that a name could be stands outside of code.
+            outside = "".join(line.split("`")[::2])
+            assert "<" not in outside
+            assert "](" not in outside
+
+
+def test_another_suffix_is_no_report(dropping: Path, tmp_path: Path) -> None:
+    result = CliRunner().invoke(
+        app, ["report", "-o", str(tmp_path / "summary.txt"), "--db", str(dropping)]
+    )
+    assert result.exit_code == UsageError.exit_code
+    assert ".html or .md" in result.stderr
+
+
+def test_the_first_page_of_a_report_has_it(
+    dropping: Path, report: Report, page: Page, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    targets = tmp_path_factory.mktemp("targets") / "targets.yaml"
+    targets.write_text(_TARGETS, encoding="utf-8")
+    page.open(report(dropping, targets=targets))
+    text = page.page.locator("main").inner_text()
+    assert "1 not measured" in text
+    blame = section(dropping, "blame").result.table.to_pylist()
+    nodes = page.page.locator(".blame-nodes .numbers").all_inner_texts()
+    assert [each.split(" · ")[0] for each in nodes] == [shown(row["duration_ns"]) for row in blame]
+    drops = page.page.get_by_role("region", name="What was dropped or lost, and why")
+    assert drops.locator("tbody tr").count() == len(section(dropping, "drops").result)
+    assert "next: msgflow" in text
+    # There is no tab that would show nothing.
+    tabs = page.page.locator(".tabs a").all_inner_texts()
+    assert "Timeline" in tabs
+    assert "Compare" not in tabs
