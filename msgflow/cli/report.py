@@ -98,7 +98,7 @@ def command(
         )
     size = read_size(max_size)
     if lake is not None:
-        if part != LATEST or not compare is through is targets is None:
+        if part != LATEST or any(given is not None for given in (compare, through, targets)):
             raise UsageError(
                 "the page of a lake is of all its runs", "--where chooses some of them"
             )
