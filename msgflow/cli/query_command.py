@@ -6,7 +6,7 @@ from inspect import Parameter
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from typer.core import TyperCommand
+from typer.core import TyperCommand, TyperOption
 
 from msgflow.cli.header_options import escape, given_of, header_parameter
 from msgflow.cli.options import (
@@ -194,7 +194,8 @@ def _command_class(header: Header) -> type[TyperCommand]:
             """Print the help of Typer, without what every query has, then the columns."""
             # Completion still offers the options: they are hidden only here.
             for param in self.params:
-                param.hidden = param.hidden or param.name in _OF_EVERY_QUERY
+                if isinstance(param, TyperOption) and param.name in _OF_EVERY_QUERY:
+                    param.hidden = True
             super().format_help(ctx, formatter)
             _print_columns(header)
             _print_common()
