@@ -123,5 +123,5 @@ LEFT JOIN main.client AS c ON m.action_client_id = c.client_id
 LEFT JOIN main.process AS cp ON c.process_id = cp.process_id
 LEFT JOIN main.node AS cn ON c.node_id = cn.node_id
 ORDER BY
-    m.run_id, m.action_name, server NULLS LAST, client NULLS LAST, m.action_server_id,
-    m.action_client_id
+    m.run_id, result_p99_ns DESC NULLS LAST, m.action_name, server NULLS LAST,
+    client NULLS LAST, m.action_server_id, m.action_client_id

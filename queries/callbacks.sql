@@ -1,7 +1,7 @@
 -- name: callbacks
 -- title: Callback durations and periods
 -- description: How long callbacks ran, and how far apart their starts were. Instances without an
---     end are counted separately.
+--     end are counted separately. The longest 99th percentile comes first.
 -- grain: one row per callback object that ran
 -- variant: each BOOLEAN = false  Each callback instance, the longest first
 -- column: run_id BIGINT             Run
@@ -74,4 +74,4 @@ SELECT
 FROM measured AS m
 JOIN main.callback_label AS l ON m.callback_id = l.callback_id
 JOIN main.callback AS c ON m.callback_id = c.callback_id
-ORDER BY m.run_id, l.node, l.label, m.callback_id
+ORDER BY m.run_id, p99_ns DESC NULLS LAST, l.node, l.label, m.callback_id

@@ -11,7 +11,7 @@
 -- param: to VARCHAR = NULL  Topics or nodes where flows end, likewise
 -- param: via VARCHAR = NULL  Only flows through all of these topics or nodes
 -- param: without VARCHAR = NULL  Only flows through none of these
--- param: slowest BIGINT {1..} = 1  Number of flows, the slowest first
+-- param: slowest BIGINT {1..} = 1  Number of flows
 -- param: quantile VARCHAR {median|p90|p95|p99|max} = NULL  Instead, the flow at this quantile of
 --     the latency
 -- param: take BIGINT = NULL  Instead, the longest flow that ends with this take_id

@@ -1,6 +1,7 @@
 -- name: path-breakdown
 -- title: What the latency of each path consists of
--- description: End-to-end latency of every path, hop by hop. The parts of a flow follow each other
+-- description: End-to-end latency of every path, hop by hop, in the order of the path: --sort
+--     share:desc puts the largest part first. The parts of a flow follow each other
 --     from its start to its end and add up to its latency exactly. The parts of a hop are: the
 --     callback up to its publication; the wait in a cache for other messages or a timer; calls of
 --     services; publishing by layer, up to the last one; the time for which a message was stored,

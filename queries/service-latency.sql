@@ -133,5 +133,5 @@ LEFT JOIN main.client AS c ON m.client_id = c.client_id
 LEFT JOIN main.process AS cp ON c.process_id = cp.process_id
 LEFT JOIN main.node AS cn ON c.node_id = cn.node_id
 ORDER BY
-    m.run_id, service_name NULLS LAST, server NULLS LAST, client NULLS LAST, m.service_id,
-    m.client_id
+    m.run_id, round_trip_p99_ns DESC NULLS LAST, service_name NULLS LAST, server NULLS LAST,
+    client NULLS LAST, m.service_id, m.client_id

@@ -224,4 +224,4 @@ LEFT JOIN kept AS k ON a.callback_id = k.callback_id
 LEFT JOIN delayed AS d ON a.callback_id = d.callback_id
 LEFT JOIN placed AS g ON a.callback_id = g.callback_id
 LEFT JOIN meanwhile AS m ON a.callback_id = m.callback_id
-ORDER BY a.run_id, n.node, n.label, a.callback_id
+ORDER BY a.run_id, lateness_p99_ns DESC NULLS LAST, n.node, n.label, a.callback_id
