@@ -98,7 +98,7 @@ def command(
         )
     size = read_size(max_size)
     if lake is not None:
-        if part != LATEST or not compare is path is targets is None:
+        if part != LATEST or (compare, path, targets) != (None, None, None):
             raise UsageError(
                 "the page of a lake is of all its runs", "--where chooses some of them"
             )

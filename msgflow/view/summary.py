@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     from msgflow.query.compare import Comparison
     from msgflow.run.choice import Run
+    from msgflow.sql.value import Value
     from msgflow.verify import Verification
 
 # The slowest paths whose latency is taken apart.
@@ -202,7 +203,7 @@ def blame_section(
     header = load_query("critical-path")
     results, commands = [], []
     for rank, (first, last, take) in enumerate(flows, 1):
-        given = {"from": first, "to": last, "flow": take, "by": "node"}
+        given: dict[str, Value] = {"from": first, "to": last, "flow": take, "by": "node"}
         result = run_query(connection, header, given, slice_of(run, window))
         table = result.table
         ranks = pa.array([rank] * len(result), pa.int64())
