@@ -391,6 +391,7 @@ def test_hosts_and_nodes_of_the_slowest_flow_stand_out_in_the_graph(
     assert {name: total for name, total in heats if total} == {
         name: total for name, total in totals.items() if total
     }
+    page.page.locator(".vertex.slowest").first.wait_for(timeout=60_000)
     assert page.page.locator(".vertex.slowest").count() > 1
     colors_of = page.page.locator(".group-box").evaluate_all(
         "all => [...new Set(all.map(one => getComputedStyle(one).stroke))].length"

@@ -139,6 +139,7 @@ def test_the_first_page_of_a_report_has_it(
     text = page.page.locator("main").inner_text()
     assert "1 not measured" in text
     blame = section(dropping, "blame").result.table.to_pylist()
+    page.page.locator(".blame-nodes").first.wait_for(timeout=60_000)
     nodes = page.page.locator(".blame-nodes .numbers").all_inner_texts()
     assert [each.split(" · ")[0] for each in nodes] == [shown(row["duration_ns"]) for row in blame]
     drops = page.page.get_by_role("region", name="What was dropped or lost, and why")

@@ -21,8 +21,7 @@ _LANES = "msgflow.page.renderer.lanes.map(lane => [lane.type, lane.label, Boolea
 @pytest.fixture
 def timeline(dropping: Path, serve: Serve, page: Page) -> Page:
     """The timeline of a system whose queues are too short, all of it in sight."""
-    page.open(f"{serve(dropping).address}")
-    page.go("#/timeline?from=0&to=100000000")
+    page.open(f"{serve(dropping).address}#/timeline?from=0&to=100000000")
     return page
 
 
@@ -138,8 +137,8 @@ def test_a_pinned_row_is_the_first(timeline: Page) -> None:
 
 
 def test_the_strip_moves_the_window(timeline: Page) -> None:
-    timeline.page.wait_for_function("msgflow.page.minimap.shares !== null")
-    strip = timeline.page.locator("canvas.minimap")
+    strip = timeline.page.locator("canvas.minimap[data-filled]")
+    strip.wait_for(timeout=60_000)
     box = strip.bounding_box()
     strip.click(position={"x": box["width"] / 2, "y": 10})
     view, length = timeline.page.evaluate("[msgflow.page.renderer.view, msgflow.page.length]")

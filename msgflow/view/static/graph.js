@@ -5,7 +5,7 @@ import { address, current, replace } from "./address.js";
 import { count, duration, percent } from "./labels.js";
 import { dataTable, besides } from "./table.js";
 import { command, failed, notes, waiting } from "./notice.js";
-import { model } from "./graph_model.js";
+import { markSlowest, model } from "./graph_model.js";
 import { savePng, saveSvg } from "./picture_file.js";
 import { Zoom } from "./zoom.js";
 
@@ -34,12 +34,12 @@ export class GraphPage {
   async build() {
     clear(this.root, waiting());
     const { app } = this;
-    const [rates, transports, services, actions, indirect, executors, callbacks, drops, blame] = await Promise.all([
+    const [rates, transports, services, actions, indirect, executors, callbacks, drops] = await Promise.all([
       app.query("topics-rate"), app.query("topics-latency"), app.query("service-latency"), app.query("action-latency"),
-      app.query("links"), app.fetch("executor_node"), app.query("callbacks"), app.query("topics-delivery"), app.fetch("summary", { part: "blame" }),
+      app.query("links"), app.fetch("executor_node"), app.query("callbacks"), app.query("topics-delivery"),
     ]);
     this.tables = { rates, transports, services, actions };
-    this.model = model({ rates, transports, services, actions, indirect, executors, callbacks, drops, blame });
+    this.model = model({ rates, transports, services, actions, indirect, executors, callbacks, drops });
     this.search = h("input", { type: "search", placeholder: "node or topic …", value: current().q ?? "", "aria-label": "only what is beside nodes and topics with this text",
       on: { change: () => this.filter(this.search.value) } });
     const group = h("input", { type: "checkbox", checked: true, on: { change: () => { this.grouped = group.checked; this.draw(); } } });
@@ -58,7 +58,7 @@ export class GraphPage {
         h("span", { className: "legend-item" }, h("span", { className: "stroke dashed color-indirect" }), "published by an indirect link"),
         h("span", { className: "legend-item" }, "the wider an arrow, the more messages; the darker a node, the longer its callbacks ran"),
         this.model.edges.some((edge) => edge.missing) && h("span", { className: "legend-item" }, h("span", { className: "stroke color-error" }), "messages dropped or lost"),
-        [...this.model.vertices.values()].some((vertex) => vertex.slowest > 0) && h("span", { className: "legend-item" }, h("span", { className: "shape box slowest" }), "part of the slowest flow, with its share"),
+        h("span", { className: "legend-item" }, h("span", { className: "shape box slowest" }), "part of the slowest flow, with its share"),
         this.model.hosts.length > 1 && this.model.hosts.map((host, place) => h("span", { className: "legend-item" }, h("span", { className: `swatch host-mark host-${place % HOSTS}` }), `on ${host}`))),
       besides("topics and their publishers as a table", dataTable(rates, { label: "publication rates" }), command(rates.meta.command)),
       besides("receivers and their latencies as a table", dataTable(transports, { label: "latencies from publication to take" }), notes(transports.meta.notes), command(transports.meta.command)),
@@ -66,6 +66,17 @@ export class GraphPage {
       actions.rows ? besides("actions as a table", dataTable(actions, { label: "actions" }), command(actions.meta.command)) : null);
     this.zoom = new Zoom(this.picture);
     this.draw();
+    this.slowest();
+  }
+
+  // What takes longest comes when it is known.
+  async slowest() {
+    try {
+      const blame = await this.app.fetch("summary", { part: "blame" });
+      if (this.app.page === this && markSlowest(this.model.vertices, blame)) this.draw();
+    } catch (error) {
+      if (error.name !== "AbortError") clear(this.said, failed(error));
+    }
   }
 
   async save() {

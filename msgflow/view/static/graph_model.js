@@ -5,7 +5,7 @@ import { brief, count, duration } from "./labels.js";
 // The services of an action are one vertex: the action.
 const OF_ACTION = "/_action/";
 
-export function model({ rates, transports, services, actions, indirect, executors, callbacks, drops, blame }) {
+export function model({ rates, transports, services, actions, indirect, executors, callbacks, drops }) {
   const vertices = new Map();
   const groups = new Map();
   const edges = [];
@@ -65,25 +65,31 @@ export function model({ rates, transports, services, actions, indirect, executor
     if (actions.client[row]) edges.push({ from: add("node", actions.client[row]), to: action, kind: "service", count: actions.goals[row], label: "", title: `${actions.client[row]} sent to ${name}: ${said}` });
     if (actions.server[row]) edges.push({ from: action, to: add("node", actions.server[row]), kind: "service", count: actions.goals[row], label: "", title: `${actions.server[row]} executes ${name}: ${said}` });
   }
-  markGraph({ vertices, edges, callbacks, drops, blame });
+  markGraph({ vertices, edges, callbacks, drops });
   return { vertices, edges: merged(edges), groups,
     hosts: [...new Set([...groups.values()].map(({ host }) => host))].sort() };
 }
 
-// Of each node how long its callbacks ran and its share of the slowest flow; of each receiver what
-// it did not get.
-function markGraph({ vertices, edges, callbacks, drops, blame }) {
+// Of each node its share of the slowest flow. Tells whether there is any.
+export function markSlowest(vertices, blame) {
+  let isAny = false;
+  for (let row = 0; row < blame.rows; row++) {
+    const vertex = blame.rank[row] === 1 && vertices.get(`node:${blame.node[row]}`);
+    if (!vertex) continue;
+    vertex.slowest = blame.share[row];
+    isAny = true;
+  }
+  return isAny;
+}
+
+// Of each node how long its callbacks ran; of each receiver what it did not get.
+function markGraph({ vertices, edges, callbacks, drops }) {
   for (let row = 0; row < callbacks.rows; row++) {
     const vertex = vertices.get(`node:${callbacks.node[row]}`);
     if (vertex && callbacks.total_ns[row] > 0) vertex.busy = (vertex.busy ?? 0) + callbacks.total_ns[row];
   }
   const most = Math.max(1, ...[...vertices.values()].map((vertex) => vertex.busy ?? 0));
   for (const vertex of vertices.values()) vertex.heat = (vertex.busy ?? 0) / most;
-  for (let row = 0; row < blame.rows; row++) {
-    if (blame.rank[row] !== 1) continue;
-    const vertex = vertices.get(`node:${blame.node[row]}`);
-    if (vertex) vertex.slowest = blame.share[row];
-  }
   for (let row = 0; row < drops.rows; row++) {
     const missing = drops.dropped[row] + drops.lost[row];
     const edge = missing > 0 && edges.find((one) => one.from === `topic:${drops.topic_name[row]}` && one.to === `node:${drops.subscriber[row]}`);

@@ -45,6 +45,7 @@ export class Minimap {
     }
     const most = Math.max(...shares);
     this.shares = most > 0 ? shares.map((share) => share / most) : shares;
+    this.canvas.dataset.filled = "1";
     this.draw(this.view);
   }
 

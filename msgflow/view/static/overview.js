@@ -93,7 +93,6 @@ export class OverviewPage {
     });
     const others = [
       ...given.map((one) => fill(one, async () => summary(await app.fetch("summary", { part: one.part })))),
-      fill(nodes, async () => blame(await app.fetch("summary", { part: "blame" }))),
       ...[[drops, "drops"], [threads, "threads"]].map(([place, part]) => fill(place, async () => summary(await app.fetch("summary", { part })))),
       fill(topics, async () => {
         const table = await app.query("topics");
@@ -104,6 +103,8 @@ export class OverviewPage {
         return [besides(`${count(table.rows, "process")}`.replace("processs", "processes"), dataTable(table, { label: "processes" }), command(table.meta.command))];
       }),
     ];
+    // The page stands without what takes longest.
+    fill(nodes, async () => blame(await app.fetch("summary", { part: "blame" })));
     await Promise.all([hosts, findings, paths, ...others]);
   }
 

@@ -431,6 +431,7 @@ export class TimelinePage {
   recolor() { if (this.rows) { this.renderer.resize(); this.redraw(); } }
 
   key(event) {
+    if (this.help.open) return;
     if (event.target instanceof HTMLInputElement || event.target instanceof HTMLSelectElement) {
       if (event.key === "Escape") event.target.blur();
       return;
