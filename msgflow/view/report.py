@@ -15,6 +15,8 @@ from pyarrow import compute
 
 from msgflow.atomic import replacing
 from msgflow.errors import UsageError
+from msgflow.query.catalogue import load_query
+from msgflow.query.runner import run_query
 from msgflow.run.slice import Slice
 from msgflow.run.window import WHOLE, Window
 from msgflow.view.page_query import run_page_query
@@ -32,6 +34,15 @@ if TYPE_CHECKING:
 
 # Pictures of at most so many paths: of those with the slowest flows.
 MOST_PATHS = 200
+# Panels of at most so many callbacks, topics and clients.
+MOST_PANELS = 200
+# A named query whose rows open panels, the column that tells them apart, the parameter of it in
+# page queries, and these.
+_PANELS = (
+    ("callbacks", "callback_id", "callback", ("callback_point", "callback_slowest")),
+    ("topics-summary", "topic_name", "topic", ("topic_point", "topic_slowest")),
+    ("service-latency", "client_id", "client", ("service_point", "service_slowest")),
+)
 # The report has the critical paths of so many flows, the slowest ones.
 MOST_CRITICAL = 6
 # Estimate: bytes of a bar with its links in the file, compressed.
@@ -149,8 +160,12 @@ class _Maker:
         self.keep("finding")
         for name in NAMED:
             self.keep("query", name=name)
-        for name in ("row", "gap", "path", "executor_node", "executor_share"):
+        for name in (
+            "row", "gap", "path", "executor_node", "executor_share", "callback", "loss",
+            "loss_point",
+        ):  # fmt: skip
             self.keep(name)
+        self.panels()
         self.progress("paths")
         chosen = self.paths()
         if other is not None:
@@ -159,6 +174,15 @@ class _Maker:
         self.progress("timeline")
         head = self.timeline(Window(begin, end), chosen)
         return single_page(self.parts, head), self.notes
+
+    def panels(self) -> None:
+        """Keep what callbacks, topics and services did over time: of the first ones of each."""
+        for query, column, key, names in _PANELS:
+            table = run_query(self.connection, load_query(query), {}, Slice(self.extent.run.run_id))
+            for value in dict.fromkeys(table.to_arrow()[column].to_pylist()[:MOST_PANELS]):
+                given = {} if value is None else {key: value}
+                for name in names:
+                    self.keep(name, **given)
 
     def other(self, compare: str | int) -> Run:
         """Return the run to compare with."""
