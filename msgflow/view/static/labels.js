@@ -25,7 +25,7 @@ export const LINK_CODES = ["transport", "direct", "periodic_async", "partial_syn
 const TITLES = {
   run_id: "run", roots: "flows", loss_affected: "touched by losses",
   sink_event: "ends with", is_cut: "search cut", what: "what",
-  topic_name: "topic", is_loss_affected: "touched by losses", rate_hz: "rate",
+  topic_name: "topic", service_name: "service", action_name: "action", is_loss_affected: "touched by losses", rate_hz: "rate",
   callback_share: "busy", orphans: "takes without publication", cliffs_delta: "Cliff's delta",
   start_at: "begin", length: "duration", a_ns: "A", b_ns: "B",
   difference_ns: "B − A", change_percent: "change", low_ns: "95 % interval, from", high_ns: "to",

@@ -31,7 +31,8 @@ export class ServicesPage {
     this.show();
     await fill(actions, async () => {
       const rows = await app.query("action-latency");
-      return [dataTable(rows, { label: "actions", columns: OF_ACTIONS, sort: { name: "result_max_ns", down: true }, nothing: "No goal of an action was recorded." }), notes(rows.meta.notes), commands([rows])];
+      const table = rows.rows ? dataTable(rows, { label: "actions", columns: OF_ACTIONS, sort: { name: "result_max_ns", down: true } }) : h("p", {}, "No goal of an action was recorded.");
+      return [table, notes(rows.meta.notes), commands([rows])];
     });
   }
 
