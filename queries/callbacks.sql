@@ -9,6 +9,7 @@
 -- column: callback VARCHAR [callback]  What triggers it
 -- column: count BIGINT              Callback instances that began in the time window
 -- column: open BIGINT               Instances without an end
+-- column: rate_hz DOUBLE [Hz]      Instances per second, from the first start to the last
 -- column: period_min_ns BIGINT [ns]     Shortest time from one start to the next
 -- column: period_median_ns BIGINT [ns]  Median time from one start to the next
 -- column: period_max_ns BIGINT [ns]     Longest time from one start to the next
@@ -28,6 +29,7 @@ WITH instance AS (
     SELECT
         run_id,
         callback_id,
+        start_ns,
         end_ns - start_ns AS duration_ns,
         start_ns - lag(start_ns) OVER (
             PARTITION BY callback_id ORDER BY start_ns, callback_instance_id
@@ -41,6 +43,7 @@ measured AS (
         callback_id,
         count(*) AS count,
         count(*) - count(duration_ns) AS open,
+        (count(*) - 1) * 1e9 / nullif(max(start_ns) - min(start_ns), 0) AS rate_hz,
         min(period_ns) AS period_min_ns,
         quantile_disc(period_ns, 0.5) AS period_median_ns,
         max(period_ns) AS period_max_ns,
@@ -58,6 +61,7 @@ SELECT
     l.label AS callback,
     m.count,
     m.open,
+    m.rate_hz,
     m.period_min_ns,
     m.period_median_ns,
     m.period_max_ns,

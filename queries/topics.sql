@@ -4,9 +4,10 @@
 --     and how many were handed over. Publishers and subscriptions without a known topic are a
 --     row of their own.
 -- grain: one row per topic
--- variant: measure VARCHAR {messages|rate|latency|delivery|unmatched} = 'messages'  What is
---     measured: numbers of messages, rates and periods by publisher, the latency from publication
---     to take, what became of the messages, or messages and takes without a partner, one by one
+-- variant: measure VARCHAR {messages|rate|latency|delivery|unmatched|summary} = 'messages'  What
+--     is measured: numbers of messages, rates and periods by publisher, the latency from
+--     publication to take, what became of the messages, messages and takes without a partner, one
+--     by one, or the most important of these by topic
 -- column: run_id BIGINT               Run
 -- column: topic_name VARCHAR [topic]  Topic
 -- column: publisher_count BIGINT      Publishers

@@ -268,6 +268,19 @@ def compare(
     return replace(compared, without_warm_up=without)
 
 
+def warm_up(connection: duckdb.DuckDBPyConnection, run: Run) -> float:
+    """Return the seconds for which a run warms up, as a comparison of its paths finds it; 0: none.
+
+    Args:
+        connection: to a database with the public views.
+        run: the run.
+    """
+    both: dict[str, Value] = {"run_a": run.run_id, "run_b": run.run_id, "resamples": 0}
+    asked = bind(internal_sql().header("comparison"), both, "msgflow compare")
+    _require_sense(asked)
+    return _warm_up(_compared(connection, asked, run, run, is_strict=False))
+
+
 def _compared(
     connection: duckdb.DuckDBPyConnection,
     asked: dict[str, Any],

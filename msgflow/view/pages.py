@@ -6,36 +6,37 @@ import json
 import shlex
 import threading
 from collections import OrderedDict
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-import duckdb
 import pyarrow as pa
 
 from msgflow.db.finding import next_command, read_findings
 from msgflow.errors import UsageError
 from msgflow.query.catalogue import load_query
 from msgflow.query.clock_notes import clock_notes
-from msgflow.query.compare import compare
+from msgflow.query.compare import compare, warm_up
 from msgflow.query.runner import run_query
 from msgflow.run.slice import Slice
 from msgflow.run.window import WHOLE, Window
 from msgflow.view.critical_path import critical_path
 from msgflow.view.encoded import encoded_comparison, encoded_section
 from msgflow.view.page_query import page_query, run_page_query
+from msgflow.view.scratch import Scratch
 from msgflow.view.summary import (
     MOST_PATHS,
+    Part,
     Section,
     area_section,
     blame_section,
     query_section,
-    slice_of,
-    window_words,
 )
 from msgflow.view.table_encoding import encode
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
+
+    import duckdb
 
     from msgflow.run.choice import Run
 
@@ -47,7 +48,7 @@ NAMED = (
     "executor-usage",
     "waits", "waits-pair", "topics-rate", "topics-latency", "service-latency",
     "action-latency", "links", "topics-delivery", "info-hosts", "info-processes", "topics",
-    "clocks",
+    "clocks", "topics-summary", "callbacks", "timers", "info-nodes",
 )  # fmt: skip
 # A window with more bars than this is drawn in bins, in so many at the most.
 MOST_BARS = 40_000
@@ -78,51 +79,6 @@ class Extent:
     def frame(self, window: Window) -> Params:
         """Return the parameters that most page queries need."""
         return {"run": self.run.run_id, "origin_ns": self.origin_ns, **window.bindings}
-
-
-class Scratch:
-    """Tables in memory, beside the database: what is computed once per run and asked often."""
-
-    def __init__(self) -> None:
-        self._connection = duckdb.connect(":memory:")
-        self._connection.execute(
-            "CREATE TABLE flow (run_id BIGINT, path_id BIGINT, root_kind VARCHAR, root_id BIGINT,"
-            " root_at BIGINT, take_id BIGINT, latency BIGINT, status VARCHAR,"
-            " is_loss_affected BOOLEAN)"
-        )
-        self._connection.execute(
-            "CREATE TABLE level (run_id BIGINT, row_key BIGINT, kind UTINYINT, id BIGINT,"
-            " start_at BIGINT, length BIGINT, flags UTINYINT, count BIGINT, busy BIGINT)"
-        )
-        self._locks: dict[tuple[str, int], threading.Lock] = {}
-        self._filled: set[tuple[str, int]] = set()
-        self._guard = threading.Lock()
-
-    def fill(self, table: str, run_id: int, read: Callable[[], pa.Table]) -> None:
-        """Put the rows of a run into a table, unless they are there."""
-        key = (table, run_id)
-        with self._guard:
-            lock = self._locks.setdefault(key, threading.Lock())
-        with lock:
-            if key in self._filled:
-                return
-            rows = read()
-            with self._connection.cursor() as cursor:
-                cursor.register("incoming", rows)
-                cursor.execute(
-                    f"INSERT INTO {table} BY NAME SELECT $run::BIGINT AS run_id, * FROM incoming",
-                    {"run": run_id},
-                )
-            self._filled.add(key)
-
-    def ask(self, name: str, values: Mapping[str, Any]) -> pa.Table:
-        """Return the rows of a page query over these tables."""
-        with self._connection.cursor() as cursor:
-            return run_page_query(cursor, name, values)
-
-    def close(self) -> None:
-        """Free the memory."""
-        self._connection.close()
 
 
 class Pages:
@@ -198,6 +154,25 @@ class Pages:
             min(extent.origin_ns + end, self._window.end_ns),
         )
 
+    def _slice(self, extent: Extent, params: Params) -> Slice:
+        """Return the run, and the window that the page asks for; the whole run has no window."""
+        part = Slice(extent.run.run_id)
+        if self._window == WHOLE and not {"start", "end"} & params.keys():
+            return part
+        window = self.window(extent, params)
+        # Only those ends that were given: a command then has no other ones.
+        is_begun = "start" in params or self._window.start_ns != WHOLE.start_ns
+        is_ended = "end" in params or self._window.end_ns != WHOLE.end_ns
+        return replace(
+            part,
+            start=window.start_ns if is_begun else None,
+            end=window.end_ns if is_ended else None,
+        )
+
+    def _part(self, extent: Extent, params: Params) -> Part:
+        part = self._slice(extent, params)
+        return Part(part, _window_options(extent, part))
+
     def _run(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
         return encode(run_page_query(connection, "run", {}), units=_units("run"))
 
@@ -207,9 +182,9 @@ class Pages:
             raise UsageError(f"pages do not show such a query — {name}")
         header = load_query(name)
         extent = self.extent(connection, params)
-        window = self._window if header.has_window else WHOLE
-        part = slice_of(extent.run, window)
-        result = run_query(connection, header, {}, part, internal=bool(params.get("internal")))
+        internal = _is_set(params, "internal")
+        part = self._slice(extent, params) if header.has_window else Slice(extent.run.run_id)
+        result = run_query(connection, header, {}, part, internal=internal)
         return encode(
             result.to_arrow(),
             meta={
@@ -217,42 +192,46 @@ class Pages:
                 "description": header.description,
                 "notes": result.notes,
                 "columns": {column.name: column.description for column in header.columns},
-                "command": shlex.join(
-                    [
-                        "msgflow",
-                        "query",
-                        *header.words.split(),
-                        *window_words(window),
-                        "--run",
-                        extent.run.name,
-                    ]
-                ),
+                "command": _command(name, extent, part, internal=internal),
             },
             origin_ns=extent.origin_ns,
             units=result.units,
         )
 
+    def _warm_up(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
+        extent = self.extent(connection, params)
+        skipped_ns = round(warm_up(connection, extent.run) * 1e9)
+        return encode(pa.table({"skipped": [skipped_ns]}), units={"skipped": "ns"})
+
     def summary(
-        self, connection: duckdb.DuckDBPyConnection, extent: Extent, part: str, through: str = ""
+        self,
+        connection: duckdb.DuckDBPyConnection,
+        extent: Extent,
+        name: str,
+        through: str = "",
+        params: Params | None = None,
     ) -> Section:
         """Return a section of the summary: 'paths', 'blame', 'drops' or 'threads'.
 
         Args:
             connection: to the database, of this thread alone.
             extent: the run.
-            part: name of the section.
+            name: of the section.
             through: of 'blame' only paths with this text in them.
+            params: as the page gives them; their window counts.
 
         Raises:
             UsageError: there is no such section.
             QueryError: the database could not run it.
         """
-        if part not in SUMMARY:
-            raise UsageError(f"the summary has no such section — {part}")
-        if part != "blame":
-            return query_section(connection, extent.run, self._window, part)
+        if name not in SUMMARY:
+            raise UsageError(f"the summary has no such section — {name}")
+        part = self._part(extent, params or {})
+        if name != "blame":
+            return query_section(connection, extent.run, part, name)
         self.fill_flows(connection, extent)
-        flows = self.ask("path_slowest", {"run": extent.run.run_id, "limit": 1})
+        values = _window_of_flows(params or {})
+        flows = self.ask("path_slowest", {"run": extent.run.run_id, "limit": 1} | values)
         rows = run_page_query(connection, "path", {"run": extent.run.run_id}).to_pylist()
         topics = {row["path_id"]: row["topics"] for row in rows if through in row["path"]}
         order = [("latency", "descending"), ("path_id", "ascending")]
@@ -263,11 +242,11 @@ class Pages:
             if (names := topics.get(flow["path_id"])) and flow["take_id"] is not None
         }
         slowest = list(reversed(chosen.values()))[:MOST_PATHS]
-        return blame_section(connection, extent.run, self._window, slowest)
+        return blame_section(connection, extent.run, part, slowest)
 
     def _summary(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
         extent = self.extent(connection, params)
-        section = self.summary(connection, extent, str(params.get("part")))
+        section = self.summary(connection, extent, str(params.get("part")), params=params)
         return encoded_section(section, extent.origin_ns)
 
     def _area(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
@@ -278,8 +257,8 @@ class Pages:
             of = None
         if not isinstance(of, list) or not all(isinstance(one, str | int) for one in of):
             raise UsageError(f"sums are of a list of names or identities — {params.get('of')}")
-        window = self.window(extent, params)
-        section = area_section(connection, extent.run, window, str(params.get("part")), of)
+        part = self._part(extent, params)
+        section = area_section(connection, extent.run, part, str(params.get("part")), of)
         return encoded_section(section, extent.origin_ns)
 
     def _critical(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
@@ -387,12 +366,16 @@ class Pages:
         extent = self.extent(connection, params)
         values = extent.frame(self.window(extent, params))
         table = run_page_query(connection, name, values | _own(name, params, values))
-        return encode(table, units=_units(name))
+        meta = {}
+        if name in _LISTED_BY:
+            part, internal = self._slice(extent, params), _is_set(params, "internal")
+            meta["command"] = _command(_LISTED_BY[name], extent, part, internal=internal)
+        return encode(table, meta=meta, units=_units(name))
 
     def _of_path(self, connection: duckdb.DuckDBPyConnection, name: str, params: Params) -> bytes:
         extent = self.extent(connection, params)
         self.fill_flows(connection, extent)
-        values: Params = {"run": extent.run.run_id}
+        values: Params = {"run": extent.run.run_id} | _window_of_flows(params)
         table = self._scratch.ask(name, values | _own(name, params, values))
         return encode(table, units=_units(name))
 
@@ -408,17 +391,56 @@ ANSWERS: dict[str, Callable[[Pages, duckdb.DuckDBPyConnection, Params], bytes]] 
     "links": Pages._links,
     "flow": Pages._flow,
     "critical": Pages._critical,
+    "warm_up": Pages._warm_up,
 }
 """Methods of the answers that are no plain page query, by name."""
 
 # Sections of the summary that need nothing but the run.
 SUMMARY = ("paths", "blame", "drops", "threads")
-_PLAIN = ("row", "gap", "path", "executor_share", "executor_node", "neighbour")
+_PLAIN = (
+    "row", "gap", "path", "executor_share", "executor_node", "neighbour", "rate", "callback",
+    "callback_point", "callback_slowest", "topic_point", "topic_slowest", "service_point",
+    "service_slowest", "loss", "loss_point",
+)  # fmt: skip
+# Named queries that list one by one what a page query counts.
+_LISTED_BY = {"loss": "topics-unmatched"}
 _OF_PATH = ("path_histogram", "path_share", "path_point", "path_slowest")
 
 
 def _units(name: str) -> dict[str, str]:
     return {column.name: column.unit for column in page_query(name).columns if column.unit}
+
+
+def _window_of_flows(params: Params) -> Params:
+    """Return the window of page queries on flows: of their roots, None where it is open."""
+    names = {"start": "begin_at", "end": "end_at"}
+    return {name: _whole(params, end) if end in params else None for end, name in names.items()}
+
+
+def _is_set(params: Params, name: str) -> bool:
+    return str(params.get(name, "")) not in ("", "0", "False")
+
+
+def _command(name: str, extent: Extent, part: Slice, *, internal: bool) -> str:
+    """Return the command that prints the rows of a named query, as the page shows them."""
+    words = ["msgflow", "query", *load_query(name).words.split(), "--run", extent.run.name]
+    return shlex.join(words + _window_options(extent, part) + ["--internal"] * internal)
+
+
+def _window_options(extent: Extent, part: Slice) -> list[str]:
+    """Return the options that choose the window of a slice, as offsets in seconds."""
+    ends = {"--start": part.start, "--end": part.end}
+    return [
+        word
+        for option, time_ns in ends.items()
+        if time_ns is not None
+        for word in (option, _seconds(int(time_ns) - extent.origin_ns))
+    ]
+
+
+def _seconds(offset_ns: int) -> str:
+    whole, rest = divmod(max(offset_ns, 0), 1_000_000_000)
+    return f"{whole}.{rest:09d}".rstrip("0").rstrip(".") + "s"
 
 
 def _kind(params: Params) -> str:

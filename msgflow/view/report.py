@@ -16,7 +16,9 @@ from pyarrow import compute
 from msgflow.atomic import replacing
 from msgflow.db.finding import read_findings
 from msgflow.errors import UsageError
+from msgflow.query.catalogue import load_query
 from msgflow.query.compare import compare as compare_runs
+from msgflow.query.runner import run_query
 from msgflow.run.slice import Slice
 from msgflow.run.window import WHOLE, Window
 from msgflow.text.values import format_duration
@@ -47,6 +49,15 @@ if TYPE_CHECKING:
 MARKDOWN = ".md"
 # Pictures of at most so many paths: of those with the slowest flows.
 MOST_PATHS = 200
+# Panels of at most so many callbacks, topics and clients.
+MOST_PANELS = 200
+# A named query whose rows open panels, the column that tells them apart, the parameter of it in
+# page queries, and these.
+_PANELS = (
+    ("callbacks", "callback_id", "callback", ("callback_point", "callback_slowest")),
+    ("topics-summary", "topic_name", "topic", ("topic_point", "topic_slowest")),
+    ("service-latency", "client_id", "client", ("service_point", "service_slowest")),
+)
 # The report has the critical paths of so many flows, the slowest ones.
 MOST_CRITICAL = 6
 # Estimate: bytes of a bar with its links in the file, compressed.
@@ -158,8 +169,12 @@ class _Maker:
         self.keep("finding")
         for name in NAMED:
             self.keep("query", name=name)
-        for name in ("row", "gap", "path", "executor_node", "executor_share"):
+        for name in (
+            "row", "gap", "path", "executor_node", "executor_share", "callback", "loss",
+            "loss_point",
+        ):  # fmt: skip
             self.keep(name)
+        self.panels()
         self.progress("paths")
         chosen = self.paths()
         comparison = None
@@ -229,13 +244,35 @@ class _Maker:
 
     def absent(self, other: Run | None) -> list[str]:
         """Return the pages that would show nothing."""
-        needed = {"paths": "path", "executors": "executor_node", "graph": "row", "timeline": "row"}
+        needed = {
+            "paths": "path", "executors": "executor_node", "graph": "row", "timeline": "row",
+            "losses": "loss", "nodes": "callback",
+        }  # fmt: skip
         empty = [
             page
             for page, name in needed.items()
             if not run_page_query(self.connection, name, {"run": self.extent.run.run_id}).num_rows
         ]
+        named = {
+            "topics": ("topics-summary",),
+            "timers": ("timers",),
+            "services": ("service-latency", "action-latency"),
+        }
+        empty += [page for page, names in named.items() if not any(map(self._row_count, names))]
         return [*empty, *([] if other else ["compare"])]
+
+    def _row_count(self, name: str) -> int:
+        part = Slice(self.extent.run.run_id)
+        return len(run_query(self.connection, load_query(name), {}, part))
+
+    def panels(self) -> None:
+        """Keep what callbacks, topics and services did over time: of the first ones of each."""
+        for query, column, key, names in _PANELS:
+            table = run_query(self.connection, load_query(query), {}, Slice(self.extent.run.run_id))
+            for value in dict.fromkeys(table.to_arrow()[column].to_pylist()[:MOST_PANELS]):
+                given = {} if value is None else {key: value}
+                for name in names:
+                    self.keep(name, **given)
 
     def other(self, compare: str | int) -> Run:
         """Return the run to compare with."""

@@ -17,8 +17,6 @@ from msgflow.query.catalogue import load_query
 from msgflow.query.result import QueryResult
 from msgflow.query.runner import run_query
 from msgflow.query.selection import Selection
-from msgflow.run.slice import Slice
-from msgflow.run.window import WHOLE, Window
 from msgflow.sql.quoting import literal
 
 if TYPE_CHECKING:
@@ -28,6 +26,7 @@ if TYPE_CHECKING:
 
     from msgflow.query.compare import Comparison
     from msgflow.run.choice import Run
+    from msgflow.run.slice import Slice
     from msgflow.sql.value import Value
     from msgflow.verify import Verification
 
@@ -118,22 +117,21 @@ class Section:
         return _WHEN_EMPTY[self.name]
 
 
-def window_words(window: Window) -> list[str]:
-    """Return the options that choose the window, none for a whole run."""
-    start = ["--start", str(window.start_ns)] if window.start_ns != WHOLE.start_ns else []
-    end = ["--end", str(window.end_ns)] if window.end_ns != WHOLE.end_ns else []
-    return start + end
+@dataclass(frozen=True)
+class Part:
+    """The run and the window that a section is about.
 
+    Attributes:
+        slice: as queries read it.
+        options: of the command line, which choose the same window.
+    """
 
-def slice_of(run: Run, window: Window) -> Slice:
-    """Return the run and the window as a part to read."""
-    start = None if window.start_ns == WHOLE.start_ns else window.start_ns
-    end = None if window.end_ns == WHOLE.end_ns else window.end_ns
-    return Slice(run.run_id, start, end)
+    slice: Slice
+    options: Sequence[str] = ()
 
 
 def query_section(
-    connection: duckdb.DuckDBPyConnection, run: Run, window: Window, name: str
+    connection: duckdb.DuckDBPyConnection, run: Run, part: Part, name: str
 ) -> Section:
     """Return 'paths', 'drops' or 'threads' of a run.
 
@@ -142,17 +140,17 @@ def query_section(
     """
     query, selection = _QUERIES[name]
     header = load_query(query)
-    result = run_query(connection, header, {}, slice_of(run, window), selection=selection)
+    result = run_query(connection, header, {}, part.slice, selection=selection)
     words = ["msgflow", "query", *header.words.split(), "--where", selection.where or ""]
     words += ["--sort", *selection.sort, "--limit", str(selection.limit)]
-    command = shlex.join([*words, *window_words(window), "--run", run.name])
+    command = shlex.join([*words, *part.options, "--run", run.name])
     return Section(name, result, (command,))
 
 
 def area_section(
     connection: duckdb.DuckDBPyConnection,
     run: Run,
-    window: Window,
+    part: Part,
     name: str,
     of: Sequence[str | int],
 ) -> Section:
@@ -161,7 +159,7 @@ def area_section(
     Args:
         connection: to a database with the public views.
         run: the run.
-        window: the times.
+        part: the times.
         name: 'callbacks' of nodes, or 'usage' of threads.
         of: names of the nodes, or identities of the threads.
 
@@ -177,16 +175,16 @@ def area_section(
     where = f"{column} IN ({wanted})"
     header = load_query(query)
     selection = Selection(where=where, sort=(sort,))
-    result = run_query(connection, header, {}, slice_of(run, window), selection=selection)
+    result = run_query(connection, header, {}, part.slice, selection=selection)
     words = ["msgflow", "query", *header.words.split(), "--where", where, "--sort", sort]
-    command = shlex.join([*words, *window_words(window), "--run", run.name])
+    command = shlex.join([*words, *part.options, "--run", run.name])
     return Section(name, result, (command,))
 
 
 def blame_section(
     connection: duckdb.DuckDBPyConnection,
     run: Run,
-    window: Window,
+    part: Part,
     flows: Sequence[tuple[str, str, int]],
 ) -> Section:
     """Return how long each node took of each flow, the slowest flow first.
@@ -194,7 +192,7 @@ def blame_section(
     Args:
         connection: to a database with the public views.
         run: the run.
-        window: of the beginnings of flows.
+        part: the times of the beginnings of flows.
         flows: of each its first topic, its last one and its take_id, the slowest first.
 
     Raises:
@@ -204,13 +202,13 @@ def blame_section(
     results, commands = [], []
     for rank, (first, last, take) in enumerate(flows, 1):
         given: dict[str, Value] = {"from": first, "to": last, "take": take, "by": "node"}
-        result = run_query(connection, header, given, slice_of(run, window))
+        result = run_query(connection, header, given, part.slice)
         table = result.table
         ranks = pa.array([rank] * len(result), pa.int64())
         results.append(table.set_column(table.column_names.index("rank"), "rank", ranks))
         options = [word for name, value in given.items() for word in (f"--{name}", str(value))]
         commands.append(
-            shlex.join(["msgflow", "query", "critical-path", *options, *window_words(window),
+            shlex.join(["msgflow", "query", "critical-path", *options, *part.options,
                         "--run", run.name])
         )  # fmt: skip
     if not results:

@@ -51,7 +51,7 @@ from msgflow.query.runner import run_query
 from msgflow.run.slice import Slice
 from msgflow.sql.statement import internal_sql
 from msgflow.view.page_query import run_page_query
-from msgflow.view.pages import Scratch
+from msgflow.view.scratch import Scratch
 
 Rows = list[list[str | None]]
 

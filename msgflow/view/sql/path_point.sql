@@ -6,6 +6,8 @@
 -- param: run BIGINT  Run
 -- param: path BIGINT  Number of the path
 -- param: limit BIGINT = 2000  Most rows
+-- param: begin_at BIGINT = NULL  Only flows that began at this time or later, ns since origin
+-- param: end_at BIGINT = NULL  Only flows that began before this time, ns since origin
 -- column: root_at BIGINT [ns since origin]  Start of the root
 -- column: root_kind VARCHAR  'callback_instance' or 'publication'
 -- column: root_id BIGINT  Identity of the root
@@ -22,7 +24,10 @@ WITH numbered AS (
         min(root_at) OVER () AS first_at,
         max(root_at) OVER () AS last_at
     FROM flow
-    WHERE run_id = $run AND path_id = $path
+    WHERE run_id = $run
+        AND path_id = $path
+        AND ($begin_at IS NULL OR root_at >= $begin_at)
+        AND ($end_at IS NULL OR root_at < $end_at)
 )
 SELECT
     arg_max(root_at, coalesce(latency, -1)) AS root_at,

@@ -5,6 +5,8 @@
 -- param: run BIGINT  Run
 -- param: path BIGINT = NULL  Number of the path; every one when NULL
 -- param: limit BIGINT = 10  Most flows of a path
+-- param: begin_at BIGINT = NULL  Only flows that began at this time or later, ns since origin
+-- param: end_at BIGINT = NULL  Only flows that began before this time, ns since origin
 -- column: path_id BIGINT  Number of the path
 -- column: root_at BIGINT [ns since origin]  Start of the root
 -- column: root_kind VARCHAR  'callback_instance' or 'publication'
@@ -13,7 +15,11 @@
 -- column: latency BIGINT [ns]  Latency
 SELECT path_id, root_at, root_kind, root_id, take_id, latency
 FROM flow
-WHERE run_id = $run AND latency IS NOT NULL AND ($path IS NULL OR path_id = $path)
+WHERE run_id = $run
+    AND latency IS NOT NULL
+    AND ($path IS NULL OR path_id = $path)
+    AND ($begin_at IS NULL OR root_at >= $begin_at)
+    AND ($end_at IS NULL OR root_at < $end_at)
 QUALIFY row_number() OVER (
     PARTITION BY path_id ORDER BY latency DESC, root_at, root_kind, root_id
 ) <= $limit

@@ -18,6 +18,16 @@ export function address(changes) {
   return `#/${page}${text ? `?${text}` : ""}`;
 }
 
+// What holds on all pages: the run, the window of time, and whether rows of ROS itself are shown.
+const KEPT = ["run", "start", "end", "internal"];
+
+// The address of another page: of what is shown now, only that remains which holds on all pages.
+export function pageAddress(page, values = {}) {
+  const known = current();
+  const cleared = Object.fromEntries(Object.keys(known).filter((name) => !KEPT.includes(name)).map((name) => [name, null]));
+  return address({ ...cleared, page, ...values });
+}
+
 export function go(changes) {
   location.hash = address(changes);
 }

@@ -1,7 +1,7 @@
 // The application: it chooses where data come from, and shows the page of the address.
 
 import { h, clear, color } from "./dom.js";
-import { address, current, go, onChange } from "./address.js";
+import { address, current, go, onChange, pageAddress } from "./address.js";
 import { embedded } from "./report_data.js";
 import { decode, records } from "./table_decoding.js";
 import { OverviewPage } from "./overview.js";
@@ -9,6 +9,12 @@ import { PathsPage } from "./paths.js";
 import { TimelinePage } from "./timeline.js";
 import { GraphPage } from "./graph.js";
 import { ExecutorsPage } from "./executors.js";
+import { NodesPage } from "./nodes.js";
+import { TopicsPage } from "./topics.js";
+import { TimersPage } from "./timers.js";
+import { ServicesPage } from "./services.js";
+import { LossesPage } from "./losses.js";
+import { Bar } from "./bar.js";
 import { ComparePage } from "./compare.js";
 import { LakePage } from "./lake.js";
 import { failed, waiting } from "./notice.js";
@@ -18,6 +24,11 @@ const PAGES = {
   paths: ["Paths", PathsPage],
   timeline: ["Timeline", TimelinePage],
   graph: ["Graph", GraphPage],
+  nodes: ["Nodes", NodesPage],
+  topics: ["Topics", TopicsPage],
+  timers: ["Timers", TimersPage],
+  services: ["Services", ServicesPage],
+  losses: ["Losses", LossesPage],
   executors: ["Executors", ExecutorsPage],
   compare: ["Compare", ComparePage],
   lake: ["Lake", LakePage],
@@ -95,18 +106,42 @@ class App {
     return this.source.fetch(name, { run: this.run.run_id, ...params }, signal);
   }
 
+  // The window of time that holds on all pages, in nanoseconds since the begin of the run; without
+  // the ends that nobody chose. A report has one of its own, which its data are of.
+  get window() {
+    if (!this.source.isServed) return {};
+    const { start, end } = current();
+    const ends = { start: whole(start), end: whole(end) };
+    return Object.fromEntries(Object.entries(ends).filter(([, at]) => at !== null));
+  }
+
+  get internal() {
+    return this.source.isServed && current().internal === "1";
+  }
+
+  // Where the window begins and ends on the time axis of a page.
+  get extent() {
+    const { start = 0, end = this.run.length + 1 } = this.window;
+    return { start, end };
+  }
+
+  inWindow(name, params = {}, signal = undefined) {
+    return this.fetch(name, { ...this.window, ...params }, signal);
+  }
+
   query(name, params = {}) {
-    return this.fetch("query", { name, ...params });
+    return this.inWindow("query", { name, internal: this.internal ? 1 : null, ...params });
   }
 
   header() {
     const runs = this.runs.length > 1
-      ? h("select", { "aria-label": "run", on: { change: (event) => go({ page: current().page, run: event.target.value, from: null, to: null, flow: null, path: null, hide: null, pin: null }) } },
+      ? h("select", { "aria-label": "run", on: { change: (event) => { location.hash = pageAddress(current().page, { run: event.target.value, start: null, end: null }); } } },
         this.runs.map((run) => h("option", { value: String(run.run_id), selected: run === this.run }, run.name)))
       : h("span", { className: "run-name" }, this.run?.name ?? "no run");
     this.tabs = Object.entries(this.pages).map(([page, [title]]) => ({ page, link: h("a", {}, title) }));
     const theme = h("button", { type: "button", className: "theme", title: "light or dark", "aria-label": "light or dark", on: { click: () => this.theme() } }, "◐");
     clear(this.nav, h("span", { className: "brand" }, "msgflow"), runs, h("span", { className: "tabs" }, this.tabs.map(({ link }) => link)), theme);
+    if (!this.source.pages) this.bar = new Bar(this, document.querySelector(".bar"));
     const said = document.querySelector(".said");
     if (this.source.notes.length) clear(said, this.source.notes.map((text) => h("p", {}, text)));
   }
@@ -119,9 +154,10 @@ class App {
   }
 
   linksMoved() {
-    const { page, run } = current();
+    const { page } = current();
+    this.bar?.update();
     for (const { page: name, link } of this.tabs) {
-      link.href = name === page ? address({}) : `#/${name}${run ? `?run=${encodeURIComponent(run)}` : ""}`;
+      link.href = name === page ? address({}) : pageAddress(name);
       if (name === page) {
         link.setAttribute("aria-current", "page");
         // Not all tabs fit on a phone.
@@ -166,6 +202,10 @@ class App {
     this.steps.push(milliseconds);
     if (this.steps.length === 1) document.documentElement.dataset.painted = String(performance.now());
   }
+}
+
+function whole(text) {
+  return text && /^\d{1,18}$/.test(text) ? Number(text) : null;
 }
 
 const LACKING = [

@@ -2,12 +2,14 @@
 
 import { h, color } from "./dom.js";
 import { duration } from "./labels.js";
+import { downloads } from "./download.js";
 
 const drawn = new Set();
 
-// Series: {label, color, values, width, points, fill, paths, stepped}; x: numbers.
+// Series: {label, color, values, width, points, fill, paths, stepped, isJoined (over
+// what is missing)}; x: numbers.
 // Options: height, xFormat, yFormat, title, onClick(index), xLabel, yLabel, legend (false: none),
-// xAxis (more of what uPlot takes for the axis).
+// xAxis (more of what uPlot takes for the axis), xName (of the first column of its CSV).
 export function chart(x, series, options = {}) {
   const frame = h("div", { className: "chart", role: "img", "aria-label": options.title ?? "chart" });
   const place = { frame, plot: null };
@@ -26,7 +28,7 @@ export function chart(x, series, options = {}) {
       scales: { x: { time: false }, y: { range: (_, low, high) => [Math.min(0, low ?? 0), (high ?? 1) * 1.05 || 1] } },
       axes: [axis(options.xFormat ?? String, options.xLabel, 44, options.xAxis), axis(options.yFormat ?? duration, options.yLabel, 74)],
       series: [{}, ...series.map((one) => ({
-        label: one.label, stroke: color(one.color), width: one.width ?? 1.5, spanGaps: false,
+        label: one.label, stroke: color(one.color), width: one.width ?? 1.5, spanGaps: Boolean(one.isJoined),
         fill: one.fill ? alpha(color(one.color), 0.35) : undefined,
         points: { show: Boolean(one.points), size: 5, fill: color(one.color), stroke: color(one.color) },
         paths: one.points ? () => null : one.bars ? globalThis.uPlot.paths.bars({ size: [1, Infinity], align: 1 })
@@ -45,7 +47,10 @@ export function chart(x, series, options = {}) {
   place.draw = draw;
   drawn.add(place);
   requestAnimationFrame(draw);
-  return frame;
+  return h("div", { className: "chart-frame" }, frame, downloads({
+    name: options.title ?? "chart", canvases: () => [...frame.querySelectorAll("canvas")],
+    columns: () => [[options.xName ?? "x", x], ...series.map((one) => [one.label, one.values])],
+  }));
 }
 
 function alpha(text, share) {

@@ -108,7 +108,7 @@ export class ComparePage {
       const values = (side) => { if (!side?.rows) return x.map(() => null); let at = 0; return x.map((latency) => { while (at < side.rows && side.latency[at] <= latency) at++; return at ? side.share[at - 1] : 0; }); };
       clear(this.picture, h("h3", { className: "path-title" }, subject), h("p", { className: "soft" }, "Share of the flows that took no longer, of both runs."),
         chart(x, [{ label: `A: ${this.other.name}`, color: "second", values: values(sides[0]), stepped: true, dash: [6, 3], width: 2 }, { label: `B: ${this.app.run.name}`, color: "timer", values: values(sides[1]), stepped: true, width: 2 }],
-          { xFormat: duration, yFormat: (value) => percent(value, 0), height: 300, title: "distributions of both runs" }),
+          { xFormat: duration, yFormat: (value) => percent(value, 0), height: 300, title: "distributions of both runs", xName: "latency [ns]" }),
         besides("as a table", ["A", "B"].map((name, place) => (sides[place] ? [h("h4", {}, name), dataTable(sides[place], { label: `distribution of ${name}` })] : h("p", {}, `not in ${name}`)))));
     } catch (error) {
       clear(this.picture, failed(error));

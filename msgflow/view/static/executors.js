@@ -2,8 +2,9 @@
 
 import { h, clear, color } from "./dom.js";
 import { count, duration, moment, percent } from "./labels.js";
-import { address } from "./address.js";
+import { pageAddress } from "./address.js";
 import { dataTable, besides } from "./table.js";
+import { downloads } from "./download.js";
 import { command, failed, notes, waiting } from "./notice.js";
 import { fill, section } from "./overview.js";
 
@@ -28,10 +29,11 @@ export class ExecutorsPage {
     clear(this.root, over.root, blame.root, waits.root);
     await Promise.all([
       fill(over, async () => {
-        const [usage, shares] = await Promise.all([app.query("executor-usage"), app.fetch("executor_share")]);
+        const [usage, shares] = await Promise.all([app.query("executor-usage"), app.inWindow("executor_share")]);
         this.strips = { usage, shares, places: [] };
         if (!usage.rows) return h("p", {}, "No executor is known: the trace has no callbacks.");
-        const ticks = [0, 0.25, 0.5, 0.75, 1].map((share) => h("span", {}, duration(share * this.app.run.length)));
+        const { extent } = app;
+        const ticks = [0, 0.25, 0.5, 0.75, 1].map((share) => h("span", {}, duration(extent.start + share * (extent.end - extent.start))));
         const list = h("div", { className: "strips" },
           h("div", { className: "strip-row strip-axis" }, h("div", {}, "since the begin of the run"), h("div", { className: "axis" }, ticks)));
         for (let row = 0; row < usage.rows; row++) {
@@ -46,6 +48,8 @@ export class ExecutorsPage {
           h("div", { className: "legend" }, ACTIVITIES.map(([, shade, text]) =>
             h("span", { className: "legend-item" }, h("span", { className: `swatch color-${shade}` }), text))),
           list,
+          downloads({ name: "what executor threads did", canvases: () => this.strips.places.map(({ canvas }) => canvas),
+            columns: () => [["thread_id", shares.thread_id], ["start_at [ns since begin of run]", shares.start_at], ["length [ns]", shares.length], ["activity", shares.activity], ["busy [ns]", shares.busy]] }),
           besides("as a table", dataTable(usage, { label: "executor threads", columns: ["host", "process", "pid", "tid", "executor_kind", "seen_ns", "wait_ns", "select_ns", "take_ns", "callback_ns", "blocked_ns", "unknown_ns", "callbacks", "callback_share"] })),
           notes(usage.meta.notes), command(usage.meta.command)];
       }),
@@ -75,7 +79,8 @@ export class ExecutorsPage {
       if (!byThread.has(thread)) byThread.set(thread, []);
       byThread.get(thread).push(row);
     }
-    const whole = this.app.run.length || 1;
+    const { start, end } = this.app.extent;
+    const whole = end - start || 1;
     for (const { canvas, thread } of places) {
       const ratio = devicePixelRatio || 1;
       const box = canvas.getBoundingClientRect();
@@ -92,7 +97,7 @@ export class ExecutorsPage {
         context.fillStyle = color(shade);
         for (const row of rows) {
           if (shares.activity[row] !== activity) continue;
-          const x = (shares.start_at[row] / whole) * box.width;
+          const x = ((shares.start_at[row] - start) / whole) * box.width;
           const width = Math.max((shares.length[row] / whole) * box.width, 1) + 0.3;
           const below = filled.get(shares.start_at[row]) ?? 0;
           const high = (shares.busy[row] / shares.length[row]) * box.height;
@@ -101,8 +106,8 @@ export class ExecutorsPage {
         }
       }
       canvas.onclick = (event) => {
-        const at = (event.offsetX / box.width) * whole;
-        location.hash = address({ page: "timeline", from: Math.max(0, Math.round(at - whole / 100)), to: Math.round(at + whole / 100), flow: null });
+        const at = start + (event.offsetX / box.width) * whole;
+        location.hash = pageAddress("timeline", { from: Math.max(0, Math.round(at - whole / 100)), to: Math.round(at + whole / 100) });
       };
     }
   }

@@ -26,7 +26,7 @@ export const LINK_CODES = ["transport", "direct", "periodic_async", "partial_syn
 const TITLES = {
   run_id: "run", roots: "flows", loss_affected: "touched by losses",
   sink_event: "ends with", is_cut: "search cut", what: "what",
-  topic_name: "topic", is_loss_affected: "touched by losses", rate_hz: "rate",
+  topic_name: "topic", service_name: "service", action_name: "action", is_loss_affected: "touched by losses", rate_hz: "rate",
   callback_share: "busy", orphans: "takes without publication", cliffs_delta: "Cliff's delta",
   start_at: "begin", length: "duration", a_ns: "A", b_ns: "B",
   difference_ns: "B − A", change_percent: "change", low_ns: "95 % interval, from", high_ns: "to",
@@ -37,6 +37,8 @@ const TITLES = {
   busy_worst_ns: "busy, longest", busy_total_min_ns: "busy in all, at least", busy_total_max_ns: "busy in all, at most",
   meanwhile_node: "kept waiting by", meanwhile_callback: "its callback", overlap_min_ns: "ran meanwhile, at least",
   overlap_max_ns: "ran meanwhile, at most", worst_ns: "longest", a_share: "share in A", b_share: "share in B",
+  open: "not seen to end", period_deviation_ns: "jitter", first_at: "first", last_at: "last", taken_at: "taken at", subscriber: "received by",
+  not_taken: "not taken", busy_share: "executor busy", callback_instance_id: "callback instance", request_id: "request", take_id: "take",
   usual_ns: "usual median", at_ns: "begin in the run", value: "value", to_open_it: "opens with", worst_run: "run with most", cure: "what to do",
 };
 
@@ -103,6 +105,23 @@ export function moment(at) {
   const whole = Math.floor(Math.abs(at) / 1e9);
   const rest = Math.round(Math.abs(at) - whole * 1e9).toString().padStart(9, "0");
   return `${negative ? "−" : ""}${whole}.${rest.slice(0, 3)} ${rest.slice(3, 6)} ${rest.slice(6)} s`;
+}
+
+// A point in time as the command line takes it: seconds, all digits, without those that are zero.
+export function secondsText(at) {
+  const whole = Math.floor(at / 1e9);
+  const rest = Math.round(at - whole * 1e9).toString().padStart(9, "0").replace(/0+$/, "");
+  return rest ? `${whole}.${rest}` : String(whole);
+}
+
+// At the axis of a chart over time.
+export const momentAxis = (at) => `${+(at / 1e9).toFixed(6)} s`;
+
+// What secondsText writes, or a number with another unit, in nanoseconds; undefined: neither.
+const SIZES = { "": 1e9, s: 1e9, ms: 1e6, "µs": 1e3, us: 1e3, ns: 1, min: 60e9 };
+export function momentOf(text) {
+  const found = /^\s*(\d{1,18}(?:\.\d{1,9})?)\s*(|s|ms|µs|us|ns|min)\s*$/.exec(text);
+  return found ? Math.round(Number(found[1]) * SIZES[found[2]]) : undefined;
 }
 
 export function count(number, thing) {

@@ -23,6 +23,11 @@ export function command(text) {
   return text ? h("p", { className: "command" }, "the same numbers: ", h("code", {}, text)) : null;
 }
 
+// The commands of several tables, those that the numbers of a page come from.
+export function commands(tables) {
+  return tables.map((table) => command(table.meta.command));
+}
+
 // A text as one word of a shell, and as a text in SQL.
 export const quoted = (text) => `'${text.replaceAll("'", `'"'"'`)}'`;
 export const sqlText = (text) => `'${text.replaceAll("'", "''")}'`;

@@ -68,7 +68,7 @@ export class PathsPage {
     const path = this.ids[row];
     const begin = this.paths.topics[this.paths.path_id.indexOf(path)][0];
     const [histogram, shares, points, slowest] = await Promise.all(
-      ["path_histogram", "path_share", "path_point", "path_slowest"].map((name) => app.fetch(name, { path })));
+      ["path_histogram", "path_share", "path_point", "path_slowest"].map((name) => app.inWindow(name, { path })));
     const parts = h("div", {}, waiting("taking the latency apart …"));
     app.query("path-breakdown").then((breakdown) => clear(parts, this.breakdown(breakdown, path, table.path[row])))
       .catch((error) => clear(parts, failed(error)));
@@ -81,15 +81,15 @@ export class PathsPage {
         h("section", {}, h("h3", {}, "Latency over time"),
           h("p", { className: "soft" }, points.rows && points.count.some((n) => n > 1) ? `The slowest flow of each of ${points.rows} pieces of time, and the median of the piece. Click a point to see its flow.` : "Click a point to see its flow."),
           chart(Array.from(points.root_at), pointSeries(points), {
-            xFormat: (value) => `${+(value / 1e9).toFixed(6)} s`, title: "latency over time", onClick: (at) => { location.hash = toFlow(points, at); } }),
+            xFormat: (value) => `${+(value / 1e9).toFixed(6)} s`, title: "latency over time", xName: "began at [ns since begin of run]", onClick: (at) => { location.hash = toFlow(points, at); } }),
           besides("as a table", dataTable(points, { columns: ["root_at", "latency", "median", "count", "missing"], label: "latency over time", onPick: (at) => { location.hash = toFlow(points, at); } }))),
         h("section", {}, h("h3", {}, "Histogram"),
           chart(bins.low, [{ label: "flows", color: "timer", values: bins.count, bars: true, fill: true }],
-            { xFormat: duration, yFormat: (value) => value.toLocaleString("en-US"), title: "histogram of the latency" }),
+            { xFormat: duration, yFormat: (value) => value.toLocaleString("en-US"), title: "histogram of the latency", xName: "at least [ns]" }),
           besides("as a table", dataTable(histogram, { columns: ["low", "width", "count"], label: "histogram" }))),
         h("section", {}, h("h3", {}, "Share of the flows that took no longer"),
           chart(Array.from(shares.latency), [{ label: "share", color: "timer", values: Array.from(shares.share), stepped: true }],
-            { xFormat: duration, yFormat: (value) => percent(value, 0), title: "distribution of the latency" }),
+            { xFormat: duration, yFormat: (value) => percent(value, 0), title: "distribution of the latency", xName: "latency [ns]" }),
           besides("as a table", dataTable(shares, { label: "distribution" }))),
         h("section", {}, h("h3", {}, "Slowest flows"),
           dataTable(slowest, { columns: ["root_at", "latency"], label: "slowest flows", onPick: (at) => { location.hash = toFlow(slowest, at); } }))) : h("p", {}, "No flow reached the end of this path."),

@@ -9,7 +9,8 @@ const HIDDEN = new Set(["run_id"]);
 
 // Options: columns (names, in order), onPick(row), picked (row), sort, label, shown, order (compares
 // two rows before any column is chosen), once (a column that is left empty below an equal value),
-// doubted (row): its durations are between clocks that are not synchronised.
+// doubted (row): its durations are between clocks that are not synchronised, state (an object that
+// keeps the chosen order while the table is made anew).
 export function dataTable(table, options = {}) {
   const described = table.meta?.columns ?? {};
   const names = options.columns ?? table.columns.map((column) => column.name)
@@ -19,7 +20,8 @@ export function dataTable(table, options = {}) {
   const order = Array.from({ length: table.rows }, (_, row) => row)
     .filter((row) => !options.only || options.only(row));
   if (options.order) order.sort(options.order);
-  let sort = options.sort ?? null;
+  const state = options.state ?? {};
+  let sort = state.sort ?? options.sort ?? null;
   let shown = options.shown ?? SHOWN;
   const body = h("tbody");
   const more = h("button", { type: "button", className: "more", on: { click: () => { shown *= 10; fill(); } } });
@@ -27,7 +29,7 @@ export function dataTable(table, options = {}) {
     const isNumber = column.type === "integer" || column.type === "double";
     return h("th", { scope: "col", className: isNumber ? "number" : "", title: described[column.name] ?? "" },
       h("button", { type: "button", on: { click: () => {
-        sort = { name: column.name, down: sort?.name === column.name ? !sort.down : isNumber };
+        sort = state.sort = { name: column.name, down: sort?.name === column.name ? !sort.down : isNumber };
         fill();
       } } }, title(column.name)));
   });

@@ -53,8 +53,9 @@ export class TimelinePage {
       h("div", { className: "stage" }, h("div", { className: "canvas-frame" }, this.canvas, this.tooltip), this.side),
       this.minimap.canvas, this.status, this.area, this.legend(), this.beside);
     this.listen();
-    this.setView(number(asked.from, 0), number(asked.to, this.length), false);
-    this.isOpening = !asked.from && !asked.to && !asked.flow;
+    const chosen = this.app.window;
+    this.setView(number(asked.from, chosen.start ?? 0), number(asked.to, chosen.end ?? this.length), false);
+    this.isOpening = !asked.from && !asked.to && !asked.flow && chosen.start === undefined && chosen.end === undefined;
     this.state.query = asked.q ?? "";
     this.search.value = this.state.query;
     this.state.internal = asked.internal === "1";

@@ -1,0 +1,37 @@
+-- name: callback_point
+-- title: A callback over time
+-- description: Instances of a callback by pieces of time, with the longest of each.
+-- grain: one row per piece of time in which an instance began
+-- param: run BIGINT  Run
+-- param: origin_ns BIGINT  What times count from, epoch ns
+-- param: start_ns BIGINT  Begin of the window, epoch ns
+-- param: end_ns BIGINT  Its end, epoch ns, exclusive
+-- param: callback BIGINT  The callback
+-- param: bins BIGINT = 80  Number of pieces
+-- column: start_at BIGINT [ns since origin]  Begin of the piece
+-- column: length BIGINT [ns]  Length of the piece
+-- column: count BIGINT  Instances that began in it
+-- column: median BIGINT [ns]  Median duration; NULL: none was seen to end
+-- column: duration BIGINT [ns]  Longest duration
+-- column: callback_instance_id BIGINT  Instance with the longest duration; the first one if none was
+--     seen to end
+WITH extent AS (
+    SELECT ($end_ns - $start_ns) // $bins + 1 AS width
+)
+SELECT
+    $start_ns - $origin_ns + (i.start_ns - $start_ns) // e.width * e.width AS start_at,
+    e.width AS length,
+    count(*) AS count,
+    quantile_disc(i.end_ns - i.start_ns, 0.5) AS median,
+    max(i.end_ns - i.start_ns) AS duration,
+    arg_max(
+        i.callback_instance_id, (coalesce(i.end_ns - i.start_ns, -1), -i.callback_instance_id)
+    ) AS callback_instance_id
+FROM main.callback_instance AS i
+CROSS JOIN extent AS e
+WHERE i.run_id = $run
+    AND i.callback_id = $callback
+    AND i.start_ns >= $start_ns
+    AND i.start_ns < $end_ns
+GROUP BY ALL
+ORDER BY start_at

@@ -1,0 +1,25 @@
+-- name: callback_slowest
+-- title: Longest instances of a callback
+-- description: The instances of a callback that ran longest, as callbacks --each lists them.
+-- grain: one row per callback instance
+-- param: run BIGINT  Run
+-- param: origin_ns BIGINT  What times count from, epoch ns
+-- param: start_ns BIGINT  Begin of the window, epoch ns
+-- param: end_ns BIGINT  Its end, epoch ns, exclusive
+-- param: callback BIGINT  The callback
+-- param: limit BIGINT = 10  Most rows
+-- column: start_at BIGINT [ns since origin]  When it began
+-- column: duration BIGINT [ns]  How long it ran
+-- column: callback_instance_id BIGINT  Identity of the instance
+SELECT
+    start_ns - $origin_ns AS start_at,
+    end_ns - start_ns AS duration,
+    callback_instance_id
+FROM main.callback_instance
+WHERE run_id = $run
+    AND callback_id = $callback
+    AND start_ns >= $start_ns
+    AND start_ns < $end_ns
+    AND end_ns IS NOT NULL
+ORDER BY end_ns - start_ns DESC, callback_instance_id
+LIMIT $limit

@@ -1,0 +1,42 @@
+-- name: loss
+-- title: Messages that were not taken, and takes without a publication, by reason
+-- description: What `msgflow query topics --measure unmatched` lists one by one, counted by topic,
+--     receiving node and reason.
+-- grain: one row per topic, receiving node, status and reason
+-- param: run BIGINT  Run
+-- param: origin_ns BIGINT  What times count from, epoch ns
+-- param: start_ns BIGINT  Begin of the window, epoch ns
+-- param: end_ns BIGINT  Its end, epoch ns, exclusive
+-- column: topic VARCHAR  Topic
+-- column: subscriber VARCHAR  Node that should have taken, or took
+-- column: status VARCHAR  'dropped', 'lost', 'not_connected', 'unknown' or 'orphan' (a take without
+--     a publication)
+-- column: reason VARCHAR  Why the other side is missing
+-- column: count BIGINT  Messages, or takes
+-- column: first_at BIGINT [ns since origin]  The first of them
+-- column: last_at BIGINT [ns since origin]  The last of them
+-- column: kind VARCHAR  What the first one is: 'publication' or 'take'
+-- column: id BIGINT  Identity of the first one
+-- column: is_internal BOOLEAN  ROS uses the topic for itself
+WITH missing AS (
+    SELECT at_ns, kind, id, subscription_id, process_id, status, reason
+    FROM missing_side
+    WHERE run_id = $run AND at_ns >= $start_ns AND at_ns < $end_ns
+)
+SELECT
+    s.topic_name AS topic,
+    main.node_label(n.full_name, p.name, p.pid) AS subscriber,
+    m.status,
+    m.reason,
+    count(*) AS count,
+    min(m.at_ns) - $origin_ns AS first_at,
+    max(m.at_ns) - $origin_ns AS last_at,
+    m.kind,
+    arg_min(m.id, (m.at_ns, m.id)) AS id,
+    bool_or(coalesce(s.is_internal, false)) AS is_internal
+FROM missing AS m
+LEFT JOIN main.subscription AS s ON m.subscription_id = s.subscription_id
+LEFT JOIN main.node AS n ON s.node_id = n.node_id
+LEFT JOIN main.process AS p ON m.process_id = p.process_id
+GROUP BY ALL
+ORDER BY count DESC, topic, subscriber, m.status, m.reason, id

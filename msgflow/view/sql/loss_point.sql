@@ -1,0 +1,38 @@
+-- name: loss_point
+-- title: Messages that were not taken, and takes without a publication, over time
+-- description: What `msgflow query topics --measure unmatched` lists one by one, counted by pieces
+--     of time, topic and reason.
+-- grain: one row per piece of time, topic and reason
+-- param: run BIGINT  Run
+-- param: origin_ns BIGINT  What times count from, epoch ns
+-- param: start_ns BIGINT  Begin of the window, epoch ns
+-- param: end_ns BIGINT  Its end, epoch ns, exclusive
+-- param: bins BIGINT = 100  Number of pieces
+-- column: start_at BIGINT [ns since origin]  Begin of the piece
+-- column: length BIGINT [ns]  Length of the piece
+-- column: topic VARCHAR  Topic
+-- column: status VARCHAR  As in loss
+-- column: reason VARCHAR  Why the other side is missing
+-- column: count BIGINT  Messages, or takes
+-- column: is_internal BOOLEAN  ROS uses the topic for itself
+WITH missing AS (
+    SELECT at_ns, subscription_id, status, reason
+    FROM missing_side
+    WHERE run_id = $run AND at_ns >= $start_ns AND at_ns < $end_ns
+),
+extent AS (
+    SELECT ($end_ns - $start_ns) // $bins + 1 AS width
+)
+SELECT
+    $start_ns - $origin_ns + (m.at_ns - $start_ns) // e.width * e.width AS start_at,
+    e.width AS length,
+    s.topic_name AS topic,
+    m.status,
+    m.reason,
+    count(*) AS count,
+    coalesce(s.is_internal, false) AS is_internal
+FROM missing AS m
+CROSS JOIN extent AS e
+LEFT JOIN main.subscription AS s ON m.subscription_id = s.subscription_id
+GROUP BY ALL
+ORDER BY start_at, topic, m.status, m.reason, is_internal

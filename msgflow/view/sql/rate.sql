@@ -1,0 +1,32 @@
+-- name: rate
+-- title: How much happened over time
+-- description: Publications, takes and callbacks that began, by pieces of time: the curve on which
+--     a window of time is chosen.
+-- grain: one row per piece of time in which something began
+-- param: run BIGINT  Run
+-- param: origin_ns BIGINT  What times count from, epoch ns
+-- param: start_ns BIGINT  Begin of the window, epoch ns
+-- param: end_ns BIGINT  Its end, epoch ns, exclusive
+-- param: bins BIGINT = 300  Number of pieces
+-- column: start_at BIGINT [ns since origin]  Begin of the piece
+-- column: length BIGINT [ns]  Length of the piece
+-- column: count BIGINT  What began in it
+WITH began AS (
+    SELECT start_ns AS at_ns FROM main.publication WHERE run_id = $run
+    UNION ALL
+    SELECT taken_ns FROM main.take WHERE run_id = $run
+    UNION ALL
+    SELECT start_ns FROM main.callback_instance WHERE run_id = $run
+),
+extent AS (
+    SELECT ($end_ns - $start_ns) // $bins + 1 AS width
+)
+SELECT
+    $start_ns - $origin_ns + (b.at_ns - $start_ns) // e.width * e.width AS start_at,
+    e.width AS length,
+    count(*) AS count
+FROM began AS b
+CROSS JOIN extent AS e
+WHERE b.at_ns >= $start_ns AND b.at_ns < $end_ns
+GROUP BY ALL
+ORDER BY start_at

@@ -1,0 +1,27 @@
+-- name: service_slowest
+-- title: Longest calls of a service
+-- description: The calls of one client of a service with the longest round trip.
+-- grain: one row per request
+-- param: run BIGINT  Run
+-- param: origin_ns BIGINT  What times count from, epoch ns
+-- param: start_ns BIGINT  Begin of the window, epoch ns
+-- param: end_ns BIGINT  Its end, epoch ns, exclusive
+-- param: client BIGINT = NULL  Client that called; NULL: not known
+-- param: limit BIGINT = 10  Most rows
+-- column: start_at BIGINT [ns since origin]  When the request was sent
+-- column: duration BIGINT [ns]  Round trip
+-- column: request_id BIGINT  Identity of the request
+SELECT
+    q.sent_ns - $origin_ns AS start_at,
+    min(r.taken_ns) - q.sent_ns AS duration,
+    q.request_id
+FROM main.request AS q
+JOIN main.response AS r ON q.request_id = r.request_id
+WHERE q.run_id = $run
+    AND q.client_id IS NOT DISTINCT FROM $client
+    AND q.sent_ns >= $start_ns
+    AND q.sent_ns < $end_ns
+    AND r.taken_ns IS NOT NULL
+GROUP BY q.request_id, q.sent_ns
+ORDER BY duration DESC, q.request_id
+LIMIT $limit
