@@ -38,8 +38,8 @@ JOIN staging.thread_tid AS t
     AND w.at_ns < t.until_ns
 UNION ALL
 SELECT
-    t.thread_id, t.tid, w.trace_index, w.event_id, w.at_ns, w.cpu, false, w.prev_priority, w.prev_state,
-    w.next_tid, w.next_comm, w.next_priority
+    t.thread_id, t.tid, w.trace_index, w.event_id, w.at_ns, w.cpu, false,
+    w.prev_priority, w.prev_state, w.next_tid, w.next_comm, w.next_priority
 FROM switch AS w
 JOIN staging.thread_tid AS t
     ON w.clock_key = t.clock_key
