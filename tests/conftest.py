@@ -152,3 +152,12 @@ def shared_traces() -> Path:
     if not path.is_dir():
         pytest.skip("the recorded traces (../shared/traces) are not here")
     return path
+
+
+@pytest.fixture(scope="session")
+def shared_kernel() -> Path:
+    """Recordings with kernel traces, which lie beside the checkout where they are at hand."""
+    path = ROOT.parent / "shared" / "kernel"
+    if not path.is_dir():
+        pytest.skip("the recordings with kernel traces (../shared/kernel) are not here")
+    return path

@@ -221,6 +221,7 @@ def _sources(traces: Sequence[TraceInfo], hostnames: Mapping[int, str]) -> list[
                 trace.begin_ns,
                 trace.end_ns,
                 trace.clock_correction_ns,
+                trace.clock_offset_ns + trace.clock_correction_ns,
             ]
         )
     return rows

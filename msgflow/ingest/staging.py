@@ -54,7 +54,7 @@ _SOURCE_TABLE = """
 CREATE TABLE staging.source (
     trace_index INTEGER, path VARCHAR, uuid VARCHAR, domain VARCHAR, hostname VARCHAR,
     tracer VARCHAR, clock_uuid VARCHAR, clock_key VARCHAR, begin_ns BIGINT, end_ns BIGINT,
-    clock_correction_ns BIGINT
+    clock_correction_ns BIGINT, clock_origin_ns BIGINT
 )
 """
 

@@ -114,7 +114,7 @@ class LayoutMaker:
             [8, 16, 32, 64] + [1, 3, 5, 12, 24, 27, 33, 63] * self.style.bit_packed
         )
         align = self.align_of(size)
-        if self.style.bit_packed and random.random() < 0.3:
+        if random.random() < 0.3:
             align = 1
         big, more = self.style.big_endian, ""
         if not self.style.bit_packed and random.random() < 0.2:

@@ -19,6 +19,7 @@ import pyarrow as pa
 
 from msgflow.ingest import overlapping_traces, staging
 from msgflow.ingest.catalogue import load
+from msgflow.ingest.load import without_thread
 from msgflow.ingest.sequences import Sequences
 from msgflow.trace import COMMON_SCHEMA, PACKET_SCHEMA
 
@@ -43,12 +44,21 @@ class Thread:
 
 @dataclass(frozen=True)
 class Source:
-    """A trace: its host, its clock, its recording unless it is alone, and its path."""
+    """A trace: its host, its clock, its recording unless it is alone, and its path.
+
+    `origin_ns` is when its clock began to count; a tracer that is not of LTTng-UST is the kernel's.
+    """
 
     hostname: str = "alpha"
     clock: str = "boot"
     recording: str | None = None
     path: str | None = None
+    tracer: str = "lttng-ust 2.13.9"
+    origin_ns: int = 0
+
+    @property
+    def domain(self) -> str:
+        return "ust" if self.tracer.startswith("lttng-ust") else "kernel"
 
 
 class StagedEvents:
@@ -104,9 +114,11 @@ class StagedEvents:
         clock: str,
         recording: str | None = None,
         path: str | None = None,
+        tracer: str = Source.tracer,
+        origin_ns: int = 0,
     ) -> None:
         """Add a trace, or change the one there is."""
-        self.sources[trace] = Source(hostname, clock, recording, path)
+        self.sources[trace] = Source(hostname, clock, recording, path, tracer, origin_ns)
 
     def add_packet(
         self,
@@ -156,15 +168,17 @@ class StagedEvents:
         """Fill `raw` and `staging` as reading the traces would."""
         for index, source in sorted(self.sources.items()):
             con.execute(
-                "INSERT INTO staging.source "
-                "VALUES (?, ?, ?, 'ust', ?, 'lttng-ust 2.13.9', ?, ?, NULL, NULL, 0)",
+                "INSERT INTO staging.source VALUES (?, ?, ?, ?, ?, ?, ?, ?, NULL, NULL, 0, ?)",
                 [
                     index,
                     source.path or f"trace-{index}",
                     source.recording or f"uuid-{index}",
+                    source.domain,
                     source.hostname,
+                    source.tracer,
                     source.clock,
                     source.clock,
+                    source.origin_ns,
                 ],
             )
         rows: dict[str, list[dict[str, Any]]] = defaultdict(list)
@@ -196,6 +210,11 @@ class StagedEvents:
         packets: pa.RecordBatch,
     ) -> None:
         batches = [(name, batch) for name, batch in batches if batch.num_rows]
+        for name, batch in batches:
+            if load().staged[name].is_kernel:
+                table, rows = without_thread(load().staged[name], batch)
+                _insert(con, f"raw.{table}", rows)
+        batches = [(n, batch) for n, batch in batches if not load().staged[n].is_kernel]
         if batches:
             hosts: dict[tuple[str, str], int] = {}
             sources = [self.sources.get(n, Source()) for n in range(max(self.sources) + 1)]

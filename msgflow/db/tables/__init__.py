@@ -21,6 +21,7 @@ from msgflow.db.tables import (
     link,
     recording,
     ros_object,
+    schedule,
     user_event,
 )
 from msgflow.db.tables.column import STORE
@@ -36,5 +37,6 @@ __all__ = [
     "link",
     "recording",
     "ros_object",
+    "schedule",
     "user_event",
 ]

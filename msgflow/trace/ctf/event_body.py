@@ -44,7 +44,7 @@ class Kind(Enum):
 
 @dataclass(frozen=True)
 class PlainField:
-    """A field that lies on whole bytes.
+    """A field that lies on whole bytes, whether or not its type is aligned to them.
 
     Attributes:
         scope: the structure that it is in.
@@ -245,9 +245,8 @@ def _add_fields(
 
 
 def _plain(fields: list[PlainField], scope: Scope, name: str, declared: Type) -> PlainField | None:
-    if declared.align % BYTE:
-        return None
-    align = declared.align // BYTE
+    # Every plain field ends on a whole byte: a smaller alignment changes nothing behind it.
+    align = max(declared.align // BYTE, 1)
     match declared:
         case String():
             return PlainField(scope, name, Kind.STRING, align, type=declared)

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 _MOST_EMPTY_ELEMENTS = 1 << 16
 _MOST_VARIABLE_BYTES = 10
+_USUAL_TEXT = 64
 
 
 class FieldReader:
@@ -137,10 +138,17 @@ class FieldReader:
 
     def _string(self, field_type: String) -> str:
         begin = self._take(0, field_type.align) // BYTE
-        content = bytes(self._data[begin : self._end // BYTE])
-        length = content.find(b"\0")
-        if length < 0:
-            raise FieldError("a text does not end within the packet")
+        end = self._end // BYTE
+        size = _USUAL_TEXT
+        # The rest of a packet may have megabytes: too much to copy for each text.
+        while True:
+            content = bytes(self._data[begin : min(begin + size, end)])
+            length = content.find(b"\0")
+            if length >= 0:
+                break
+            if begin + size >= end:
+                raise FieldError("a text does not end within the packet")
+            size *= 2
         self.position = (begin + length + 1) * BYTE
         return content[:length].decode("utf-8", "replace")
 

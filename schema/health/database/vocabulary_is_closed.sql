@@ -41,6 +41,16 @@ WITH foreign_word AS (
     FROM store.executor_state
     WHERE state NOT IN ('wait', 'process', 'execute')
     UNION ALL
+    SELECT DISTINCT run_id, 'thread_state.state', state
+    FROM store.thread_state
+    WHERE state NOT IN (
+        'running', 'preempted', 'runnable', 'sleeping', 'uninterruptible', 'unknown'
+    )
+    UNION ALL
+    SELECT DISTINCT run_id, 'thread_state.waker_kind', waker_kind
+    FROM store.thread_state
+    WHERE waker_kind NOT IN ('thread', 'timer', 'interrupt', 'softirq')
+    UNION ALL
     SELECT DISTINCT run_id, 'ring_buffer_event.kind', kind
     FROM store.ring_buffer_event
     WHERE kind NOT IN ('enqueue', 'dequeue', 'clear')

@@ -5,6 +5,6 @@ SELECT
     row_number() OVER (ORDER BY min(s.trace_index)) AS host_id,
     c.clock_id,
     s.hostname
-FROM staging.source AS s
+FROM staging.placed_source AS s
 JOIN staging.clock AS c ON s.clock_key = c.clock_key
 GROUP BY c.clock_id, s.hostname

@@ -4,14 +4,14 @@
 -- grain: one row per clock
 SELECT
     row_number() OVER (ORDER BY min(trace_index)) AS clock_id,
-    any_value(clock_uuid) AS uuid,
+    arg_min(clock_uuid, coalesce(domain = 'kernel', false)) AS uuid,
     clock_key,
     0::BIGINT AS offset_ns,
     0::BIGINT AS drift_ppb,
-    coalesce(min(begin_ns), 0) AS reference_ns,
+    coalesce(min(begin_ns + shift_ns), 0) AS reference_ns,
     NULL::BIGINT AS uncertainty_ns,
     'none' AS method,
     NULL::BIGINT AS drift_uncertainty_ppb,
     NULL::BIGINT AS reference_clock_id
-FROM staging.source
+FROM staging.placed_source
 GROUP BY clock_key

@@ -28,12 +28,12 @@ SELECT
     s.uuid,
     s.tracer,
     s.domain,
-    coalesce(e.start_ns, s.begin_ns) AS start_ns,
-    coalesce(e.end_ns, s.end_ns) AS end_ns,
+    coalesce(e.start_ns, s.begin_ns) + s.shift_ns AS start_ns,
+    coalesce(e.end_ns, s.end_ns) + s.shift_ns AS end_ns,
     coalesce(e.event_count, 0) AS event_count,
     coalesce(e.discarded_event_count, 0) AS discarded_event_count,
     s.trace_index IN (FROM with_requests) AS has_request_events
-FROM staging.source AS s
+FROM staging.placed_source AS s
 JOIN staging.clock AS c ON s.clock_key = c.clock_key
 JOIN staging.host AS h ON c.clock_id = h.clock_id AND s.hostname = h.hostname
 LEFT JOIN extent AS e ON s.trace_index = e.trace_index

@@ -52,3 +52,19 @@ def test_as_ctf2(shared_traces: Path, copy_of: Callable[[str], Path], name: str)
     for one, other in zip(original.traces, translated.traces, strict=True):
         assert dataclasses.replace(one, path=other.path) == other
     assert not differences(dataclasses.replace(original, traces=translated.traces), translated)
+
+
+def test_perf_as_bt2(shared_kernel: Path, bt2_bindings: Any) -> None:
+    path = shared_kernel / "public" / "perf-taskset2"
+    ours = read(path)
+    assert not ours.damages
+    assert not differences(ours, read(path, reader="bt2"))
+
+
+def test_perf_is_read_in_columns(shared_kernel: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its numbers have an alignment of one bit, and lie on whole bytes all the same."""
+    path = shared_kernel / "public" / "perf-taskset2"
+    with monkeypatch.context() as patch:
+        patch.delattr("msgflow.trace.ctf.field_reader.EventReader.event_end")
+        patch.delattr("msgflow.trace.ctf.batches.event_reader_of")
+        assert read(path).event_counts

@@ -1,0 +1,62 @@
+-- name: preemption
+-- title: What took the CPU from which thread
+-- description: How often each thread of a ROS process lost the CPU while it had work, to which
+--     thread, and for how long until it had one again (docs/scheduling.md). That time counts for
+--     what got the CPU first, though others may have followed. Without kernel traces there are no
+--     rows. The longest time comes first.
+-- grain: one row per thread, priority, and thread that took the CPU from it, with its priority
+-- column: run_id BIGINT             Run
+-- column: process VARCHAR           Process name
+-- column: thread VARCHAR            Thread that lost the CPU
+-- column: tid INTEGER               Its thread id
+-- column: priority INTEGER          Its priority, as the kernel has it: 0 to 99 real-time, 100 to
+--     139 nice -20 to 19
+-- column: preempted_by VARCHAR      Thread that took the CPU
+-- column: preempted_by_tid INTEGER  Its thread id; of a process without ROS the kernel's number
+-- column: preempted_by_priority INTEGER  Its priority
+-- column: is_ros BOOLEAN            It is of a ROS process
+-- column: count BIGINT              How often it began in the time window
+-- column: median_ns BIGINT [ns]     Median time until the thread had a CPU again
+-- column: max_ns BIGINT [ns]        Longest such time
+-- column: total_ns BIGINT [ns]      Sum of these times
+-- column: thread_id BIGINT          Identity of the thread that lost the CPU
+-- brief: process, thread, preempted_by, count, total_ns, max_ns, median_ns, priority,
+--     preempted_by_priority, tid, preempted_by_tid
+WITH lost AS (
+    SELECT
+        run_id, thread_id, priority, preempted_by_thread_id, preempted_by_other_thread_id,
+        preempted_by_priority,
+        count(*) AS count,
+        quantile_disc(end_ns - start_ns, 0.5) AS median_ns,
+        max(end_ns - start_ns) AS max_ns,
+        sum(end_ns - start_ns)::BIGINT AS total_ns
+    FROM main.thread_state
+    WHERE state = 'preempted'
+        AND list_contains($runs, run_id)
+        AND start_ns >= $start_ns
+        AND start_ns < $end_ns
+    GROUP BY ALL
+)
+SELECT
+    l.run_id,
+    p.name AS process,
+    t.name AS thread,
+    t.tid,
+    l.priority,
+    coalesce(b.name, o.name) AS preempted_by,
+    coalesce(b.tid, o.tid) AS preempted_by_tid,
+    l.preempted_by_priority,
+    l.preempted_by_thread_id IS NOT NULL AS is_ros,
+    l.count,
+    l.median_ns,
+    l.max_ns,
+    l.total_ns,
+    l.thread_id
+FROM lost AS l
+JOIN main.thread AS t ON l.thread_id = t.thread_id
+JOIN main.process AS p ON t.process_id = p.process_id
+LEFT JOIN main.thread AS b ON l.preempted_by_thread_id = b.thread_id
+LEFT JOIN main.other_thread AS o ON l.preempted_by_other_thread_id = o.other_thread_id
+ORDER BY
+    l.run_id, l.total_ns DESC, l.thread_id, l.priority, l.preempted_by_thread_id,
+    l.preempted_by_other_thread_id, l.preempted_by_priority

@@ -1,0 +1,34 @@
+-- name: staging.other_thread
+-- description: Threads that are none of a ROS process, but took the CPU from one that is, or woke
+--     it. The kernel's idle thread of each CPU is one of them.
+-- grain: one row per host, tid and name
+-- when: staging.schedule_interval
+-- column: other_thread_id BIGINT  Number of the thread
+-- column: host_id BIGINT  Host
+-- column: tid INTEGER  Number of the thread to the kernel
+-- column: name VARCHAR  Its name
+-- column: clock_key VARCHAR  Clock of the host
+WITH host AS (
+    SELECT s.clock_key, min(t.host_id) AS host_id
+    FROM staging.schedule AS s
+    JOIN staging.trace AS t ON s.trace_index + 1 = t.trace_id
+    WHERE s.is_joined
+    GROUP BY s.clock_key
+)
+SELECT
+    row_number() OVER (ORDER BY h.host_id, o.tid, o.name) AS other_thread_id,
+    h.host_id,
+    o.tid,
+    o.name,
+    o.clock_key
+FROM (
+    SELECT DISTINCT o.clock_key, o.tid, o.name
+    FROM staging.schedule_other AS o
+    LEFT JOIN staging.thread_tid AS t
+        ON o.clock_key = t.clock_key
+        AND o.tid = t.tid
+        AND o.at_ns >= t.from_ns
+        AND o.at_ns < t.until_ns
+    WHERE t.thread_id IS NULL
+) AS o
+JOIN host AS h ON o.clock_key = h.clock_key

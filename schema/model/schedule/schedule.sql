@@ -1,0 +1,61 @@
+-- name: staging.schedule
+-- description: The clock of each kernel trace: the one by which most events of ROS processes
+--     happened while the kernel says that their thread ran on their CPU. A thread has one number
+--     until its process initialises ROS again: any other one counts as contradiction. With the
+--     right clock all events agree; 5 us beside it a tenth to a quarter do not.
+-- grain: one row per kernel trace with switches
+-- when: staging.schedule_candidate
+-- column: trace_index INTEGER  The kernel trace
+-- column: clock_key VARCHAR  Its clock, or the best of those it may be of
+-- column: shift_ns BIGINT [ns]  What has to be added to its times
+-- column: event_count BIGINT  Events of ROS processes that it covers
+-- column: agreeing_count BIGINT  Those that agree with it
+-- column: is_joined BOOLEAN  It is of that clock
+WITH initialisation AS (
+    SELECT t.trace_index, t.pid_ns, t.vpid, i.event_id
+    FROM raw.ros2_rcl_init AS i
+    JOIN raw.thread AS t ON i.thread_index = t.thread_index
+),
+thread AS (
+    SELECT thread_index, trace_index, coalesce(pid_ns, 0) AS pid_ns, vpid FROM raw.thread
+),
+ran AS (
+    SELECT
+        m.trace_index, m.clock_key, m.shift_ns, m.thread_index, i.event_id AS life, m.tid,
+        count(*) AS event_count
+    FROM staging.schedule_moment AS m
+    JOIN thread AS t ON m.thread_index = t.thread_index
+    ASOF LEFT JOIN initialisation AS i
+        ON t.vpid = i.vpid
+        AND t.trace_index = i.trace_index
+        AND t.pid_ns = coalesce(i.pid_ns, 0)
+        AND m.event_id >= i.event_id
+    GROUP BY ALL
+),
+most AS (
+    SELECT
+        trace_index, clock_key, shift_ns, sum(event_count) AS event_count,
+        coalesce(max(event_count) FILTER (WHERE tid <> 0), 0) AS agreeing_count
+    FROM ran
+    GROUP BY trace_index, clock_key, shift_ns, thread_index, life
+),
+agreement AS (
+    SELECT
+        trace_index, clock_key, shift_ns,
+        sum(event_count)::BIGINT AS event_count, sum(agreeing_count)::BIGINT AS agreeing_count
+    FROM most
+    GROUP BY ALL
+)
+SELECT
+    c.trace_index,
+    c.clock_key,
+    c.shift_ns,
+    coalesce(a.event_count, 0) AS event_count,
+    coalesce(a.agreeing_count, 0) AS agreeing_count,
+    coalesce(a.agreeing_count >= 0.95 * a.event_count, false) AS is_joined
+FROM staging.schedule_candidate AS c
+LEFT JOIN agreement AS a USING (trace_index, clock_key, shift_ns)
+QUALIFY row_number() OVER (
+    PARTITION BY c.trace_index
+    ORDER BY a.agreeing_count / a.event_count DESC NULLS LAST, c.clock_key, abs(c.shift_ns)
+) = 1

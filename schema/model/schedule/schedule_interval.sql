@@ -1,0 +1,111 @@
+-- name: staging.schedule_interval
+-- description: What each thread of a ROS process did, from switch to switch and waking. A waking
+--     may come before the switch that it undoes. What the next switch contradicts is not known.
+-- grain: one row per interval in which a thread had one state
+-- when: staging.thread_switch
+-- column: thread_id BIGINT  The thread
+-- column: start_ns BIGINT [epoch ns]  Begin
+-- column: end_ns BIGINT [epoch ns]  End
+-- column: state VARCHAR  State
+-- column: cpu INTEGER  CPU it ran on, or left
+-- column: priority INTEGER  Its priority
+-- column: other_tid INTEGER  What got the CPU from it
+-- column: other_name VARCHAR  The name of that
+-- column: other_priority INTEGER  The priority of that
+-- column: waking_event_id BIGINT [event order]  Waking that ended it
+WITH extent AS (
+    SELECT s.clock_key, min(w.ts_ns + s.shift_ns) AS start_ns, max(w.ts_ns + s.shift_ns) AS end_ns
+    FROM raw.sched_switch AS w
+    JOIN staging.schedule AS s ON w.trace_index = s.trace_index
+    WHERE s.is_joined
+    GROUP BY s.clock_key
+),
+life AS (
+    SELECT
+        t.thread_id,
+        t.tid,
+        greatest(e.start_ns, t.from_ns) AS start_ns,
+        least(e.end_ns, t.until_ns) AS end_ns
+    FROM staging.thread_tid AS t
+    JOIN extent AS e ON t.clock_key = e.clock_key
+),
+step AS (
+    SELECT
+        *,
+        row_number() OVER thread AS number,
+        lead(at_ns) OVER thread AS next_ns,
+        lead(is_on) OVER thread AS is_next_on,
+        lead(cpu) OVER thread AS next_cpu
+    FROM staging.thread_switch
+    WINDOW thread AS (PARTITION BY thread_id, tid ORDER BY at_ns, event_id)
+),
+-- A waking while the thread runs is of the switch that follows.
+waking AS (
+    SELECT
+        k.thread_id,
+        k.tid,
+        w.number + CASE WHEN w.is_on THEN 1 ELSE 0 END AS number,
+        min_by(k.event_id, k.at_ns) AS event_id,
+        min(k.at_ns) AS at_ns
+    FROM staging.thread_waking AS k
+    ASOF LEFT JOIN step AS w
+        ON k.thread_id = w.thread_id AND k.tid = w.tid AND k.at_ns >= w.at_ns
+    GROUP BY ALL
+),
+placed AS (
+    SELECT
+        s.*,
+        coalesce(s.next_ns, greatest(f.end_ns, s.at_ns)) AS end_ns,
+        k.event_id AS waking_event_id,
+        CASE WHEN k.at_ns IS NOT NULL THEN greatest(k.at_ns, s.at_ns) END AS woken_ns,
+        CASE
+            WHEN s.is_on THEN CASE
+                WHEN s.is_next_on OR s.next_cpu <> s.cpu THEN 'unknown' ELSE 'running' END
+            WHEN NOT s.is_next_on THEN 'unknown'
+            WHEN s.prev_state & 255 = 0 THEN 'preempted'
+            WHEN s.next_ns IS NULL AND s.prev_state & 112 <> 0 THEN NULL
+            WHEN s.prev_state & 2 <> 0 THEN 'uninterruptible'
+            ELSE 'sleeping'
+        END AS state
+    FROM step AS s
+    JOIN life AS f ON s.thread_id = f.thread_id AND s.tid = f.tid
+    LEFT JOIN waking AS k
+        ON s.thread_id = k.thread_id AND s.tid = k.tid AND s.number = k.number
+),
+interval AS (
+    SELECT
+        thread_id, at_ns AS start_ns,
+        CASE WHEN state IN ('sleeping', 'uninterruptible')
+            THEN coalesce(woken_ns, end_ns) ELSE end_ns END AS end_ns,
+        state, cpu, priority, other_tid, other_name, other_priority,
+        CASE WHEN state IN ('sleeping', 'uninterruptible') THEN waking_event_id END
+            AS waking_event_id
+    FROM placed
+    WHERE state IS NOT NULL
+    UNION ALL
+    SELECT
+        thread_id, woken_ns, end_ns, 'runnable', cpu, priority, NULL, NULL, NULL, waking_event_id
+    FROM placed
+    WHERE state IN ('sleeping', 'uninterruptible') AND woken_ns IS NOT NULL
+    UNION ALL
+    -- What was before the first switch.
+    SELECT
+        s.thread_id,
+        CASE WHEN s.is_on THEN k.at_ns ELSE f.start_ns END,
+        s.at_ns,
+        CASE WHEN s.is_on THEN 'runnable' ELSE 'running' END,
+        s.cpu, s.priority, NULL, NULL, NULL, CASE WHEN s.is_on THEN k.event_id END
+    FROM step AS s
+    JOIN life AS f ON s.thread_id = f.thread_id AND s.tid = f.tid
+    LEFT JOIN waking AS k
+        ON s.thread_id = k.thread_id AND s.tid = k.tid AND k.number IS NULL
+    WHERE s.number = 1
+)
+SELECT
+    thread_id, start_ns, end_ns, state, cpu, priority,
+    CASE WHEN state = 'preempted' THEN other_tid END AS other_tid,
+    CASE WHEN state = 'preempted' THEN other_name END AS other_name,
+    CASE WHEN state = 'preempted' THEN other_priority END AS other_priority,
+    waking_event_id
+FROM interval
+WHERE end_ns > start_ns

@@ -1,0 +1,55 @@
+-- name: staging.thread_state
+-- description: States of threads of ROS processes, with what took the CPU and what woke them.
+-- grain: one row per interval in which a thread had one state
+-- when: staging.schedule_interval
+-- column: thread_id BIGINT  The thread
+-- column: start_ns BIGINT [epoch ns]  Begin
+-- column: end_ns BIGINT [epoch ns]  End
+-- column: state VARCHAR  State
+-- column: cpu INTEGER  CPU it ran on, or left
+-- column: priority INTEGER  Its priority
+-- column: preempted_by_thread_id BIGINT  What took the CPU, a thread of a ROS process
+-- column: preempted_by_other_thread_id BIGINT  What took the CPU, another thread
+-- column: preempted_by_priority INTEGER  The priority of that
+-- column: waker_kind VARCHAR  What woke it
+-- column: waker_thread_id BIGINT  What woke it, a thread of a ROS process
+-- column: waker_other_thread_id BIGINT  What woke it, another thread
+-- column: is_loss_affected BOOLEAN  Kernel events were lost meanwhile
+SELECT
+    i.thread_id,
+    i.start_ns,
+    i.end_ns,
+    i.state,
+    i.cpu,
+    i.priority,
+    p.thread_id AS preempted_by_thread_id,
+    CASE WHEN p.thread_id IS NULL THEN po.other_thread_id END AS preempted_by_other_thread_id,
+    i.other_priority AS preempted_by_priority,
+    w.kind AS waker_kind,
+    wt.thread_id AS waker_thread_id,
+    CASE WHEN wt.thread_id IS NULL THEN wo.other_thread_id END AS waker_other_thread_id,
+    coalesce(l.until_ns > i.start_ns, false) AS is_loss_affected
+FROM staging.schedule_interval AS i
+JOIN (SELECT DISTINCT thread_id, clock_key FROM staging.thread_tid) AS t
+    ON i.thread_id = t.thread_id
+LEFT JOIN staging.thread_tid AS p
+    ON t.clock_key = p.clock_key
+    AND i.other_tid = p.tid
+    AND i.start_ns >= p.from_ns
+    AND i.start_ns < p.until_ns
+LEFT JOIN staging.other_thread AS po
+    ON t.clock_key = po.clock_key
+    AND i.other_tid = po.tid
+    AND i.other_name IS NOT DISTINCT FROM po.name
+LEFT JOIN staging.thread_waking AS w ON i.waking_event_id = w.event_id
+LEFT JOIN staging.thread_tid AS wt
+    ON w.clock_key = wt.clock_key
+    AND w.waker_tid = wt.tid
+    AND w.at_ns >= wt.from_ns
+    AND w.at_ns < wt.until_ns
+LEFT JOIN staging.other_thread AS wo
+    ON w.clock_key = wo.clock_key
+    AND w.waker_tid = wo.tid
+    AND w.waker_name IS NOT DISTINCT FROM wo.name
+ASOF LEFT JOIN staging.kernel_loss AS l ON t.clock_key = l.clock_key AND i.end_ns > l.start_ns
+ORDER BY i.thread_id, i.start_ns

@@ -1,0 +1,94 @@
+-- name: staging.thread_tid
+-- description: The number that the kernel has for each thread. A declaration counts, the latest
+--     while the thread lived, unless it is of several threads or the schedule contradicts it; else
+--     what ran on the CPU at most events of the thread.
+-- grain: one row per thread of a process life and number
+-- when: staging.schedule
+-- column: thread_id BIGINT  The thread
+-- column: clock_key VARCHAR  Clock of its host
+-- column: tid INTEGER  Its number
+-- column: source VARCHAR  'state dump', 'fork' or 'schedule'
+-- column: from_ns BIGINT [epoch ns]  The number means this thread from here
+-- column: until_ns BIGINT [epoch ns]  It means the next one from here
+WITH ran AS (
+    SELECT
+        x.thread_id, m.tid, count(*) AS event_count,
+        min(m.at_ns + m.shift_ns) AS first_ns, max(m.at_ns + m.shift_ns) AS last_ns
+    FROM staging.schedule_moment AS m
+    JOIN staging.schedule AS s USING (trace_index, clock_key, shift_ns)
+    JOIN staging.context AS x
+        ON m.thread_index = x.thread_index
+        AND m.event_id >= x.from_event_id
+        AND m.event_id < x.until_event_id
+    WHERE s.is_joined AND m.tid <> 0
+    GROUP BY x.thread_id, m.tid
+    QUALIFY count(*) >= 0.05 * sum(count(*)) OVER (PARTITION BY x.thread_id)
+),
+-- A process that was started again may have the same ids: its thread has one number after the
+-- other.
+pattern AS (
+    SELECT r.thread_id, r.tid, r.first_ns
+    FROM ran AS r
+    WHERE NOT EXISTS (
+        SELECT 1
+        FROM ran AS o
+        WHERE o.thread_id = r.thread_id
+            AND o.tid <> r.tid
+            AND (o.event_count, o.tid) > (r.event_count, r.tid)
+            AND o.first_ns <= r.last_ns
+            AND o.last_ns >= r.first_ns
+    )
+),
+lived AS (
+    SELECT
+        t.thread_id, t.tid AS vtid, t.first_seen_ns, t.last_seen_ns, p.pid AS vpid,
+        p.pid_namespace, c.clock_key
+    FROM staging.thread AS t
+    JOIN staging.process AS p ON t.process_id = p.process_id
+    JOIN staging.host AS h ON p.host_id = h.host_id
+    JOIN staging.clock AS c ON h.clock_id = c.clock_id
+),
+latest AS (
+    SELECT
+        v.thread_id,
+        d.source,
+        d.tid,
+        d.declared_ns,
+        -- A dump declares all threads at about the same time.
+        CASE d.source WHEN 'fork' THEN d.declared_ns ELSE 0 END AS rank_ns
+    FROM lived AS v
+    JOIN staging.declared_tid AS d
+        ON v.clock_key = d.clock_key
+        AND v.vpid = d.vpid
+        AND v.vtid = d.vtid
+        AND d.declared_ns <= v.last_seen_ns
+        AND coalesce(v.pid_namespace = d.ns_inum, true)
+    QUALIFY rank() OVER (PARTITION BY v.thread_id ORDER BY rank_ns DESC) = 1
+),
+declared AS (
+    SELECT thread_id, any_value(tid) AS tid, any_value(source) AS source
+    FROM latest
+    GROUP BY thread_id
+    HAVING count(DISTINCT tid) = 1
+),
+known AS (
+    SELECT
+        v.thread_id,
+        v.clock_key,
+        coalesce(p.first_ns, v.first_seen_ns) AS first_ns,
+        coalesce(p.tid, d.tid) AS tid,
+        CASE WHEN d.tid = coalesce(p.tid, d.tid) THEN d.source ELSE 'schedule' END AS source
+    FROM lived AS v
+    LEFT JOIN pattern AS p ON v.thread_id = p.thread_id
+    LEFT JOIN declared AS d ON v.thread_id = d.thread_id
+    WHERE coalesce(p.tid, d.tid) IS NOT NULL
+)
+SELECT
+    thread_id,
+    clock_key,
+    tid,
+    source,
+    CASE WHEN row_number() OVER number = 1 THEN -4611686018427387904 ELSE first_ns END AS from_ns,
+    lead(first_ns, 1, 4611686018427387904) OVER number AS until_ns
+FROM known
+WINDOW number AS (PARTITION BY clock_key, tid ORDER BY first_ns, thread_id)

@@ -1,0 +1,81 @@
+"""Recordings with kernel traces, of LTTng and of perf, against what is known of their callbacks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import duckdb
+import pytest
+from thorough import few
+
+from msgflow.ingest import ingest
+
+RECORDED = ("pipeline", "mutex", "cond", "autoware", "nodump")
+# The kernel trace of this one comes first, and another epoch with it.
+EPOCH_NS = {"cond": 4_241_675_552}
+
+TRUTH = """
+CREATE TEMP TABLE compared AS
+SELECT
+    t.*,
+    s.running_ns,
+    s.preempted_ns AS lost_ns,
+    s.runnable_ns AS woken_ns,
+    s.sleeping_ns + s.uninterruptible_ns AS waited_ns,
+    s.unknown_ns,
+    s.preemption_count,
+    s.migration_count,
+    i.end_ns - i.start_ns AS duration_ns
+FROM read_csv($truth) AS t
+LEFT JOIN (
+    SELECT i.*, x.tid AS thread_number, p.pid
+    FROM callback_instance AS i
+    JOIN thread AS x ON i.thread_id = x.thread_id
+    JOIN process AS p ON i.process_id = p.process_id
+) AS i ON t.vpid = i.pid AND t.vtid = i.thread_number AND t.start = i.start_ns - $epoch_ns
+LEFT JOIN callback_schedule AS s ON i.callback_instance_id = s.callback_instance_id
+WHERE t.covered = 1 AND t.repaired = 0
+"""
+
+
+def compared(
+    path: Path, recording: Path, *traces: str, epoch_ns: int = 0
+) -> duckdb.DuckDBPyConnection:
+    """Ingest, and join what came out with the truth in the table `compared`."""
+    ingest([recording / trace for trace in traces], path)
+    con = duckdb.connect(str(path), read_only=True)
+    truth = str(recording / "kernel_truth.csv.gz")
+    con.execute(TRUTH, {"truth": truth, "epoch_ns": epoch_ns})
+    return con
+
+
+@pytest.mark.parametrize("name", few(RECORDED, "cond"))
+def test_of_lttng(shared_kernel: Path, tmp_path: Path, name: str) -> None:
+    epoch_ns = EPOCH_NS.get(name, 0)
+    con = compared(
+        tmp_path / "run.duckdb", shared_kernel / name, "trace-chrisnux", epoch_ns=epoch_ns
+    )
+    wrong = con.execute(
+        "SELECT count(*) FROM compared WHERE duration_ns IS NULL "
+        "OR abs(running_ns - cpu_ns) > 1000 OR abs(lost_ns - preempted_ns) > 1000 "
+        "OR abs(woken_ns - wakeup_ns) > 1000 OR abs(waited_ns - blocked_ns) > 1000 "
+        "OR running_ns + lost_ns + woken_ns + waited_ns + unknown_ns <> duration_ns "
+        "OR migration_count <> migrations "
+        # There, to go on on another CPU ends a preemption and begins another one.
+        "OR (migrations = 0 AND preemption_count <> preemptions)"
+    ).fetchall()
+    assert wrong == [(0,)]
+    assert con.execute("SELECT count(*) > 1000 FROM compared").fetchall() == [(True,)]
+
+
+@pytest.mark.parametrize("name", few(RECORDED, "cond"))
+def test_of_perf(shared_kernel: Path, tmp_path: Path, name: str) -> None:
+    """As recorded: what a virtual machine hid is not known, and nothing else differs."""
+    con = compared(tmp_path / "run.duckdb", shared_kernel / name, "trace-chrisnux/ust", "perf")
+    assert con.execute(
+        "SELECT count(*) FROM compared WHERE unknown_ns = 0 AND (duration_ns IS NULL "
+        "OR abs(running_ns - cpu_ns) > 1000 OR abs(waited_ns - blocked_ns) > 1000)"
+    ).fetchall() == [(0,)]
+    assert con.execute(
+        "SELECT count(*) FILTER (WHERE unknown_ns > 0) < 0.01 * count(*) FROM compared"
+    ).fetchall() == [(True,)]

@@ -1,0 +1,285 @@
+"""States of threads from a kernel trace: its clock, its threads, switches and wakings."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from analysis import Analyse, Analysis
+from ros_system import RosSystem
+from staged_events import Thread
+
+MAIN = Thread(100)
+KERNEL = 1
+HOG, TIMER = 7, 8
+STATES = "SELECT start_ns, end_ns, state, cpu FROM thread_state ORDER BY thread_id, start_ns"
+BLOCKED, LOST = 1, 0
+"""States in which a thread leaves its CPU: it waits, or it had more to do."""
+
+
+class Kernel:
+    """Records what CPUs do, in a trace of the kernel."""
+
+    def __init__(self, system: RosSystem, **source: Any) -> None:
+        self._system = system
+        self.shift_ns = 0
+        given = {"hostname": "alpha", "clock": "boot", "tracer": "lttng-modules 2.13.9"} | source
+        system.add_source(KERNEL, **given)
+
+    def add(self, name: str, ts: int, cpu: int = 0, **fields: Any) -> int:
+        where = Thread(-1, cpu=cpu, trace=KERNEL, name=None)
+        self._system.add(name, where, ts=ts + self.shift_ns, **fields)
+        return ts
+
+    def switch(self, ts: int, before: int, after: int, state: int = LOST, cpu: int = 0) -> int:
+        """Let a thread take the CPU from another one."""
+        return self.add(
+            "sched_switch", ts, cpu, prev_tid=before, prev_prio=20, prev_state=state,
+            next_tid=after, next_prio=19, next_comm=f"thread {after}",
+        )  # fmt: skip
+
+    def wake(self, ts: int, tid: int, cpu: int = 0) -> int:
+        return self.add("sched_waking", ts, cpu, tid=tid)
+
+
+def call(system: RosSystem, begin: int, end: int, thread: Thread = MAIN) -> None:
+    """Let a callback run for so long."""
+    system.add("ros2:callback_start", thread, ts=begin, callback=0xC1, is_intra_process=0)
+    system.add("ros2:callback_end", thread, ts=end, callback=0xC1)
+
+
+def schedules(model: Analysis) -> list[tuple[Any, ...]]:
+    return model.rows(
+        "SELECT running_ns, preempted_ns, runnable_ns, sleeping_ns, uninterruptible_ns, unknown_ns "
+        "FROM callback_schedule ORDER BY callback_instance_id"
+    )
+
+
+def recorded(system: RosSystem, **source: Any) -> Kernel:
+    """Record a callback from 1000 to 2000 that is preempted, and then sleeps."""
+    kernel = Kernel(system, **source)
+    kernel.switch(900, 0, 41)
+    kernel.switch(1100, 41, HOG)
+    kernel.switch(1300, HOG, 41)
+    kernel.switch(1500, 41, 0, BLOCKED)
+    kernel.add("timer_hrtimer_expire_entry", 1690)
+    kernel.wake(1700, 41)
+    kernel.add("timer_hrtimer_expire_exit", 1710)
+    kernel.switch(1800, 0, 41)
+    kernel.switch(2100, 41, 0, BLOCKED)
+    kernel.switch(3000, 0, HOG)
+    call(system, 1000, 2000)
+    return kernel
+
+
+def test_states_follow_from_switches_and_wakings(system: RosSystem, analyse: Analyse) -> None:
+    recorded(system)
+    model = analyse(system)
+    assert model.rows(STATES) == [
+        (900, 1100, "running", 0),
+        (1100, 1300, "preempted", 0),
+        (1300, 1500, "running", 0),
+        (1500, 1700, "sleeping", 0),
+        (1700, 1800, "runnable", 0),
+        (1800, 2100, "running", 0),
+        (2100, 3000, "sleeping", 0),
+    ]
+    assert schedules(model) == [(500, 200, 100, 200, 0, 0)]
+    assert model.rows("SELECT preemption_count, migration_count FROM callback_schedule") == [(1, 0)]
+
+
+def test_any_interval_of_a_thread_divides_as_callbacks_do(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    recorded(system)
+    model = analyse(system)
+    assert model.rows("FROM thread_schedule(1, 1000, 2000)") == schedules(model)
+    assert model.rows("FROM thread_schedule(1, 0, 950)") == [(50, 0, 0, 0, 0, 900)]
+
+
+def test_who_took_the_cpu_and_who_woke(system: RosSystem, analyse: Analyse) -> None:
+    """A timer's interrupt woke the thread, not what it interrupted."""
+    recorded(system)
+    model = analyse(system)
+    assert model.rows(
+        "SELECT s.state, o.tid, o.name, s.preempted_by_priority, s.waker_kind "
+        "FROM thread_state AS s LEFT JOIN other_thread AS o ON o.other_thread_id = "
+        "coalesce(s.preempted_by_other_thread_id, s.waker_other_thread_id) "
+        "WHERE s.state IN ('preempted', 'runnable') ORDER BY s.start_ns"
+    ) == [
+        ("preempted", HOG, "thread 7", 119, None),
+        ("runnable", 0, "thread 0", None, "timer"),
+    ]
+
+
+def test_a_switch_ends_an_interrupt(system: RosSystem, analyse: Analyse) -> None:
+    """Its end is not always recorded: then the thread that runs now is the waker."""
+    kernel = Kernel(system)
+    kernel.switch(900, 0, 41)
+    kernel.switch(1200, 41, 0, BLOCKED)
+    kernel.add("irq_handler_entry", 1250)
+    kernel.switch(1300, 0, HOG)
+    kernel.wake(1400, 41)
+    kernel.switch(1500, HOG, 41, BLOCKED)
+    kernel.switch(2000, 41, 0, BLOCKED)
+    call(system, 1000, 1600)
+    model = analyse(system)
+    assert model.rows(
+        "SELECT waker_kind, o.tid FROM thread_state AS s JOIN other_thread AS o "
+        "ON s.waker_other_thread_id = o.other_thread_id WHERE state = 'runnable'"
+    ) == [("thread", HOG)]
+
+
+def test_a_waking_may_come_before_the_switch_that_it_undoes(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    kernel = Kernel(system)
+    kernel.switch(900, 0, 41)
+    kernel.wake(1190, 41, cpu=1)
+    kernel.switch(1200, 41, 0, BLOCKED)
+    kernel.switch(1300, 0, 41)
+    kernel.switch(2000, 41, 0, BLOCKED)
+    call(system, 1000, 1600)
+    assert schedules(analyse(system)) == [(500, 0, 100, 0, 0, 0)]
+
+
+def test_without_wakings_a_sleep_lasts_until_the_thread_runs(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    kernel = Kernel(system)
+    kernel.switch(900, 0, 41)
+    kernel.switch(1200, 41, 0, 2)
+    kernel.switch(1300, 0, 41)
+    kernel.switch(2000, 41, 0, BLOCKED)
+    call(system, 1000, 1600)
+    assert schedules(analyse(system)) == [(500, 0, 0, 0, 100, 0)]
+
+
+def test_what_the_next_switch_contradicts_is_not_known(system: RosSystem, analyse: Analyse) -> None:
+    """The thread left its CPU unseen, and comes back on another one."""
+    kernel = Kernel(system)
+    kernel.switch(900, 0, 41)
+    kernel.switch(900, 0, HOG, cpu=1)
+    kernel.switch(1300, HOG, 41, cpu=1)
+    kernel.switch(2000, 41, 0, BLOCKED, cpu=1)
+    call(system, 1000, 1600)
+    call(system, 1700, 1800, Thread(100, cpu=1))
+    assert schedules(analyse(system)) == [(300, 0, 0, 0, 0, 300), (100, 0, 0, 0, 0, 0)]
+
+
+def test_a_callback_beyond_the_kernel_trace_is_not_known(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    recorded(system)
+    call(system, 5000, 5500)
+    assert schedules(analyse(system))[1] == (0, 0, 0, 0, 0, 500)
+
+
+def test_lost_kernel_events_are_marked(system: RosSystem, analyse: Analyse) -> None:
+    recorded(system)
+    system.add_packet(900, 1200, last_event=1100, discarded=3, trace=KERNEL)
+    system.add_packet(1250, 3000, trace=KERNEL)
+    model = analyse(system)
+    assert model.rows("SELECT start_ns FROM thread_state WHERE is_loss_affected") == [(1100,)]
+    assert model.rows("SELECT is_loss_affected FROM callback_schedule") == [(True,)]
+
+
+def test_times_of_perf_count_from_the_origin_of_the_clock(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    """It names no clock: its host and its times follow from the schedule."""
+    system.add_source(0, "alpha", "boot", origin_ns=10_000)
+    kernel = Kernel(system, hostname="unknown", clock="perf", tracer="perf")
+    kernel.shift_ns = -10_000
+    kernel.switch(10_900, 0, 41)
+    kernel.switch(12_100, 41, 0, BLOCKED)
+    call(system, 11_000, 12_000)
+    model = analyse(system)
+    assert schedules(model) == [(1000, 0, 0, 0, 0, 0)]
+    assert model.rows("SELECT hostname FROM host") == [("alpha",)]
+    assert model.rows("SELECT count(*) FROM clock") == [(1,)]
+    assert model.rows("SELECT priority FROM thread_state WHERE state = 'running'") == [(19,)]
+    assert model.rows("SELECT start_ns FROM trace WHERE domain = 'kernel'") == [(10_900,)]
+
+
+def test_a_kernel_trace_that_contradicts_the_events_is_not_joined(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    kernel = Kernel(system, clock="perf", tracer="perf")
+    for number in range(20):
+        kernel.switch(1000 + 100 * number, number, number + 1)
+    kernel.switch(9000, 20, 21)
+    for number in range(20):
+        call(system, 1010 + 100 * number, 1020 + 100 * number)
+    model = analyse(system)
+    assert model.rows(STATES) == []
+    assert model.rows(
+        "SELECT trace_id, detail FROM finding WHERE name = 'kernel_trace_not_joined'"
+    ) == [
+        (
+            KERNEL + 1,
+            "the kernel trace agrees with 5.0 % of the events of ROS processes about which thread "
+            "ran, with its times shifted by +0.000000 s: not joined",
+        )
+    ]
+
+
+def test_a_process_that_was_started_again_has_other_numbers(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    """With the same ids in its container, its threads are others to the kernel."""
+    kernel = Kernel(system)
+    for begin, tid in ((1000, 41), (3000, 52)):
+        kernel.switch(begin - 100, 0, tid)
+        system.add("ros2:rcl_init", MAIN, ts=begin - 50, context_handle=begin, version="8.4.0")
+        call(system, begin, begin + 100)
+        kernel.switch(begin + 200, tid, 0, 0x10)
+    kernel.switch(9000, 0, HOG)
+    assert schedules(analyse(system)) == [(100, 0, 0, 0, 0, 0), (100, 0, 0, 0, 0, 0)]
+
+
+@pytest.mark.parametrize("source", ["dump", "fork"])
+def test_declared_numbers_hold_where_no_event_tells_them(
+    system: RosSystem, analyse: Analyse, source: str
+) -> None:
+    """The second thread had its only events before the first switch of its CPU."""
+    kernel = Kernel(system)
+    if source == "dump":
+        kernel.add(
+            "lttng_statedump_process_state", 850, tid=42, namespace_tid=101, namespace_pid=100,
+        )  # fmt: skip
+    else:
+        kernel.add("sched_process_fork", 840, child_tid=41, child_pid=41, vtids=[41, 100])
+        kernel.add("sched_process_fork", 850, child_tid=42, child_pid=41, vtids=[42, 101])
+    call(system, 860, 870, Thread(100, 101, cpu=1))
+    kernel.switch(900, 0, 41)
+    kernel.switch(1500, 42, 0, BLOCKED, cpu=1)
+    kernel.switch(2000, 41, 0, BLOCKED)
+    call(system, 1000, 1600)
+    model = analyse(system)
+    assert model.rows(
+        "SELECT t.tid, s.end_ns, s.state FROM thread_state AS s JOIN thread AS t USING (thread_id) "
+        "WHERE s.state = 'running' ORDER BY t.tid"
+    ) == [(100, 2000, "running"), (101, 1500, "running")]
+
+
+def test_a_thread_that_nothing_tells_is_said(system: RosSystem, analyse: Analyse) -> None:
+    recorded(system)
+    call(system, 800, 810, Thread(100, 101))
+    model = analyse(system)
+    assert model.rows(
+        "SELECT subject, count, detail FROM finding WHERE name = 'kernel_thread_unknown'"
+    ) == [
+        (
+            "main",
+            1,
+            "1 threads of main (pid 100) are not known to the kernel trace: no states of them",
+        )
+    ]
+
+
+def test_without_a_kernel_trace_there_is_nothing(system: RosSystem, analyse: Analyse) -> None:
+    call(system, 1000, 2000)
+    model = analyse(system)
+    assert model.rows(STATES) == schedules(model) == []
+    assert model.rows("FROM other_thread") == []
