@@ -187,9 +187,9 @@ class _Maker:
             content = encoded_section(section, self.extent.origin_ns)
             self.parts.add(f"summary?part={section.name}", content)
         self.progress("timeline")
-        head = self.timeline(shown, chosen)
-        head["summary"] = [section.name for section in sections]
-        head["absent"] = self.absent(other)
+        names = [section.name for section in sections]
+        said = {"summary": names, "absent": self.absent(other)}
+        head = self.timeline(shown, chosen, said)
         return single_page(self.parts, head), self.notes
 
     def make_markdown(self, compare: str | int | None) -> tuple[str, list[str]]:
@@ -363,10 +363,10 @@ class _Maker:
             if number not in chosen:
                 self.keep("path_share", path=number)
 
-    def timeline(self, window: Window, paths: list[int]) -> dict[str, Any]:
-        """Keep bars, arrows and links; return the head that says which."""
+    def timeline(self, window: Window, paths: list[int], said: dict[str, Any]) -> dict[str, Any]:
+        """Keep bars, arrows and links; return the head, which says that beside what is `said`."""
         origin = self.extent.origin_ns
-        head: dict[str, Any] = {
+        head: dict[str, Any] = said | {
             "start": window.start_ns - origin,
             "end": window.end_ns - origin,
             "stretches": [],

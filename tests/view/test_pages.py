@@ -279,4 +279,4 @@ def test_compare_overlays_a_path(systems: Path, report: Report, page: Page) -> N
 def test_compare_needs_two(demo: Path, serve: Serve, page: Page) -> None:
     page.open(serve(demo).address)
     page.go("#/compare")
-    assert "report --compare" in page.page.locator("main").inner_text()
+    assert "only one run" in page.page.locator("main").inner_text()

@@ -103,14 +103,6 @@ def test_sums_of_an_area_are_those_of_the_command(dropping: Path, timeline: Page
     assert area.inner_text() == ""
 
 
-def test_what_is_no_list_of_nodes_has_no_sums(dropping: Path, serve: Serve) -> None:
-    server = serve(dropping)
-    for query in ("part=callbacks&of=x", "part=callbacks&of=%7B%7D", "part=other&of=%5B1%5D"):
-        status, _, content = server.get(f"/api/area?{query}")
-        assert status == 400, query
-        assert b"error" in content
-
-
 def test_a_search_keeps_what_exchanges_messages_with_it(timeline: Page) -> None:
     every = timeline.page.evaluate(_LANES)
     timeline.page.locator("input[type=search]").fill("subscription")
