@@ -22,7 +22,10 @@ from msgflow.run.window import Window
 from msgflow.view import report as report_module
 from msgflow.view.pages import Pages
 
-PAGES = ("overview", "paths", "timeline", "graph", "executors", "compare")
+PAGES = (
+    "overview", "paths", "timeline", "graph", "nodes", "topics", "timers", "services", "losses",
+    "executors", "compare",
+)  # fmt: skip
 
 
 @pytest.fixture(autouse=True)
@@ -75,6 +78,12 @@ def test_names_are_only_ever_text(
         assert page.flow()
         page.page.locator("canvas.timeline").hover(position={"x": 400, "y": 120})
         assert page.page.evaluate("typeof hacked") == "undefined"
+        page.go("#/topics?run=1")
+        page.page.get_by_role("region", name="topics", exact=True).locator(".pick").first.click()
+        page.page.get_by_role("region", name="Publishers").wait_for()
+        page.page.get_by_label("find a node, topic").fill("i")
+        page.page.locator(".found a").first.wait_for()
+        assert page.page.evaluate("typeof hacked") == "undefined"
 
 
 def _first_publication(path: Path) -> list[tuple[int]]:
@@ -97,6 +106,10 @@ def test_names_in_the_address_are_only_ever_text(
             f"timeline?from={text}&to=1&hide={text}",
             f"graph?q={text}",
             f"paths?path={text}",
+            f"nodes?q={text}&callback={text}",
+            f"topics?topic={text}&start={text}",
+            f"services?q={text}&call={text}",
+            f"losses?topic={text}&internal={text}",
             f"compare?other={text}&what={text}",
         ):
             page.go(f"#/{place}")
