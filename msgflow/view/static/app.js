@@ -184,11 +184,14 @@ class App {
       this.done();
       return;
     }
+    // A page has a place of its own: one that was left may still come to its end.
+    const root = h("div", {}, waiting());
+    clear(this.main, root);
     try {
-      this.page = new Page(this, this.main);
+      this.page = new Page(this, root);
       await this.page.ready;
     } catch (error) {
-      if (error.name !== "AbortError") clear(this.main, failed(error));
+      if (error.name !== "AbortError") clear(root, failed(error));
     }
     this.done();
   }

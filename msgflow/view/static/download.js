@@ -10,8 +10,8 @@ export function downloads({ name, columns, canvases }) {
   const file = name.replaceAll(/[^\w-]+/g, "_").replaceAll(/^_+|_+$/g, "") || "chart";
   const button = (kind, action) => h("button", { type: "button", title: `download as ${kind}`, "aria-label": `${name} as ${kind}`, on: { click: action } }, kind);
   return h("div", { className: "downloads" },
-    button("CSV", () => save(new Blob([csvText(columns())], { type: "text/csv" }), `${file}.csv`)),
-    button("PNG", () => painted(name, canvases()).toBlob((blob) => save(blob, `${file}.png`), "image/png")));
+    button("CSV", () => saveFile(new Blob([csvText(columns())], { type: "text/csv" }), `${file}.csv`)),
+    button("PNG", () => painted(name, canvases()).toBlob((blob) => saveFile(blob, `${file}.png`), "image/png")));
 }
 
 export function csvText(columns) {
@@ -50,7 +50,7 @@ function painted(title, canvases) {
   return result;
 }
 
-function save(blob, name) {
+function saveFile(blob, name) {
   const link = h("a", { href: URL.createObjectURL(blob), download: name });
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
