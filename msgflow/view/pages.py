@@ -44,7 +44,7 @@ Params = dict[str, Any]
 
 # Named queries that pages show, with the numbers of `msgflow query`.
 NAMED = (
-    "callbacks", "e2e-latency", "path-breakdown", "e2e-latency-reaction", "e2e-latency-age",
+    "e2e-latency", "path-breakdown", "e2e-latency-reaction", "e2e-latency-age",
     "executor-usage",
     "waits", "waits-pair", "topics-rate", "topics-latency", "service-latency",
     "action-latency", "links", "topics-delivery", "info-hosts", "info-processes", "topics",

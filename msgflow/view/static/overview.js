@@ -93,7 +93,7 @@ export class OverviewPage {
     });
     const others = [
       ...given.map((one) => fill(one, async () => summary(await app.fetch("summary", { part: one.part })))),
-      ...[[drops, "drops"], [threads, "threads"]].map(([place, part]) => fill(place, async () => summary(await app.fetch("summary", { part })))),
+      ...[[drops, "drops"], [threads, "threads"]].map(([place, part]) => fill(place, async () => summary(await app.inWindow("summary", { part })))),
       fill(topics, async () => {
         const table = await app.query("topics");
         return [dataTable(table, { label: "topics", shown: 12, nothing: "no topics" }), notes(table.meta.notes), command(table.meta.command)];
@@ -104,7 +104,7 @@ export class OverviewPage {
       }),
     ];
     // The page stands without what takes longest.
-    fill(nodes, async () => blame(await app.fetch("summary", { part: "blame" })));
+    fill(nodes, async () => blame(await app.inWindow("summary", { part: "blame" })));
     await Promise.all([hosts, findings, paths, ...others]);
   }
 
