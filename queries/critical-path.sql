@@ -35,16 +35,17 @@
 --     'service', 'response_to_take', 'publish' or its layer, 'stored', 'publish_to_take' or
 --     'take_to_callback'
 -- column: activity VARCHAR         What happened: the part itself; up to a take 'network_or_idle',
---     'executor_busy' (it ran something else), 'blocked' (a callback ran that excludes the waiting
---     one) or 'undecided' (nothing shows when the message arrived); in a cache 'timer' (not due
---     yet), 'unpublished' (the message that was waited for had not been published), or a part of
---     that message's own flow; 'rest': pieces too short for a line of their own
+--     'executor_busy' (it ran something else), 'all_threads_busy' (none of its threads was free),
+--     'blocked' (a callback ran that excludes the waiting one) or 'undecided' (nothing shows when
+--     the message arrived); in a cache 'timer' (not due yet), 'unpublished' (the message that was
+--     waited for had not been published), or a part of that message's own flow; 'rest': pieces too
+--     short for a line of their own
 -- column: node VARCHAR [node]      Node that did it, or that waited
 -- column: what VARCHAR             The callback, or the topic of the message
 -- column: share DOUBLE [share]     Part of the latency, rounded to 4 places
 -- column: pieces BIGINT            Number of pieces in the row
--- column: is_certain BOOLEAN       For 'executor_busy' and 'blocked': what waited was ready by
---     then; no: it may have arrived during this piece
+-- column: is_certain BOOLEAN       For 'executor_busy', 'all_threads_busy' and 'blocked': what
+--     waited was ready by then; no: it may have arrived during this piece
 -- column: from_ns BIGINT [epoch ns]  Begin
 -- column: callback_instance_id BIGINT  Callback instance
 -- column: publication_id BIGINT    Message
@@ -103,8 +104,8 @@ WITH piece AS (
         coalesce(l.node, main.node_label(n.full_name, r.name, r.pid)) AS node,
         CASE
             WHEN c.activity IN (
-                'callback', 'cache', 'take_to_callback', 'service', 'executor_busy', 'blocked',
-                'timer'
+                'callback', 'cache', 'take_to_callback', 'service', 'executor_busy',
+                'all_threads_busy', 'blocked', 'timer'
             ) OR c.part = 'request_to_take' THEN l.label
             ELSE coalesce(p.topic_name, '?')
         END AS what,

@@ -19,7 +19,8 @@
 -- column: busy_min_ns BIGINT [ns]   Executor busy with others meanwhile, at least
 -- column: busy_max_ns BIGINT [ns]   Executor busy with others meanwhile, at most
 -- column: held_max_ns BIGINT [ns]   No thread of an executor of several waited for work meanwhile,
---     though not all ran callbacks: they were blocked by its lock, or looked for work
+--     though not all ran callbacks: they were blocked by its lock, or looked for work; or the
+--     thread that ran this callback had picked it, and did not start it yet
 -- column: reason VARCHAR            What took the most of the wait, if the message came at once:
 --     'executor busy' (it ran others; its threads are one, or when they waited is not known), 'all
 --     threads busy', 'excluded' (a callback ran that never runs beside this one) or 'network or

@@ -22,6 +22,7 @@ _WAITS = 3
 _BY_NODE = {
     "callback": ("callbacks", "--each", "--slowest", "5"),
     "executor_busy": ("waits", "--by", "instance", "--slowest", "5"),
+    "all_threads_busy": ("waits", "--by", "instance", "--slowest", "5"),
     "blocked": ("waits", "--by", "instance", "--slowest", "5"),
     "undecided": ("waits", "--by", "instance", "--slowest", "5"),
     "take_to_callback": ("waits", "--by", "instance", "--slowest", "5"),

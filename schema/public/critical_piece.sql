@@ -17,15 +17,15 @@
 -- column: position BIGINT  Order within the flow, from 1
 -- column: part VARCHAR  Part of the flow, as in main.end_to_end_part
 -- column: activity VARCHAR  What happened: the part itself; up to a take 'network_or_idle',
---     'executor_busy' (it ran something else), 'blocked' (a callback ran that excludes the waiting
---     one) or 'undecided' (nothing shows when the message arrived); in a cache 'timer' (not due
---     yet), 'unpublished' (the message that was waited for had not been published), or a part of
---     that message's own flow
+--     'executor_busy' (it ran something else), 'all_threads_busy' (none of its threads was free),
+--     'blocked' (a callback ran that excludes the waiting one) or 'undecided' (nothing shows when
+--     the message arrived); in a cache 'timer' (not due yet), 'unpublished' (the message that was
+--     waited for had not been published), or a part of that message's own flow
 -- column: from_ns BIGINT [epoch ns]  Begin
 -- column: to_ns BIGINT [epoch ns]  End
 -- column: duration_ns BIGINT [ns]  to_ns - from_ns
--- column: is_certain BOOLEAN  For 'executor_busy' and 'blocked': what waited was ready by then;
---     false: it may have arrived during this piece. NULL for others
+-- column: is_certain BOOLEAN  For 'executor_busy', 'all_threads_busy' and 'blocked': what waited
+--     was ready by then; false: it may have arrived during this piece. NULL for others
 -- column: callback_instance_id BIGINT  Callback instance that it is, or that it waits for
 -- column: publication_id BIGINT  Message that is published, under way or waited for
 CREATE OR REPLACE MACRO main.critical_piece(parts, runs) AS TABLE
@@ -59,7 +59,7 @@ waited AS MATERIALIZED (
 ready AS MATERIALIZED (
     SELECT
         run_id, executor_id, thread_id, callback_id, callback_instance_id, since, origin_ns,
-        earliest_ns, latest_ns, start_ns
+        earliest_ns, latest_ns, start_ns, picked_ns, thread_count
     FROM derive.callback_ready('waited')
     WHERE callback_instance_id IN (SELECT callback_instance_id FROM waiting)
 ),
@@ -91,6 +91,43 @@ meanwhile AS MATERIALIZED (
     JOIN main.callback_instance AS r ON i.meanwhile_id = r.callback_instance_id
     WHERE i.overlap_ns > 0
 ),
+-- Several threads of an executor wait for work one at a time.
+several AS (
+    SELECT executor_id, max(start_ns) AS until_ns
+    FROM ready
+    WHERE thread_count > 1
+    GROUP BY executor_id
+),
+poll AS MATERIALIZED (
+    SELECT executor_id, start_ns, end_ns FROM derive.executor_poll('several')
+),
+-- Between two of these waits no thread was free.
+held AS (
+    SELECT
+        executor_id, end_ns AS start_ns,
+        coalesce(lead(start_ns) OVER in_time, 9223372036854775807) AS end_ns
+    FROM poll
+    WINDOW in_time AS (PARTITION BY executor_id ORDER BY end_ns)
+    UNION ALL
+    SELECT executor_id, 0, min(start_ns) FROM poll GROUP BY executor_id
+),
+-- Nor is one for what a thread has picked.
+unserved AS (
+    SELECT
+        r.callback_instance_id, r.thread_id, r.latest_ns,
+        greatest(r.earliest_ns, h.start_ns) AS from_ns,
+        least(greatest(r.earliest_ns, r.picked_ns), h.end_ns) AS to_ns
+    FROM ready AS r
+    JOIN held AS h
+        ON r.executor_id = h.executor_id
+        AND r.earliest_ns < h.end_ns
+        AND r.picked_ns > h.start_ns
+    UNION ALL
+    SELECT
+        callback_instance_id, thread_id, latest_ns, greatest(earliest_ns, picked_ns), start_ns
+    FROM ready
+    WHERE earliest_ns IS NOT NULL AND executor_id IN (SELECT executor_id FROM poll)
+),
 -- Of several threads all have to be busy; then the one that took over was, too.
 full_house AS (
     SELECT
@@ -114,8 +151,10 @@ occupied AS (
     WHERE s.thread_count = 1
     UNION ALL
     SELECT
-        m.callback_instance_id, 1, 'executor_busy', greatest(m.from_ns, b.start_ns),
-        least(m.to_ns, b.end_ns), m.latest_ns, m.meanwhile_id
+        m.callback_instance_id, 1,
+        CASE WHEN m.executor_id IN (SELECT executor_id FROM poll) THEN 'all_threads_busy'
+            ELSE 'executor_busy' END,
+        greatest(m.from_ns, b.start_ns), least(m.to_ns, b.end_ns), m.latest_ns, m.meanwhile_id
     FROM meanwhile AS m
     JOIN full_house AS b
         ON m.executor_id = b.executor_id AND m.from_ns < b.end_ns AND m.to_ns > b.start_ns
@@ -129,6 +168,16 @@ occupied AS (
         ON m.meanwhile_callback_id = r.callback_id
         AND w.kind = r.kind
         AND w.exclusion_id = r.exclusion_id
+    UNION ALL
+    SELECT
+        u.callback_instance_id, 3, 'all_threads_busy',
+        derive.corrected_ns(u.from_ns, c.offset_ns, c.drift_ppb, c.reference_ns),
+        derive.corrected_ns(u.to_ns, c.offset_ns, c.drift_ppb, c.reference_ns),
+        derive.corrected_ns(u.latest_ns, c.offset_ns, c.drift_ppb, c.reference_ns),
+        u.callback_instance_id
+    FROM unserved AS u
+    JOIN store.thread AS t ON u.thread_id = t.thread_id
+    JOIN derive.process_clock AS c ON t.process_id = c.process_id
 ),
 -- The message whose callback published for what lay in the cache, or the timer that did.
 completing AS (
@@ -151,15 +200,16 @@ candidate AS (
         o.meanwhile_id AS callback_instance_id, NULL::BIGINT AS publication_id
     FROM waiting AS w
     JOIN occupied AS o ON w.callback_instance_id = o.callback_instance_id
+    WHERE o.priority <= 2 OR w.part <> 'take_to_callback'
     UNION ALL
-    SELECT w.position, 3, 'timer', w.from_ns, i.origin_ns, NULL, w.callback_instance_id, NULL
+    SELECT w.position, 4, 'timer', w.from_ns, i.origin_ns, NULL, w.callback_instance_id, NULL
     FROM waiting AS w
     JOIN wait AS i ON w.callback_instance_id = i.callback_instance_id
     WHERE w.part = 'cache' AND i.since = 'timer'
     UNION ALL
     -- Before it is known that the input was there, the executor may have been what it waited for.
     SELECT
-        w.position, 4, 'undecided', coalesce(c.end_ns, w.from_ns),
+        w.position, 5, 'undecided', coalesce(c.end_ns, w.from_ns),
         CASE WHEN i.callback_instance_id IS NULL THEN coalesce(c.taken_ns, w.to_ns)
             ELSE least(c.taken_ns, i.latest_ns) END,
         NULL, w.callback_instance_id, coalesce(c.publication_id, w.publication_id)
@@ -169,24 +219,24 @@ candidate AS (
     WHERE (w.part IN ('publish_to_take', 'request_to_take') OR c.position IS NOT NULL)
         AND i.is_bounded IS DISTINCT FROM true
     UNION ALL
-    SELECT c.position, 5, 'unpublished', w.from_ns, coalesce(c.publishing_ns, c.published_ns),
+    SELECT c.position, 6, 'unpublished', w.from_ns, coalesce(c.publishing_ns, c.published_ns),
         NULL, c.publishing_id, c.publication_id
     FROM completing AS c
     JOIN waiting AS w ON c.position = w.position
     UNION ALL
-    SELECT position, 5, 'callback', publishing_ns, published_ns, NULL, publishing_id, publication_id
+    SELECT position, 6, 'callback', publishing_ns, published_ns, NULL, publishing_id, publication_id
     FROM completing
     WHERE publishing_ns IS NOT NULL
     UNION ALL
-    SELECT position, 5, 'publish', published_ns, end_ns, NULL, publishing_id, publication_id
+    SELECT position, 6, 'publish', published_ns, end_ns, NULL, publishing_id, publication_id
     FROM completing
     UNION ALL
     SELECT
-        position, 5, 'network_or_idle', end_ns, taken_ns, NULL, callback_instance_id,
+        position, 6, 'network_or_idle', end_ns, taken_ns, NULL, callback_instance_id,
         publication_id
     FROM completing
     UNION ALL
-    SELECT c.position, 5, 'take_to_callback', c.taken_ns, w.to_ns, NULL, c.callback_instance_id,
+    SELECT c.position, 6, 'take_to_callback', c.taken_ns, w.to_ns, NULL, c.callback_instance_id,
         c.publication_id
     FROM completing AS c
     JOIN waiting AS w ON c.position = w.position
@@ -201,7 +251,7 @@ named AS (
             WHEN p.callback_instance_id IS NULL AND p.duration_ns > 0 THEN 'undecided'
             ELSE 'network_or_idle'
         END AS activity,
-        CASE WHEN c.priority <= 2 THEN coalesce(c.from_ns >= c.latest_ns, false) END AS is_certain,
+        CASE WHEN c.priority <= 3 THEN coalesce(c.from_ns >= c.latest_ns, false) END AS is_certain,
         CASE WHEN c.activity IS NULL THEN p.callback_instance_id ELSE c.callback_instance_id END
             AS callback_instance_id,
         CASE WHEN c.activity IS NULL THEN p.publication_id ELSE c.publication_id END

@@ -22,11 +22,13 @@
 -- column: busy_max_ns BIGINT [ns]  Executor busy with other callbacks from earliest_ns on
 -- column: blocked_max_ns BIGINT [ns]  Part of busy_max_ns for which a thread was free, but a
 --     callback ran that never runs beside this one
--- column: idle_ns BIGINT [ns]  Executor waiting for work from earliest_ns on; NULL: not known
+-- column: idle_ns BIGINT [ns]  Executor waiting for work from earliest_ns on, until a thread
+--     picked this callback; NULL: not known
 -- column: is_loss_affected BOOLEAN  A gap of the trace lies in it
 -- column: held_max_ns BIGINT [ns]  From earliest_ns on, no thread of an executor of several waited
---     for work, though not all ran callbacks: they were blocked by its lock, or looked for work.
---     Not part of busy_max_ns. NULL: not known, or one thread
+--     for work, though not all ran callbacks: they were blocked by its lock, or looked for work;
+--     or the thread that ran this callback had picked it, and did not start it yet. Not part of
+--     busy_max_ns. NULL: not known, or one thread
 -- column: meanwhile_callback_ids BIGINT[]  Callbacks that ran meanwhile, the longest first;
 --     NULL: none
 -- column: meanwhile_ns BIGINT[] [ns]  For how long each of them did, from earliest_ns on (from
@@ -43,7 +45,7 @@ WITH executor AS (
 ready AS MATERIALIZED (
     SELECT
         run_id, executor_id, thread_id, callback_id, callback_instance_id, since, origin_ns,
-        earliest_ns, latest_ns, start_ns, thread_count, wait_start_ns, wait_end_ns,
+        earliest_ns, latest_ns, start_ns, thread_count, picked_ns, wait_start_ns, wait_end_ns,
         wait_before_ns, previous_wait_end_ns, is_loss_affected
     FROM derive.callback_ready('executor')
 ),

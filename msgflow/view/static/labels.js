@@ -46,7 +46,7 @@ const TITLES = {
 const PARTS = {
   network_or_idle: "network, or executor idle", executor_busy: "executor busy with others",
   undecided: "undecided: network or busy executor", take_to_callback: "take to callback",
-  blocked: "blocked by another callback", unpublished: "waiting for a message not published yet",
+  all_threads_busy: "all threads of the executor busy", blocked: "blocked by another callback", unpublished: "waiting for a message not published yet",
   timer: "waiting for the timer", cache: "in a cache", stored: "stored until the subscription existed",
 };
 export const partTitle = (name) => PARTS[name] ?? name.replaceAll("_", " ");
@@ -54,7 +54,7 @@ export const partTitle = (name) => PARTS[name] ?? name.replaceAll("_", " ");
 export const PALE = new Set(["wait", "faint"]);
 export const PART_COLORS = {
   callback: "subscription", cache: "indirect", take_to_callback: "faint", stored: "stored", network_or_idle: "transport", undecided: "wait",
-  executor_busy: "process", blocked: "process", unpublished: "faint", timer: "timer", service: "service", rclcpp: "publication",
+  executor_busy: "process", all_threads_busy: "process", blocked: "process", unpublished: "faint", timer: "timer", service: "service", rclcpp: "publication",
   rcl: "publication", rmw: "publication", dds: "publication", intra: "publication", publish: "publication", take: "take",
 };
 

@@ -5,8 +5,9 @@
 --     not before it last went to sleep, nor before the last polling point but one, which would
 --     have found it (unless that callback ran in between: then more of its input may have
 --     waited). At the latest when the executor last learned what is ready, before it picked this
---     callback. With that wait of the executor, the end of the wait before it, and the time spent
---     waiting before.
+--     callback. With that wait of the executor, the end of the wait before it, the time spent
+--     waiting before, and the moment at which its thread began to look for work and picked it
+--     (the start, with one thread or where that does not show).
 -- grain: one row per callback instance that is not nested in another
 -- param: executors VARCHAR  Name of rows of executor_id, until_ns: those to look at. Callback
 --     instances that began after the last of these moments are left out (where all are NULL: none)
@@ -49,7 +50,8 @@ polled AS (
     SELECT
         p.run_id, p.executor_id, p.thread_id, p.callback_id, p.callback_instance_id, p.start_ns,
         p.previous_start_ns, p.since, p.origin_ns, p.subscribed_ns, p.latest_ns, p.thread_count,
-        w.end_ns AS polled_ns, w.previous_end_ns, w.asleep_ns, w.start_ns AS wait_start_ns,
+        p.picked_ns, w.end_ns AS polled_ns, w.previous_end_ns, w.asleep_ns,
+        w.start_ns AS wait_start_ns,
         w.before_ns AS wait_before_ns
     FROM picked AS p
     ASOF LEFT JOIN derive.executor_poll('sized') AS w
@@ -68,7 +70,8 @@ resumed AS (
 known AS (
     SELECT
         p.run_id, p.executor_id, p.thread_id, p.callback_id, p.callback_instance_id, p.start_ns,
-        p.since, p.origin_ns, p.subscribed_ns, p.latest_ns, p.thread_count, b.resumed_ns,
+        p.since, p.origin_ns, p.subscribed_ns, p.latest_ns, p.thread_count, p.picked_ns,
+        b.resumed_ns,
         p.polled_ns AS wait_end_ns, p.wait_start_ns, p.wait_before_ns, p.previous_end_ns,
         CASE WHEN p.polled_ns < b.resumed_ns THEN NULL ELSE p.polled_ns END AS polled_ns,
         CASE
@@ -84,16 +87,16 @@ known AS (
 confined AS (
     SELECT
         run_id, executor_id, thread_id, callback_id, callback_instance_id, start_ns, since,
-        origin_ns, subscribed_ns, latest_ns, thread_count, resumed_ns, polled_ns, wait_start_ns,
-        wait_end_ns, wait_before_ns, previous_end_ns,
+        origin_ns, subscribed_ns, latest_ns, thread_count, picked_ns, resumed_ns, polled_ns,
+        wait_start_ns, wait_end_ns, wait_before_ns, previous_end_ns,
         greatest(not_polled_ns, asleep_ns) AS not_ready_ns
     FROM known
 ),
 bounded AS (
     SELECT
         run_id, executor_id, thread_id, callback_id, callback_instance_id, start_ns, since,
-        thread_count, resumed_ns, latest_ns, wait_start_ns, wait_end_ns, wait_before_ns,
-        previous_end_ns,
+        thread_count, picked_ns, resumed_ns, latest_ns, wait_start_ns, wait_end_ns,
+        wait_before_ns, previous_end_ns,
         CASE WHEN since = 'timer' THEN greatest(origin_ns, not_ready_ns) ELSE origin_ns END
             AS origin_ns,
         CASE WHEN origin_ns IS NOT NULL OR not_ready_ns IS NOT NULL
@@ -117,6 +120,7 @@ SELECT
         AS latest_ns,
     start_ns,
     thread_count,
+    coalesce(picked_ns, start_ns) AS picked_ns,
     wait_start_ns,
     wait_end_ns,
     wait_before_ns,

@@ -14,8 +14,9 @@ WITH stretch AS MATERIALIZED (
 ready AS MATERIALIZED (
     SELECT
         r.run_id, r.executor_id, r.thread_id, r.callback_id, r.callback_instance_id, r.since,
-        r.origin_ns, r.earliest_ns, r.latest_ns, r.start_ns, r.thread_count, r.wait_start_ns,
-        r.wait_end_ns, r.wait_before_ns, r.previous_wait_end_ns, r.is_loss_affected,
+        r.origin_ns, r.earliest_ns, r.latest_ns, r.start_ns, r.thread_count, r.picked_ns,
+        r.wait_start_ns, r.wait_end_ns, r.wait_before_ns, r.previous_wait_end_ns,
+        r.is_loss_affected,
         b.before_ns AS start_busy_ns,
         CASE WHEN r.earliest_ns >= coalesce(b.previous_end_ns, r.earliest_ns) THEN b.before_ns END
             AS earliest_busy_ns,
@@ -87,7 +88,10 @@ drowsy AS MATERIALIZED (
             OR earliest_ns < wait_start_ns AND earliest_ns < previous_wait_end_ns
         )
     UNION ALL
-    SELECT callback_instance_id, executor_id, 'start', start_ns FROM ready WHERE thread_count > 1
+    -- What a thread has picked does not wait for work that others wait for.
+    SELECT callback_instance_id, executor_id, 'picked', greatest(picked_ns, earliest_ns)
+    FROM ready
+    WHERE thread_count > 1
 ),
 -- Whether an executor waits at all is looked up where none of its callbacks shows it.
 silent AS (
@@ -126,7 +130,7 @@ passed AS (
         max(CASE WHEN what = 'blocked_latest' THEN until_ns END) AS blocked_latest_ns,
         max(CASE WHEN what = 'blocked_start' THEN until_ns END) AS blocked_start_ns,
         max(CASE WHEN what = 'idle_earliest' THEN until_ns END) AS idle_earliest_ns,
-        max(CASE WHEN what = 'idle_start' THEN until_ns END) AS idle_start_ns
+        max(CASE WHEN what = 'idle_picked' THEN until_ns END) AS idle_picked_ns
     FROM until
     GROUP BY callback_instance_id
 ),
@@ -146,7 +150,7 @@ measured AS (
         coalesce(p.blocked_start_ns - p.blocked_earliest_ns, 0) AS blocked_max_ns,
         CASE
             WHEN w.executor_id IS NULL OR r.earliest_ns IS NULL THEN NULL
-            WHEN r.thread_count > 1 THEN p.idle_start_ns - p.idle_earliest_ns
+            WHEN r.thread_count > 1 THEN p.idle_picked_ns - p.idle_earliest_ns
             WHEN r.wait_start_ns IS NULL OR r.earliest_ns >= r.wait_end_ns THEN 0
             WHEN r.earliest_ns >= r.wait_start_ns THEN r.wait_end_ns - r.earliest_ns
             ELSE r.wait_end_ns - r.wait_start_ns
