@@ -66,3 +66,7 @@ class DatabaseError(MsgflowError):
     """A database is missing, locked, foreign, or of another schema revision."""
 
     exit_code = ExitCode.DATABASE
+
+
+class DatabaseInUseError(DatabaseError):
+    """Another process has the database open."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import Annotated
 
 import typer
@@ -38,7 +39,7 @@ def command(
     The printed address contains a token; without it, nothing is shown. The
     server answers this machine only: from another one, open the same address
     through ssh -L. Ctrl-C stops it. While it runs, other programs can read the
-    database, but not write to it.
+    database, and write to it when no page has asked for some seconds.
     """
     from msgflow.cli.output import print_note, print_status
     from msgflow.view.server import serve, serve_single
@@ -59,6 +60,7 @@ def command(
     # Made once before the browser asks, so that errors are printed here.
     first = [lake_page(opened, where=where).content]
     serve_single(
+        lake if "://" in lake else os.path.realpath(lake),
         lambda: first.pop() if first else lake_page(opened, where=where).content,
         port=port,
         started=started,

@@ -19,7 +19,7 @@ import duckdb
 from msgflow.db.lock_holder import lock_holder
 from msgflow.db.memory import limit_threads, set_memory_limit
 from msgflow.db.workspace import remove_abandoned_workspaces
-from msgflow.errors import DatabaseError
+from msgflow.errors import DatabaseError, DatabaseInUseError
 from msgflow.sql.failure import in_words
 from msgflow.temporary_owner import is_abandoned, mark
 
@@ -30,6 +30,10 @@ if TYPE_CHECKING:
 # would lose which parts of stored statements are MATERIALIZED.
 STORAGE_VERSION = "v1.5.0"
 _SPILL = ".spill"
+_LET_GO = (
+    "try again: msgflow ui lets go of it a few seconds after its pages asked for something; "
+    "or end it"
+)
 
 
 def open_file(
@@ -169,9 +173,12 @@ def opening(path: Path) -> Iterator[None]:
     except duckdb.IOException as error:
         text = str(error)
         if "lock" in text.lower():
-            raise DatabaseError(
-                f"database is in use by another process{lock_holder(path)} — {path}",
-                "close the program that has it open, or give another file with --db",
+            holder = lock_holder(path)
+            raise DatabaseInUseError(
+                f"database is in use by another process{holder} — {path}",
+                _LET_GO
+                if "msgflow ui" in holder
+                else "close the program that has it open, or give another file with --db",
             ) from error
         if (words := in_words(error, path)) is not None:
             raise words from error

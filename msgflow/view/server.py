@@ -11,11 +11,8 @@ import hmac
 import html
 import ipaddress
 import re
-import secrets
 import socket
-import threading
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import anyio
@@ -26,13 +23,12 @@ from starlette.applications import Starlette
 from starlette.responses import JSONResponse, PlainTextResponse, RedirectResponse, Response
 from starlette.routing import Route
 
-from msgflow.db.connection import connect
-from msgflow.db.memory import default_limit
-from msgflow.errors import DatabaseError, MsgflowError, QueryError, UsageError
+from msgflow.errors import MsgflowError, UsageError
 from msgflow.sql.failure import first_line
 from msgflow.view import assets
 from msgflow.view.connection import Connection, timed
-from msgflow.view.pages import Pages
+from msgflow.view.kept_token import kept_token
+from msgflow.view.shared_database import ReplacedError, SharedDatabase, UnopenedError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -64,259 +60,7 @@ _HEADERS = {
 _FILE = re.compile(r"[\w.-]+\.(?:js|css)")
 
 
-class ReplacedError(DatabaseError):
-    """The database is not the one that the page was made of."""
-
-
-class UnopenedError(DatabaseError):
-    """What took the place of the database cannot be opened, or not yet."""
-
-
-@dataclass(frozen=True)
-class Identity:
-    """Tells a file from another of the same name."""
-
-    device: int
-    inode: int
-    modified_ns: int
-    size: int
-
-
-class Turns:
-    """Turns of questions: several at a time, and one alone that had too little memory."""
-
-    def __init__(self) -> None:
-        self._changed = threading.Condition()
-        self._running = 0
-        self._is_alone = False
-
-    def ask(self, question: Callable[[], bytes]) -> bytes:
-        """Return the answer.
-
-        Raises:
-            MsgflowError: what the question raises; of memory only where it has too little alone.
-        """
-        with self._turn(alone=False):
-            answer = _if_memory_suffices(question)
-        if answer is not None:
-            return answer
-        with self._turn(alone=True):
-            answer = _if_memory_suffices(question)
-        if answer is None:
-            raise QueryError(
-                "this takes more memory than the server may use",
-                "start it with more: msgflow ui --memory-limit 8GB",
-            )
-        return answer
-
-    @contextmanager
-    def _turn(self, *, alone: bool) -> Iterator[None]:
-        with self._changed:
-            self._changed.wait_for(lambda: not self._is_alone and not (alone and self._running))
-            self._running += 1
-            self._is_alone = alone
-        try:
-            yield
-        finally:
-            with self._changed:
-                self._running -= 1
-                self._is_alone = False
-                self._changed.notify_all()
-
-
-class Ahead:
-    """Asks for the timeline of the latest run before the page does.
-
-    The bars of a large run are counted once, which takes longer than a browser needs to open.
-    """
-
-    def __init__(self, turns: Turns, pages: Pages, cursor: duckdb.DuckDBPyConnection) -> None:
-        self._turns = turns
-        self._pages = pages
-        self._cursor = cursor
-        self._thread = threading.Thread(target=self._ask, daemon=True)
-        self._thread.start()
-
-    def _ask(self) -> None:
-        # The page asks for it too, and shows the error.
-        with suppress(MsgflowError, duckdb.Error):
-            self._turns.ask(lambda: self._pages.answer(self._cursor, "segments", {}))
-
-    def stop(self) -> None:
-        """End it, if it still asks."""
-        while self._thread.is_alive():
-            self._cursor.interrupt()
-            self._thread.join(_SECONDS_BETWEEN_LOOKS)
-        self._cursor.close()
-
-
-def _if_memory_suffices(question: Callable[[], bytes]) -> bytes | None:
-    try:
-        return question()
-    except (duckdb.OutOfMemoryException, QueryError) as error:
-        if not isinstance(error.__cause__ or error, duckdb.OutOfMemoryException):
-            raise
-    return None
-
-
-@dataclass
-class Opened:
-    """The database as it was opened once.
-
-    Attributes:
-        identity: of its file.
-        base: a connection, which those of questions are made of.
-        pages: answer questions.
-        turns: of questions.
-        ahead: the question that comes before those of pages.
-    """
-
-    identity: Identity
-    base: duckdb.DuckDBPyConnection
-    pages: Pages
-    turns: Turns
-    ahead: Ahead
-
-    def close(self) -> None:
-        """Close it; no question may run."""
-        self.ahead.stop()
-        self.base.close()
-        self.pages.close()
-
-
-class Shared:
-    """The open database, which all requests share; it is opened anew when its file is replaced.
-
-    Attributes:
-        generation: counts how often that was.
-    """
-
-    def __init__(self, path: Path, memory_limit: str | None) -> None:
-        self.path = path
-        self.generation = 1
-        self._memory_limit = memory_limit
-        self._changed = threading.Condition()
-        self._cursors: set[duckdb.DuckDBPyConnection] = set()
-        self._opened: Opened | None = self._open()
-
-    def _open(self) -> Opened:
-        # First: if the file is replaced meanwhile, the next request sees another identity.
-        identity = _identity(self.path)
-        base = connect(
-            self.path, read_only=True, memory_limit=self._memory_limit or default_limit()
-        )
-        pages, turns = Pages(), Turns()
-        return Opened(identity, base, pages, turns, Ahead(turns, pages, base.cursor()))
-
-    def renew(self) -> None:
-        """Open the database anew if its file was replaced.
-
-        Raises:
-            ReplacedError: the file is gone.
-            UnopenedError: what took its place cannot be opened.
-        """
-        with self._changed:
-            self._current()
-
-    def answer(
-        self,
-        name: str,
-        params: dict[str, Any],
-        generation: str | None,
-        started: Callable[[duckdb.DuckDBPyConnection], None],
-    ) -> bytes:
-        """Return the answer to a question of a page.
-
-        Args:
-            name: of the answer.
-            params: as the page gives them.
-            generation: that of the page.
-            started: called with the connection that is asked, which can be interrupted.
-
-        Raises:
-            ReplacedError: the file was replaced since the page was made, or is gone.
-            UnopenedError: what took its place cannot be opened.
-            MsgflowError: as `Pages.answer` does.
-        """
-        with self._changed:
-            opened = self._current()
-            if generation is not None and generation != str(self.generation):
-                raise self._replaced()
-            cursor = opened.base.cursor()
-            self._cursors.add(cursor)
-        try:
-            started(cursor)
-            content = opened.turns.ask(lambda: opened.pages.answer(cursor, name, params))
-        except (MsgflowError, duckdb.Error):
-            if not self._is_same(opened):  # then it was interrupted, or read another file
-                raise self._replaced() from None
-            raise
-        finally:
-            with self._changed:
-                cursor.close()
-                self._cursors.discard(cursor)
-                self._changed.notify_all()
-        if not self._is_same(opened):  # written in its place, it can be a part of each
-            raise self._replaced()
-        return content
-
-    def _current(self) -> Opened:
-        # A process has a file of one name open once: the old one is closed before the new one.
-        while not self._is_same(self._opened):
-            if self._cursors:
-                self._end_questions()
-                continue
-            if self._opened is not None:
-                self._opened.close()
-                self._opened = None
-            try:
-                self._opened = self._open()
-            except DatabaseError as error:
-                if not self.path.exists():
-                    raise ReplacedError(
-                        f"the database is no longer there — {self.path}", "msgflow ui --db FILE"
-                    ) from None
-                raise UnopenedError(error.message, error.hint) from None
-            self.generation += 1
-        assert self._opened is not None
-        return self._opened
-
-    def _is_same(self, opened: Opened | None) -> bool:
-        try:
-            return opened is not None and opened.identity == _identity(self.path)
-        except (OSError, DatabaseError):
-            return False
-
-    def _end_questions(self) -> None:
-        for cursor in self._cursors:
-            cursor.interrupt()
-        self._changed.wait(_SECONDS_BETWEEN_LOOKS)
-
-    def _replaced(self) -> ReplacedError:
-        return ReplacedError(
-            f"the database was replaced while the page was open — {self.path}",
-            "reload the page to see the new one",
-        )
-
-    def close(self) -> None:
-        """Close the database."""
-        with self._changed:
-            while self._cursors:
-                self._end_questions()
-            if self._opened is not None:
-                self._opened.close()
-                self._opened = None
-
-
-def _identity(path: Path) -> Identity:
-    try:
-        stat = path.stat()
-    except FileNotFoundError:
-        raise DatabaseError(f"no database — {path}", "msgflow ingest TRACE") from None
-    return Identity(stat.st_dev, stat.st_ino, stat.st_mtime_ns, stat.st_size)
-
-
-def application(shared: Shared, token: str) -> ASGIApp:
+def application(shared: SharedDatabase, token: str) -> ASGIApp:
     """Return the application: pages and their data, for requests with the token.
 
     Args:
@@ -326,10 +70,11 @@ def application(shared: Shared, token: str) -> ASGIApp:
     limiter: list[anyio.CapacityLimiter] = []
 
     async def page(request: Request) -> Response:
+        generation = ""
         with suppress(MsgflowError):  # the page asks too, and shows the error
-            await anyio.to_thread.run_sync(shared.renew)
+            generation = await anyio.to_thread.run_sync(shared.generation)
         content = assets.page(
-            head=_head(), attributes=f' data-generation="{html.escape(str(shared.generation))}"'
+            head=_head(), attributes=f' data-generation="{html.escape(generation)}"'
         )
         return Response(content, media_type="text/html")
 
@@ -353,7 +98,7 @@ def application(shared: Shared, token: str) -> ASGIApp:
         except ReplacedError as error:
             return _failure(error, 409, "replaced")
         except UnopenedError as error:
-            return _failure(error, 503, "failed")
+            return _failure(error, 503, "unopened")
         except UsageError as error:
             return _failure(error, 400, "usage")
         except MsgflowError as error:
@@ -393,6 +138,7 @@ def single_application(make: Callable[[], str], token: str) -> ASGIApp:
 
 
 def serve_single(
+    place: str,
     make: Callable[[], str],
     *,
     port: int | None = None,
@@ -401,6 +147,7 @@ def serve_single(
     """Serve one page with its data inside until Ctrl-C.
 
     Args:
+        place: what the page shows; its token is kept.
         make: returns the page; called whenever it is loaded.
         port: of 127.0.0.1; 0 takes any that is free, None the usual one or else any.
         started: called with the address, which has the token, once it can be opened.
@@ -408,14 +155,16 @@ def serve_single(
     Raises:
         UsageError: the port is in use.
     """
-    with listening(port, lambda token: single_application(make, token)) as (
+    with listening(place, port, lambda token: single_application(make, token)) as (
         server, listener, address,
     ):  # fmt: skip
         started(address)
         server.run(sockets=[listener])
 
 
-async def _answered(shared: Shared, request: Request, limiter: anyio.CapacityLimiter) -> Response:
+async def _answered(
+    shared: SharedDatabase, request: Request, limiter: anyio.CapacityLimiter
+) -> Response:
     """Return the answer; interrupt the query when the browser no longer waits for it."""
     name = request.path_params["name"]
     params: dict[str, Any] = dict(request.query_params)
@@ -605,9 +354,10 @@ def running(
     path: Path, *, port: int | None, memory_limit: str | None
 ) -> Iterator[tuple[uvicorn.Server, socket.socket, str]]:
     """Prepare a server; see `serve`."""
-    shared = Shared(path, memory_limit)
+    shared = SharedDatabase(path, memory_limit)
     try:
-        with listening(port, lambda token: application(shared, token)) as server:
+        place = str(path.resolve())
+        with listening(place, port, lambda token: application(shared, token)) as server:
             yield server
     finally:
         shared.close()
@@ -615,11 +365,11 @@ def running(
 
 @contextmanager
 def listening(
-    port: int | None, make: Callable[[str], ASGIApp]
+    place: str, port: int | None, make: Callable[[str], ASGIApp]
 ) -> Iterator[tuple[uvicorn.Server, socket.socket, str]]:
-    """Prepare a server of the application that `make` returns for a token."""
+    """Prepare a server of the application that `make` returns for the token of a place."""
     listener = listen(port)
-    token = secrets.token_urlsafe(24)
+    token = kept_token(place)
     address = f"http://{HOST}:{listener.getsockname()[1]}/?token={token}"
     config = uvicorn.Config(
         timed(make(token)), log_level="error", access_log=False, lifespan="off", ws="none",

@@ -43,6 +43,11 @@ class Served:
         connection.close()
         return answer.status, {k.lower(): v for k, v in answer.getheaders()}, content
 
+    def generation(self) -> str:
+        """Return the generation of the page that is loaded now."""
+        page = self.get("/")[2].decode()
+        return page.partition('data-generation="')[2].partition('"')[0]
+
     def close(self) -> None:
         self.server.should_exit = True
         self._thread.join(20)

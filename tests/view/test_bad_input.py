@@ -233,7 +233,7 @@ def test_a_page_of_a_replaced_database_says_so(
         other.replace(path)
         page.go("#/paths")
         said = page.page.locator("main").inner_text()
-        assert "the database was replaced while the page was open" in said
+        assert "the database was changed while the page was open" in said
         page.page.get_by_role("button", name="reload the page").click()
         page.page.get_by_role("region", name="paths", exact=True).wait_for(timeout=60_000)
         assert "/BehaviorPlanner" in page.page.locator("main").inner_text()

@@ -166,7 +166,7 @@ def test_the_server_shows_the_page_anew(lake: Lake, page: Page) -> None:
 
 
 def served(make: object) -> Iterator[tuple[str, None]]:
-    with listening(0, lambda token: single_application(make, token)) as (  # type: ignore[arg-type]
+    with listening("lake", 0, lambda token: single_application(make, token)) as (  # type: ignore[arg-type]
         server,
         listener,
         address,

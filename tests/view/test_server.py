@@ -23,12 +23,13 @@ import pytest
 from served import Served
 from tables import decoded
 
-from msgflow.errors import DatabaseError, QueryError, UsageError
-from msgflow.ingest import ingest
+from msgflow.errors import QueryError, UsageError
 from msgflow.view import pages
 from msgflow.view.connection import timed
 from msgflow.view.pages import Pages
-from msgflow.view.server import Ahead, Turns, is_local, listen, serve
+from msgflow.view.server import is_local, listen, serve
+from msgflow.view.shared_database import Ahead
+from msgflow.view.turns import Turns
 
 Serve = Callable[[Path], Served]
 
@@ -175,19 +176,20 @@ def test_a_replaced_database_is_said(demo: Path, tmp_path: Path, systems: Path) 
     shutil.copyfile(demo, path)
     server = Served(path)
     try:
-        assert server.get("/api/run", X_Generation="1")[0] == 200
+        before = server.generation()
+        assert server.get("/api/run", X_Generation=before)[0] == 200
         other = tmp_path / "other.duckdb"
         shutil.copyfile(systems, other)
         other.replace(path)
-        status, _, content = server.get("/api/run", X_Generation="1")
+        status, _, content = server.get("/api/run", X_Generation=before)
         assert status == 409
         assert json.loads(content)["code"] == "replaced"
-        assert b'data-generation="2"' in server.get("/")[2]
-        status, _, content = server.get("/api/run", X_Generation="2")
+        after = server.generation()
+        status, _, content = server.get("/api/run", X_Generation=after)
         assert status == 200
         assert len(decoded(content).rows) == 3
         path.unlink()
-        status, _, content = server.get("/api/run", X_Generation="2")
+        status, _, content = server.get("/api/run", X_Generation=after)
         assert status == 409
         assert "no longer there" in json.loads(content)["error"]
     finally:
@@ -201,21 +203,24 @@ def test_a_database_is_replaced_during_questions(
 
     def wait(_: Pages, connection: duckdb.DuckDBPyConnection, params: dict[str, Any]) -> bytes:
         is_asked.set()
-        return bytes(connection.execute("SELECT count(*) FROM range(1000000000000)").fetchone()[0])
+        return bytes(
+            connection.execute("SELECT count(*) FROM range(1000000000000)").fetchall()[0][0]
+        )
 
     path = shutil.copyfile(demo, tmp_path / "copy.duckdb")
     monkeypatch.setitem(pages.ANSWERS, "wait", wait)
     server = Served(path)
     try:
+        before = server.generation()
         with ThreadPoolExecutor(2) as pool:
-            waiting = [pool.submit(server.get, "/api/wait", X_Generation="1") for _ in range(2)]
+            waiting = [pool.submit(server.get, "/api/wait", X_Generation=before) for _ in range(2)]
             assert is_asked.wait(30)
             shutil.copyfile(systems, tmp_path / "other.duckdb").replace(path)
-            status, _, content = server.get("/api/run", X_Generation="1")
+            status, _, content = server.get("/api/run", X_Generation=before)
             for answer in [(status, {}, content), *(one.result(60) for one in waiting)]:
                 assert answer[0] == 409, answer
                 assert json.loads(answer[2])["code"] == "replaced"
-        status, _, content = server.get("/api/run", X_Generation="2")
+        status, _, content = server.get("/api/run", X_Generation=server.generation())
         assert status == 200
         assert len(decoded(content).rows) == 3
     finally:
@@ -229,8 +234,7 @@ def test_a_page_that_is_loaded_is_that_of_the_new_database(
     server = Served(path)
     try:
         shutil.copyfile(systems, tmp_path / "other.duckdb").replace(path)
-        assert b'data-generation="2"' in server.get("/")[2]
-        assert server.get("/api/run", X_Generation="2")[0] == 200
+        assert server.get("/api/run", X_Generation=server.generation())[0] == 200
     finally:
         server.close()
 
@@ -239,17 +243,17 @@ def test_what_cannot_be_opened_is_said_until_it_can(demo: Path, tmp_path: Path) 
     path = shutil.copyfile(demo, tmp_path / "copy.duckdb")
     server = Served(path)
     try:
+        before = server.generation()
         aside = path.rename(tmp_path / "aside.duckdb")
         path.write_text("no database")
         for _ in range(2):
             status, _, content = server.get("/api/run")
             assert status == 503
             assert "copy.duckdb" in json.loads(content)["error"]
-        assert server.get("/")[0] == 200
+        assert server.generation() == ""
         aside.rename(path)
-        status, _, content = server.get("/api/run", X_Generation="1")
-        assert status == 409
-        assert server.get("/api/run", X_Generation="2")[0] == 200
+        assert server.get("/api/run", X_Generation="")[0] == 409
+        assert server.get("/api/run", X_Generation=before)[0] == 200
     finally:
         server.close()
 
@@ -266,19 +270,9 @@ def test_an_answer_from_a_file_that_was_written_meanwhile_is_none(
     monkeypatch.setitem(pages.ANSWERS, "write", write)
     server = Served(path)
     try:
-        assert server.get("/api/write", X_Generation="1")[0] == 409
+        assert server.get("/api/write", X_Generation=server.generation())[0] == 409
     finally:
         server.close()
-
-
-def test_an_ingest_meanwhile_is_refused(simulated: Callable[..., Path], tmp_path: Path) -> None:
-    demo = simulated("pipeline", 0.1)
-    path = tmp_path / "copy.duckdb"
-    shutil.copyfile(demo, path)
-    with running_program(path) as (process, _):
-        with pytest.raises(DatabaseError, match="in use by another process"):
-            ingest([demo.parent / "trace"], path, name="again")
-        assert process.poll() is None
 
 
 def test_a_port_in_use_is_said(demo: Path, tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ export function waiting(text = "reading …") {
 }
 
 export function failed(error) {
-  const reload = error.code === "replaced" || error.code === "gone";
+  const reload = ["replaced", "gone", "unopened"].includes(error.code);
   return h("div", { className: "failed", role: "alert" },
     h("p", {}, `Error: ${error.message}`),
     error.hint && h("p", { className: "soft" }, `What to do: ${error.hint}`),

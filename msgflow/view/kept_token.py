@@ -1,0 +1,69 @@
+"""Tokens of `msgflow ui`, kept for each database, so that open pages outlive a restart."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import re
+import secrets
+import stat
+from pathlib import Path
+
+_BYTES = 24
+# Neither a link nor a pipe is followed or waited for.
+_FLAGS = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+_OF_OTHERS = stat.S_IRWXG | stat.S_IRWXO
+_TOKEN = re.compile(rb"[\w-]{32}")
+
+
+def kept_token(place: str) -> str:
+    """Return the token of a database or lake: the kept one, or a new one that is kept from now on.
+
+    It is kept in a file that its user alone can read. A file that others can read or have written
+    is replaced. Where nothing can be kept, each call returns another token.
+
+    Args:
+        place: the absolute path of a database, or the address of a lake.
+    """
+    with contextlib.suppress(OSError, RuntimeError):  # the last: there is no home directory
+        path = _file(place)
+        return _read(path) or _keep(path, _new())
+    return _new()
+
+
+def _new() -> str:
+    return secrets.token_urlsafe(_BYTES)
+
+
+def _file(place: str) -> Path:
+    given = os.environ.get("LOCALAPPDATA" if os.name == "nt" else "XDG_STATE_HOME")
+    root = Path(given) if given and os.path.isabs(given) else Path("~/.local/state").expanduser()
+    return root / "msgflow" / f"token-{hashlib.sha256(os.fsencode(place)).hexdigest()}"
+
+
+def _read(path: Path) -> str | None:
+    try:
+        descriptor = os.open(path, _FLAGS)
+    except OSError:
+        return None
+    with open(descriptor, "rb") as file:
+        status = os.fstat(descriptor)
+        is_ours = stat.S_ISREG(status.st_mode) and (
+            os.name == "nt" or (status.st_uid == os.geteuid() and not status.st_mode & _OF_OTHERS)
+        )
+        found = _TOKEN.fullmatch(file.read(_BYTES * 2)) if is_ours else None
+    return None if found is None else found[0].decode()
+
+
+def _keep(path: Path, token: str) -> str:
+    path.parent.mkdir(mode=stat.S_IRWXU, parents=True, exist_ok=True)
+    aside = path.with_name(f"{path.name}.{secrets.token_hex(_BYTES)}.part")
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL
+    try:
+        with open(os.open(aside, flags, stat.S_IRUSR | stat.S_IWUSR), "w") as file:
+            file.write(token)
+        aside.replace(path)
+    finally:
+        aside.unlink(missing_ok=True)
+    return token

@@ -1,0 +1,294 @@
+"""The database of `msgflow ui`, which all requests share.
+
+It is open while questions are asked. When none was asked for some seconds it is closed, so that
+other commands can write to it. The next question opens it again.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import threading
+import time
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import duckdb
+
+from msgflow.db.connection import connect
+from msgflow.db.memory import default_limit
+from msgflow.errors import DatabaseError, DatabaseInUseError, MsgflowError
+from msgflow.version import __version__
+from msgflow.view.pages import Pages
+from msgflow.view.turns import Turns
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+# More than the questions of one page are apart, less than it takes to type a command.
+SECONDS_UNTIL_FREE = 3.0
+_SECONDS_BETWEEN_LOOKS = 0.1
+
+
+class ReplacedError(DatabaseError):
+    """The database is not the one that the page was made of."""
+
+
+class UnopenedError(DatabaseError):
+    """The database cannot be opened, or not yet."""
+
+
+class Ahead:
+    """Asks for the timeline of the latest run before the page does.
+
+    The bars of a large run are counted once, which takes longer than a browser needs to open.
+    """
+
+    def __init__(self, turns: Turns, pages: Pages, cursor: duckdb.DuckDBPyConnection) -> None:
+        self._turns = turns
+        self._pages = pages
+        self._cursor = cursor
+        self._thread = threading.Thread(target=self._ask, daemon=True)
+        self._thread.start()
+
+    def _ask(self) -> None:
+        # The page asks for it too, and shows the error.
+        with suppress(MsgflowError, duckdb.Error):
+            self._turns.ask(lambda: self._pages.answer(self._cursor, "segments", {}))
+
+    def is_asking(self) -> bool:
+        """Tell whether it has no answer yet."""
+        return self._thread.is_alive()
+
+    def stop(self) -> None:
+        """End it, if it still asks."""
+        while self._thread.is_alive():
+            self._cursor.interrupt()
+            self._thread.join(_SECONDS_BETWEEN_LOOKS)
+        self._cursor.close()
+
+
+@dataclass
+class Answers:
+    """Answers from one state of the database, which are kept while it is closed.
+
+    Attributes:
+        generation: of that state, see `generation_of`.
+        pages: answer questions.
+        turns: of questions.
+    """
+
+    generation: str
+    pages: Pages
+    turns: Turns
+
+
+@dataclass
+class Opened:
+    """The database as it was opened once.
+
+    Attributes:
+        answers: from its state.
+        base: a connection, which those of questions are made of.
+        ahead: the question that comes before those of pages.
+    """
+
+    answers: Answers
+    base: duckdb.DuckDBPyConnection
+    ahead: Ahead
+
+    def close(self) -> None:
+        """Close it; no question may run."""
+        self.ahead.stop()
+        self.base.close()
+
+
+class SharedDatabase:
+    """The database that all requests share, open while questions are asked.
+
+    Args:
+        path: the database.
+        memory_limit: most memory that DuckDB takes, such as '1GB'; see `serve` for None.
+
+    Raises:
+        DatabaseError: the file is missing, locked, foreign, or of another schema revision.
+    """
+
+    def __init__(self, path: Path, memory_limit: str | None) -> None:
+        self.path = path
+        self._memory_limit = memory_limit
+        self._changed = threading.Condition()
+        self._cursors: set[duckdb.DuckDBPyConnection] = set()
+        self._answers: Answers | None = None
+        self._opened: Opened | None = None
+        self._asked_at = time.monotonic()
+        self._is_closed = False
+        self._open()
+        self._idle = threading.Thread(target=self._free_when_idle, daemon=True)
+        self._idle.start()
+
+    def generation(self) -> str:
+        """Return the generation of the database as it is now, which is opened for it.
+
+        Raises:
+            ReplacedError: the file is gone.
+            UnopenedError: it cannot be opened.
+        """
+        with self._changed:
+            return self._current().answers.generation
+
+    def answer(
+        self,
+        name: str,
+        params: dict[str, Any],
+        generation: str | None,
+        started: Callable[[duckdb.DuckDBPyConnection], None],
+    ) -> bytes:
+        """Return the answer to a question of a page.
+
+        Args:
+            name: of the answer.
+            params: as the page gives them.
+            generation: that of the page.
+            started: called with the connection that is asked, which can be interrupted.
+
+        Raises:
+            ReplacedError: the file was changed since the page was made, or is gone.
+            UnopenedError: it cannot be opened.
+            MsgflowError: as `Pages.answer` does.
+        """
+        with self._changed:
+            opened = self._current()
+            answers = opened.answers
+            if generation is not None and generation != answers.generation:
+                raise self._replaced()
+            cursor = opened.base.cursor()
+            self._cursors.add(cursor)
+        try:
+            started(cursor)
+            content = answers.turns.ask(lambda: answers.pages.answer(cursor, name, params))
+        except (MsgflowError, duckdb.Error):
+            if not self._is_same(answers):  # then it was interrupted, or read another file
+                raise self._replaced() from None
+            raise
+        finally:
+            with self._changed:
+                cursor.close()
+                self._cursors.discard(cursor)
+                self._asked_at = time.monotonic()
+                self._changed.notify_all()
+        if not self._is_same(answers):  # written in its place, it can be a part of each
+            raise self._replaced()
+        return content
+
+    def _current(self) -> Opened:
+        # A process has a file of one name open once: the old one is closed before the new one.
+        self._asked_at = time.monotonic()
+        while self._opened is None or not self._is_same(self._opened.answers):
+            if self._cursors:
+                self._end_questions()
+                continue
+            self._free()
+            try:
+                self._open()
+            except DatabaseInUseError as error:
+                raise UnopenedError(
+                    error.message, "wait until it has ended, then reload the page"
+                ) from None
+            except DatabaseError as error:
+                if not self.path.exists():
+                    raise ReplacedError(
+                        f"the database is no longer there — {self.path}", "msgflow ui --db FILE"
+                    ) from None
+                raise UnopenedError(error.message, error.hint) from None
+        return self._opened
+
+    def _open(self) -> None:
+        # First: if the file is changed meanwhile, the next request sees another generation.
+        generation = generation_of(self.path)
+        base = connect(
+            self.path, read_only=True, memory_limit=self._memory_limit or default_limit()
+        )
+        if self._answers is None or self._answers.generation != generation:
+            self._forget()
+            self._answers = Answers(generation, Pages(), Turns())
+        ahead = Ahead(self._answers.turns, self._answers.pages, base.cursor())
+        self._opened = Opened(self._answers, base, ahead)
+        with self._changed:
+            self._changed.notify_all()
+
+    def _free_when_idle(self) -> None:
+        with self._changed:
+            while not self._is_closed:
+                self._changed.wait(self._seconds_until_free())
+                if self._seconds_until_free() == 0:
+                    self._free()
+
+    def _seconds_until_free(self) -> float | None:
+        """Return in how many seconds to look again, 0 to close it, None to wait for a change."""
+        if self._opened is None or self._cursors:
+            return None
+        if self._opened.ahead.is_asking():
+            return SECONDS_UNTIL_FREE
+        return max(self._asked_at + SECONDS_UNTIL_FREE - time.monotonic(), 0)
+
+    def _free(self) -> None:
+        if self._opened is not None:
+            self._opened.close()
+            self._opened = None
+
+    def _forget(self) -> None:
+        if self._answers is not None:
+            self._answers.pages.close()
+            self._answers = None
+
+    def _is_same(self, answers: Answers) -> bool:
+        try:
+            return answers.generation == generation_of(self.path)
+        except (OSError, DatabaseError):
+            return False
+
+    def _end_questions(self) -> None:
+        for cursor in self._cursors:
+            cursor.interrupt()
+        self._changed.wait(_SECONDS_BETWEEN_LOOKS)
+
+    def _replaced(self) -> ReplacedError:
+        return ReplacedError(
+            f"the database was changed while the page was open — {self.path}",
+            "reload the page to see it as it is now",
+        )
+
+    def close(self) -> None:
+        """Close the database."""
+        with self._changed:
+            while self._cursors:
+                self._end_questions()
+            self._is_closed = True
+            self._changed.notify_all()
+            self._free()
+            self._forget()
+        self._idle.join()
+
+
+def generation_of(path: Path) -> str:
+    """Return what tells the state of a database from others, also after a restart of the server.
+
+    It follows from the file, its log, and the version of msgflow, whose pages ask otherwise.
+
+    Raises:
+        DatabaseError: there is no such file.
+    """
+    try:
+        parts: list[object] = [__version__, *_state(path)]
+    except FileNotFoundError:
+        raise DatabaseError(f"no database — {path}", "msgflow ingest TRACE") from None
+    with suppress(FileNotFoundError):
+        parts += _state(path.with_name(f"{path.name}.wal"))
+    return hashlib.sha256(repr(parts).encode()).hexdigest()
+
+
+def _state(path: Path) -> list[int]:
+    stat = path.stat()
+    return [stat.st_dev, stat.st_ino, stat.st_mtime_ns, stat.st_size]
