@@ -88,7 +88,7 @@ def command(
     else:
         lines = screen_sections(_shown(found), screen_width(), is_chosen=True)
     print_text("\n".join(lines), output)
-    for note in [*_more(found), *found.notes]:
+    for note in [*_more(found, part, database), *found.notes]:
         print_note(note)
     for step in found.steps:
         print_status(f"next: {_command(step, part, database)}")
@@ -103,11 +103,11 @@ def _shown(found: Explanation) -> dict[str, QueryResult]:
     return shown
 
 
-def _more(found: Explanation) -> Iterator[str]:
+def _more(found: Explanation, part: Slice, database: Path) -> Iterator[str]:
     if (more := len(found.paths) - _PATHS) > 0:
-        yield f"{more} more paths: msgflow query e2e-latency" + (
-            f" --to {shlex.quote(found.place)}" if found.place else ""
-        )
+        ends = ("--to", found.place) if found.place else ()
+        paths = "1 more path" if more == 1 else f"{more} more paths"
+        yield f"{paths}: {_command(('query', 'e2e-latency', *ends), part, database)}"
 
 
 def _command(step: tuple[str, ...], part: Slice, database: Path) -> str:

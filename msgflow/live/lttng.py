@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
@@ -78,7 +79,7 @@ def lttng(*arguments: str) -> ElementTree.Element:
         reason = next((line for line in text if "Error" in line), "no reason given")
         raise RecordingError(
             f"lttng {arguments[0]} failed: {reason.removeprefix('Error: ').rstrip('.')}",
-            f"lttng {' '.join(arguments)}",
+            shlex.join(["lttng", *arguments]),
         )
     return ElementTree.fromstring(run.stdout)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import shutil
 import signal
 import subprocess
@@ -37,7 +38,8 @@ class Program:
         except OSError as error:
             raise UsageError(
                 f"cannot execute {words[0]}: {(error.strerror or str(error)).lower()}",
-                f"msgflow record -- sh {words[0]}, if it is a script without a first line #!",
+                f"msgflow record -- sh {shlex.quote(words[0])}, if it is a script without a first"
+                " line #!",
             ) from None
 
     @property

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import shutil
 import time
 from contextlib import ExitStack
@@ -126,7 +127,7 @@ def record(
                     f"the scheduler is not recorded: LTTng cannot trace this kernel (it"
                     f" needs its modules, and root or the group tracing), and {reason}"
                 )
-        watch = _Watch(name, directory, note, show, expects_nodes=bool(program))
+        watch = _Watch(name, directory, channel, note, show, expects_nodes=bool(program))
         with ExitStack() as running:
             started = None
             with recording_session(name, directory, channel, with_kernel=by_lttng):
@@ -142,7 +143,7 @@ def record(
                 except Terminated:
                     raise
                 except KeyboardInterrupt:
-                    pass
+                    interrupts.answer()
             ended_with = None if started is None else started.exit_code
         # All buffers are written now.
         last = replace(watch.status, event_bytes=recorded_bytes(directory))
@@ -156,6 +157,7 @@ class _Watch:
         self,
         name: str,
         directory: Path,
+        channel: Channel,
         note: Callable[[str], None],
         show: Callable[[Status], None],
         *,
@@ -163,6 +165,7 @@ class _Watch:
     ) -> None:
         self._name = name
         self._directory = directory
+        self._channel = channel
         self._note = note
         self._show = show
         self._expects_nodes = expects_nodes
@@ -190,8 +193,8 @@ class _Watch:
         )
         if self.status.discarded and not before.discarded:
             self._note(
-                "events are being discarded, the buffers are too small: record again with"
-                " --subbuf-size 8M or more"
+                "events are being discarded, the buffers are too small: record again with a"
+                f" --subbuf-size several times as large as {self._channel.sub_buffer_size}"
             )
         if self._expects_nodes and passed >= _UNTIL_FIRST_NODE:
             self._expects_nodes = False
@@ -226,7 +229,11 @@ def _note_running(note: Callable[[str], None]) -> None:
         first = f"{running[0].program} ({running[0].pid})"
         others = f" and {len(running) - 1} more" if len(running) > 1 else ""
         kept = next((session.name for session in sessions() if session.is_snapshot), None)
-        cure = "begin to record before they start" if kept is None else f"--dual {kept} has them"
+        cure = (
+            "begin to record before they start"
+            if kept is None
+            else f"--dual {shlex.quote(kept)} has them"
+        )
         note(
             f"{first}{others} of ROS 2 run already: the names of their nodes and topics are not"
             f" recorded; {cure}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import shutil
 import signal
 import subprocess
@@ -61,7 +62,7 @@ def recorded_with_perf(directory: Path) -> Iterator[None]:
     run = subprocess.run(convert, capture_output=True, text=True, start_new_session=True)
     if run.returncode:
         said = run.stderr.strip().splitlines() or ["no reason given"]
-        raise RecordingError(f"perf cannot write its data as CTF: {said[-1]}", " ".join(convert))
+        raise RecordingError(f"perf cannot write its data as CTF: {said[-1]}", shlex.join(convert))
     data.unlink()
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -113,7 +114,7 @@ def require_new(name: str) -> None:
     if any(session.name == name for session in sessions()):
         raise RecordingError(
             f"LTTng has a session of this name — {name}",
-            f"another --name; or, if nobody needs it: lttng destroy {name}",
+            f"another --name; or, if nobody needs it: lttng destroy {shlex.quote(name)}",
         )
 
 

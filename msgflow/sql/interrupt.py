@@ -32,6 +32,7 @@ class Interrupts:
     def __init__(self) -> None:
         self._is_noted = False
         self._is_final = False
+        self._is_answered = False
         self._kind: type[KeyboardInterrupt] = KeyboardInterrupt
         self._lock = threading.Lock()
 
@@ -49,8 +50,12 @@ class Interrupts:
 
     def check(self) -> None:
         """Raise KeyboardInterrupt if Ctrl-C came in time."""
-        if self._is_noted and not self._is_final:
+        if self._is_noted and not self._is_final and not self._is_answered:
             raise self._kind
+
+    def answer(self) -> None:
+        """Count the Ctrl-C that came as what the work waited for; another one is raised at once."""
+        self._is_answered = True
 
     def make_final(self) -> None:
         """Raise KeyboardInterrupt if Ctrl-C came before; from now on it comes too late.

@@ -19,6 +19,14 @@ def code(text: str) -> str:
     return f"{fence}{space}{text}{space}{fence}"
 
 
+def code_lines(lines: Iterable[str]) -> list[str]:
+    """Return lines as a block of code, also below a list, whatever is in them."""
+    lines = list(lines)
+    longest = max((len(ticks) for line in lines for ticks in _TICKS.findall(line)), default=0)
+    fence = "`" * max(longest + 1, 3)
+    return [fence, *lines, fence]
+
+
 def markdown_line(cells: Iterable[str]) -> str:
     """Return a line of a table."""
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"

@@ -217,7 +217,7 @@ class Pages:
             connection: to the database, of this thread alone.
             extent: the run.
             name: of the section.
-            through: of 'blame' only paths with this text in them.
+            through: of 'paths' and 'blame' only paths with this text in them.
             params: as the page gives them; their window counts.
 
         Raises:
@@ -228,7 +228,7 @@ class Pages:
             raise UsageError(f"the summary has no such section — {name}")
         part = self._part(extent, params or {})
         if name != "blame":
-            return query_section(connection, extent.run, part, name)
+            return query_section(connection, extent.run, part, name, through)
         self.fill_flows(connection, extent)
         values = _window_of_flows(params or {})
         flows = self.ask("path_slowest", {"run": extent.run.run_id, "limit": 1} | values)

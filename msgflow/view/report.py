@@ -125,7 +125,7 @@ def write_report(
     if len(written) > max_size:
         raise UsageError(
             f"the report takes {len(written):,} bytes, more than {max_size:,}",
-            "give a larger --max-size, or cut the report with --start, --end or --path",
+            "give a larger --max-size, or cut the report with --start, --end or --through",
         )
     with replacing(path) as temporary:
         temporary.write_bytes(written)
@@ -195,8 +195,11 @@ class _Maker:
     def make_markdown(self, compare: str | int | None) -> tuple[str, list[str]]:
         """Return the summary as Markdown, and what it leaves out."""
         self.shown()
-        comparison = None if compare is None else self.comparison(self.other(compare))
         run = self.extent.run
+        if self.through is not None:
+            self.chosen(run_page_query(self.connection, "path", {"run": run.run_id}))
+            self.notes.append(f"Its slowest paths are those with {self.through} (--through).")
+        comparison = None if compare is None else self.comparison(self.other(compare))
         (row,) = [
             row for row in run_page_query(self.connection, "run", {}).to_pylist()
             if row["run_id"] == run.run_id
@@ -206,10 +209,10 @@ class _Maker:
             f"{row['event_count']:,} events",
             f"{row['host_count']} {'host' if row['host_count'] == 1 else 'hosts'}",
             f"msgflow {row['msgflow_version']}",
-            *(note.rstrip(".") for note in self.notes),
         ]
         findings = read_findings(self.connection, [run.run_id])
-        return markdown(run, facts, findings, self.sections(comparison)), self.notes
+        sections = self.sections(comparison)
+        return markdown(run, facts, self.notes, findings, sections), self.notes
 
     def shown(self) -> Window:
         """Return the times that the report shows; note that they are not the whole run."""
@@ -293,17 +296,11 @@ class _Maker:
     def paths(self) -> list[int]:
         """Keep the pictures of paths; return the numbers of those kept."""
         rows = run_page_query(self.connection, "path", {"run": self.extent.run.run_id})
-        numbers: list[int] = rows["path_id"].to_pylist()
+        numbers = self.chosen(rows)
         if self.through is not None:
-            texts = rows["path"].to_pylist()
-            numbers = [n for n, text in zip(numbers, texts, strict=True) if self.through in text]
-            if not numbers:
-                raise UsageError(
-                    f"no path has this text — {self.through}", "msgflow query e2e-latency"
-                )
             self.notes.append(
                 f"Pictures of {len(numbers)} of {rows.num_rows} paths are in this report, and the"
-                f" timeline has the rows on these: those with {self.through} (--path)."
+                f" timeline has the rows on these: those with {self.through} (--through)."
             )
         if numbers:
             self.pages.fill_flows(self.connection, self.extent)
@@ -323,6 +320,17 @@ class _Maker:
         self.keep("path_slowest", limit=1)
         if numbers:
             self.critical(worst.filter(compute.is_in(worst["path_id"], pa.array(numbers))), rows)
+        return numbers
+
+    def chosen(self, paths: pa.Table) -> list[int]:
+        """Return the numbers of the paths that are wanted."""
+        numbers: list[int] = paths["path_id"].to_pylist()
+        if self.through is None:
+            return numbers
+        texts = paths["path"].to_pylist()
+        numbers = [n for n, text in zip(numbers, texts, strict=True) if self.through in text]
+        if not numbers:
+            raise UsageError(f"no path has this text — {self.through}", "msgflow query e2e-latency")
         return numbers
 
     def critical(self, slowest: pa.Table, paths: pa.Table) -> None:
@@ -387,7 +395,7 @@ class _Maker:
         if room < 0:
             raise UsageError(
                 f"the pages alone take {used:,} bytes, without the timeline",
-                "give a larger --max-size, or cut the report with --start, --end or --path",
+                "give a larger --max-size, or cut the report with --start, --end or --through",
             )
         if count * _BYTES_PER_BAR <= room or rows is not None:
             self.stretch(0, window, rows)

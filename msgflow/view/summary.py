@@ -131,14 +131,24 @@ class Part:
 
 
 def query_section(
-    connection: duckdb.DuckDBPyConnection, run: Run, part: Part, name: str
+    connection: duckdb.DuckDBPyConnection, run: Run, part: Part, name: str, through: str = ""
 ) -> Section:
     """Return 'paths', 'drops' or 'threads' of a run.
+
+    Args:
+        connection: to a database with the public views.
+        run: the run.
+        part: the times.
+        name: of the section.
+        through: of 'paths' only those with this text in them.
 
     Raises:
         QueryError: the database could not run the query.
     """
     query, selection = _QUERIES[name]
+    if through and name == "paths":
+        where = f"{selection.where} AND contains(path, {literal(through)})"
+        selection = replace(selection, where=where)
     header = load_query(query)
     result = run_query(connection, header, {}, part.slice, selection=selection)
     words = ["msgflow", "query", *header.words.split(), "--where", selection.where or ""]
@@ -222,7 +232,7 @@ def verdict_section(verification: Verification) -> Section:
         f"{verification.count(verdict)} {verdict}"
         for verdict in ("failed", "not measured", "passed")
     ]
-    command = shlex.join(["msgflow", "verify", verification.file, verification.run.name])
+    command = shlex.join(["msgflow", "verify", verification.file, "--run", verification.run.name])
     return Section("verdicts", verification.result, (command,), ", ".join(numbers))
 
 

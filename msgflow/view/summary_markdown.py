@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import shlex
 from itertools import groupby
 from typing import TYPE_CHECKING
 
 from msgflow.query.cells import cells
-from msgflow.text.markdown import code, markdown_line, rule_line
+from msgflow.text.markdown import code, code_lines, markdown_line, rule_line
 from msgflow.text.values import format_cell
 
 if TYPE_CHECKING:
@@ -21,22 +22,28 @@ _MOST_PLACES = 3
 
 
 def markdown(
-    run: Run, facts: Sequence[str], findings: Sequence[Finding], sections: Sequence[Section]
+    run: Run,
+    facts: Sequence[str],
+    notes: Sequence[str],
+    findings: Sequence[Finding],
+    sections: Sequence[Section],
 ) -> str:
     """Return the summary.
 
     Args:
         run: the run.
         facts: what was recorded, a few words each.
+        notes: what it leaves out, a sentence each.
         findings: those of `check`, errors first.
         sections: the others, in their order; requirements and changes come before findings.
     """
     before = [section for section in sections if section.name in ("verdicts", "change")]
     after = [section for section in sections if section.name not in ("verdicts", "change")]
-    lines = [f"# {code(run.name)}", "", ", ".join(facts), ""]
+    lines = [f"# {code(format_cell(run.name))}", "", ", ".join(facts), ""]
+    lines += [line for note in notes for line in (code(note), "")]
     for section in before:
         lines += _section(section)
-    lines += _findings(findings)
+    lines += _findings(run, findings)
     for section in after:
         lines += _section(section)
     return "\n".join(lines)
@@ -46,14 +53,15 @@ def _section(section: Section) -> Iterator[str]:
     yield f"## {section.title}"
     yield ""
     if section.reading:
-        yield from (f"{section.reading}.", "")
+        # Runs have names of their own.
+        reading = code(section.reading) if section.name == "change" else f"{section.reading}."
+        yield from (reading, "")
     if len(section.result):
         yield from _flows(section) if section.name == "blame" else _table(section)
     elif not section.reading:
         yield from (section.when_empty, "")
-    for command in section.commands:
-        yield f"    {command}"
     if section.commands:
+        yield from code_lines(section.commands)
         yield ""
 
 
@@ -85,7 +93,7 @@ def _flows(section: Section) -> Iterator[str]:
     yield ""
 
 
-def _findings(findings: Sequence[Finding]) -> Iterator[str]:
+def _findings(run: Run, findings: Sequence[Finding]) -> Iterator[str]:
     yield from ("## Findings", "")
     if not findings:
         yield from ("Nothing is wrong with the recording.", "")
@@ -99,4 +107,5 @@ def _findings(findings: Sequence[Finding]) -> Iterator[str]:
         if len(places) > _MOST_PLACES:
             yield f"  - and {len(places) - _MOST_PLACES} more"
         yield f"  - Cure: {first.cure}"
-    yield from ("", "    msgflow check", "")
+    command = shlex.join(["msgflow", "check", "--run", run.name])
+    yield from ("", *code_lines([command]), "")

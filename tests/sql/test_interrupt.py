@@ -63,6 +63,20 @@ def test_nothing_becomes_final_after_ctrl_c() -> None:
             interrupts.check()
 
 
+def test_a_failure_after_an_answered_ctrl_c_is_not_taken_for_its_consequence() -> None:
+    def work() -> None:
+        with noted_interrupts() as interrupts:
+            signal.raise_signal(signal.SIGINT)
+            interrupts.answer()
+            interrupts.check()
+            with pytest.raises(KeyboardInterrupt):
+                signal.raise_signal(signal.SIGINT)
+            raise ValueError("disk")
+
+    with pytest.raises(ValueError, match="disk"):
+        work()
+
+
 def test_an_inner_block_shares_what_the_outer_notes() -> None:
     with noted_interrupts() as outer:
         with noted_interrupts() as inner:

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from msgflow.text.markdown import code, markdown_line
+from msgflow.text.markdown import code, code_lines, markdown_line
 
 
 @pytest.mark.parametrize(
@@ -20,3 +20,7 @@ def test_code_is_longer_than_the_ticks_in_it(text: str, written: str) -> None:
 
 def test_a_cell_does_not_end_its_column() -> None:
     assert markdown_line(["a|b", "c"]) == r"| a\|b | c |"
+
+
+def test_lines_do_not_end_the_block_of_code() -> None:
+    assert code_lines(["a", "b\n```\n# c"]) == ["````", "a", "b\n```\n# c", "````"]

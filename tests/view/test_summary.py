@@ -15,9 +15,9 @@ from typer.testing import CliRunner
 from msgflow.cli.app import app
 from msgflow.database import open_db
 from msgflow.errors import UsageError
-from msgflow.run.window import Window
+from msgflow.run.slice import Slice
 from msgflow.view.pages import SUMMARY, Pages
-from msgflow.view.summary import Section, query_section
+from msgflow.view.summary import Part, Section, query_section
 
 Report = Callable[..., str]
 _TARGETS = "targets:\n  - topic: '*'\n    loss: < 1 %\n  - topic: /nowhere\n    rate: 1 Hz ± 5 %\n"
@@ -75,10 +75,11 @@ def test_a_window_is_in_the_command(dropping: Path) -> None:
     with open_db(dropping) as opened:
         (run,) = opened.runs()
         assert run.start_ns is not None
-        window = Window(run.start_ns, run.start_ns + 100_000_000)
-        found = query_section(opened.connection, run, window, "threads")
+        window = Slice(run.run_id, run.start_ns, run.start_ns + 100_000_000)
+        options = ("--start", "0s", "--end", "0.1s")
+        found = query_section(opened.connection, run, Part(window, options), "threads")
     (command,) = found.commands
-    assert f"--start {window.start_ns} --end {window.end_ns}" in command
+    assert "--start 0s --end 0.1s" in command
     assert printed(command, dropping) == found.result.table.to_pylist()
 
 
@@ -99,6 +100,8 @@ def test_markdown_has_verdicts_findings_paths_and_drops(dropping: Path, tmp_path
         findings = opened.findings()
     assert f"{verification.count('failed')} failed, 1 not measured" in text
     assert verification.count("failed") > 0
+    assert f"msgflow verify {targets} --run {verification.run.name}" in text
+    assert f"msgflow check --run {verification.run.name}" in text
     assert text.index("## Requirements") < text.index("## Findings") < text.index("## Slowest")
     for row in lost:
         assert f"| `{row['topic_name']}` | `{row['subscriber']}` | {row['published']:,}" in (
@@ -109,13 +112,30 @@ def test_markdown_has_verdicts_findings_paths_and_drops(dropping: Path, tmp_path
     assert "the run has no such topic — /nowhere" in text
 
 
+def test_markdown_of_some_paths_is_about_these(dropping: Path, tmp_path: Path) -> None:
+    output = tmp_path / "summary.md"
+    with open_db(dropping) as opened:
+        paths = opened.query("e2e-latency", where="pairs > 0").to_arrow()["path"].to_pylist()
+        text = paths[0].split(" → ")[1]
+        report = opened.report(output, path_text=text)
+        assert f"Its slowest paths are those with {text} (--through)." in report.notes
+        rows = [line for line in output.read_text("utf-8").splitlines() if " → " in line]
+        assert rows
+        assert all(text in row for row in rows)
+        with pytest.raises(UsageError, match="no path has this text"):
+            opened.report(output, path_text="/nowhere")
+
+
 def test_names_in_markdown_are_only_ever_text(systems: Path, tmp_path: Path) -> None:
     path = renamed(systems, tmp_path / "hostile.duckdb", HOSTILE)
     output = tmp_path / "summary.md"
     with open_db(path) as opened:
         opened.report(output, run=1)
-    for line in output.read_text(encoding="utf-8").splitlines():
-        if not line.startswith("    "):
+    is_code = False
+    for line in output.read_text(encoding="utf-8").split("\n"):
+        if line.startswith("```"):
+            is_code = not is_code
+        elif not is_code:
             # Nothing that a name could be stands outside of code.
             outside = "".join(line.split("`")[::2])
             assert "<" not in outside

@@ -70,6 +70,10 @@ export class Bar {
     const { start, end } = app.window;
     this.from.value = start === undefined ? "" : secondsText(start);
     this.to.value = end === undefined ? "" : secondsText(end);
+    if (this.isInternal !== app.internal) {
+      this.isInternal = app.internal;
+      this.places = null;
+    }
     if (this.run !== app.run) {
       this.run = app.run;
       this.rate = this.places = null;
@@ -80,10 +84,12 @@ export class Bar {
   }
 
   // Of both ends null is the end of the run. On the timeline the view is then that of the window.
+  // Returns whether there is such a window.
   choose(start, end) {
-    if (start !== null && end !== null && end <= start) { clear(this.said, "the window ends before it begins"); return; }
+    if (start !== null && end !== null && end <= start) { clear(this.said, "the window ends before it begins"); return false; }
     clear(this.said);
     go({ start, end, from: null, to: null });
+    return true;
   }
 
   typed() {
@@ -96,7 +102,7 @@ export class Bar {
     clear(this.said, "looking for a warm-up …");
     try {
       const [skipped] = (await this.app.fetch("warm_up")).skipped;
-      if (skipped) this.choose(skipped, this.app.window.end ?? null);
+      if (skipped && !this.choose(skipped, this.app.window.end ?? null)) return;
       clear(this.said, skipped ? `the first ${duration(skipped)} are left out` : "no warm-up is seen: the longest latencies do not lie at the start");
     } catch (error) {
       clear(this.said, error.message);

@@ -28,8 +28,7 @@ export function commands(tables) {
   return tables.map((table) => command(table.meta.command));
 }
 
-// A text as one word of a shell, and as a text in SQL.
-export const quoted = (text) => `'${text.replaceAll("'", `'"'"'`)}'`;
+// A text in SQL.
 export const sqlText = (text) => `'${text.replaceAll("'", "''")}'`;
 
 // The mark of a duration between clocks that are not synchronised, and what it means.

@@ -2,9 +2,9 @@
 
 import { h, clear, color, breakable } from "./dom.js";
 import { address, current, replace } from "./address.js";
-import { PALE, PART_COLORS, PATH_HELP, count, duration, partTitle, pathText, percent } from "./labels.js";
+import { PALE, PART_COLORS, PATH_HELP, count, duration, partTitle, pathText, percent, shellQuoted } from "./labels.js";
 import { dataTable, besides } from "./table.js";
-import { command, doubt, doubtHelp, failed, notes, quoted, sqlText, waiting } from "./notice.js";
+import { command, doubt, doubtHelp, failed, notes, sqlText, waiting } from "./notice.js";
 import { chart, redrawCharts } from "./chart.js";
 import { doubted, pathNumbers } from "./overview.js";
 
@@ -147,7 +147,7 @@ export class PathsPage {
     return [h("p", { className: "soft" }, "The mean of each part, in the order in which a flow goes through them. Where a message waited for a callback, the trace may not tell whether the network or a busy executor was the reason: that is undecided."),
       stack, legend, dataTable(breakdown, { only: (row) => breakdown.path_id[row] === path, label: "breakdown",
       columns: ["hop", "part", "node", "what", "median_ns", "mean_ns", "p95_ns", "max_ns", "share", "flows", "overlaps"] }),
-    most === 0 && h("p", {}, "All parts are zero."), notes(breakdown.meta.notes), command(`${breakdown.meta.command} --where ${quoted(`path = ${sqlText(name)}`)}`)];
+    most === 0 && h("p", {}, "All parts are zero."), notes(breakdown.meta.notes), command(`${breakdown.meta.command} --where ${shellQuoted(`path = ${sqlText(name)}`)}`)];
   }
 
   recolor() { if (this.row !== undefined) { redrawCharts(); this.choose(this.row, false); } }

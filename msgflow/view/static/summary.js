@@ -22,7 +22,7 @@ export function blame(table) {
     flows.set(rank, [...(flows.get(rank) ?? []), row]);
   }
   let before = "";
-  const list = [...flows.values()].map((rows, place) => {
+  const list = [...flows.entries()].map(([rank, rows]) => {
     const [first] = rows;
     const path = pathText(table.path[first]);
     const item = h("li", {},
@@ -34,7 +34,7 @@ export function blame(table) {
         return h("li", {}, h("span", { className: "blame-node" }, breakable(table.node[row] ?? "not known")),
           h("span", { className: "numbers" }, `${duration(table.duration_ns[row])} · ${percent(table.share[row])}`), h("span", { className: "bar-track" }, bar));
       })),
-      command(table.meta.commands[place]));
+      command(table.meta.commands[rank - 1]));
     before = path;
     return item;
   });

@@ -2,8 +2,9 @@
 
 import { h, clear } from "./dom.js";
 import { current, replace } from "./address.js";
+import { shellQuoted } from "./labels.js";
 import { dataTable } from "./table.js";
-import { commands, failed, notes, quoted, sqlText, waiting } from "./notice.js";
+import { commands, failed, notes, sqlText, waiting } from "./notice.js";
 import { Chooser, onTimeline, overTime, ratesOverTime, slowestOnes } from "./panel.js";
 
 const COLUMNS_OF_TOPICS = ["topic_name", "publication_count", "rate_hz", "period_deviation_ns", "latency_median_ns", "latency_p95_ns", "latency_max_ns", "delivered", "dropped", "lost", "reasons", "unknown", "not_connected", "publisher_count", "subscription_count"];
@@ -60,7 +61,7 @@ export class TopicsPage {
 
   part(rows, title, columns, topic) {
     // An option takes a name for a pattern: others are compared as text.
-    const only = /^[\w/]+$/.test(topic ?? "") ? `--topic ${topic}` : `--where ${quoted(topic === null ? "topic_name IS NULL" : `topic_name = ${sqlText(topic)}`)}`;
+    const only = /^[\w/]+$/.test(topic ?? "") ? `--topic ${topic}` : `--where ${shellQuoted(topic === null ? "topic_name IS NULL" : `topic_name = ${sqlText(topic)}`)}`;
     return [dataTable(rows, { label: title, columns, nothing: "none", only: (row) => (rows.topic_name[row] ?? null) === (topic ?? null) }),
       notes(rows.meta.notes), commands([{ meta: { command: `${rows.meta.command} ${only}` } }])];
   }
