@@ -2,12 +2,13 @@
 -- title: Messages delivered, dropped and lost by topic and subscription
 -- description: What became of the messages published in the time window at each subscription of
 --     their topic. Dropped: the queue was full, and newer messages took their place. Lost: they did
---     not arrive or could not be taken. Not connected: the two were not connected yet or any more,
---     or the recording ended. Unknown: events are lost, or the trace does not decide; such messages
---     may have been delivered. Together with delivered, these counts add up to what was published.
---     The shares are of messages whose fate is known: delivered, dropped or lost. Only the depth of
---     the queue decides whether a message counts as overwritten or as lost on the way; incompatible
---     QoS, lifespan and best effort do not show in a trace.
+--     not arrive or could not be taken. Not connected: the two were not connected yet or any more.
+--     Cut by the recording: it ended before they could be taken. Unknown: events are lost, or the
+--     trace does not decide; such messages may have been delivered. Together with delivered, these
+--     counts add up to what was published. The shares are of messages whose fate is known:
+--     delivered, dropped or lost. Only the depth of the queue decides whether a message counts as
+--     overwritten or as lost on the way; incompatible QoS, lifespan and best
+--     effort do not show in a trace.
 -- grain: one row per topic and subscription
 -- column: run_id BIGINT             Run
 -- column: topic_name VARCHAR [topic]  Topic
@@ -17,6 +18,7 @@
 -- column: dropped BIGINT            Of these, those that newer ones replaced in a full queue
 -- column: lost BIGINT               Of these, lost on the way
 -- column: not_connected BIGINT      Of these, before or after the two were connected
+-- column: cut_by_recording BIGINT   Of these, those that the end of the recording left untaken
 -- column: unknown BIGINT            Of these, with an unknown fate
 -- column: delivered_percent DOUBLE [%]  Share delivered, of those delivered, dropped or lost
 -- column: lost_percent DOUBLE [%]   Share lost, of the same
@@ -26,7 +28,7 @@
 -- column: subscription_id BIGINT    Identity of the subscription
 -- column: is_internal BOOLEAN       ROS uses the topic for itself
 -- brief: topic_name, subscriber, delivered, dropped, lost, reasons, unknown, delivered_percent,
---     lost_percent, published, not_connected, orphans, orphan_reasons
+--     lost_percent, published, not_connected, cut_by_recording, orphans, orphan_reasons
 -- answer: delivered, dropped, lost, unknown
 WITH outcome AS (
     SELECT d.subscription_id, d.status, d.reason, count(*) AS number
@@ -45,6 +47,8 @@ delivery AS (
         sum(CASE WHEN status = 'dropped' THEN number ELSE 0 END)::BIGINT AS dropped,
         sum(CASE WHEN status = 'lost' THEN number ELSE 0 END)::BIGINT AS lost,
         sum(CASE WHEN status = 'not_connected' THEN number ELSE 0 END)::BIGINT AS not_connected,
+        sum(CASE WHEN status = 'cut_by_recording' THEN number ELSE 0 END)::BIGINT
+            AS cut_by_recording,
         sum(CASE WHEN status = 'unknown' THEN number ELSE 0 END)::BIGINT AS unknown,
         string_agg(reason || ' ' || number, ', ' ORDER BY number DESC, reason) AS reasons
     FROM outcome
@@ -76,6 +80,7 @@ SELECT
     coalesce(d.dropped, 0) AS dropped,
     coalesce(d.lost, 0) AS lost,
     coalesce(d.not_connected, 0) AS not_connected,
+    coalesce(d.cut_by_recording, 0) AS cut_by_recording,
     coalesce(d.unknown, 0) AS unknown,
     100 * d.delivered / nullif(d.delivered + d.dropped + d.lost, 0) AS delivered_percent,
     100 * d.lost / nullif(d.delivered + d.dropped + d.lost, 0) AS lost_percent,

@@ -18,6 +18,7 @@
 -- column: dropped BIGINT              Those that newer ones replaced in a full queue
 -- column: lost BIGINT                 Those lost on the way
 -- column: not_connected BIGINT        Those before or after the two were connected
+-- column: cut_by_recording BIGINT     Those that the end of the recording left untaken
 -- column: unknown BIGINT              Those with an unknown fate
 -- column: reasons VARCHAR             Why messages were not taken, with counts
 -- column: latency_median_ns BIGINT [ns]  Median latency from publication to take
@@ -94,6 +95,8 @@ delivery AS (
         sum(CASE WHEN status = 'dropped' THEN number ELSE 0 END)::BIGINT AS dropped,
         sum(CASE WHEN status = 'lost' THEN number ELSE 0 END)::BIGINT AS lost,
         sum(CASE WHEN status = 'not_connected' THEN number ELSE 0 END)::BIGINT AS not_connected,
+        sum(CASE WHEN status = 'cut_by_recording' THEN number ELSE 0 END)::BIGINT
+            AS cut_by_recording,
         sum(CASE WHEN status = 'unknown' THEN number ELSE 0 END)::BIGINT AS unknown,
         string_agg(reason || ' ' || number, ', ' ORDER BY number DESC, reason) AS reasons
     FROM outcome
@@ -127,6 +130,7 @@ SELECT
     coalesce(d.dropped, 0) AS dropped,
     coalesce(d.lost, 0) AS lost,
     coalesce(d.not_connected, 0) AS not_connected,
+    coalesce(d.cut_by_recording, 0) AS cut_by_recording,
     coalesce(d.unknown, 0) AS unknown,
     d.reasons,
     l.quantiles[1] AS latency_median_ns,

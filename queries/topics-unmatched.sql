@@ -15,8 +15,8 @@
 -- column: topic_name VARCHAR [topic]  Topic
 -- column: publisher VARCHAR [node]  Node that published; empty: not known
 -- column: subscriber VARCHAR [node]  Node that took, or should have taken
--- column: status VARCHAR          'dropped', 'lost', 'not_connected', 'unknown', as with --measure
---     delivery; 'orphan': a take without a publication
+-- column: status VARCHAR          'dropped', 'lost', 'not_connected', 'cut_by_recording',
+--     'unknown', as with --measure delivery; 'orphan': a take without a publication
 -- column: reason VARCHAR          Why the other side is missing
 -- column: source_timestamp_ns BIGINT [epoch ns]  Stamp of the message
 -- column: publication_id BIGINT   Identity of the publication

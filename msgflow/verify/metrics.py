@@ -87,7 +87,7 @@ _PROCESSES = "SELECT DISTINCT name FROM main.process WHERE run_id = $run_id"
 _NOT_DUE = "when it was due is not known: one call only, or its creation was not recorded"
 # Roots and messages that could arrive, as far as the recording shows.
 _ARRIVALS = "roots - not_connected - cut_by_recording"
-_CONNECTED = "published - not_connected"
+_CONNECTED = "published - not_connected - cut_by_recording"
 
 PATH = "path"
 SUBJECTS: dict[str, Subject] = {

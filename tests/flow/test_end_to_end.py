@@ -154,8 +154,8 @@ def test_what_became_of_every_root(built: Analysis, chain: Chain) -> None:
         ("E", "no_output", "no_output"),
         ("F", "lost", "lost_in_transport"),
         ("G", "unknown", "callback_not_finished"),
-        ("I", "not_connected", "pending_at_end"),
-        ("J", "not_connected", "pending_at_end"),
+        ("I", "cut_by_recording", "pending_at_end"),
+        ("J", "cut_by_recording", "pending_at_end"),
     ):
         begin = times[f"{root} start"]
         expected.append(("callback_instance", begin, None, None, status, reason))
@@ -235,7 +235,7 @@ def test_from_the_middle_the_publication_is_the_root(built: Analysis, chain: Cha
     expected += [
         ("publication", at["16 published"], None, "lost"),
         ("publication", at["17 published"], None, "unknown"),
-        ("publication", at["19 published"], None, "not_connected"),
+        ("publication", at["19 published"], None, "cut_by_recording"),
     ]
     assert sorted(rows, key=str) == sorted(expected, key=str)
 
@@ -250,7 +250,7 @@ def test_to_the_middle_the_relay_is_the_sink(built: Analysis, chain: Chain) -> N
     expected += [
         (at["A start"], None, "not_connected"),
         (at["D start"], None, "lost"),
-        (at["J start"], None, "not_connected"),
+        (at["J start"], None, "cut_by_recording"),
     ]
     assert sorted(rows, key=str) == sorted(expected, key=str)
 
@@ -286,7 +286,8 @@ def test_the_query(built: Analysis, chain: Chain, case: str, sinks: list[tuple[s
     assert row["path"] == "/talker → /a → /relay → /b → /sink"
     counts = {name: row[name] for name in ("roots", *FATES)}
     assert {name: number for name, number in counts.items() if number} == {
-        "roots": 10, "reached": 3, "lost": 2, "no_output": 1, "not_connected": 3, "unknown": 1,
+        "roots": 10, "reached": 3, "lost": 2, "no_output": 1, "not_connected": 1,
+        "cut_by_recording": 2, "unknown": 1,
     }  # fmt: skip
     assert row["pairs"] == len(latencies)
     assert (row["min_ns"], row["max_ns"]) == (latencies[0], latencies[-1])

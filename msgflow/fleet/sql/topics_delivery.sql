@@ -14,6 +14,7 @@
 -- column: dropped BIGINT            Of these, those that newer ones replaced in a full queue
 -- column: lost BIGINT               Of these, lost on the way
 -- column: not_connected BIGINT      Of these, before or after the two were connected
+-- column: cut_by_recording BIGINT   Of these, those that the end of the recording left untaken
 -- column: unknown BIGINT            Of these, with an unknown fate
 -- column: delivered_percent DOUBLE [%]  Share delivered, of those delivered, dropped or lost
 -- column: lost_percent DOUBLE [%]   Share lost, of the same
@@ -22,7 +23,8 @@
 -- column: orphan_reasons VARCHAR    Why publications are not known, with counts
 -- column: is_internal BOOLEAN       ROS uses the topic for itself
 -- brief: topic_name, subscriber, delivered, dropped, lost, delivered_percent, runs, lossy_runs,
---     unknown, lost_percent, published, reasons, not_connected, orphans, orphan_reasons
+--     unknown, lost_percent, published, reasons, not_connected, cut_by_recording, orphans,
+--     orphan_reasons
 -- answer: delivered, dropped, lost, unknown
 WITH merged AS (
     SELECT
@@ -36,6 +38,7 @@ WITH merged AS (
         sum(d.dropped)::BIGINT AS dropped,
         sum(d.lost)::BIGINT AS lost,
         sum(d.not_connected)::BIGINT AS not_connected,
+        sum(d.cut_by_recording)::BIGINT AS cut_by_recording,
         sum(d.unknown)::BIGINT AS unknown,
         sum(d.orphans)::BIGINT AS orphans,
         bool_and(d.is_internal) AS is_internal
@@ -54,6 +57,7 @@ SELECT
     m.dropped,
     m.lost,
     m.not_connected,
+    m.cut_by_recording,
     m.unknown,
     100.0::DOUBLE * m.delivered / nullif(m.delivered + m.dropped + m.lost, 0) AS delivered_percent,
     100.0::DOUBLE * m.lost / nullif(m.delivered + m.dropped + m.lost, 0) AS lost_percent,

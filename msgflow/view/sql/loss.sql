@@ -9,8 +9,8 @@
 -- param: end_ns BIGINT  Its end, epoch ns, exclusive
 -- column: topic VARCHAR  Topic
 -- column: subscriber VARCHAR  Node that should have taken, or took
--- column: status VARCHAR  'dropped', 'lost', 'not_connected', 'unknown' or 'orphan' (a take without
---     a publication)
+-- column: status VARCHAR  'dropped', 'lost', 'not_connected', 'cut_by_recording',
+--     'unknown' or 'orphan' (a take without a publication)
 -- column: reason VARCHAR  Why the other side is missing
 -- column: count BIGINT  Messages, or takes
 -- column: first_at BIGINT [ns since origin]  The first of them

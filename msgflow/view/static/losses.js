@@ -12,7 +12,8 @@ import { onTimeline } from "./panel.js";
 // What became of a message, in words and colours. The first two are losses, the others may be none.
 const FATES_OF_MESSAGES = [
   ["dropped", "dropped: a queue was full", "second"], ["lost", "lost on the way", "error"],
-  ["not_connected", "not connected", "subscription"], ["unknown", "unknown: the trace does not tell", "faint"],
+  ["not_connected", "not connected", "subscription"], ["cut_by_recording", "cut by the end of the recording", "wait"],
+  ["unknown", "unknown: the trace does not tell", "faint"],
   ["orphan", "taken, and its publication is not known", "service"],
 ];
 
@@ -42,7 +43,7 @@ export class LossesPage {
     this.show();
     await fill(delivery, async () => {
       const table = await app.query("topics-delivery");
-      return [dataTable(table, { label: "delivery", columns: ["topic_name", "subscriber", "published", "delivered", "dropped", "lost", "reasons", "not_connected", "unknown", "delivered_percent", "lost_percent", "orphans", "orphan_reasons"],
+      return [dataTable(table, { label: "delivery", columns: ["topic_name", "subscriber", "published", "delivered", "dropped", "lost", "reasons", "not_connected", "cut_by_recording", "unknown", "delivered_percent", "lost_percent", "orphans", "orphan_reasons"],
         sort: { name: "dropped", down: true }, nothing: "No message was sent to a subscription." }), notes(table.meta.notes), commands([table])];
     });
   }

@@ -7,11 +7,11 @@ import { dataTable } from "./table.js";
 import { commands, failed, notes, sqlText, waiting } from "./notice.js";
 import { Chooser, onTimeline, overTime, ratesOverTime, slowestOnes } from "./panel.js";
 
-const COLUMNS_OF_TOPICS = ["topic_name", "publication_count", "rate_hz", "period_deviation_ns", "latency_median_ns", "latency_p95_ns", "latency_max_ns", "delivered", "dropped", "lost", "reasons", "unknown", "not_connected", "publisher_count", "subscription_count"];
+const COLUMNS_OF_TOPICS = ["topic_name", "publication_count", "rate_hz", "period_deviation_ns", "latency_median_ns", "latency_p95_ns", "latency_max_ns", "delivered", "dropped", "lost", "reasons", "unknown", "not_connected", "cut_by_recording", "publisher_count", "subscription_count"];
 // The tables of a topic, and what each says.
 const PARTS_OF_TOPIC = [
   ["topics-rate", "Publishers", ["publisher", "count", "rate_hz", "period_median_ns", "period_deviation_ns", "period_p95_ns", "period_max_ns"]],
-  ["topics-delivery", "What became of the messages", ["subscriber", "published", "delivered", "dropped", "lost", "reasons", "not_connected", "unknown", "orphans", "orphan_reasons"]],
+  ["topics-delivery", "What became of the messages", ["subscriber", "published", "delivered", "dropped", "lost", "reasons", "not_connected", "cut_by_recording", "unknown", "orphans", "orphan_reasons"]],
   ["topics-latency", "Latency from publication to take", ["subscriber", "takes", "median_ns", "p95_ns", "p99_ns", "max_ns", "busy_mean_min_ns", "busy_mean_max_ns"]],
 ];
 
