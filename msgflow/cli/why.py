@@ -44,7 +44,8 @@ _SHOWN = {
     ),
     "losses": (
         "messages not delivered",
-        "topic_name subscriber published dropped lost not_connected cut_by_recording unknown reasons",
+        "topic_name subscriber published dropped lost not_connected cut_by_recording unknown "
+        "reasons",
     ),
 }
 
