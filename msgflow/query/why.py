@@ -171,9 +171,10 @@ def _longest(flow: QueryResult) -> QueryResult:
 def _steps(pieces: Sequence[dict[str, Any]], losses: QueryResult) -> Iterator[tuple[str, ...]]:
     """Yield the commands that show more: of the longest piece, the flow, and lost messages."""
     longest = max(pieces, key=lambda row: row["duration_ns"])
-    if query := _BY_NODE.get(longest["activity"]):
+    # What the trace has no name for cannot be asked for.
+    if longest["node"] is not None and (query := _BY_NODE.get(longest["activity"])):
         yield ("query", *query, "--node", longest["node"])
-    elif query := _BY_TOPIC.get(longest["activity"]):
+    elif longest["what"] is not None and (query := _BY_TOPIC.get(longest["activity"])):
         yield ("query", *query, "--topic", longest["what"])
     yield ("flow", "--take", str(pieces[0]["take_id"]), "--why")
     if len(losses):
