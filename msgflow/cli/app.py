@@ -18,7 +18,9 @@ from msgflow.sql.interrupt import Terminated
 from msgflow.version import __version__
 
 COMMANDS = {
-    "record": "Record a ROS 2 system with LTTng, then print how long messages took.",
+    "record": (
+        "Record a ROS 2 system with LTTng, then print what is wrong and how long messages took."
+    ),
     "ingest": "Read LTTng traces of a ROS 2 system into a database, each recording as a run.",
     "query": "Run a named query; `msgflow query NAME --help` explains it.",
     "why": "Explain why a topic is late: its slowest path, where the time goes, what to ask next.",

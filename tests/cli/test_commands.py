@@ -179,7 +179,7 @@ def test_info_as_markdown(msgflow: Msgflow, small_database: Path) -> None:
 
 def test_export(msgflow: Msgflow, small_database: Path) -> None:
     for kind in ("parquet", "csv"):
-        arguments = ("export", kind, kind, "publisher", "node", "--db", small_database)
+        arguments = ("export", kind, "-o", kind, "publisher", "node", "--db", small_database)
         result = msgflow(*arguments)
         assert result.exit_code == 0
         assert result.stdout == ""

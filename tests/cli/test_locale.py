@@ -83,7 +83,7 @@ def test_from_the_trace_to_every_kind_of_file(tmp_path: Path) -> None:
             ["ingest", "trace", "--links", "links.yaml"],
             ["clocks", "apply", "messages"],
             ["query", "e2e-latency"],
-            ["flow", "--topic", "/camera/image"],
+            ["flow", "/camera/image"],
             ["check"],
             ["query", "e2e-latency", "-o", "latency.csv"],
             ["graph", "-o", "graph.svg"],

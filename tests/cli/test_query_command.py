@@ -106,7 +106,7 @@ def test_help_shows_types_choices_defaults_columns_and_brackets(
         "--max-depth BIGINT How deep [default: 32]",
         "--case VARCHAR Which (first, last) [default: first]",
         "Whether [default: false]",
-        "at_ns BIGINT When [epoch ns]",
+        "at_ns [epoch ns] When",
     ):
         assert part in words
     assert calls == []

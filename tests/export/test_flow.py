@@ -327,7 +327,7 @@ def test_a_topic_without_publications_says_so(small_database: Path) -> None:
         insert(connection, "subscription", names, [["1", "2", "/unused"]])
     with (
         Database(small_database) as database,
-        pytest.raises(UsageError, match="no message that was published on the topic"),
+        pytest.raises(UsageError, match="no message that was published there"),
     ):
         database.flow("/unused")
 

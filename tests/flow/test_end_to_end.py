@@ -448,7 +448,7 @@ def test_the_flow_at_a_quantile(fresh_database: Path) -> None:
             .to_pylist()
         )
         found = [
-            database.query("critical-path", at=at, by="part", to="/b").to_arrow()
+            database.query("critical-path", quantile=at, by="part", to="/b").to_arrow()
             for at in ("median", "p90", "p95", "p99", "max")
         ]
     latencies = [pc.max(table["latency_ns"]).as_py() for table in found]

@@ -282,7 +282,7 @@ def test_totals_add_up(database: Database) -> None:
 @pytest.mark.parametrize(("at", "share"), [("median", 50), ("p90", 90), ("p95", 95), ("max", 100)])
 def test_the_flow_at_a_quantile(database: Database, at: str, share: int) -> None:
     every = latencies(database, to="/base/motors")[::-1]
-    found = rows(database, "critical-path", to="/base/motors", at=at)
+    found = rows(database, "critical-path", to="/base/motors", quantile=at)
     assert found[0]["latency_ns"] == every[-(-share * len(every) // 100) - 1]
 
 

@@ -16,9 +16,9 @@ import msgflow.trace
 
 TCP, UDP, ICMP = 6, 17, 1
 SENT, RECEIVED = "net_dev_queue", "net_if_receive_skb"
-NOISE = "sched_switch"
+NOISE = "sched_process_wait"
 
-_COMMON = ["irq_handler_entry", *(f"syscall_entry_{number}" for number in range(300))]
+_COMMON = ["irq_softirq_raise", *(f"syscall_entry_{number}" for number in range(300))]
 _CONTENT_BYTES = 200_000
 
 

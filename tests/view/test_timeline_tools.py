@@ -105,7 +105,7 @@ def test_sums_of_an_area_are_those_of_the_command(dropping: Path, timeline: Page
 
 def test_a_search_keeps_what_exchanges_messages_with_it(timeline: Page) -> None:
     every = timeline.page.evaluate(_LANES)
-    timeline.page.locator("input[type=search]").fill("subscription")
+    timeline.page.get_by_label("show rows with this text").fill("subscription")
     found = timeline.page.evaluate(_LANES)
     labels = {label for kind, label, beside in found if kind == "row" and not beside}
     beside = {label for kind, label, is_beside in found if kind == "row" and is_beside}
