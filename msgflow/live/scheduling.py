@@ -17,13 +17,17 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
+# What docs/scheduling.md asks for.
 _EVENTS = (
-    "sched_switch",
-    "sched_waking",
-    "sched_wakeup_new",
-    "sched_migrate_task",
-    "sched_process_fork",
-    "sched_process_exit",
+    "sched:sched_switch",
+    "sched:sched_waking",
+    "sched:sched_wakeup_new",
+    "irq:irq_handler_entry",
+    "irq:irq_handler_exit",
+    "irq:softirq_entry",
+    "irq:softirq_exit",
+    "timer:hrtimer_expire_entry",
+    "timer:hrtimer_expire_exit",
 )
 # The clock of LTTng; pages of memory of each CPU.
 _RECORD = ("perf", "record", "--all-cpus", "--clockid=CLOCK_MONOTONIC", "--mmap-pages=8192")
@@ -67,4 +71,4 @@ def recorded_with_perf(directory: Path) -> Iterator[None]:
 
 
 def _command(target: str) -> list[str]:
-    return [*_RECORD, *(f"--event=sched:{name}" for name in _EVENTS), f"--output={target}"]
+    return [*_RECORD, *(f"--event={name}" for name in _EVENTS), f"--output={target}"]

@@ -17,7 +17,19 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 CONTEXTS = ("vpid", "vtid", "procname")
-KERNEL_EVENTS = ("sched_switch", "sched_waking", "sched_process_fork", "sched_process_exec")
+# What docs/scheduling.md asks for.
+KERNEL_EVENTS = (
+    "sched_switch",
+    "sched_waking",
+    "sched_wakeup_new",
+    "sched_process_fork",
+    "irq_handler_entry",
+    "irq_handler_exit",
+    "irq_softirq_entry",
+    "irq_softirq_exit",
+    "timer_hrtimer_expire_entry",
+    "timer_hrtimer_expire_exit",
+)
 KERNEL_CONTEXTS = ("pid", "vpid", "vtid", "procname")
 _CHANNEL = "ros2"
 # In the directory of a recording while it is made.
