@@ -14,6 +14,7 @@ from msgflow.cli.options import (
     FormatOption,
     LakeOption,
     OutputOption,
+    OwnEventsOption,
     Reader,
     ReaderOption,
     WideOption,
@@ -106,14 +107,7 @@ def ingest(
         list[str] | None,
         typer.Option("--ignore", metavar="PATTERN", help="Skip events with these names"),
     ] = None,
-    events: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--events",
-            metavar="PATTERN",
-            help="Load events of your own tracepoints",
-        ),
-    ] = None,
+    events: OwnEventsOption = None,
     quiet: Annotated[
         bool, typer.Option("--quiet", "-q", help="Print only errors and failures")
     ] = False,

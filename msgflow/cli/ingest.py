@@ -13,6 +13,8 @@ import typer
 from msgflow.cli.check import PLACES_SHOWN
 from msgflow.cli.options import (
     DatabaseOption,
+    LinksOption,
+    OwnEventsOption,
     Reader,
     ReaderOption,
     memory_limit_option,
@@ -66,12 +68,7 @@ def command(
             help="Keep the raw events, as Parquet files in DIR",
         ),
     ] = None,
-    links: Annotated[
-        Path | None,
-        typer.Option(
-            "--links", metavar="FILE", parser=path_of, help="Indirect links to declare, as YAML"
-        ),
-    ] = None,
+    links: LinksOption = None,
     clock_sync: Annotated[
         str,
         typer.Option(
@@ -95,15 +92,7 @@ def command(
             help="Skip events with these names, such as 'dds:*'; may be repeated",
         ),
     ] = None,
-    events: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--events",
-            metavar="PATTERN",
-            help="Also load events of your own tracepoints with these names, such as 'my_pkg:*',"
-            " into user_event; may be repeated",
-        ),
-    ] = None,
+    events: OwnEventsOption = None,
     memory_limit: Annotated[
         str | None,
         memory_limit_option(

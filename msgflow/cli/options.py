@@ -173,6 +173,21 @@ ColumnsOption = Annotated[
     ),
 ]
 OutputOption = Annotated[Path | None, output_option(show_default="stdout")]
+LinksOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--links", metavar="FILE", parser=path_of, help="Indirect links to declare, as YAML"
+    ),
+]
+OwnEventsOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--events",
+        metavar="PATTERN",
+        help="Also your own tracepoints with these names, such as 'my_pkg:*', into user_event; may"
+        " be repeated",
+    ),
+]
 ReaderOption = Annotated[Reader, typer.Option("--reader", help="Decoder of the traces")]
 LakeOption = Annotated[
     str,

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import time
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from msgflow.cli.options import DatabaseOption, output_option, path_of
+from msgflow.cli.options import DatabaseOption, LinksOption, OwnEventsOption, output_option
 from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import ExitCode
 
@@ -61,14 +61,7 @@ def command(
             help="Also write what this snapshot session has: how nodes that run already began",
         ),
     ] = None,
-    events: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--events",
-            metavar="PATTERN",
-            help="Also record and load your own tracepoints, such as 'my_pkg:*'; may be repeated",
-        ),
-    ] = None,
+    events: OwnEventsOption = None,
     sub_buffer_size: Annotated[
         str,
         typer.Option(
@@ -78,12 +71,7 @@ def command(
     sub_buffers: Annotated[
         int, typer.Option("--num-subbuf", min=2, help="Number of sub-buffers, per CPU")
     ] = 4,
-    links: Annotated[
-        Path | None,
-        typer.Option(
-            "--links", metavar="FILE", parser=path_of, help="Indirect links to declare, as YAML"
-        ),
-    ] = None,
+    links: LinksOption = None,
     ingest: Annotated[
         bool, typer.Option("--ingest/--no-ingest", help="Read the recording into the database")
     ] = True,
@@ -116,9 +104,8 @@ def command(
     print_status(f"recorded into {target}: {_words(recorded.last)}")
     if program and recorded.exit_code:
         print_note(f"{program[0]} ended with exit code {recorded.exit_code}")
-    if ingest:
-        _answer(target, name, events or [], links, database)
-    if recorded.exit_code:
+    is_sound = not ingest or _answer(target, name, events or [], links, database)
+    if recorded.exit_code or not is_sound:
         raise typer.Exit(ExitCode.FAILED)
 
 
@@ -152,8 +139,12 @@ def _words(status: Status) -> str:
 
 def _answer(
     directory: Path, name: str, events: list[str], links: Path | None, database: Path
-) -> None:
-    """Read the recording into the database, and print what a user wants to know first."""
+) -> bool:
+    """Read the recording into the database, and print what a user wants to know first.
+
+    Returns:
+        Whether the recording has no error.
+    """
     from msgflow.cli import check, ingest
     from msgflow.cli.output import print_result, print_status
     from msgflow.database import Database
@@ -169,8 +160,11 @@ def _answer(
         database=database,
     )
     print_status(f"read into {database} as run {name}")
-    # The exit code of errors in the recording, which it has printed.
-    with suppress(typer.Exit):
+    is_sound = True
+    try:
         check.command(database=database)
+    except typer.Exit:  # of errors in the recording, which it has printed
+        is_sound = False
     with Database(database) as opened:
         print_result(opened.query("e2e-latency"), None, None)
+    return is_sound

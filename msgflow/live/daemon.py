@@ -5,7 +5,7 @@ from __future__ import annotations
 import subprocess
 import tempfile
 import time
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import IO, TYPE_CHECKING
 
 from msgflow.errors import RecordingError
@@ -25,7 +25,7 @@ _CONNECTING = 1.0
 def session_daemon(*, with_kernel: bool, note: Callable[[str], None]) -> Iterator[None]:
     """Have a session daemon: one that runs is used and stays; else one runs during the block.
 
-    Ours ends with this process, even if SIGKILL ends it; but not before the sessions of others.
+    Ours waits for the end of sessions that others began. SIGKILL of this process ends it at once.
 
     Args:
         with_kernel: also trace the kernel; only the daemon of the root user can.
@@ -43,8 +43,12 @@ def session_daemon(*, with_kernel: bool, note: Callable[[str], None]) -> Iterato
         try:
             _wait_until_it_answers(daemon, words)
             time.sleep(_CONNECTING)
-            yield
-            _wait_for_others(note)
+            try:
+                yield
+            finally:
+                # A daemon that does not answer keeps nobody waiting.
+                with suppress(RecordingError):
+                    _wait_for_others(note)
         finally:
             daemon.terminate()
             try:

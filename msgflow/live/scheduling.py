@@ -12,23 +12,12 @@ from typing import TYPE_CHECKING
 
 from msgflow.errors import RecordingError
 from msgflow.live.daemon import started
+from msgflow.live.kernel_events import PERF_EVENTS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-# What docs/scheduling.md asks for.
-_EVENTS = (
-    "sched:sched_switch",
-    "sched:sched_waking",
-    "sched:sched_wakeup_new",
-    "irq:irq_handler_entry",
-    "irq:irq_handler_exit",
-    "irq:softirq_entry",
-    "irq:softirq_exit",
-    "timer:hrtimer_expire_entry",
-    "timer:hrtimer_expire_exit",
-)
 # The clock of LTTng; pages of memory of each CPU.
 _RECORD = ("perf", "record", "--all-cpus", "--clockid=CLOCK_MONOTONIC", "--mmap-pages=8192")
 _TRACE = "perf"
@@ -60,8 +49,15 @@ def recorded_with_perf(directory: Path) -> Iterator[None]:
         try:
             yield
         finally:
+            has_failed = perf.poll() is not None
             perf.send_signal(signal.SIGINT)
             perf.wait()
+        if has_failed:
+            words.seek(0)
+            said = words.read().strip().splitlines() or ["no reason given"]
+            raise RecordingError(
+                f"perf ended before the recording: {said[-1]}", "msgflow record without --kernel"
+            )
     convert = ["perf", "data", "convert", f"--to-ctf={directory / _TRACE}", f"--input={data}"]
     run = subprocess.run(convert, capture_output=True, text=True, start_new_session=True)
     if run.returncode:
@@ -71,4 +67,4 @@ def recorded_with_perf(directory: Path) -> Iterator[None]:
 
 
 def _command(target: str) -> list[str]:
-    return [*_RECORD, *(f"--event={name}" for name in _EVENTS), f"--output={target}"]
+    return [*_RECORD, *(f"--event={name}" for name in PERF_EVENTS), f"--output={target}"]

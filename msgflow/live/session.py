@@ -11,25 +11,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.errors import RecordingError
+from msgflow.live.kernel_events import KERNEL_EVENTS
 from msgflow.live.lttng import lttng, sessions
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
 CONTEXTS = ("vpid", "vtid", "procname")
-# What docs/scheduling.md asks for.
-KERNEL_EVENTS = (
-    "sched_switch",
-    "sched_waking",
-    "sched_wakeup_new",
-    "sched_process_fork",
-    "irq_handler_entry",
-    "irq_handler_exit",
-    "irq_softirq_entry",
-    "irq_softirq_exit",
-    "timer_hrtimer_expire_entry",
-    "timer_hrtimer_expire_exit",
-)
 KERNEL_CONTEXTS = ("pid", "vpid", "vtid", "procname")
 _CHANNEL = "ros2"
 # In the directory of a recording while it is made.
@@ -126,7 +114,7 @@ def require_new(name: str) -> None:
     if any(session.name == name for session in sessions()):
         raise RecordingError(
             f"LTTng has a session of this name — {name}",
-            f"another --name; or, if nobody needs it: lttng destroy {shlex.quote(name)}",
+            f"choose another --name, or end that session: lttng destroy {shlex.quote(name)}",
         )
 
 
@@ -176,7 +164,7 @@ def _is_left(directory: Path | None) -> bool:
 
 
 def _started(pid: int) -> str | None:
-    """Return when a process started, in ticks since the boot; None where there is none."""
+    """Return the start of a process, in ticks since the boot, or None if it does not run."""
     try:
         stat = Path(f"/proc/{pid:d}/stat").read_text()
     except OSError:

@@ -337,7 +337,7 @@ UNUSUAL = 9 * PERIOD + 100_000
         pytest.param({"stranger": -1}, True, id="nobody_else_while_it_was_recorded"),
         pytest.param({"stranger": 19 * PERIOD + 50 * MILLISECOND}, True, id="nor_behind"),
         pytest.param({"taken": 20}, True, id="each_publication_has_one"),
-        pytest.param({"others": [100_000] * 100}, True, id="usual_where_nobody_else_publishes"),
+        pytest.param({"others": [100_000] * 100}, True, id="usual_without_other_publishers"),
         pytest.param({"others": [99_999] * 100}, False, id="longer_than_is_usual_there"),
         pytest.param({"others": [30_000] * 99}, True, id="too_few_to_say_what_is_usual_there"),
     ],

@@ -14,7 +14,7 @@
 -- column: answered BIGINT  Of these, those with a round trip
 -- column: median BIGINT [ns]  Median round trip
 -- column: duration BIGINT [ns]  Longest round trip
--- column: request_id BIGINT  Request with the longest round trip; the first one if there is none
+-- column: request_id BIGINT  Request with the longest round trip; without an answer, the first request
 WITH extent AS (
     SELECT ($end_ns - $start_ns) // $bins + 1 AS width
 ),

@@ -221,7 +221,7 @@ usual_of_clock AS (
         clock_id,
         quantile_disc(delay_ns, derive.clock_limit().usual_quantile) AS usual_ns,
         quantile_disc(delay_ns, 1 - derive.clock_limit().usual_quantile) AS least_ns,
-        -- What is usual where nobody else publishes, if there are enough messages to say so.
+        -- The usual delay of topics without other publishers, if enough messages show it.
         CASE
             WHEN count(*) FILTER (topic_name NOT IN (FROM strange))
                 * (1 - derive.clock_limit().usual_quantile) >= 1
