@@ -184,8 +184,7 @@ OwnEventsOption = Annotated[
     typer.Option(
         "--events",
         metavar="PATTERN",
-        help="Also your own tracepoints with these names, such as 'my_pkg:*', into user_event; may"
-        " be repeated",
+        help="Also your own tracepoints, such as 'my_pkg:*'; repeatable",
     ),
 ]
 ReaderOption = Annotated[Reader, typer.Option("--reader", help="Decoder of the traces")]
