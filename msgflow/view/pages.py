@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 
     import duckdb
 
+    from msgflow.query.result import QueryResult
     from msgflow.run.choice import Run
 
 Params = dict[str, Any]
@@ -169,7 +170,8 @@ class Pages:
             end=window.end_ns if is_ended else None,
         )
 
-    def _part(self, extent: Extent, params: Params) -> Part:
+    def part(self, extent: Extent, params: Params) -> Part:
+        """Return the run and the window that the page asks for."""
         part = self._slice(extent, params)
         return Part(part, _window_options(extent, part))
 
@@ -177,7 +179,17 @@ class Pages:
         return encode(run_page_query(connection, "run", {}), units=_units("run"))
 
     def _query(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
-        name = str(params.get("name"))
+        return self.named(connection, str(params.get("name")), params)[1]
+
+    def named(
+        self, connection: duckdb.DuckDBPyConnection, name: str, params: Params
+    ) -> tuple[QueryResult, bytes]:
+        """Return the rows of a named query that pages show, also as bytes.
+
+        Raises:
+            UsageError: pages do not show it, or there is no such run.
+            QueryError: the database could not run it.
+        """
         if name not in NAMED:
             raise UsageError(f"pages do not show such a query — {name}")
         header = load_query(name)
@@ -185,7 +197,7 @@ class Pages:
         internal = _is_set(params, "internal")
         part = self._slice(extent, params) if header.has_window else Slice(extent.run.run_id)
         result = run_query(connection, header, {}, part, internal=internal)
-        return encode(
+        content = encode(
             result.to_arrow(),
             meta={
                 "title": header.title,
@@ -197,6 +209,7 @@ class Pages:
             origin_ns=extent.origin_ns,
             units=result.units,
         )
+        return result, content
 
     def _warm_up(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
         extent = self.extent(connection, params)
@@ -226,7 +239,7 @@ class Pages:
         """
         if name not in SUMMARY:
             raise UsageError(f"the summary has no such section — {name}")
-        part = self._part(extent, params or {})
+        part = self.part(extent, params or {})
         if name != "blame":
             return query_section(connection, extent.run, part, name, through)
         self.fill_flows(connection, extent)
@@ -255,9 +268,9 @@ class Pages:
             of = json.loads(str(params.get("of")))
         except ValueError:
             of = None
-        if not isinstance(of, list) or not all(isinstance(one, str | int) for one in of):
+        if not of or not isinstance(of, list) or not all(isinstance(one, str | int) for one in of):
             raise UsageError(f"sums are of a list of names or identities — {params.get('of')}")
-        part = self._part(extent, params)
+        part = self.part(extent, params)
         section = area_section(connection, extent.run, part, str(params.get("part")), of)
         return encoded_section(section, extent.origin_ns)
 

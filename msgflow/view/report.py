@@ -16,9 +16,7 @@ from pyarrow import compute
 from msgflow.atomic import replacing
 from msgflow.db.finding import read_findings
 from msgflow.errors import UsageError
-from msgflow.query.catalogue import load_query
 from msgflow.query.compare import compare as compare_runs
-from msgflow.query.runner import run_query
 from msgflow.run.slice import Slice
 from msgflow.run.window import WHOLE, Window
 from msgflow.text.values import format_duration
@@ -42,6 +40,7 @@ if TYPE_CHECKING:
     import duckdb
 
     from msgflow.query.compare import Comparison
+    from msgflow.query.result import QueryResult
     from msgflow.run.choice import Run
     from msgflow.verify import Verification
     from msgflow.view.summary import Section
@@ -152,6 +151,7 @@ class _Maker:
         self.progress = progress
         self.notes: list[str] = []
         self.parts = Parts()
+        self.named: dict[str, QueryResult] = {}
         self.verification: Verification | None = None
 
     def answer(self, name: str, /, **params: Any) -> bytes:
@@ -168,7 +168,8 @@ class _Maker:
         self.runs(other)
         self.keep("finding")
         for name in NAMED:
-            self.keep("query", name=name)
+            self.named[name], content = self.pages.named(self.connection, name, self.params)
+            self.parts.add(f"query?name={name}", content)
         for name in (
             "row", "gap", "path", "executor_node", "executor_share", "callback", "loss",
             "loss_point",
@@ -240,7 +241,11 @@ class _Maker:
         """Return the sections of the summary."""
         through = self.through or ""
         return [
-            *([] if self.verification is None else [verdict_section(self.verification)]),
+            *(
+                []
+                if self.verification is None
+                else [verdict_section(self.verification, self.pages.part(self.extent, {}))]
+            ),
             *([] if comparison is None else [change_section(comparison)]),
             *(self.pages.summary(self.connection, self.extent, part, through) for part in SUMMARY),
         ]
@@ -261,18 +266,19 @@ class _Maker:
             "timers": ("timers",),
             "services": ("service-latency", "action-latency"),
         }
-        empty += [page for page, names in named.items() if not any(map(self._row_count, names))]
+        empty += [
+            page
+            for page, names in named.items()
+            if not any(len(self.named[name]) for name in names)
+        ]
         return [*empty, *([] if other else ["compare"])]
-
-    def _row_count(self, name: str) -> int:
-        part = Slice(self.extent.run.run_id)
-        return len(run_query(self.connection, load_query(name), {}, part))
 
     def panels(self) -> None:
         """Keep what callbacks, topics and services did over time: of the first ones of each."""
         for query, column, key, names in _PANELS:
-            table = run_query(self.connection, load_query(query), {}, Slice(self.extent.run.run_id))
-            for value in dict.fromkeys(table.to_arrow()[column].to_pylist()[:MOST_PANELS]):
+            for value in dict.fromkeys(
+                self.named[query].to_arrow()[column].to_pylist()[:MOST_PANELS]
+            ):
                 given = {} if value is None else {key: value}
                 for name in names:
                     self.keep(name, **given)

@@ -226,13 +226,14 @@ def blame_section(
     return Section("blame", replace(result, table=pa.concat_tables(results)), tuple(commands))
 
 
-def verdict_section(verification: Verification) -> Section:
-    """Return the verdicts on requirements, those that are not met first."""
+def verdict_section(verification: Verification, part: Part) -> Section:
+    """Return the verdicts on requirements for a run and window, those that are not met first."""
     numbers = [
         f"{verification.count(verdict)} {verdict}"
         for verdict in ("failed", "not measured", "passed")
     ]
-    command = shlex.join(["msgflow", "verify", verification.file, "--run", verification.run.name])
+    words = ["msgflow", "verify", verification.file, *part.options]
+    command = shlex.join([*words, "--run", verification.run.name])
     return Section("verdicts", verification.result, (command,), ", ".join(numbers))
 
 

@@ -161,6 +161,7 @@ def test_every_answer_is_strict(demo: Path, serve: Serve) -> None:
         ("compare?other=99", "no such run"),
         ("summary?part=other", "the summary has no such section"),
         ("area?part=callbacks&of=x", "sums are of a list"),
+        ("area?part=callbacks&of=%5B%5D", "sums are of a list"),
         ("area?part=other&of=%5B1%5D", "there are no such sums"),
         ("path_point?path=x", "path is a whole number"),
     ],

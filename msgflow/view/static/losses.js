@@ -64,7 +64,7 @@ export class LossesPage {
     clear(this.picture, this.course(points));
   }
 
-  // A column for each piece of time, of all that happened in it: losses below, what is unknown on top.
+  // How many messages had each fate, in each piece of time.
   course(points) {
     const rows = Array.from({ length: points.rows }, (_, row) => row).filter((row) => this.isShown(points, row));
     if (!rows.length) return h("p", {}, "Nothing was lost.");

@@ -1,7 +1,6 @@
 // Nodes: their callbacks, how often and how long these ran, how long they waited, what they missed.
 
 import { h, clear } from "./dom.js";
-import { current, replace } from "./address.js";
 import { count } from "./labels.js";
 import { besides, dataTable } from "./table.js";
 import { commands, failed, notes, waiting } from "./notice.js";
@@ -21,10 +20,9 @@ export class NodesPage {
   async build() {
     const { app } = this;
     const [callbacks, nodes, objects] = await Promise.all([app.query("callbacks"), app.query("info-nodes"), app.fetch("callback")]);
-    this.search = h("input", { type: "search", placeholder: "node, callback …", "aria-label": "show callbacks with this text", value: current().q ?? "",
-      on: { input: () => { replace({ q: this.search.value }); app.linksMoved(); this.show(); } } });
     this.chooser = new Chooser(app, { key: "callback", label: "callbacks", sort: { name: "max_ns", down: true },
       identity: (table, row) => String(table.callback_id[row]), nothing: "No callback ran.",
+      search: { placeholder: "node, callback …", label: "show callbacks with this text", texts: (table, row) => [table.node[row], table.callback[row], table.symbol[row]] },
       panel: (table, row) => callbackPanel(app, table.callback_id[row], `${table.node[row] ?? ""} ${table.callback[row]}`) });
     this.under = h("div");
     this.later = h("div", {}, waiting("looking for what callbacks waited for …"));
@@ -33,7 +31,7 @@ export class NodesPage {
     const silent = this.silent(callbacks, nodes);
     clear(this.root, h("section", {}, h("h2", {}, "Callbacks of the nodes"),
       h("p", { className: "soft" }, "A click on a row shows the callback over time, and leads to its longest instance."),
-      h("div", { className: "tools" }, this.search), this.chooser.list, this.later, this.under), this.chooser.detail,
+      h("div", { className: "tools" }, this.chooser.search), this.chooser.list, this.later, this.under), this.chooser.detail,
     h("section", {}, silent.length > 0 && h("p", {}, `No callback ran of ${silent.join(", ")}.`),
       besides(count(nodes.rows, "node"), dataTable(nodes, { label: "nodes" }), commands([nodes]))));
     this.show();
@@ -43,11 +41,8 @@ export class NodesPage {
   }
 
   show() {
-    const text = this.search.value.trim().toLowerCase();
-    const { table } = this;
     this.chooser.options.columns = this.columns;
-    this.chooser.options.only = (row) => !text || [table.node[row], table.callback[row], table.symbol[row]].some((one) => one?.toLowerCase().includes(text));
-    this.chooser.show(table);
+    this.chooser.show(this.table);
   }
 
   said(tables) {

@@ -12,13 +12,21 @@ export const onTimeline = (kind, id) => pageAddress("timeline", { flow: `${kind}
 // A table whose rows open a panel below it. The address keeps the chosen row under `key`, by the
 // text that `identity` returns for it.
 export class Chooser {
-  // Options: those of dataTable, and key, identity(row), panel(row): what is in the panel.
+  // Options: those of dataTable, and key, identity(row), panel(row): what is in the panel. And what
+  // is searched: search.placeholder, search.label, search.texts(table, row).
   constructor(app, options) {
     this.app = app;
     this.options = options;
     this.order = {};
     this.list = h("div");
     this.detail = h("div", { className: "panel" });
+    this.search = options.search && h("input", { type: "search", placeholder: options.search.placeholder, "aria-label": options.search.label, value: current().q ?? "",
+      on: { input: () => { replace({ q: this.search.value }); app.linksMoved(); this.show(this.table); } } });
+  }
+
+  isFound(row) {
+    const text = this.search?.value.trim().toLowerCase();
+    return !text || this.options.search.texts(this.table, row).some((one) => one?.toLowerCase().includes(text));
   }
 
   show(table) {
@@ -32,7 +40,7 @@ export class Chooser {
   }
 
   fill() {
-    clear(this.list, dataTable(this.table, { ...this.options, state: this.order,
+    clear(this.list, dataTable(this.table, { ...this.options, state: this.order, only: (row) => this.isFound(row),
       picked: (row) => row === this.row, onPick: (row) => this.pick(row) }));
     this.list.classList.toggle("is-short", this.row >= 0);
   }

@@ -1,7 +1,6 @@
 // Services and actions: how long calls and goals took, and which were not answered.
 
 import { h, clear } from "./dom.js";
-import { current, replace } from "./address.js";
 import { dataTable } from "./table.js";
 import { commands, notes } from "./notice.js";
 import { fill, section } from "./overview.js";
@@ -19,28 +18,20 @@ export class ServicesPage {
 
   async build() {
     const { app } = this;
-    const table = this.table = await app.query("service-latency");
-    this.search = h("input", { type: "search", placeholder: "service, node …", "aria-label": "show services with this text", value: current().q ?? "",
-      on: { input: () => { replace({ q: this.search.value }); app.linksMoved(); this.show(); } } });
+    const table = await app.query("service-latency");
     this.chooser = new Chooser(app, { key: "call", label: "services", columns: COLUMNS_OF_SERVICES, sort: { name: "round_trip_max_ns", down: true }, nothing: "No call of a service was recorded.",
+      search: { placeholder: "service, node …", label: "show services with this text", texts: (rows, row) => [rows.service_name[row], rows.client[row], rows.server[row]] },
       identity: (rows, row) => `${rows.service_id[row]}:${rows.client_id[row]}`, panel: (rows, row) => this.panel(rows, row) });
     const actions = section("Actions");
     clear(this.root, h("section", {}, h("h2", {}, "Services"),
       h("p", { className: "soft" }, "From the request that the client sends to the response that it takes, on its own clock. A click on a row shows the calls over time, and leads to the longest."),
-      h("div", { className: "tools" }, this.search), this.chooser.list, notes(table.meta.notes), commands([table])), this.chooser.detail, actions.root);
-    this.show();
+      h("div", { className: "tools" }, this.chooser.search), this.chooser.list, notes(table.meta.notes), commands([table])), this.chooser.detail, actions.root);
+    this.chooser.show(table);
     await fill(actions, async () => {
       const rows = await app.query("action-latency");
       const table = rows.rows ? dataTable(rows, { label: "actions", columns: OF_ACTIONS, sort: { name: "result_max_ns", down: true } }) : h("p", {}, "No goal of an action was recorded.");
       return [table, notes(rows.meta.notes), commands([rows])];
     });
-  }
-
-  show() {
-    const text = this.search.value.trim().toLowerCase();
-    const { table } = this;
-    this.chooser.options.only = (row) => !text || [table.service_name[row], table.client[row], table.server[row]].some((one) => one?.toLowerCase().includes(text));
-    this.chooser.show(table);
   }
 
   async panel(rows, row) {

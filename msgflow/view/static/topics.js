@@ -1,7 +1,6 @@
 // Topics: rate, jitter, drops and latency of each; of the chosen one who publishes and receives it.
 
 import { h, clear } from "./dom.js";
-import { current, replace } from "./address.js";
 import { shellQuoted } from "./labels.js";
 import { dataTable } from "./table.js";
 import { commands, failed, notes, sqlText, waiting } from "./notice.js";
@@ -24,21 +23,14 @@ export class TopicsPage {
 
   async build() {
     const { app } = this;
-    const table = this.table = await app.query("topics-summary");
-    this.search = h("input", { type: "search", placeholder: "topic …", "aria-label": "show topics with this text", value: current().q ?? "",
-      on: { input: () => { replace({ q: this.search.value }); app.linksMoved(); this.show(); } } });
+    const table = await app.query("topics-summary");
     this.chooser = new Chooser(app, { key: "topic", label: "topics", columns: COLUMNS_OF_TOPICS, sort: { name: "publication_count", down: true }, nothing: "No topic is known.",
+      search: { placeholder: "topic …", label: "show topics with this text", texts: (rows, row) => [rows.topic_name[row]] },
       identity: (rows, row) => rows.topic_name[row] ?? "", panel: (rows, row) => this.panel(rows.topic_name[row]) });
     clear(this.root, h("section", {}, h("h2", {}, "Topics"),
       h("p", { className: "soft" }, "Messages are counted at each subscription. A click on a row shows the topic over time, who publishes and who receives it, and leads to its slowest message."),
-      h("div", { className: "tools" }, this.search), this.chooser.list, notes(table.meta.notes), commands([table])), this.chooser.detail);
-    this.show();
-  }
-
-  show() {
-    const text = this.search.value.trim().toLowerCase();
-    this.chooser.options.only = (row) => !text || (this.table.topic_name[row] ?? "").toLowerCase().includes(text);
-    this.chooser.show(this.table);
+      h("div", { className: "tools" }, this.chooser.search), this.chooser.list, notes(table.meta.notes), commands([table])), this.chooser.detail);
+    this.chooser.show(table);
   }
 
   async panel(topic) {
