@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from inspect import Parameter
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -193,12 +194,16 @@ def _command_class(header: Header) -> type[TyperCommand]:
         def format_help(self, ctx: Any, formatter: Any) -> None:
             """Print the help of Typer, without what every query has, then the columns."""
             # Completion still offers the options: they are hidden only here.
-            for param in self.params:
-                if isinstance(param, TyperOption) and param.name in _OF_EVERY_QUERY:
-                    param.hidden = True
+            common = [
+                param
+                for param in self.params
+                if isinstance(param, TyperOption) and param.name in _OF_EVERY_QUERY
+            ]
+            for param in common:
+                param.hidden = True
             super().format_help(ctx, formatter)
             _print_columns(header)
-            _print_common()
+            _print_common(common)
 
     return QueryCommand
 
@@ -221,12 +226,10 @@ def _print_columns(header: Header) -> None:
     )
 
 
-def _print_common() -> None:
-    typer.echo(
-        " Every query also has --run, --start, --end, --skip-first, --internal,\n"
-        " --format, -o, --columns, --wide, --times, --show, --db, --memory-limit:\n"
-        " msgflow query --help explains them"
-    )
+def _print_common(params: Sequence[TyperOption]) -> None:
+    names = ", ".join(param.opts[0] for param in params if param.name != "help")
+    text = f"Every query also has {names}: msgflow query --help explains them"
+    typer.echo(textwrap.fill(text, 79, initial_indent=" ", subsequent_indent=" "))
 
 
 def print_options_of_every_query() -> None:
