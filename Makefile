@@ -43,9 +43,10 @@ demo: $(VENV)/.installed
 	@echo 'What to try next:'
 	@echo '  export MSGFLOW_DB=$(CURDIR)/$(DEMO)/msgflow.duckdb; . $(BIN)/activate'
 	@echo '  msgflow check                                    what is wrong with the recording'
-	@echo '  msgflow query critical-path --to /control/cmd    why the slowest command was late'
-	@echo '  msgflow query waits --by pair                   which callbacks keep which waiting'
-	@echo '  msgflow flow /camera/image               one message: its causes and effects'
+	@echo '  msgflow why /control/cmd                         why commands are late'
+	@echo '  msgflow query critical-path --to /control/cmd    what the slowest command waited for'
+	@echo '  msgflow query waits --by pair                    which callbacks keep which waiting'
+	@echo '  msgflow flow /camera/image                       one message: its causes and effects'
 	@echo 'see it: $(BIN)/msgflow ui --db $(DEMO)/msgflow.duckdb'
 
 quick: $(VENV)/.developed
