@@ -136,9 +136,11 @@ def find_take(connection: duckdb.DuckDBPyConnection, start: Start) -> tuple[int,
     """
     found = connection.execute(_TAKE, {"kind": start.kind, "id": start.id}).fetchall()
     if not found:
+        is_message = start.kind == "publication"
+        said = "no subscription took this message" if is_message else "no message was taken for it"
         raise UsageError(
-            f"no take of a message belongs to it — {start.kind} {start.id}",
-            "msgflow query flows lists takes at the ends of paths",
+            f"{said} — {start.kind} {start.id}",
+            "a later one: --at TIME; or a take that msgflow query flows lists: --take ID",
         )
     ((take_id, topic, run_id),) = found
     return take_id, topic, run_id

@@ -66,7 +66,7 @@ def test_json_and_files(msgflow: Msgflow, small_database: Path, tmp_path: Path) 
         (("--slowest", "2", "--format", "json"), "--slowest 2"),
         (("--slowest", "1"), "no flow arrived"),
         (("/chatter", "--why", "--depth", "3"), "--why goes without --depth"),
-        (("/chatter", "--why"), "no take of a message belongs to it"),
+        (("/chatter", "--why"), "no subscription took this message"),
         (("--slowest", "2", "--why"), "critical-path --slowest 2"),
         (("--case", "last"), "choose among the slowest"),
         (("--slowest", "1", "--to", "/nothing"), "/nothing"),
