@@ -56,7 +56,7 @@ export class GraphPage {
         item("box", "node"), item("pill", "topic, with its rate"), item("diamond", "service, with its round trip"), actions.rows > 0 && item("action", "action, with the time from a goal to its result"),
         h("span", { className: "legend-item" }, h("span", { className: "stroke color-transport" }), "published, received: median · p95 from publication to take"),
         h("span", { className: "legend-item" }, h("span", { className: "stroke dashed color-indirect" }), "published by an indirect link"),
-        h("span", { className: "legend-item" }, "the wider an arrow, the more messages; the darker a node, the longer its callbacks ran"),
+        h("span", { className: "legend-item" }, "the wider an arrow, the more messages; the stronger the colour of a node, the longer its callbacks ran"),
         this.model.edges.some((edge) => edge.missing) && h("span", { className: "legend-item" }, h("span", { className: "stroke color-error" }), "messages dropped or lost"),
         h("span", { className: "legend-item" }, h("span", { className: "shape box slowest" }), "part of the slowest flow, with its share"),
         this.model.hosts.length > 1 && this.model.hosts.map((host, place) => h("span", { className: "legend-item" }, h("span", { className: `swatch host-mark host-${place % HOSTS}` }), `on ${host}`))),
