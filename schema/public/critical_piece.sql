@@ -102,26 +102,38 @@ poll AS MATERIALIZED (
     SELECT executor_id, start_ns, end_ns FROM derive.executor_poll('several')
 ),
 -- Between two of these waits no thread was free.
-held AS (
+held AS MATERIALIZED (
     SELECT
-        executor_id, end_ns AS start_ns,
-        coalesce(lead(start_ns) OVER in_time, 9223372036854775807) AS end_ns
-    FROM poll
-    WINDOW in_time AS (PARTITION BY executor_id ORDER BY end_ns)
-    UNION ALL
-    SELECT executor_id, 0, min(start_ns) FROM poll GROUP BY executor_id
+        executor_id, start_ns, end_ns,
+        row_number() OVER (PARTITION BY executor_id ORDER BY start_ns) AS number
+    FROM (
+        SELECT
+            executor_id, end_ns AS start_ns,
+            coalesce(lead(start_ns) OVER in_time, 9223372036854775807) AS end_ns
+        FROM poll
+        WINDOW in_time AS (PARTITION BY executor_id ORDER BY end_ns)
+        UNION ALL
+        SELECT executor_id, 0, min(start_ns) FROM poll GROUP BY executor_id
+    )
+),
+-- Looked up at both ends: each wait compared with each of these times takes minutes.
+held_meanwhile AS (
+    SELECT
+        r.callback_instance_id, r.executor_id, r.thread_id, r.latest_ns, r.earliest_ns, r.picked_ns,
+        unnest(range(f.number, l.number + 1)) AS number
+    FROM ready AS r
+    ASOF JOIN held AS f ON r.executor_id = f.executor_id AND r.earliest_ns >= f.start_ns
+    ASOF JOIN held AS l ON r.executor_id = l.executor_id AND r.picked_ns > l.start_ns
 ),
 -- Nor is one for what a thread has picked.
 unserved AS (
     SELECT
-        r.callback_instance_id, r.thread_id, r.latest_ns,
-        greatest(r.earliest_ns, h.start_ns) AS from_ns,
-        least(greatest(r.earliest_ns, r.picked_ns), h.end_ns) AS to_ns
-    FROM ready AS r
-    JOIN held AS h
-        ON r.executor_id = h.executor_id
-        AND r.earliest_ns < h.end_ns
-        AND r.picked_ns > h.start_ns
+        m.callback_instance_id, m.thread_id, m.latest_ns,
+        greatest(m.earliest_ns, h.start_ns) AS from_ns,
+        least(greatest(m.earliest_ns, m.picked_ns), h.end_ns) AS to_ns
+    FROM held_meanwhile AS m
+    JOIN held AS h ON m.executor_id = h.executor_id AND m.number = h.number
+    WHERE m.earliest_ns < h.end_ns
     UNION ALL
     SELECT
         callback_instance_id, thread_id, latest_ns, greatest(earliest_ns, picked_ns), start_ns

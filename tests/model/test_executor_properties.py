@@ -32,7 +32,16 @@ WAITS = (
     "busy_max_ns, blocked_max_ns FROM executor_wait ORDER BY callback_instance_id"
 )
 
-IDLE = "SELECT earliest_ns, start_ns, idle_ns FROM executor_wait ORDER BY callback_instance_id"
+# What a thread among several has picked does not wait for work that others wait for.
+IDLE = (
+    "SELECT w.earliest_ns, CASE WHEN s.thread_count = 1 THEN w.start_ns "
+    "ELSE coalesce(max(e.start_ns), w.start_ns) END AS until_ns, w.idle_ns "
+    "FROM executor_wait AS w JOIN derive.executor_size AS s USING (executor_id) "
+    "LEFT JOIN executor_state AS e ON e.thread_id = w.thread_id AND e.state = 'process' "
+    "AND e.start_ns <= w.start_ns "
+    "GROUP BY w.callback_instance_id, w.earliest_ns, w.start_ns, w.idle_ns, s.thread_count "
+    "ORDER BY w.callback_instance_id"
+)
 # What a callback that spins waits for is no business of its executor.
 SLEEPS = (
     "SELECT s.start_ns, s.end_ns FROM executor_state AS s WHERE state = 'wait' "
@@ -153,11 +162,11 @@ def idle_is_the_sum_of_what_threads_wait(model: Analysis) -> None:
     waits = model.rows(IDLE)
     assert waits
     compared = 0
-    for earliest, start, idle in waits:
+    for earliest, until, idle in waits:
         if earliest is None or not sleeps:
             assert idle is None
             continue
-        inside = sorted((max(a, earliest), min(b, start)) for a, b in sleeps)
+        inside = sorted((max(a, earliest), min(b, until)) for a, b in sleeps)
         inside = [(a, b) for a, b in inside if a < b]
         # One thread waits for all: two at once do not happen in rclcpp.
         if all(end <= begin for (_, end), (begin, _) in pairwise(inside)):
