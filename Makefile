@@ -20,7 +20,7 @@ APT := apt_install() { \
 	$$root env DEBIAN_FRONTEND=noninteractive \
 		apt-get install -y -qq --no-install-recommends "$$@"; }
 
-.PHONY: help demo quick test test-all bench truth real fuzz mutants babeltrace chromium ros clean
+.PHONY: help demo quick test test-all bench truth real fuzz mutants docs babeltrace chromium ros clean
 
 help:
 	@echo 'make demo    simulate a robot, ingest its trace, print end-to-end latency'
@@ -32,6 +32,7 @@ help:
 	@echo 'make real    the same on real ROS 2: nodes of rclpy, recorded with LTTng'
 	@echo 'make fuzz    damaged traces, archives, databases and files through all of msgflow'
 	@echo 'make mutants changes numbers and comparisons of SQL rules, and says what no test notices'
+	@echo 'make docs    the documentation as a site, in .site; fails at a dead link'
 	@echo 'make clean   remove what these made'
 
 demo: $(VENV)/.installed
@@ -82,6 +83,10 @@ fuzz: $(VENV)/.installed
 mutants: $(VENV)/.developed
 	$(BIN)/python benchmarks/mutants.py
 
+docs: $(VENV)/.installed
+	$(BIN)/python -m pip install --quiet --group docs
+	$(BIN)/zensical build --clean
+
 $(VENV)/.made:
 	@! command -v $(PYTHON) >/dev/null 2>&1 \
 		|| $(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
@@ -122,4 +127,4 @@ ros: $(VENV)/.made
 		|| echo "note: no rclpy: the tests with real ROS 2 are skipped" >&2
 
 clean:
-	rm -rf $(VENV) $(DEMO)
+	rm -rf $(VENV) $(DEMO) .site .cache

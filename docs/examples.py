@@ -4,9 +4,9 @@
 
 A block that begins with ```console has commands, each behind `$ `, and what they print in a
 terminal of 100 columns. A block ```sql is answered by the block ```text behind it. Blocks that
-begin with ```sh setup run first, and show nothing; pages with the same setup share what it made,
-and a page without one starts from the database of the demo. A test keeps the pages equal to what
-the commands print.
+begin with ```sh title="Setup" run first, and show nothing; pages with the same setup share what it
+made, and a page without one starts from the database of the demo. A test keeps the pages equal to
+what the commands print.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ msgflow simulate demo trace
 msgflow ingest trace --clock-sync messages
 """
 COLUMNS = 100
-SETUP = re.compile(r"^```sh setup\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+SETUP = re.compile(r'^```sh title="Setup"\n(.*?)^```$', re.MULTILINE | re.DOTALL)
 CONSOLE = re.compile(r"^```console\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 COMMAND = re.compile(r"^\$ ((?:.*\\\n)*.*)\n", re.MULTILINE)
 SQL = re.compile(r"^```sql\n(.*?)^```\n\n```text\n.*?^```$", re.MULTILINE | re.DOTALL)

@@ -138,14 +138,20 @@ def _object(header: Header) -> str:
             default = _default(param.default, header.kind) if param.has_default else ""
             choices = f" ({', '.join(param.choices)})" if param.choices else ""
             lines.append(
-                f"| `{param.name}` | {param.type} | {default} | {param.description}{choices} |\n"
+                f"| `{param.name}` | {_type(param.type)} | {default} | "
+                f"{param.description}{choices} |\n"
             )
     if header.columns:
         lines.append("\n| column | type | meaning |\n| --- | --- | --- |\n")
     for column in header.columns:
         unit = f" [{column.unit}]" if column.unit else ""
-        lines.append(f"| `{column.name}` | {column.type} | {column.description}{unit} |\n")
+        lines.append(f"| `{column.name}` | {_type(column.type)} | {column.description}{unit} |\n")
     return "".join(lines)
+
+
+def _type(name: str) -> str:
+    # In Markdown two pairs of brackets are a link.
+    return name.replace("][", "]\\[")
 
 
 def _sentence(grain: str) -> str:

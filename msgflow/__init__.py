@@ -1,10 +1,9 @@
 """msgflow: ROS 2 traces as a relational database.
 
-import msgflow
-
-with msgflow.open_db("msgflow.duckdb") as database:
-    database.ingest("traces/session")
-    print(database.query("e2e-latency").to_pandas())
+Example:
+    with msgflow.open_db("msgflow.duckdb") as database:
+        database.ingest("traces/session")
+        print(database.query("e2e-latency").to_pandas())
 """
 
 from __future__ import annotations

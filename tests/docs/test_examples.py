@@ -75,7 +75,10 @@ def test_snippets_of_the_readme_run(small_database: Path, monkeypatch: pytest.Mo
 
 
 def test_a_page_that_differs_is_found(tmp_path: Path) -> None:
-    text = "```sh setup\ntrue\n```\n\n```console\n$ echo ä; echo b >&2\nwrong\n\n$ tput cols\n```\n"
+    text = (
+        '```sh title="Setup"\ntrue\n```\n\n'
+        "```console\n$ echo ä; echo b >&2\nwrong\n\n$ tput cols\n```\n"
+    )
     assert script().filled(text, tmp_path) == text.replace("wrong\n", "ä\nb\n").replace(
         "cols\n", "cols\n100\n"
     )

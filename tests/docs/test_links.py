@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -83,3 +84,11 @@ def test_pages_named_elsewhere_exist() -> None:
         if not (ROOT / name).exists()
     ]
     assert not missing
+
+
+def test_the_site_shows_every_page() -> None:
+    site = tomllib.loads((ROOT / "zensical.toml").read_text(encoding="utf-8"))["project"]
+    shown = [page for part in site["nav"] for pages in part.values() for page in pages]
+    assert sorted(shown) == sorted(page.name for page in (ROOT / "docs").glob("*.md"))
+    assert site["strict"]
+    assert site["validation"] == {"invalid_links": True, "invalid_link_anchors": True}
