@@ -1,0 +1,39 @@
+"""What other programs read of the project says the same as the project."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+from ruamel.yaml import YAML
+
+from msgflow.version import __version__
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def test_one_version_everywhere() -> None:
+    cited = YAML(typ="safe").load(ROOT / "CITATION.cff")
+    package = ElementTree.parse(ROOT / "packaging" / "colcon" / "package.xml")
+    assert cited["version"] == package.findtext("version") == __version__
+
+
+def test_workflows_start_with_the_oldest_python() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    tests = YAML(typ="safe").load(ROOT / ".github" / "workflows" / "tests.yml")["jobs"]["tests"]
+    matrix = tests["strategy"]["matrix"]
+    assert f">={matrix['python'][0]}" == project["requires-python"]
+    (oldest,) = (row for row in matrix["include"] if row["duckdb"] == "oldest")
+    assert oldest["python"] == matrix["python"][0]
+
+
+def test_the_oldest_duckdb_is_found() -> None:
+    """The workflow takes it from pyproject.toml with sed."""
+    workflow = (ROOT / ".github" / "workflows" / "tests.yml").read_text(encoding="utf-8")
+    (pattern,) = re.findall(r"sed -n 's/(.+)/duckdb==", workflow)
+    text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    found = re.findall(pattern.replace(r"\(", "(").replace(r"\)", ")"), text)
+    (wanted,) = re.findall(r'"duckdb>=([\d.]+)', text)
+    assert found == [wanted]
