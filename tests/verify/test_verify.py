@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+import duckdb
 import pytest
 from hostile import HOSTILE, renamed
 from thorough import few
@@ -156,8 +157,21 @@ def test_a_path_passes_every_topic_that_is_named(check: Check) -> None:
     assert [row["verdict"] for row in rows(check(text))] == ["not measured"]
 
 
-def test_every_metric_reads_columns_that_its_query_has(check: Check, goals: Path) -> None:
+def test_every_metric_reads_columns_that_its_query_has(
+    check: Check, system: Path, goals: Path
+) -> None:
     """With a condition that nothing meets, so that worst cases are looked for, too."""
+    with duckdb.connect(str(system)) as connection:
+        connection.execute(
+            "INSERT INTO store.callback_schedule BY NAME SELECT run_id, callback_instance_id, "
+            "90 AS running_ns, 10 AS preempted_ns, 0 AS runnable_ns, 0 AS sleeping_ns, "
+            "0 AS uninterruptible_ns, 0 AS unknown_ns, 1 AS preemption_count, "
+            "0 AS migration_count, false AS is_loss_affected FROM store.callback_instance"
+        )
+        connection.execute(
+            "INSERT INTO store.thread_state BY NAME SELECT run_id, thread_id, 100 AS start_ns, "
+            "130 AS end_ns, 'runnable' AS state, false AS is_loss_affected FROM store.thread"
+        )
     units = {"ns": "1 ns", "Hz": "1 Hz", "share": "1 %", "count": "1"}
     names = {"path": "[/a, /b]", "timer": "/source", "callback": "Sub*", "topic": "/a"}
     names |= {"service": "/add", "action": "/dock", "process": "process"}
@@ -357,3 +371,31 @@ def test_without_the_file_a_name_means_nothing(system: Path, tmp_path: Path) -> 
     (tmp_path / "targets.yaml").write_text("targets: [{path: there, latency: max < 1 s}]")
     with Database(system) as database, pytest.raises(UsageError, match=r"none\.yaml"):
         database.verify(tmp_path / "targets.yaml", paths=tmp_path / "none.yaml")
+
+
+def test_scheduling_where_the_kernel_was_traced(check: Check, traced: Path) -> None:
+    text = """
+targets:
+  - callback: Timer(5 ms)
+    cpu: [median < 151 ns, p99 < 180 ns]
+    preempted: < 24 %
+  - callback: Subscription(/goal)
+    preempted: < 50 %
+  - process: process
+    wakeup: p99 < 31 ns
+"""
+    found = {
+        (row["subject"], row["condition"]): (row["verdict"], row["value"], row["see"])
+        for row in rows(check(text, traced))
+    }
+    assert found == {
+        ("/planner Timer(5 ms)", "median < 151 ns"): ("passed", 150, None),
+        ("/planner Timer(5 ms)", "p99 < 180 ns"): ("failed", 180, None),
+        ("/planner Timer(5 ms)", "< 24 %"): ("passed", 140 / 600, None),
+        ("/planner Subscription(/goal)", "< 50 %"): (
+            "failed", 0.6, "msgflow flow --callback-instance 5",
+        ),
+        ("process, thread 1", "p99 < 31 ns"): ("passed", 30, None),
+    }  # fmt: skip
+    without = rows(check(text))
+    assert {row["verdict"] for row in without} == {"not measured"}
