@@ -1,0 +1,182 @@
+"""Reads the chunks of a recording one after the other, and reports window after window."""
+
+from __future__ import annotations
+
+import time
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from msgflow.errors import TraceError, UsageError
+from msgflow.ingest.memory import ingested_in_memory
+from msgflow.run.window import Window
+from msgflow.trace import Continuation
+from msgflow.watch.history import History
+from msgflow.watch.kept_chunk import read_chunk
+from msgflow.watch.window_report import report_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+    import duckdb
+
+    from msgflow.clocks import ClockSync
+    from msgflow.links import LinksFile
+    from msgflow.watch.alarm import Alarm
+    from msgflow.watch.chunk import Chunk
+    from msgflow.watch.flight_recorder import FlightRecorder
+    from msgflow.watch.kept_traces import KeptTraces
+    from msgflow.watch.prometheus import Exporter
+    from msgflow.watch.window_report import WindowReport
+
+_RUN = "watch"
+_SECOND_NS = 1_000_000_000
+
+
+class Watcher:
+    """What is known of a recording so far, and the windows over it.
+
+    Attributes:
+        history: the last chunks.
+        numbers: of the last chunk of each source.
+        on_passed: gets the directory of each chunk that no window needs any more.
+    """
+
+    def __init__(
+        self,
+        *,
+        window_ns: int,
+        step_ns: int,
+        links: LinksFile | None,
+        clocks: ClockSync,
+        note: Callable[[str], None],
+        alarm: Alarm | None = None,
+        recorder: FlightRecorder | None = None,
+        exporter: Exporter | None = None,
+    ) -> None:
+        """Start before the first chunk.
+
+        Args:
+            window_ns: length of a window.
+            step_ns: how far a window is from the one before.
+            links: indirect links to declare.
+            clocks: how clocks of several hosts are brought together.
+            note: gets sentences about what is wrong with the recording.
+            alarm: the targets of each window.
+            recorder: keeps the chunks around a violation.
+            exporter: counts each moment once.
+        """
+        self.history = History(window_ns, step_ns)
+        self._links = links
+        self._clocks = clocks
+        self._note = note
+        self._alarm = alarm
+        self._recorder = recorder
+        self._exporter = exporter
+        self.on_passed: Callable[[Path], None] | None = None
+        self._lacks_links = False
+        self._violated: tuple[int, KeptTraces, list[Path]] | None = None
+        self._after = Continuation()
+        self.numbers: dict[Path, int] = {}
+
+    def read(self, chunk: Chunk) -> None:
+        """Read the next chunk of a host; what is wrong with it is noted, and the others go on."""
+        before = self.numbers.get(chunk.source)
+        self.numbers[chunk.source] = chunk.number
+        if before is not None and chunk.number > before + 1:
+            self._note(
+                f"{chunk.number - before - 1} chunks are missing before number {chunk.number}"
+                f" of {chunk.source}"
+            )
+        try:
+            kept = read_chunk(chunk, self._after)
+        except TraceError as error:
+            self._note(f"a chunk cannot be read: {error.message}")
+            return
+        if kept is None:
+            return
+        if kept.damages:
+            first = kept.damages[0]
+            self._note(f"{len(kept.damages)} damages in {chunk.path}, the first: {first.message}")
+        self.history.add(kept)
+
+    def go_on(self) -> None:
+        """Make a border if one is due, and forget what no window needs."""
+        if not self.history.is_due:
+            return
+        self.history.add_border()
+        if self.history.final_ns is None:
+            # So much has been recorded before we came.
+            self._forget(self.history.newest_window())
+
+    def final_report(self, *, is_live: bool, is_last: bool = False) -> WindowReport | None:
+        """Return the next window of which all is known; None if there is none yet.
+
+        Args:
+            is_live: the recording goes on at this moment.
+            is_last: nothing more comes.
+        """
+        window = self.history.final_window(is_last=is_last)
+        if window is None:
+            return None
+        report = self._report(window, is_final=True, is_live=is_live)
+        self.history.final_ns = window.end_ns
+        self._forget(window)
+        return report
+
+    def keep_violation(self) -> None:
+        """Keep the chunks of the last report if it has a violation, once it has been told."""
+        if self._violated is not None and self._recorder is not None:
+            self._recorder.keep(*self._violated)
+        self._violated = None
+
+    def _forget(self, window: Window) -> None:
+        for path in self.history.forget(window):
+            if self.on_passed is not None:
+                self.on_passed(path)
+
+    @contextmanager
+    def _database(self, traces: KeptTraces) -> Iterator[duckdb.DuckDBPyConnection]:
+        """Have a database of a window; links of nodes that are not there yet are left out."""
+        with ExitStack() as stack:
+
+            def opened(links: LinksFile | None) -> duckdb.DuckDBPyConnection:
+                made = ingested_in_memory(traces, _RUN, links=links, clocks=self._clocks)
+                return stack.enter_context(made)
+
+            try:
+                con = opened(self._links)
+            except UsageError as error:
+                if self._links is None:
+                    raise
+                if not self._lacks_links:
+                    self._note(f"the declared links are left out for now: {error.message}")
+                self._lacks_links = True
+                con = opened(None)
+            else:
+                self._lacks_links = False
+            yield con
+
+    def _report(self, window: Window, *, is_final: bool, is_live: bool) -> WindowReport:
+        traces = self.history.traces(window)
+        with self._database(traces) as con:
+            report = report_of(con, window, is_final=is_final)
+            if self._alarm is not None:
+                # What came after the window counts, too: an alarm must be early.
+                whole = Window(window.start_ns, self.history.border_ns)
+                found = self._alarm.violations(con, whole, window.end_ns)
+                report = replace(report, violations=found)
+            if self._exporter is not None:
+                since_ns = self.history.final_ns
+                start_ns = window.start_ns if since_ns is None else since_ns
+                self._exporter.count(con, Window(start_ns, window.end_ns))
+        if report.violations:
+            self._violated = (self.history.border_ns, traces, self.history.paths(window))
+        self.history.note_longest(report.longest_ns)
+        if is_live:
+            lag_s = (time.time_ns() - self.history.last_event_ns) / _SECOND_NS
+            report = replace(report, lag_s=lag_s)
+        if self._exporter is not None:
+            self._exporter.show(report)
+        return report
