@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from msgflow.db.finding import Finding
     from msgflow.export.flow import Flow
     from msgflow.export.graph import Graph
+    from msgflow.export.otlp import ExportedTraces
     from msgflow.export.perfetto import PerfettoTrace
     from msgflow.export.views import ExportedView
     from msgflow.ingest import IngestProgress, IngestReport
@@ -362,10 +363,7 @@ class Database:
         part = Slice(run, start, end, skip_first)
         if path is not None:
             if via or without or {"from", "from_", "to", "to_"} & set(parameters):
-                raise UsageError(
-                    f"a path with a name goes without others — {path}",
-                    "leave out --from, --to, --via and --without",
-                )
+                raise _path_and_others(path)
             words = self._ask(lambda: self._named_path(header, path, Path(paths), part))
             via, without = words.pop("via", None), words.pop("without", None)
             parameters |= words
@@ -396,10 +394,14 @@ class Database:
 
     def _named_path(self, header: Header, name: str, file: Path, part: Slice) -> dict[str, str]:
         """Return the arguments of `query` that a named path stands for."""
-        from msgflow.paths import read_paths
 
         if not any(param.name == "from" for param in header.params):
             raise UsageError(f"{header.words} has no paths — --path {name}", "leave it out")
+        return self._words_of_path(name, file, part)
+
+    def _words_of_path(self, name: str, file: Path, part: Slice) -> dict[str, str]:
+        from msgflow.paths import read_paths
+
         named = read_paths(file)
         path = named.named(name)
         named.require(self.connection, part.runs(self.connection), path)
@@ -957,6 +959,64 @@ class Database:
         part = Slice(run, start, end, skip_first)
         return self._ask(lambda: write_perfetto(connection, Path(path), part))
 
+    def export_otlp(
+        self,
+        target: str | Path,
+        *,
+        run: str | int | None = None,
+        start: str | int | None = None,
+        end: str | int | None = None,
+        skip_first: float | None = None,
+        from_: str | None = None,
+        to: str | None = None,
+        via: str | None = None,
+        without: str | None = None,
+        slowest: int | None = None,
+        path: str | None = None,
+        paths: str | Path = DEFAULT_PATHS,
+    ) -> ExportedTraces:
+        """Write a run, or some of its flows, as traces of OpenTelemetry.
+
+        A trace is a root (a thing without a cause) and all that it led to. If flows are chosen,
+        it is a flow that reached the end of its path.
+
+        Args:
+            target: a file (OTLP/JSON, a request per line), which is replaced; or the address of a
+                receiver, 'http://HOST:4318', that takes OTLP/HTTP.
+            run, start, end, skip_first: what to read, see `msgflow.Slice`; one run.
+            from_: topics or nodes where flows start: globs, with commas between.
+            to: topics or nodes where flows end.
+            via: topics, nodes and services that all flows visit.
+            without: those that they do not visit.
+            slowest: number of the slowest flows.
+            path: name of a path in a file; in place of `from_`, `to`, `via` and `without`.
+            paths: that file.
+
+        Raises:
+            UsageError: not exactly one run, a name or time that does not exist, a file that cannot
+                be written, a receiver that does not take the traces, or the package
+                opentelemetry-proto is not installed, which a receiver needs.
+            DatabaseError: the file cannot be opened.
+        """
+        from msgflow.export.otlp import write_otlp
+
+        connection = self.connection
+        part = Slice(run, start, end, skip_first)
+        words = {"from": from_, "to": to, "via": via, "without": without}
+        choice: dict[str, Value] = {word: text for word, text in words.items() if text}
+        if path is not None:
+            if choice:
+                raise _path_and_others(path)
+            choice |= self._ask(lambda: self._words_of_path(path, Path(paths), part))
+        if slowest is not None:
+            choice["slowest"] = slowest
+        is_address = isinstance(target, str) and "://" in target
+        return self._ask(
+            lambda: write_otlp(
+                connection, str(target) if is_address else Path(target), part, choice or None
+            )
+        )
+
     def export_csv(
         self,
         directory: str | Path,
@@ -1004,6 +1064,13 @@ class Database:
             return write(connection, Path(directory), selection, force=force)
 
         return self._ask(export)
+
+
+def _path_and_others(path: str) -> UsageError:
+    return UsageError(
+        f"a path with a name goes without others — {path}",
+        "leave out --from, --to, --via and --without",
+    )
 
 
 def capped(relation: duckdb.DuckDBPyRelation, limit: int | None) -> QueryResult:

@@ -4,20 +4,21 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from msgflow.cli.completion import complete
+from msgflow.cli.completion import complete, complete_path
 from msgflow.cli.options import (
     OUTPUT,
     SELECTION,
     DatabaseOption,
     MemoryLimitOption,
     output_option,
+    path_of,
 )
 from msgflow.cli.slice_options import with_slice
-from msgflow.default_files import DEFAULT_DATABASE
+from msgflow.default_files import DEFAULT_DATABASE, DEFAULT_PATHS
 from msgflow.errors import UsageError
 from msgflow.export.series import What
 from msgflow.query.times import Times
@@ -49,6 +50,15 @@ _RunOption = Annotated[
         rich_help_panel=SELECTION,
     ),
 ]
+
+
+def _flow_option(name: str, metavar: str, help: str, kind: str | None = None, **more: Any) -> Any:
+    completion: dict[str, Any] = {} if kind is None else {"autocompletion": complete(kind)}
+    return typer.Option(
+        name, metavar=metavar, help=help, rich_help_panel=SELECTION, **completion, **more
+    )
+
+
 _ForceOption = Annotated[bool, typer.Option("--force", help="Replace an earlier export")]
 
 
@@ -140,6 +150,93 @@ def perfetto(
         f" {count(trace.values, 'value')} of counters{own} written to {output}:"
         " open it at ui.perfetto.dev"
     )
+
+
+@app.command("otlp")
+@with_slice()
+def otlp(
+    output: Annotated[
+        Path | None, output_option("FILE.json", show_default="msgflow-traces.json")
+    ] = None,
+    endpoint: Annotated[
+        str | None,
+        typer.Option(
+            "--endpoint",
+            metavar="URL",
+            help="Send the traces there instead: a receiver of OTLP/HTTP, http://HOST:4318",
+            rich_help_panel=OUTPUT,
+        ),
+    ] = None,
+    from_: Annotated[
+        list[str] | None,
+        _flow_option("--from", "NAME", "Flows that start at this topic or node", "place"),
+    ] = None,
+    to: Annotated[
+        list[str] | None,
+        _flow_option("--to", "NAME", "Flows that end at this topic or node", "place"),
+    ] = None,
+    via: Annotated[
+        list[str] | None,
+        _flow_option("--via", "NAME", "Flows through all of these topics and nodes", "place"),
+    ] = None,
+    without: Annotated[
+        list[str] | None,
+        _flow_option("--without", "NAME", "Flows through none of these", "place"),
+    ] = None,
+    slowest: Annotated[
+        int | None, _flow_option("--slowest", "N", "Only the N slowest flows", min=1)
+    ] = None,
+    path: Annotated[
+        str | None,
+        typer.Option(
+            "--path",
+            metavar="NAME",
+            help="A path by its name in a file, see msgflow suggest paths",
+            autocompletion=complete_path,
+            rich_help_panel=SELECTION,
+        ),
+    ] = None,
+    paths: Annotated[
+        Path, _flow_option("--paths", "FILE", "File of named paths", parser=path_of)
+    ] = Path(DEFAULT_PATHS),
+    part: Slice = LATEST,
+    memory_limit: MemoryLimitOption = None,
+    database: DatabaseOption = DEFAULT_DATABASE,
+) -> None:
+    """Write a run as traces of OpenTelemetry, for Jaeger, Grafana Tempo and others.
+
+    A trace is a root and all that it led to: callbacks, publications, takes, requests and
+    responses are spans, and further causes are links. If flows are chosen, a trace is a flow
+    that reached the end of its path.
+
+    --endpoint needs the package opentelemetry-proto: pip install opentelemetry-proto, or in
+    a checkout '.\\[otlp]'.
+    """
+    from msgflow.cli.output import count, print_runs, print_status
+    from msgflow.database import Database
+
+    if output is not None and endpoint is not None:
+        raise UsageError("--endpoint and --output exclude each other", "give one of them")
+    target = endpoint or output or Path("msgflow-traces.json")
+    places = {"from_": from_, "to": to, "via": via, "without": without}
+    given: dict[str, Any] = {name: ",".join(names) for name, names in places.items() if names}
+    with Database(database, memory_limit=memory_limit) as opened:
+        traces = opened.export_otlp(
+            target,
+            **asdict(part),
+            **given,
+            slowest=slowest,
+            path=path,
+            paths=paths,
+        )
+    print_runs([traces.run])
+    done = "written" if endpoint is None else "sent"
+    print_status(
+        f"{count(traces.traces, 'trace')}, {count(traces.spans, 'span')},"
+        f" {count(traces.links, 'link')} {done} to {target}"
+    )
+    if traces.rejected:
+        print_status(f"the receiver rejected {count(traces.rejected, 'span')}")
 
 
 @app.command("series")

@@ -58,11 +58,29 @@ class Statements:
             name: of the statement.
             values: its parameters; those with a default may be left out, others are ignored.
         """
-        inherited = {p.name: p.default for p in self.header(name).params if p.has_default}
         (statement,) = connection.extract_statements(self.text(name))
-        used = statement.named_parameters
-        bound = {key: values.get(key, inherited.get(key)) for key in used}
+        bound = self._bound(name, statement, values)
         return connection.sql(statement, params=bound)
+
+    def keep(
+        self, connection: duckdb.DuckDBPyConnection, name: str, values: Mapping[str, Any]
+    ) -> None:
+        """Make a temporary table of the rows of a statement, which has its name.
+
+        Args:
+            connection: as in `run`.
+            name: likewise.
+            values: likewise.
+        """
+        text = f"CREATE OR REPLACE TEMP TABLE {name} AS\n{self.text(name)}"
+        (statement,) = connection.extract_statements(text)
+        connection.execute(statement, self._bound(name, statement, values))
+
+    def _bound(
+        self, name: str, statement: duckdb.Statement, values: Mapping[str, Any]
+    ) -> dict[str, Any]:
+        inherited = {p.name: p.default for p in self.header(name).params if p.has_default}
+        return {key: values.get(key, inherited.get(key)) for key in statement.named_parameters}
 
 
 @cache

@@ -57,6 +57,7 @@ def test_every_command_has_help(msgflow: Msgflow, command: str) -> None:
         "compare 1 2",
         "export parquet -o views",
         "export perfetto -o trace.pftrace",
+        "export otlp -o traces.json",
         "export csv -o rows",
         "export series -o series.csv",
         "ui --no-browser",

@@ -1,0 +1,121 @@
+"""SQL that makes requests of OTLP out of batches of `internal.otlp_span`, kept as a table."""
+
+from __future__ import annotations
+
+# The spans of a batch, by resource. Attributes are those of the conventions for messaging, remote
+# calls, threads and code; what these have no word for begins with 'msgflow.'.
+_SPANS_OF_BATCH = """
+WITH span AS (
+    SELECT
+        *,
+        [
+            {'key': 'service.name', 'text': node, 'number': NULL::BIGINT},
+            {'key': 'host.name', 'text': host, 'number': NULL},
+            {'key': 'process.pid', 'text': NULL, 'number': pid},
+            {'key': 'process.executable.name', 'text': process, 'number': NULL},
+            {'key': 'msgflow.run', 'text': $run, 'number': NULL}
+        ] AS resource,
+        [
+            {'key': 'messaging.system', 'number': NULL::BIGINT,
+                'text': CASE WHEN operation IS NOT NULL THEN 'ros2' END},
+            {'key': 'messaging.destination.name', 'text': topic, 'number': NULL},
+            {'key': 'messaging.operation.name', 'number': NULL, 'text': CASE operation
+                WHEN 'send' THEN 'publish' WHEN 'receive' THEN 'take' ELSE operation END},
+            {'key': 'messaging.operation.type', 'text': operation, 'number': NULL},
+            {'key': 'rpc.system.name', 'number': NULL,
+                'text': CASE WHEN service IS NOT NULL THEN 'ros2' END},
+            {'key': 'rpc.method', 'text': service, 'number': NULL},
+            {'key': 'code.function.name', 'text': symbol, 'number': NULL},
+            {'key': 'thread.id', 'text': NULL, 'number': tid},
+            {'key': 'thread.name', 'text': thread, 'number': NULL},
+            {'key': 'msgflow.' || kind || '_id', 'text': NULL, 'number': id},
+            {'key': 'msgflow.link', 'text': cause, 'number': NULL},
+            {'key': 'msgflow.latency_ns', 'text': NULL, 'number': latency_ns}
+        ] AS attributes,
+        coalesce(list_zip(link_trace_ids, link_span_ids, link_causes), []) AS links
+    FROM (
+        SELECT
+            *,
+            CASE
+                WHEN kind = 'publication' THEN 'send'
+                WHEN kind = 'take' THEN 'receive'
+                WHEN kind = 'callback_instance' AND topic IS NOT NULL THEN 'process'
+            END AS operation
+        FROM temp.otlp_span
+        WHERE batch = $batch
+    )
+)
+"""
+_KNOWN = "list_filter({}, lambda each: each.text IS NOT NULL OR each.number IS NOT NULL)"
+# A value is text or a number. 64-bit integers are text in JSON, ids are hexadecimal.
+_JSON_ATTRIBUTES = """list_transform({}, lambda each: json_object(
+    'key', each.key,
+    'value', CASE WHEN each.number IS NULL THEN json_object('stringValue', each.text)
+        ELSE json_object('intValue', each.number::VARCHAR) END
+))"""
+# One row with one text.
+BATCH_AS_JSON = f"""{_SPANS_OF_BATCH},
+resource_span AS (
+    SELECT json_object(
+        'resource', json_object('attributes', {_JSON_ATTRIBUTES.format(_KNOWN.format("resource"))}),
+        'scopeSpans', [json_object(
+            'scope', json_object('name', 'msgflow', 'version', $version),
+            'spans', list(json_object(
+                'traceId', trace_id,
+                'spanId', span_id,
+                'parentSpanId', coalesce(parent_span_id, ''),
+                'name', name,
+                'kind', span_kind,
+                'startTimeUnixNano', from_ns::VARCHAR,
+                'endTimeUnixNano', to_ns::VARCHAR,
+                'attributes', {_JSON_ATTRIBUTES.format(_KNOWN.format("attributes"))},
+                'links', list_transform(links, lambda each: json_object(
+                    'traceId', each[1],
+                    'spanId', each[2],
+                    'attributes', [json_object(
+                        'key', 'msgflow.link', 'value', json_object('stringValue', each[3])
+                    )]
+                )),
+                'status', CASE WHEN not_delivered IS NULL THEN json_object('code', 0)
+                    ELSE json_object('code', 2, 'message', not_delivered) END
+            ) ORDER BY from_ns, kind, id)
+        )]
+    ) AS json
+    FROM span
+    GROUP BY resource
+)
+SELECT json_object('resourceSpans', list(json ORDER BY json))::VARCHAR FROM resource_span
+"""
+_MESSAGE_ATTRIBUTES = """list_transform({}, lambda each: {{
+    'key': each.key, 'value': {{'string_value': each.text, 'int_value': each.number}}
+}})"""
+# A row is a `ResourceSpans` of the package opentelemetry-proto.
+BATCH_AS_MESSAGE = f"""{_SPANS_OF_BATCH}
+SELECT
+    {{'attributes': {_MESSAGE_ATTRIBUTES.format(_KNOWN.format("resource"))}}} AS resource,
+    [{{
+        'scope': {{'name': 'msgflow', 'version': $version}},
+        'spans': list({{
+            'trace_id': unhex(trace_id),
+            'span_id': unhex(span_id),
+            'parent_span_id': unhex(coalesce(parent_span_id, '')),
+            'name': name,
+            'kind': span_kind,
+            'start_time_unix_nano': from_ns,
+            'end_time_unix_nano': to_ns,
+            'attributes': {_MESSAGE_ATTRIBUTES.format(_KNOWN.format("attributes"))},
+            'links': list_transform(links, lambda each: {{
+                'trace_id': unhex(each[1]),
+                'span_id': unhex(each[2]),
+                'attributes': [{{'key': 'msgflow.link', 'value': {{'string_value': each[3]}}}}]
+            }}),
+            'status': {{
+                'code': CASE WHEN not_delivered IS NULL THEN 0 ELSE 2 END,
+                'message': not_delivered
+            }}
+        }} ORDER BY from_ns, kind, id)
+    }}] AS scope_spans
+FROM span
+GROUP BY resource
+ORDER BY resource
+"""
