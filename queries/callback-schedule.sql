@@ -20,6 +20,9 @@
 -- column: sleeping_ns BIGINT [ns]   Of that, waiting for something
 -- column: uninterruptible_ns BIGINT [ns]  Of that, waiting for a page or a disk
 -- column: unknown_ns BIGINT [ns]    Of that, not known
+-- column: irq_ns BIGINT [ns]        Of the time on a CPU, interrupts; NULL: not recorded
+-- column: softirq_ns BIGINT [ns]    Of the time on a CPU, what interrupts left for later; NULL: not
+--     recorded
 -- column: preemptions BIGINT        How often the CPU was taken away
 -- column: migrations BIGINT         How often a callback went on on another CPU
 -- column: loss_affected BIGINT      Callback instances during which kernel events were lost
@@ -43,6 +46,8 @@ WITH measured AS (
         sum(s.sleeping_ns)::BIGINT AS sleeping_ns,
         sum(s.uninterruptible_ns)::BIGINT AS uninterruptible_ns,
         sum(s.unknown_ns)::BIGINT AS unknown_ns,
+        sum(s.irq_ns)::BIGINT AS irq_ns,
+        sum(s.softirq_ns)::BIGINT AS softirq_ns,
         sum(s.preemption_count)::BIGINT AS preemptions,
         sum(s.migration_count)::BIGINT AS migrations,
         count(*) FILTER (WHERE s.is_loss_affected) AS loss_affected
@@ -68,6 +73,8 @@ SELECT
     m.sleeping_ns,
     m.uninterruptible_ns,
     m.unknown_ns,
+    m.irq_ns,
+    m.softirq_ns,
     m.preemptions,
     m.migrations,
     m.loss_affected,

@@ -1,9 +1,9 @@
 -- name: preemption
 -- title: What took the CPU from which thread
 -- description: How often each thread of a ROS process lost the CPU while it had work, to which
---     thread, and for how long until it had one again (docs/scheduling.md). That time counts for
---     what got the CPU first, though others may have followed. Without kernel traces there are no
---     rows. The longest time comes first.
+--     thread, and for how long (docs/scheduling.md). Where several threads had the CPU until it got
+--     one again, each has its time. Without kernel traces there are no rows. The longest time comes
+--     first.
 -- grain: one row per thread, priority, and thread that took the CPU from it, with its priority
 -- column: run_id BIGINT             Run
 -- column: process VARCHAR           Process name
@@ -11,12 +11,12 @@
 -- column: tid INTEGER               Its thread id
 -- column: priority INTEGER          Its priority, as the kernel has it: 0 to 99 real-time, 100 to
 --     139 nice -20 to 19
--- column: preempted_by VARCHAR      Thread that took the CPU
+-- column: preempted_by VARCHAR      Thread that had the CPU
 -- column: preempted_by_tid INTEGER  Its thread id; of a process without ROS the kernel's number
 -- column: preempted_by_priority INTEGER  Its priority
 -- column: is_ros BOOLEAN            It is of a ROS process
 -- column: count BIGINT              How often it began in the time window
--- column: median_ns BIGINT [ns]     Median time until the thread had a CPU again
+-- column: median_ns BIGINT [ns]     Median time for which that one had the CPU
 -- column: max_ns BIGINT [ns]        Longest such time
 -- column: total_ns BIGINT [ns]      Sum of these times
 -- column: thread_id BIGINT          Identity of the thread that lost the CPU
@@ -24,13 +24,15 @@
 --     preempted_by_priority, tid, preempted_by_tid
 WITH lost AS (
     SELECT
-        run_id, thread_id, priority, preempted_by_thread_id, preempted_by_other_thread_id,
-        preempted_by_priority,
+        run_id, thread_id, thread_priority AS priority,
+        preemptor_thread_id AS preempted_by_thread_id,
+        preemptor_other_thread_id AS preempted_by_other_thread_id,
+        preemptor_priority AS preempted_by_priority,
         count(*) AS count,
         quantile_disc(end_ns - start_ns, 0.5) AS median_ns,
         max(end_ns - start_ns) AS max_ns,
         sum(end_ns - start_ns)::BIGINT AS total_ns
-    FROM main.thread_state
+    FROM main.preemptor
     WHERE state = 'preempted'
         AND list_contains($runs, run_id)
         AND start_ns >= $start_ns

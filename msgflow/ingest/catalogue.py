@@ -58,6 +58,23 @@ class Origin(Enum):
     LABEL = "label"
 
 
+class CpuRole(Enum):
+    """What an event of the kernel's scheduler says of the CPU on which it happens."""
+
+    SWITCH = "switch"
+    WAKING = "waking"
+    BEGIN = "begin"
+    END = "end"
+
+
+_OF_CPU = {
+    CpuRole.SWITCH: (("run_start_ns", "BIGINT"), ("switch_number", "BIGINT")),
+    CpuRole.WAKING: (("switch_event_id", "BIGINT"), ("interrupt", "VARCHAR")),
+}
+"""Columns about what ran on the CPU: since when the thread had it that leaves it (NULL: not known)
+and the number of the switch there; the latest switch, and the interrupt that is handled."""
+
+
 @dataclass(frozen=True)
 class Predecessor:
     """A column about the latest earlier event of a sequence on the same thread.
@@ -95,6 +112,8 @@ class Tracepoint:
             it interrupted.
         is_lasting: what it says stays true: of objects, their names and states. Who reads a part of
             a recording needs it from all that came before.
+        role: what it says of its CPU; the begin and end of interrupts have no staging table.
+        interrupt: the kind of interrupt that begins or ends.
     """
 
     name: str
@@ -109,6 +128,8 @@ class Tracepoint:
     where: str | None = None
     is_kernel: bool = False
     is_lasting: bool = False
+    role: CpuRole | None = None
+    interrupt: str | None = None
 
     @property
     def provider(self) -> str:
@@ -155,6 +176,7 @@ class Tracepoint:
         return (
             *self.common_columns,
             *((before.column, types[before.origin]) for before in self.predecessors),
+            *(_OF_CPU.get(self.role, ()) if self.role else ()),
             *((field.name, field.type) for field in self.fields),
         )
 
@@ -191,8 +213,15 @@ class Catalogue:
 
     @cached_property
     def staged(self) -> Mapping[str, Tracepoint]:
-        """What has a staging table, by name: all tracepoints, and `USER_EVENT`."""
-        return {**self.tracepoints, USER_EVENT.name: USER_EVENT}
+        """What has a staging table, by name: tracepoints, and `USER_EVENT`."""
+        staged = {n: t for n, t in self.tracepoints.items() if t.interrupt is None}
+        return {**staged, USER_EVENT.name: USER_EVENT}
+
+    @property
+    def interrupts(self) -> tuple[str, ...]:
+        """Kinds of interrupts, in alphabetical order."""
+        kinds = {t.interrupt for t in self.tracepoints.values() if t.interrupt is not None}
+        return tuple(sorted(kinds))
 
     @cached_property
     def in_traces(self) -> Mapping[str, Tracepoint]:
@@ -236,7 +265,9 @@ def _tracepoint(entry: dict[str, Any]) -> Tracepoint:
     )
     predecessors = tuple(_predecessor(text) for text in entry.get("predecessors", ()))
     tuples = {name: tuple(entry.get(name, ())) for name in ("aliases", "sequences")}
-    return Tracepoint(**{**entry, **tuples, "fields": fields, "predecessors": predecessors})
+    role = CpuRole(entry["role"]) if "role" in entry else None
+    given = {"fields": fields, "predecessors": predecessors, "role": role}
+    return Tracepoint(**{**entry, **tuples, **given})
 
 
 def _predecessor(text: str) -> Predecessor:

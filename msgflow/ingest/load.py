@@ -13,6 +13,7 @@ import pyarrow as pa
 from msgflow.db.transaction import transaction
 from msgflow.ingest import overlapping_traces, staging
 from msgflow.ingest.catalogue import USER_EVENT, load
+from msgflow.ingest.cpus import Cpus
 from msgflow.ingest.event_patterns import is_match, matches
 from msgflow.ingest.raw_tables import RawTables
 from msgflow.ingest.sequences import Placed, Sequences
@@ -84,7 +85,10 @@ def load_traces(
     """
     catalogue = load()
     user_names = {n for n in names_of(events, traces.traces) if not is_match(n, ignore)}
-    wanted = wanted_events(ignore) | dict.fromkeys(user_names)
+    wanted = wanted_events(ignore)
+    for name in superfluous(traces.traces):
+        wanted.pop(name, None)
+    wanted |= dict.fromkeys(user_names)
     sources = _sources(traces.traces, hostnames)
     for source in sources:
         con.execute(f"INSERT INTO staging.source VALUES ({', '.join('?' * len(source))})", source)
@@ -100,11 +104,11 @@ def load_traces(
     def read(corrections: Corrections | None) -> ImplausibleValues:
         batches = traces.batches(wanted, progress=report)
         implausible = ImplausibleValues()
-        sequences = Sequences(catalogue, _hosts(sources))
+        sequences, cpus = Sequences(catalogue, _hosts(sources)), Cpus(catalogue)
         with transaction(con), con.cursor() as beside:
             # A thread reads the next round while DuckDB inserts this one.
             placed = Prefetch(
-                lambda: _placed(batches, sequences, corrections, implausible, beside), 1
+                lambda: _placed(batches, sequences, cpus, corrections, implausible, beside), 1
             )
             with contextlib.closing(placed):
                 for item in placed.items():
@@ -174,6 +178,7 @@ def wanted_events(ignore: Sequence[str] = ()) -> dict[str, pa.Schema | None]:
 def _placed(
     batches: Iterable[EventBatch],
     sequences: Sequences,
+    cpus: Cpus,
     corrections: Corrections | None,
     implausible: ImplausibleValues,
     beside: duckdb.DuckDBPyConnection,
@@ -185,11 +190,15 @@ def _placed(
     tracepoints = load().in_traces
     for _, of_round in itertools.groupby(batches, key=lambda batch: batch.round):
         events = []
+        of_cpus = []
         for batch in of_round:
             if batch.name == PACKET:
                 yield PACKET, batch.batch
                 continue
             tracepoint = tracepoints.get(batch.name, USER_EVENT)
+            if tracepoint.role is not None:
+                of_cpus.append((tracepoint, batch.batch))
+                continue
             if tracepoint.is_kernel:
                 yield without_thread(tracepoint, batch.batch)
                 continue
@@ -200,8 +209,21 @@ def _placed(
             rows = rows if corrections is None else corrections.applied(rows)
             if rows.num_rows:
                 events.append((tracepoint.name, rows))
+        if of_cpus:
+            yield from cpus.place(of_cpus)
         if events:
             yield sequences.place(events)
+
+
+def superfluous(traces: Sequence[TraceInfo]) -> frozenset[str]:
+    """Return the names of `sched_wakeup`, if a `sched_waking` came before each."""
+    wakeup, waking = (
+        {tracepoint.name, *tracepoint.aliases}
+        for tracepoint in map(load().tracepoints.__getitem__, ("sched_wakeup", "sched_waking"))
+    )
+    declared = [set(trace.event_names) for trace in traces]
+    is_needed = any(names & wakeup and not names & waking for names in declared)
+    return frozenset() if is_needed else frozenset(wakeup)
 
 
 def without_thread(tracepoint: Tracepoint, batch: pa.RecordBatch) -> tuple[str, pa.RecordBatch]:

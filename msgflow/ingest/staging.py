@@ -3,7 +3,8 @@
 `raw` and `staging` are temporary database files. A database in memory would have to compress what
 it spills, and keep the beginning of each column of each row group. `raw` has one table per
 tracepoint, the packets, and the threads, all as read (`raw.cpu_return`: events of threads that
-changed their CPU twice faster than a thread can; `raw.user_event`: the user's events of all names).
+changed their CPU twice faster than a thread can; `raw.interrupt`: interrupts, each with the thread
+that it interrupted; `raw.user_event`: the user's events of all names).
 `staging` has `staging.source` (one row per trace), `staging.event_count`, `staging.declared`
 (tracepoints that were enabled in a trace, also if they never occurred), `staging.left_out` (events
 that another trace holds as well),
@@ -48,6 +49,12 @@ CREATE TABLE raw.thread_name (
     first_seen_ns BIGINT, last_seen_ns BIGINT
 );
 CREATE TABLE raw.cpu_return (thread_index INTEGER, event_id BIGINT)
+"""
+
+_INTERRUPT_TABLE = """
+CREATE TABLE raw.interrupt (
+    trace_index INTEGER, cpu_id INTEGER, kind VARCHAR, start_ns BIGINT, end_ns BIGINT, tid INTEGER
+)
 """
 
 _SOURCE_TABLE = """
@@ -124,6 +131,7 @@ def _tables() -> tuple[str, ...]:
         *(each.create_table_sql("raw", catalogue.labels) for each in catalogue.staged.values()),
         _PACKET_TABLE,
         _THREAD_TABLES,
+        _INTERRUPT_TABLE,
         _SOURCE_TABLE,
         _EVENT_COUNT_TABLE,
         _DECLARED_TABLE,
@@ -155,7 +163,7 @@ def narrow(con: duckdb.DuckDBPyConnection, empty: Collection[str]) -> None:
 
 def empty(con: duckdb.DuckDBPyConnection) -> None:
     """Empty `raw`, to read everything again."""
-    for table in (*event_tables(), "packet", "thread", "thread_name", "cpu_return"):
+    for table in (*event_tables(), "packet", "thread", "thread_name", "cpu_return", "interrupt"):
         con.execute(f"TRUNCATE raw.{table}")
 
 

@@ -7,6 +7,7 @@ _NAMES = {
     "sched_switch": "sched:sched_switch",
     "sched_waking": "sched:sched_waking",
     "sched_wakeup_new": "sched:sched_wakeup_new",
+    "sched_migrate_task": "sched:sched_migrate_task",
     "sched_process_fork": "sched:sched_process_fork",
     "irq_handler_entry": "irq:irq_handler_entry",
     "irq_handler_exit": "irq:irq_handler_exit",

@@ -17,11 +17,9 @@ from msgflow.trace.model import TraceInfo, undeclared
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from msgflow.trace.time_base import TimeBase
 
-
-def describe(bt2: Any, path: Path, index: int, base: TimeBase) -> tuple[TraceInfo, list[Any]]:
-    """Describe one trace, with names and payload schemas of its events; put it on a time base.
+def describe(bt2: Any, path: Path, index: int) -> tuple[TraceInfo, list[Any]]:
+    """Describe one trace, with names and payload schemas of its events.
 
     Raises:
         TraceError: Babeltrace cannot open it.
@@ -51,7 +49,6 @@ def describe(bt2: Any, path: Path, index: int, base: TimeBase) -> tuple[TraceInf
     info = description(
         path,
         index,
-        base,
         uuid=None if trace.uuid is None else str(trace.uuid),
         environment={str(name): str(value) for name, value in trace.environment.items()},
         clock=clock_of(streams[0].default_clock_class),

@@ -18,7 +18,7 @@ from msgflow.trace.ctf.clock import GIGA, Clock
 from msgflow.trace.ctf.packet_index import DiscardCounters
 from msgflow.trace.model import EventBatch, Progress
 from msgflow.trace.schemas import COMMON_SCHEMA, PACKET, PACKET_SCHEMA
-from msgflow.trace.time_base import TimeBase
+from msgflow.trace.time_base import on_one_base
 from msgflow.trace.trace_set import ExclusiveTraceSet, Report
 
 if TYPE_CHECKING:
@@ -37,11 +37,9 @@ class Bt2TraceSet(ExclusiveTraceSet):
     def __init__(self, locations: Sequence[TraceLocation]) -> None:
         """Describe the traces; raises TraceError where bt2 is missing or cannot open one."""
         super().__init__()
-        self._bt2, base = bt2_library.load(), TimeBase()
-        described = [
-            describe(self._bt2, at.path, index, base) for index, at in enumerate(locations)
-        ]
-        self.traces = tuple(info for info, _ in described)
+        self._bt2 = bt2_library.load()
+        described = [describe(self._bt2, at.path, index) for index, at in enumerate(locations)]
+        self.traces = on_one_base([info for info, _ in described], {})
         self._declared = columns.merged_schemas(e for _, events in described for e in events)
 
     def _batches(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from msgflow.trace.model import TraceInfo
 
@@ -10,7 +10,25 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence, Set
     from pathlib import Path
 
-    from msgflow.trace.time_base import DeclaredClock, TimeBase
+
+class DeclaredClock(Protocol):
+    """A clock as the metadata of a trace declares it."""
+
+    @property
+    def uuid(self) -> str | None:
+        """Its uuid."""
+
+    @property
+    def name(self) -> str | None:
+        """Its name."""
+
+    @property
+    def frequency(self) -> int:
+        """How often it counts [Hz]."""
+
+    def to_ns(self, value: int) -> int:
+        """Return the time of a value of it [ns since the epoch]."""
+
 
 _PROCESS_CONTEXT = {"vpid", "vtid"}
 
@@ -18,7 +36,6 @@ _PROCESS_CONTEXT = {"vpid", "vtid"}
 def description(
     path: Path,
     index: int,
-    base: TimeBase,
     *,
     uuid: str | None,
     environment: Mapping[str, int | str],
@@ -28,12 +45,11 @@ def description(
     events: Sequence[tuple[str, Set[str]]],
     has_time: bool = True,
 ) -> TraceInfo:
-    """Describe a trace, and put its clock on a time base.
+    """Describe a trace, with its times as declared.
 
     Args:
         path: the directory of the trace.
         index: its place among the traces opened together.
-        base: the time base of these traces.
         uuid: the uuid that the metadata declares.
         environment: the `env` of the metadata.
         clock: the clock of the events.
@@ -42,7 +58,6 @@ def description(
         events: the name of each event class and the names of its contexts.
         has_time: the events have times.
     """
-    correction_ns = base.correction_ns(clock)
     return TraceInfo(
         index=index,
         path=path,
@@ -53,9 +68,10 @@ def description(
         clock_uuid=clock.uuid,
         clock_name=clock.name,
         clock_offset_ns=clock.to_ns(0),
-        clock_correction_ns=correction_ns,
-        begin_ns=min(begins) + correction_ns if begins else None,
-        end_ns=max(ends) + correction_ns if ends else None,
+        clock_frequency=clock.frequency,
+        clock_correction_ns=0,
+        begin_ns=min(begins, default=None),
+        end_ns=max(ends, default=None),
         has_process_context=all(contexts >= _PROCESS_CONTEXT for _, contexts in events),
         event_names=tuple(sorted({name for name, _ in events})),
         has_time=has_time,

@@ -42,8 +42,9 @@ class TraceInfo:
         clock_uuid: uuid of the clock (LTTng: the boot id), or None.
         clock_name: name of the clock, such as 'monotonic', or None.
         clock_offset_ns: nanoseconds from the epoch to the origin of the clock, as declared.
-        clock_correction_ns: what is added to that, to be on one time base with the first trace of
-            the same clock.
+        clock_frequency: how often the clock counts [Hz]; 0 without event data.
+        clock_correction_ns: what is added to the offset, to be on one time base with the first
+            trace of the same clock that is not the kernel's.
         begin_ns: time of the first packet's begin, epoch nanoseconds, or None.
         end_ns: time of the last packet's end, epoch nanoseconds, or None.
         has_process_context: every event carries both `vpid` and `vtid`.
@@ -60,6 +61,7 @@ class TraceInfo:
     clock_uuid: str | None
     clock_name: str | None
     clock_offset_ns: int
+    clock_frequency: int
     clock_correction_ns: int
     begin_ns: int | None
     end_ns: int | None
@@ -80,6 +82,7 @@ def undeclared(path: Path, index: int) -> TraceInfo:
         clock_uuid=None,
         clock_name=None,
         clock_offset_ns=0,
+        clock_frequency=0,
         clock_correction_ns=0,
         begin_ns=None,
         end_ns=None,

@@ -9,47 +9,52 @@ every other reader shows. That a clock was set is undone: times of one host have
 
 from __future__ import annotations
 
-from typing import Protocol
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from msgflow.trace.model import TraceInfo
+
+# Uuid and name of a clock.
+ClockName = tuple[str, str | None]
 GIGA = 1_000_000_000
 # LTTng reads the two clocks next to each other, several times, and takes the best: some ns, or some
 # hundred where reading a clock needs the kernel.
 GREATEST_ERROR_NS = 1_000
 
 
-class DeclaredClock(Protocol):
-    """A clock as the metadata of a trace declares it."""
+def on_one_base(
+    traces: Sequence[TraceInfo], offsets: dict[ClockName, int]
+) -> tuple[TraceInfo, ...]:
+    """Return the descriptions of traces with corrections, so that times of each boot fit together.
 
-    @property
-    def uuid(self) -> str | None:
-        """Its uuid."""
+    The first trace of programs decides, the kernel's only where there is no other: a kernel trace
+    beside a recording moves no time of it. Only a clock that has a uuid and counts nanoseconds is
+    corrected: without a uuid it is a clock of its own.
 
-    @property
-    def name(self) -> str | None:
-        """Its name."""
+    Args:
+        traces: the descriptions.
+        offsets: what traces that were opened before decided, by uuid and name of the clock [ns
+            since the epoch]; takes in those of these traces.
+    """
+    for trace in sorted(traces, key=lambda trace: trace.domain == "kernel"):
+        if trace.clock_uuid is not None and trace.clock_frequency == GIGA:
+            clock = trace.clock_uuid, trace.clock_name
+            offsets.setdefault(clock, trace.clock_offset_ns)
+    return tuple(_corrected(trace, offsets) for trace in traces)
 
-    @property
-    def frequency(self) -> int:
-        """How often it counts [Hz]."""
 
-    def to_ns(self, value: int) -> int:
-        """Return the time of a value of it [ns since the epoch]."""
-
-
-class TimeBase:
-    """The offsets of the clocks of traces that are opened one after the other."""
-
-    def __init__(self) -> None:
-        self._offsets: dict[tuple[str, str | None], int] = {}
-
-    def correction_ns(self, clock: DeclaredClock) -> int:
-        """Return what to add to the times of a trace [ns], so that they fit those of the first one.
-
-        Only a clock that has a uuid and counts nanoseconds is corrected: without a uuid it is a
-        clock of its own.
-        """
-        if clock.uuid is None or clock.frequency != GIGA:
-            return 0
-        offset_ns = clock.to_ns(0)
-        correction = self._offsets.setdefault((clock.uuid, clock.name), offset_ns) - offset_ns
-        return 0 if abs(correction) <= GREATEST_ERROR_NS else correction
+def _corrected(trace: TraceInfo, offsets: dict[ClockName, int]) -> TraceInfo:
+    if trace.clock_uuid is None or trace.clock_frequency != GIGA:
+        return trace
+    correction = offsets[trace.clock_uuid, trace.clock_name] - trace.clock_offset_ns
+    if abs(correction) <= GREATEST_ERROR_NS:
+        return trace
+    return replace(
+        trace,
+        clock_correction_ns=correction,
+        begin_ns=None if trace.begin_ns is None else trace.begin_ns + correction,
+        end_ns=None if trace.end_ns is None else trace.end_ns + correction,
+    )

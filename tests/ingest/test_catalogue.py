@@ -13,6 +13,7 @@ import pytest
 
 import msgflow.trace
 from msgflow.ingest import catalogue
+from msgflow.ingest.cpus import Cpus
 from msgflow.ingest.load import without_thread
 from msgflow.ingest.sequences import Sequences
 from msgflow.trace import COMMON_SCHEMA
@@ -27,6 +28,8 @@ TRACEPOINT_KEYS = {
     "until",
     "where",
     "is_kernel",
+    "role",
+    "interrupt",
     "label",
     "sequences",
     "predecessors",
@@ -118,17 +121,19 @@ def test_predecessors_are_of_sequences_that_exist() -> None:
 
 
 def test_tables_take_the_readers_batches() -> None:
-    """Once `Sequences` has put thread and predecessors in the place of the contexts."""
+    """Once `Sequences` or `Cpus` has put what it finds in the place of the contexts."""
     con = duckdb.connect()
     con.execute("ATTACH ':memory:' AS staging")
     known = catalogue.load()
-    sequences = Sequences(known, [0])
-    for tracepoint in known.tracepoints.values():
+    sequences, cpus = Sequences(known, [0]), Cpus(known)
+    for tracepoint in known.staged.values():
         con.execute(tracepoint.create_table_sql("staging", known.labels))
         schema = pa.schema([*COMMON_SCHEMA, *tracepoint.arrow_schema()])
         row = {"event_id": 1, "ts_ns": 2, "trace_index": 0, "vpid": 3, "vtid": 4}
         batch = pa.RecordBatch.from_pylist([row], schema)
-        if tracepoint.is_kernel:
+        if tracepoint.role is not None:
+            ((_, placed),) = cpus.place([(tracepoint, batch)])
+        elif tracepoint.is_kernel:
             _, placed = without_thread(tracepoint, batch)
         else:
             ((_, placed),) = sequences.place([(tracepoint.name, batch)]).batches

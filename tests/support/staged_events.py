@@ -18,7 +18,8 @@ import duckdb
 import pyarrow as pa
 
 from msgflow.ingest import overlapping_traces, staging
-from msgflow.ingest.catalogue import load
+from msgflow.ingest.catalogue import Tracepoint, load
+from msgflow.ingest.cpus import Cpus
 from msgflow.ingest.load import without_thread
 from msgflow.ingest.sequences import Sequences
 from msgflow.trace import COMMON_SCHEMA, PACKET_SCHEMA
@@ -77,7 +78,7 @@ class StagedEvents:
 
     def add(self, name: str, thread: Thread, /, *, ts: int | None = None, **fields: Any) -> int:
         """Add an event; fields left out are NULL. Returns its time stamp."""
-        known = {field.name for field in load().staged[name].fields}
+        known = {field.name for field in _tracepoint(name).fields}
         if fields.keys() - known:
             raise ValueError(f"{name} has no field {', '.join(sorted(fields.keys() - known))}")
         self.now = self.now + STEP_NS if ts is None else ts
@@ -187,7 +188,7 @@ class StagedEvents:
         batches = []
         counts: list[tuple[int, str, int]] = []
         for name, events in rows.items():
-            schema = pa.schema([*COMMON_SCHEMA, *load().staged[name].arrow_schema()])
+            schema = pa.schema([*COMMON_SCHEMA, *_tracepoint(name).arrow_schema()])
             batches.append((name, pa.RecordBatch.from_pylist(events, schema=schema)))
             of_traces = Counter(event["trace_index"] for event in events)
             counts += [(trace, name, count) for trace, count in of_traces.items()]
@@ -210,11 +211,13 @@ class StagedEvents:
         packets: pa.RecordBatch,
     ) -> None:
         batches = [(name, batch) for name, batch in batches if batch.num_rows]
-        for name, batch in batches:
-            if load().staged[name].is_kernel:
-                table, rows = without_thread(load().staged[name], batch)
-                _insert(con, f"raw.{table}", rows)
-        batches = [(n, batch) for n, batch in batches if not load().staged[n].is_kernel]
+        kernel = [(_tracepoint(n), batch) for n, batch in batches if _tracepoint(n).is_kernel]
+        of_cpus = [(known, batch) for known, batch in kernel if known.role is not None]
+        placed_there = Cpus(load()).place(of_cpus) if of_cpus else []
+        others = [without_thread(known, batch) for known, batch in kernel if known.role is None]
+        for table, rows in [*placed_there, *others]:
+            _insert(con, f"raw.{table}", rows)
+        batches = [(n, batch) for n, batch in batches if not _tracepoint(n).is_kernel]
         if batches:
             hosts: dict[tuple[str, str], int] = {}
             sources = [self.sources.get(n, Source()) for n in range(max(self.sources) + 1)]
@@ -241,6 +244,10 @@ class StagedEvents:
                 )
         packets = {**self._packets, **whole._packets}
         return [packet for trace in sorted(packets) for packet in packets[trace]]
+
+
+def _tracepoint(name: str) -> Tracepoint:
+    return {**load().tracepoints, **load().staged}[name]
 
 
 def _insert(con: duckdb.DuckDBPyConnection, table: str, rows: pa.RecordBatch) -> None:

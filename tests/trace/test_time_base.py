@@ -55,6 +55,16 @@ def test_the_first_trace_of_a_boot_decides(tmp_path: Path, open_traces: Open) ->
     assert sorted(packets) == [(10_010, 10_020), (10_012, 10_022), (10_015, 10_015)]
 
 
+def test_a_kernel_trace_decides_only_alone(tmp_path: Path, open_traces: Open) -> None:
+    write(tmp_path / "a", 10_000, [10], environment={"domain": "kernel"})
+    write(tmp_path / "b", 4_000, [15, 16], environment={"domain": "ust"})
+    with open_traces(tmp_path) as traces:
+        assert [info.clock_correction_ns for info in traces.traces] == [-6_000, 0]
+        assert read(traces)[0] == [(0, 4_010), (1, 4_015), (1, 4_016)]
+    with open_traces(tmp_path / "a") as traces:
+        assert read(traces)[0] == [(0, 10_010)]
+
+
 def test_errors_of_measuring_are_left_alone(tmp_path: Path, open_traces: Open) -> None:
     write(tmp_path / "a", 10_000, [10, 11])
     write(tmp_path / "b", 9_000, [15])

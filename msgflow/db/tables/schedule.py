@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from sqlalchemy import INTEGER, Column, Table
+from typing import Any
+
+from sqlalchemy import INTEGER, VARCHAR, Column, Table
 
 from msgflow.db.tables.column import (
     STORE,
+    column,
     flag,
     key,
     moment,
@@ -15,6 +18,27 @@ from msgflow.db.tables.column import (
     text,
     thread_id,
 )
+
+_POLICY = column(
+    "policy",
+    VARCHAR,
+    "How it is scheduled, as its priority tells: 'deadline', 'real_time' or 'normal'",
+    sql="CASE WHEN self.priority < 0 THEN 'deadline' WHEN self.priority < 100 THEN 'real_time' "
+    "WHEN self.priority IS NOT NULL THEN 'normal' END",
+)
+
+
+def _preemptor() -> tuple[Column[Any], ...]:
+    return (
+        thread_id("Thread that had the CPU", name="preemptor_thread_id", required=False),
+        reference(
+            "preemptor_other_thread_id",
+            "Thread of another process that had the CPU",
+            to="other_thread.other_thread_id",
+        ),
+        Column("preemptor_priority", INTEGER, comment="The priority of that thread"),
+    )
+
 
 Table(
     "other_thread",
@@ -41,7 +65,11 @@ Table(
         "'sleeping', 'uninterruptible' (waits for a page or a disk) or 'unknown'",
         required=True,
     ),
-    Column("cpu", INTEGER, comment="CPU it ran on; of other states the one that it left"),
+    Column(
+        "cpu",
+        INTEGER,
+        comment="CPU it ran on; preempted: the one it waits for; else the one that it left",
+    ),
     Column(
         "priority",
         INTEGER,
@@ -67,7 +95,42 @@ Table(
     ),
     flag("is_loss_affected", "Kernel events were lost meanwhile"),
     comment="One row per interval in which a thread had one state",
-    info={"view": "States of threads of ROS processes, as the kernel recorded them."},
+    info={
+        "view": "States of threads of ROS processes, as the kernel recorded them.",
+        "computed": (_POLICY,),
+    },
+)
+
+Table(
+    "preemptor",
+    STORE,
+    run_id(),
+    thread_id("The thread that waited"),
+    moment("start_ns", "Begin", required=True, clock="thread_id"),
+    moment("end_ns", "End", required=True, clock="thread_id"),
+    text("state", "Its state: 'preempted' or 'runnable'", required=True),
+    Column("cpu", INTEGER, comment="The CPU"),
+    *_preemptor(),
+    Column("thread_priority", INTEGER, comment="The priority of the thread that waited"),
+    comment="One row per wait of a thread for a CPU, and stretch in which another thread had it",
+    info={"view": "What ran on the CPU for which a thread of a ROS process waited."},
+)
+
+Table(
+    "callback_preemptor",
+    STORE,
+    run_id(),
+    reference(
+        "callback_instance_id",
+        "The callback instance that waited",
+        to="callback_instance.callback_instance_id",
+        required=True,
+    ),
+    *_preemptor(),
+    number("preempted_ns", "For so long, while it was preempted", unit="ns", required=True),
+    number("runnable_ns", "For so long, while it was woken", unit="ns", required=True),
+    comment="One row per callback instance that waited for a CPU, and thread that had it meanwhile",
+    info={"view": "What ran on the CPU for which callback instances waited, and for how long."},
 )
 
 Table(
@@ -89,6 +152,12 @@ Table(
     number("preemption_count", "How often the CPU was taken away", required=True),
     number("migration_count", "How often it went on on another CPU", required=True),
     flag("is_loss_affected", "Kernel events were lost meanwhile"),
+    number("irq_ns", "Of the time on a CPU, interrupts; NULL: not recorded", unit="ns"),
+    number(
+        "softirq_ns",
+        "Of the time on a CPU, what interrupts left for later; NULL: not recorded",
+        unit="ns",
+    ),
     comment="One row per callback instance that ended, on a thread whose states are known",
     info={
         "view": "How the time of callback instances divides into states of their threads: the "

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from msgflow.trace.ctf.losses import LossCounter
-from msgflow.trace.time_base import TimeBase
+
+if TYPE_CHECKING:
+    from msgflow.trace.time_base import ClockName
 
 
 @dataclass
@@ -13,9 +16,9 @@ class Continuation:
     """What was read so far of recordings whose parts are opened one after the other, each once.
 
     Attributes:
-        time_base: the clocks of the traces.
+        clock_offsets: how far the clocks are from the epoch, see `on_one_base`.
         losses: the counters in their packets.
     """
 
-    time_base: TimeBase = field(default_factory=TimeBase)
+    clock_offsets: dict[ClockName, int] = field(default_factory=dict)
     losses: LossCounter = field(default_factory=LossCounter)

@@ -17,12 +17,12 @@ from msgflow.trace.ctf.packet_order import entries_of
 from msgflow.trace.ctf.packet_times import begins_of, numbers_of
 from msgflow.trace.ctf.stream_layout import StreamLayout
 from msgflow.trace.ctf.streams import streams_of
-from msgflow.trace.ctf.trace_info import describe
+from msgflow.trace.ctf.trace_info import corrected, describe
 from msgflow.trace.discovery import irregular_files, stream_files
 from msgflow.trace.metadata_frame import FILE_NAME
 from msgflow.trace.model import Damage, undeclared
 from msgflow.trace.regular_file import unreadable_error
-from msgflow.trace.time_base import TimeBase
+from msgflow.trace.time_base import on_one_base
 from msgflow.trace.trace_set import ExclusiveTraceSet
 
 if TYPE_CHECKING:
@@ -65,12 +65,14 @@ class CtfTraceSet(ExclusiveTraceSet):
         self._streams: list[Stream] = []
         self._begins: dict[Packet, tuple[int, int]] | None = None
         self._found_early: list[Damage] = []
-        self._time_base = TimeBase() if after is None else after.time_base
         self._losses = None if after is None else after.losses
         self.damages: list[Damage] = []
-        self.traces: tuple[TraceInfo, ...] = tuple(
-            self._open(location, index) for index, location in enumerate(locations)
+        self.traces: tuple[TraceInfo, ...] = on_one_base(
+            [self._open(location, index) for index, location in enumerate(locations)],
+            {} if after is None else after.clock_offsets,
         )
+        for layout in self._layouts:
+            layout.stream.clock = corrected(layout.stream.clock, self.traces[layout.trace_index])
         self._found_early = list(self.damages)
 
     def _open(self, location: TraceLocation, index: int) -> TraceInfo:
@@ -114,7 +116,7 @@ class CtfTraceSet(ExclusiveTraceSet):
         for stream in streams:
             stream.rank = len(self._streams)
             self._streams.append(stream)
-        return describe(declared, path, index, streams, self._time_base)
+        return describe(declared, path, index, streams)
 
     def _batches(
         self,

@@ -13,17 +13,15 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+    from msgflow.trace.ctf.clock import Clock
     from msgflow.trace.ctf.declarations import TraceClass
     from msgflow.trace.ctf.field_types import Structure
     from msgflow.trace.ctf.streams import Stream
     from msgflow.trace.model import TraceInfo
-    from msgflow.trace.time_base import TimeBase
 
 
-def describe(
-    trace: TraceClass, path: Path, index: int, streams: Sequence[Stream], base: TimeBase
-) -> TraceInfo:
-    """Return the description of a trace that has event data, and put its clocks on `base`.
+def describe(trace: TraceClass, path: Path, index: int, streams: Sequence[Stream]) -> TraceInfo:
+    """Return the description of a trace that has event data.
 
     Raises:
         TraceError: it declares no stream, or only some of its streams have times.
@@ -38,10 +36,9 @@ def describe(
     clock = used[0].clock
     assert clock is not None
     spans = [_range(stream) for stream in streams]
-    info = description(
+    return description(
         path,
         index,
-        base,
         uuid=trace.uuid,
         environment=trace.environment,
         clock=clock,
@@ -54,11 +51,6 @@ def describe(
         ],
         has_time=used[0].has_time,
     )
-    correction = info.clock_correction_ns
-    for stream_class in classes:
-        if correction and stream_class.clock == clock:
-            stream_class.clock = replace(clock, offset_cycles=clock.offset_cycles + correction)
-    return info
 
 
 def _range(stream: Stream) -> tuple[int | None, int | None]:
@@ -76,3 +68,11 @@ def _range(stream: Stream) -> tuple[int | None, int | None]:
 
 def _names(structure: Structure) -> set[str]:
     return {member.name for member in structure.members}
+
+
+def corrected(clock: Clock | None, info: TraceInfo) -> Clock | None:
+    """Return the clock of a stream, on the time base that its trace was brought to."""
+    correction = info.clock_correction_ns
+    if clock is None or not correction or clock.to_ns(0) != info.clock_offset_ns:
+        return clock
+    return replace(clock, offset_cycles=clock.offset_cycles + correction)

@@ -1,7 +1,7 @@
 -- name: finding.clock_offsets_differ
 -- title: Clock offsets of one boot differ
 -- description: Traces of one boot count from different times. All were brought to the time of the
---     first.
+--     first that is not the kernel's.
 -- cause: The clock of the host was set between the starts of two sessions.
 -- cure: None needed.
 -- grain: one row, if there are any

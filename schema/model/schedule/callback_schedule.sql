@@ -1,6 +1,5 @@
 -- name: staging.callback_schedule
--- description: How the time of callback instances divides into states of their threads, from sums
---     of the states up to their begin and up to their end.
+-- description: How the time of callback instances divides into states of their threads.
 -- grain: one row per callback instance that ended, on a thread with known states
 -- when: staging.thread_state
 -- column: callback_instance_id BIGINT  The callback instance
@@ -10,101 +9,83 @@
 -- column: sleeping_ns BIGINT [ns]  Waiting for something
 -- column: uninterruptible_ns BIGINT [ns]  Waiting for a page or a disk
 -- column: unknown_ns BIGINT [ns]  Not known
+-- column: irq_ns BIGINT [ns]  Of the time on a CPU, interrupts; NULL: not recorded
+-- column: softirq_ns BIGINT [ns]  Of the time on a CPU, what interrupts left for later; likewise
 -- column: preemption_count BIGINT  How often it lost the CPU
 -- column: migration_count BIGINT  How often it went on on another CPU
 -- column: is_loss_affected BOOLEAN  Kernel events were lost meanwhile
-WITH run AS (
+WITH migration AS (
     SELECT
-        thread_id, start_ns,
-        coalesce(cpu <> lag(cpu) OVER (PARTITION BY thread_id ORDER BY start_ns), false)
-            AS is_migration
+        number,
+        cpu <> lag(cpu) OVER (PARTITION BY thread_id ORDER BY start_ns) AS is_migration
     FROM staging.thread_state
     WHERE state = 'running'
 ),
-state AS (
-    SELECT
-        s.thread_id, s.start_ns, s.end_ns, s.state, s.end_ns - s.start_ns AS length_ns,
-        coalesce(r.is_migration, false) AS is_migration, s.is_loss_affected
-    FROM staging.thread_state AS s
-    LEFT JOIN run AS r
-        ON s.thread_id = r.thread_id AND s.start_ns = r.start_ns AND s.state = 'running'
-),
--- Sums up to the end of each state.
-total AS (
-    SELECT
-        thread_id, start_ns, end_ns, state, is_loss_affected,
-        sum(length_ns) FILTER (WHERE state = 'running') OVER earlier AS running_ns,
-        sum(length_ns) FILTER (WHERE state = 'preempted') OVER earlier AS preempted_ns,
-        sum(length_ns) FILTER (WHERE state = 'runnable') OVER earlier AS runnable_ns,
-        sum(length_ns) FILTER (WHERE state = 'sleeping') OVER earlier AS sleeping_ns,
-        sum(length_ns) FILTER (WHERE state = 'uninterruptible') OVER earlier AS uninterruptible_ns,
-        count(*) FILTER (WHERE state = 'preempted') OVER earlier AS preemption_count,
-        count(*) FILTER (WHERE is_migration) OVER earlier AS migration_count,
-        count(*) FILTER (WHERE is_loss_affected) OVER earlier AS loss_count
-    FROM state
-    WINDOW earlier AS (PARTITION BY thread_id ORDER BY start_ns ROWS UNBOUNDED PRECEDING)
-),
-instance AS (
-    SELECT callback_instance_id, thread_id, start_ns, end_ns
-    FROM staging.callback_instance
-    WHERE end_ns IS NOT NULL AND thread_id IN (SELECT thread_id FROM staging.thread_state)
-),
-edge AS (
-    SELECT callback_instance_id, thread_id, start_ns AS at_ns, -1 AS sign FROM instance
-    UNION ALL
-    SELECT callback_instance_id, thread_id, end_ns, 1 FROM instance
-),
--- What is left of the state in which the edge lies does not count yet.
-value AS (
-    SELECT
-        e.callback_instance_id,
-        e.sign,
-        t.state,
-        greatest(t.end_ns - e.at_ns, 0) AS rest_ns,
-        coalesce(t.running_ns, 0) AS running_ns,
-        coalesce(t.preempted_ns, 0) AS preempted_ns,
-        coalesce(t.runnable_ns, 0) AS runnable_ns,
-        coalesce(t.sleeping_ns, 0) AS sleeping_ns,
-        coalesce(t.uninterruptible_ns, 0) AS uninterruptible_ns,
-        coalesce(t.preemption_count, 0) AS preemption_count,
-        coalesce(t.migration_count, 0) AS migration_count,
-        coalesce(t.loss_count, 0)
-        - CASE WHEN e.sign < 0 AND t.is_loss_affected AND t.end_ns > e.at_ns THEN 1 ELSE 0 END
-            AS loss_count
-    FROM edge AS e
-    ASOF LEFT JOIN total AS t ON e.thread_id = t.thread_id AND e.at_ns >= t.start_ns
-),
 part AS (
     SELECT
+        c.callback_instance_id,
+        sum(c.end_ns - c.start_ns) FILTER (WHERE s.state = 'running') AS running_ns,
+        sum(c.end_ns - c.start_ns) FILTER (WHERE s.state = 'preempted') AS preempted_ns,
+        sum(c.end_ns - c.start_ns) FILTER (WHERE s.state = 'runnable') AS runnable_ns,
+        sum(c.end_ns - c.start_ns) FILTER (WHERE s.state = 'sleeping') AS sleeping_ns,
+        sum(c.end_ns - c.start_ns) FILTER (WHERE s.state = 'uninterruptible')
+            AS uninterruptible_ns,
+        count(*) FILTER (WHERE s.state = 'preempted' AND c.is_begin) AS preemption_count,
+        count(*) FILTER (WHERE m.is_migration AND c.is_begin) AS migration_count,
+        bool_or(s.is_loss_affected) AS is_loss_affected
+    FROM staging.callback_state AS c
+    JOIN staging.thread_state AS s ON c.state_number = s.number
+    LEFT JOIN migration AS m ON c.state_number = m.number
+    GROUP BY c.callback_instance_id
+),
+handled AS (
+    SELECT
+        c.callback_instance_id,
+        i.kind,
+        sum(least(i.end_ns, c.end_ns) - greatest(i.start_ns, c.start_ns)) AS length_ns
+    FROM staging.thread_interrupt AS i
+    JOIN staging.callback_state AS c ON i.state_number = c.state_number
+    WHERE i.end_ns > c.start_ns AND i.start_ns < c.end_ns
+    GROUP BY ALL
+),
+interrupted AS (
+    SELECT
         callback_instance_id,
-        sum(sign * (running_ns - CASE state WHEN 'running' THEN rest_ns ELSE 0 END))::BIGINT
-            AS running_ns,
-        sum(sign * (preempted_ns - CASE state WHEN 'preempted' THEN rest_ns ELSE 0 END))::BIGINT
-            AS preempted_ns,
-        sum(sign * (runnable_ns - CASE state WHEN 'runnable' THEN rest_ns ELSE 0 END))::BIGINT
-            AS runnable_ns,
-        sum(sign * (sleeping_ns - CASE state WHEN 'sleeping' THEN rest_ns ELSE 0 END))::BIGINT
-            AS sleeping_ns,
-        sum(
-            sign * (uninterruptible_ns - CASE state WHEN 'uninterruptible' THEN rest_ns ELSE 0 END)
-        )::BIGINT AS uninterruptible_ns,
-        sum(sign * preemption_count)::BIGINT AS preemption_count,
-        sum(sign * migration_count)::BIGINT AS migration_count,
-        sum(sign * loss_count) > 0 AS is_loss_affected
-    FROM value
+        sum(length_ns) FILTER (WHERE kind = 'interrupt') AS irq_ns,
+        sum(length_ns) FILTER (WHERE kind = 'softirq') AS softirq_ns
+    FROM handled
     GROUP BY callback_instance_id
+),
+recorded AS (
+    SELECT
+        t.thread_id,
+        bool_or(d.name LIKE '%irq_handler_exit') AS has_irq,
+        bool_or(d.name LIKE '%softirq_exit') AS has_softirq
+    FROM (SELECT DISTINCT thread_id, clock_key FROM staging.thread_tid) AS t
+    JOIN staging.schedule AS s ON t.clock_key = s.clock_key
+    JOIN staging.declared AS d ON s.trace_index = d.trace_index
+    WHERE s.is_joined
+    GROUP BY t.thread_id
 )
 SELECT
-    p.callback_instance_id,
-    p.running_ns,
-    p.preempted_ns,
-    p.runnable_ns,
-    p.sleeping_ns,
-    p.uninterruptible_ns,
-    i.end_ns - i.start_ns - p.running_ns - p.preempted_ns - p.runnable_ns - p.sleeping_ns
-    - p.uninterruptible_ns AS unknown_ns,
-    p.preemption_count,
-    p.migration_count,
-    p.is_loss_affected
-FROM part AS p
-JOIN instance AS i ON p.callback_instance_id = i.callback_instance_id
+    i.callback_instance_id,
+    coalesce(p.running_ns, 0)::BIGINT AS running_ns,
+    coalesce(p.preempted_ns, 0)::BIGINT AS preempted_ns,
+    coalesce(p.runnable_ns, 0)::BIGINT AS runnable_ns,
+    coalesce(p.sleeping_ns, 0)::BIGINT AS sleeping_ns,
+    coalesce(p.uninterruptible_ns, 0)::BIGINT AS uninterruptible_ns,
+    (
+        i.end_ns - i.start_ns - coalesce(p.running_ns, 0) - coalesce(p.preempted_ns, 0)
+        - coalesce(p.runnable_ns, 0) - coalesce(p.sleeping_ns, 0)
+        - coalesce(p.uninterruptible_ns, 0)
+    )::BIGINT AS unknown_ns,
+    CASE WHEN r.has_irq THEN coalesce(h.irq_ns, 0)::BIGINT END AS irq_ns,
+    CASE WHEN r.has_softirq THEN coalesce(h.softirq_ns, 0)::BIGINT END AS softirq_ns,
+    coalesce(p.preemption_count, 0) AS preemption_count,
+    coalesce(p.migration_count, 0) AS migration_count,
+    coalesce(p.is_loss_affected, false) AS is_loss_affected
+FROM staging.callback_instance AS i
+JOIN recorded AS r ON i.thread_id = r.thread_id
+LEFT JOIN part AS p ON i.callback_instance_id = p.callback_instance_id
+LEFT JOIN interrupted AS h ON i.callback_instance_id = h.callback_instance_id
+WHERE i.end_ns IS NOT NULL AND i.thread_id IN (SELECT thread_id FROM staging.thread_state)

@@ -1,6 +1,6 @@
 -- name: staging.other_thread
--- description: Threads that are none of a ROS process, but took the CPU from one that is, or woke
---     it. The kernel's idle thread of each CPU is one of them.
+-- description: Threads that are none of a ROS process, but had the CPU while one that is waited
+--     for it, or woke it. The kernel's idle thread of each CPU is one of them.
 -- grain: one row per host, tid and name
 -- when: staging.schedule_interval
 -- column: other_thread_id BIGINT  Number of the thread

@@ -4,14 +4,15 @@
 -- grain: one row per interval in which a thread had one state
 -- when: staging.thread_switch
 -- column: thread_id BIGINT  The thread
+-- column: tid INTEGER  Its number
 -- column: start_ns BIGINT [epoch ns]  Begin
 -- column: end_ns BIGINT [epoch ns]  End
 -- column: state VARCHAR  State
+-- column: trace_index INTEGER  The kernel trace
 -- column: cpu INTEGER  CPU it ran on, or left
+-- column: next_cpu INTEGER  CPU on which it goes on
+-- column: left_ns BIGINT [epoch ns]  When it left its CPU
 -- column: priority INTEGER  Its priority
--- column: other_tid INTEGER  What got the CPU from it
--- column: other_name VARCHAR  The name of that
--- column: other_priority INTEGER  The priority of that
 -- column: waking_event_id BIGINT [event order]  Waking that ended it
 WITH extent AS (
     SELECT s.clock_key, min(w.ts_ns + s.shift_ns) AS start_ns, max(w.ts_ns + s.shift_ns) AS end_ns
@@ -74,27 +75,31 @@ placed AS (
 ),
 interval AS (
     SELECT
-        thread_id, at_ns AS start_ns,
+        thread_id, tid, trace_index, at_ns AS start_ns, at_ns AS left_ns,
         CASE WHEN state IN ('sleeping', 'uninterruptible')
             THEN coalesce(woken_ns, end_ns) ELSE end_ns END AS end_ns,
-        state, cpu, priority, other_tid, other_name, other_priority,
+        state, cpu, next_cpu, priority,
         CASE WHEN state IN ('sleeping', 'uninterruptible') THEN waking_event_id END
             AS waking_event_id
     FROM placed
     WHERE state IS NOT NULL
     UNION ALL
     SELECT
-        thread_id, woken_ns, end_ns, 'runnable', cpu, priority, NULL, NULL, NULL, waking_event_id
+        thread_id, tid, trace_index, woken_ns, at_ns, end_ns, 'runnable', cpu, next_cpu, priority,
+        waking_event_id
     FROM placed
     WHERE state IN ('sleeping', 'uninterruptible') AND woken_ns IS NOT NULL
     UNION ALL
     -- What was before the first switch.
     SELECT
         s.thread_id,
+        s.tid,
+        s.trace_index,
         CASE WHEN s.is_on THEN k.at_ns ELSE f.start_ns END,
+        NULL,
         s.at_ns,
         CASE WHEN s.is_on THEN 'runnable' ELSE 'running' END,
-        s.cpu, s.priority, NULL, NULL, NULL, CASE WHEN s.is_on THEN k.event_id END
+        s.cpu, s.cpu, s.priority, CASE WHEN s.is_on THEN k.event_id END
     FROM step AS s
     JOIN life AS f ON s.thread_id = f.thread_id AND s.tid = f.tid
     LEFT JOIN waking AS k
@@ -102,10 +107,7 @@ interval AS (
     WHERE s.number = 1
 )
 SELECT
-    thread_id, start_ns, end_ns, state, cpu, priority,
-    CASE WHEN state = 'preempted' THEN other_tid END AS other_tid,
-    CASE WHEN state = 'preempted' THEN other_name END AS other_name,
-    CASE WHEN state = 'preempted' THEN other_priority END AS other_priority,
+    thread_id, tid, start_ns, end_ns, state, trace_index, cpu, next_cpu, left_ns, priority,
     waking_event_id
 FROM interval
 WHERE end_ns > start_ns

@@ -6,7 +6,8 @@
 -- column: start_ns BIGINT [epoch ns]  Begin
 -- column: end_ns BIGINT [epoch ns]  End
 -- column: state VARCHAR  State
--- column: cpu INTEGER  CPU it ran on, or left
+-- column: number BIGINT  Number of the row
+-- column: cpu INTEGER  CPU it ran on, left, or waits for
 -- column: priority INTEGER  Its priority
 -- column: preempted_by_thread_id BIGINT  What took the CPU, a thread of a ROS process
 -- column: preempted_by_other_thread_id BIGINT  What took the CPU, another thread
@@ -15,32 +16,35 @@
 -- column: waker_thread_id BIGINT  What woke it, a thread of a ROS process
 -- column: waker_other_thread_id BIGINT  What woke it, another thread
 -- column: is_loss_affected BOOLEAN  Kernel events were lost meanwhile
+WITH interval AS (
+    SELECT thread_id, start_ns, end_ns, state, cpu, priority, waking_event_id
+    FROM staging.schedule_interval
+    WHERE state <> 'preempted'
+    UNION ALL
+    SELECT thread_id, start_ns, end_ns, state, cpu, priority, NULL
+    FROM staging.cpu_wait
+    WHERE state = 'preempted'
+)
 SELECT
+    row_number() OVER (ORDER BY i.thread_id, i.start_ns) AS number,
     i.thread_id,
     i.start_ns,
     i.end_ns,
     i.state,
     i.cpu,
     i.priority,
-    p.thread_id AS preempted_by_thread_id,
-    CASE WHEN p.thread_id IS NULL THEN po.other_thread_id END AS preempted_by_other_thread_id,
-    i.other_priority AS preempted_by_priority,
+    p.preemptor_thread_id AS preempted_by_thread_id,
+    p.preemptor_other_thread_id AS preempted_by_other_thread_id,
+    p.preemptor_priority AS preempted_by_priority,
     w.kind AS waker_kind,
     wt.thread_id AS waker_thread_id,
     CASE WHEN wt.thread_id IS NULL THEN wo.other_thread_id END AS waker_other_thread_id,
     coalesce(l.until_ns > i.start_ns, false) AS is_loss_affected
-FROM staging.schedule_interval AS i
+FROM interval AS i
 JOIN (SELECT DISTINCT thread_id, clock_key FROM staging.thread_tid) AS t
     ON i.thread_id = t.thread_id
-LEFT JOIN staging.thread_tid AS p
-    ON t.clock_key = p.clock_key
-    AND i.other_tid = p.tid
-    AND i.start_ns >= p.from_ns
-    AND i.start_ns < p.until_ns
-LEFT JOIN staging.other_thread AS po
-    ON t.clock_key = po.clock_key
-    AND i.other_tid = po.tid
-    AND i.other_name IS NOT DISTINCT FROM po.name
+LEFT JOIN staging.preemptor AS p
+    ON i.state = 'preempted' AND i.thread_id = p.thread_id AND i.start_ns = p.start_ns
 LEFT JOIN staging.thread_waking AS w ON i.waking_event_id = w.event_id
 LEFT JOIN staging.thread_tid AS wt
     ON w.clock_key = wt.clock_key

@@ -12,13 +12,10 @@
 -- column: is_on BOOLEAN  The thread got the CPU
 -- column: priority INTEGER  Its priority
 -- column: prev_state BIGINT  State in which it left the CPU, as the kernel has it
--- column: other_tid INTEGER  What got the CPU from it
--- column: other_name VARCHAR  The name of that
--- column: other_priority INTEGER  The priority of that
 WITH switch AS (
     SELECT
         w.trace_index, w.event_id, w.ts_ns + s.shift_ns AS at_ns, s.clock_key, w.cpu_id AS cpu,
-        w.prev_tid, w.prev_state, w.next_tid, w.next_comm,
+        w.prev_tid, w.prev_state, w.next_tid,
         w.prev_prio + CASE WHEN o.tracer LIKE 'perf%' THEN 0 ELSE 100 END AS prev_priority,
         w.next_prio + CASE WHEN o.tracer LIKE 'perf%' THEN 0 ELSE 100 END AS next_priority
     FROM raw.sched_switch AS w
@@ -28,8 +25,7 @@ WITH switch AS (
 )
 SELECT
     t.thread_id, t.tid, w.trace_index, w.event_id, w.at_ns, w.cpu, true AS is_on,
-    w.next_priority AS priority, NULL::BIGINT AS prev_state, NULL::INTEGER AS other_tid,
-    NULL::VARCHAR AS other_name, NULL::INTEGER AS other_priority
+    w.next_priority AS priority, NULL::BIGINT AS prev_state
 FROM switch AS w
 JOIN staging.thread_tid AS t
     ON w.clock_key = t.clock_key
@@ -39,7 +35,7 @@ JOIN staging.thread_tid AS t
 UNION ALL
 SELECT
     t.thread_id, t.tid, w.trace_index, w.event_id, w.at_ns, w.cpu, false,
-    w.prev_priority, w.prev_state, w.next_tid, w.next_comm, w.next_priority
+    w.prev_priority, w.prev_state
 FROM switch AS w
 JOIN staging.thread_tid AS t
     ON w.clock_key = t.clock_key

@@ -1,0 +1,38 @@
+-- name: staging.callback_state
+-- description: States of the thread during callback instances, cut to them.
+-- grain: one row per callback instance that ended and state that it overlaps
+-- when: staging.thread_state
+-- column: callback_instance_id BIGINT  The callback instance
+-- column: state_number BIGINT  The state
+-- column: start_ns BIGINT [epoch ns]  Begin of the part
+-- column: end_ns BIGINT [epoch ns]  End of the part
+-- column: is_begin BOOLEAN  The state began during the callback instance
+WITH extent AS (
+    SELECT thread_id, min(number) AS first_number FROM staging.thread_state GROUP BY thread_id
+),
+begun AS (
+    SELECT i.callback_instance_id, i.thread_id, i.start_ns, i.end_ns, s.number
+    FROM staging.callback_instance AS i
+    ASOF LEFT JOIN staging.thread_state AS s
+        ON i.thread_id = s.thread_id AND i.start_ns >= s.start_ns
+    WHERE i.end_ns > i.start_ns
+),
+covered AS (
+    SELECT
+        b.callback_instance_id,
+        b.start_ns,
+        b.end_ns,
+        unnest(range(coalesce(b.number, e.first_number), s.number + 1)) AS number
+    FROM begun AS b
+    JOIN extent AS e ON b.thread_id = e.thread_id
+    ASOF JOIN staging.thread_state AS s ON b.thread_id = s.thread_id AND b.end_ns > s.start_ns
+)
+SELECT
+    c.callback_instance_id,
+    c.number AS state_number,
+    greatest(c.start_ns, s.start_ns) AS start_ns,
+    least(c.end_ns, s.end_ns) AS end_ns,
+    s.start_ns > c.start_ns AS is_begin
+FROM covered AS c
+JOIN staging.thread_state AS s ON c.number = s.number
+WHERE s.end_ns > c.start_ns

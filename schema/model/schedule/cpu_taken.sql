@@ -1,0 +1,58 @@
+-- name: staging.cpu_taken
+-- description: What ran on the CPU for which a thread waited, one thread after the other.
+-- grain: one row per wait for a CPU and stretch of time in which another thread had it
+-- when: staging.cpu_wait
+-- column: thread_id BIGINT  The thread that waited
+-- column: state_start_ns BIGINT [epoch ns]  Begin of its wait
+-- column: wait_start_ns BIGINT [epoch ns]  Begin of its wait for this CPU
+-- column: start_ns BIGINT [epoch ns]  From here the other one ran, while it waited
+-- column: end_ns BIGINT [epoch ns]  Until here
+-- column: state VARCHAR  State of the thread that waited
+-- column: cpu INTEGER  The CPU
+-- column: clock_key VARCHAR  Clock of the host
+-- column: tid INTEGER  What ran
+-- column: name VARCHAR  Its name
+-- column: priority INTEGER  Its priority
+-- column: thread_priority INTEGER  Priority of the thread that waited
+WITH wait AS (
+    SELECT w.*, s.clock_key, s.shift_ns
+    FROM staging.cpu_wait AS w
+    JOIN staging.schedule AS s ON w.trace_index = s.trace_index
+),
+first_run AS (
+    SELECT w.*, r.switch_number AS first_number
+    FROM wait AS w
+    ASOF JOIN raw.sched_switch AS r
+        ON w.trace_index = r.trace_index
+        AND w.cpu = r.cpu_id
+        AND w.start_ns - w.shift_ns >= r.ts_ns
+),
+run AS (
+    SELECT
+        w.* EXCLUDE (first_number), unnest(range(w.first_number, r.switch_number + 1)) AS number
+    FROM first_run AS w
+    ASOF JOIN raw.sched_switch AS r
+        ON w.trace_index = r.trace_index
+        AND w.cpu = r.cpu_id
+        AND w.end_ns - w.shift_ns > r.ts_ns
+)
+SELECT
+    w.thread_id,
+    w.state_start_ns,
+    w.start_ns AS wait_start_ns,
+    greatest(w.start_ns, r.ts_ns + w.shift_ns) AS start_ns,
+    least(w.end_ns, coalesce(e.ts_ns + w.shift_ns, w.end_ns)) AS end_ns,
+    w.state,
+    w.cpu,
+    w.clock_key,
+    r.next_tid AS tid,
+    r.next_comm AS name,
+    r.next_prio + CASE WHEN o.tracer LIKE 'perf%' THEN 0 ELSE 100 END AS priority,
+    w.priority AS thread_priority
+FROM run AS w
+JOIN raw.sched_switch AS r
+    ON w.trace_index = r.trace_index AND w.cpu = r.cpu_id AND w.number = r.switch_number
+JOIN staging.source AS o ON w.trace_index = o.trace_index
+LEFT JOIN raw.sched_switch AS e
+    ON w.trace_index = e.trace_index AND w.cpu = e.cpu_id AND w.number + 1 = e.switch_number
+WHERE r.next_tid <> w.tid

@@ -1,0 +1,75 @@
+-- name: staging.cpu_wait
+-- description: Waits of threads for a CPU: preempted, or woken. A wait is cut where the thread goes
+--     to another CPU. Where the kernel trace does not say that, a thread that was woken waits for
+--     the CPU on which it goes on.
+-- grain: one row per wait and CPU
+-- when: staging.schedule_interval
+-- column: thread_id BIGINT  The thread
+-- column: tid INTEGER  Its number
+-- column: state_start_ns BIGINT [epoch ns]  Begin of the wait
+-- column: start_ns BIGINT [epoch ns]  Begin of the wait for this CPU
+-- column: end_ns BIGINT [epoch ns]  End of the wait for this CPU
+-- column: state VARCHAR  'preempted' or 'runnable'
+-- column: trace_index INTEGER  The kernel trace
+-- column: cpu INTEGER  The CPU
+-- column: priority INTEGER  Priority of the thread
+WITH migration AS (
+    SELECT t.thread_id, t.tid, m.ts_ns + s.shift_ns AS at_ns, m.dest_cpu AS cpu
+    FROM raw.sched_migrate_task AS m
+    JOIN staging.schedule AS s ON m.trace_index = s.trace_index
+    JOIN staging.thread_tid AS t
+        ON s.clock_key = t.clock_key
+        AND m.tid = t.tid
+        AND m.ts_ns + s.shift_ns >= t.from_ns
+        AND m.ts_ns + s.shift_ns < t.until_ns
+    WHERE s.is_joined
+),
+wait AS (
+    SELECT *
+    FROM staging.schedule_interval
+    WHERE state IN ('preempted', 'runnable')
+),
+begin AS (
+    SELECT
+        w.thread_id,
+        w.tid,
+        w.start_ns AS state_start_ns,
+        w.start_ns,
+        CASE
+            WHEN m.at_ns >= coalesce(w.left_ns, m.at_ns) THEN m.cpu
+            WHEN w.state = 'runnable'
+                AND w.trace_index NOT IN (SELECT trace_index FROM raw.sched_migrate_task)
+                THEN coalesce(w.next_cpu, w.cpu)
+            ELSE w.cpu
+        END AS cpu
+    FROM wait AS w
+    ASOF LEFT JOIN migration AS m
+        ON w.thread_id = m.thread_id AND w.tid = m.tid AND w.start_ns >= m.at_ns
+),
+cut AS (
+    SELECT m.thread_id, m.tid, w.start_ns AS state_start_ns, m.at_ns AS start_ns, m.cpu
+    FROM migration AS m
+    ASOF JOIN wait AS w
+        ON m.thread_id = w.thread_id AND m.tid = w.tid AND m.at_ns > w.start_ns
+    WHERE m.at_ns < w.end_ns
+),
+part AS (
+    SELECT * FROM begin
+    UNION ALL
+    SELECT * FROM cut
+)
+SELECT
+    p.thread_id,
+    p.tid,
+    p.state_start_ns,
+    p.start_ns,
+    lead(p.start_ns, 1, w.end_ns) OVER (
+        PARTITION BY p.thread_id, p.tid, p.state_start_ns ORDER BY p.start_ns
+    ) AS end_ns,
+    w.state,
+    w.trace_index,
+    p.cpu,
+    w.priority
+FROM part AS p
+JOIN wait AS w
+    ON p.thread_id = w.thread_id AND p.tid = w.tid AND p.state_start_ns = w.start_ns

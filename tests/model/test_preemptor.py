@@ -1,0 +1,123 @@
+"""What had the CPU for which threads waited, and interrupts, from a kernel trace."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from analysis import Analyse, Analysis
+from kernel_schedule import BLOCKED, HOG, MAIN, Kernel, call, recorded
+from ros_system import RosSystem
+
+OTHER = 6
+
+
+def waits(model: Analysis) -> list[tuple[Any, ...]]:
+    return model.rows(
+        "SELECT o.tid, p.state, p.cpu, p.start_ns, p.end_ns, p.preemptor_priority, "
+        "p.thread_priority FROM preemptor AS p JOIN other_thread AS o "
+        "ON p.preemptor_other_thread_id = o.other_thread_id ORDER BY p.start_ns"
+    )
+
+
+def of_callback(model: Analysis) -> list[tuple[Any, ...]]:
+    return model.rows(
+        "SELECT o.tid, p.preempted_ns, p.runnable_ns FROM callback_preemptor AS p "
+        "JOIN other_thread AS o ON p.preemptor_other_thread_id = o.other_thread_id ORDER BY o.tid"
+    )
+
+
+def test_all_that_had_the_cpu_have_their_time(system: RosSystem, analyse: Analyse) -> None:
+    kernel = Kernel(system)
+    kernel.switch(900, 0, 41)
+    kernel.switch(1100, 41, HOG)
+    kernel.switch(1150, HOG, OTHER)
+    kernel.switch(1300, OTHER, 41)
+    kernel.switch(2100, 41, 0, BLOCKED)
+    call(system, 1000, 2000)
+    model = analyse(system)
+    assert waits(model) == [
+        (HOG, "preempted", 0, 1100, 1150, 119, 120),
+        (OTHER, "preempted", 0, 1150, 1300, 119, 120),
+    ]
+    assert of_callback(model) == [(OTHER, 150, 0), (HOG, 50, 0)]
+    assert model.rows("SELECT preemption_count, preempted_ns FROM callback_schedule") == [(1, 200)]
+
+
+def test_a_callback_counts_only_its_own_part(system: RosSystem, analyse: Analyse) -> None:
+    """The thread was preempted before the callback began, and woken when it had not yet ended."""
+    recorded(system)
+    model = analyse(system)
+    assert of_callback(model) == [(0, 0, 100), (HOG, 200, 0)]
+
+
+def test_a_thread_that_migrates_waits_for_another_cpu(system: RosSystem, analyse: Analyse) -> None:
+    kernel = Kernel(system)
+    kernel.switch(800, 0, OTHER, cpu=1)
+    kernel.switch(900, 0, 41)
+    kernel.switch(1100, 41, HOG)
+    kernel.add("sched_migrate_task", 1200, tid=41, dest_cpu=1)
+    kernel.switch(1300, OTHER, 41, cpu=1)
+    call(system, 1000, 1090)
+    model = analyse(system)
+    assert waits(model) == [
+        (HOG, "preempted", 0, 1100, 1200, 119, 120),
+        (OTHER, "preempted", 1, 1200, 1300, 119, 120),
+    ]
+    assert model.rows("SELECT count(*) FROM thread_state WHERE state = 'preempted'") == [(2,)]
+
+
+def test_a_woken_thread_waits_where_it_goes_on(system: RosSystem, analyse: Analyse) -> None:
+    """Without events of migration, that is all there is to know."""
+    kernel = Kernel(system)
+    kernel.switch(800, 0, OTHER, cpu=1)
+    kernel.switch(900, 0, 41)
+    kernel.switch(1200, 41, 0, BLOCKED)
+    kernel.wake(1300, 41)
+    kernel.switch(1350, OTHER, 41, cpu=1)
+    call(system, 1000, 1150)
+    assert waits(analyse(system)) == [(OTHER, "runnable", 1, 1300, 1350, 119, 120)]
+
+
+def test_interrupts_are_part_of_the_time_on_a_cpu(system: RosSystem, analyse: Analyse) -> None:
+    kernel = Kernel(system)
+    kernel.switch(900, 0, 41)
+    kernel.add("irq_handler_entry", 990)
+    kernel.add("irq_handler_exit", 1010)
+    kernel.add("irq_softirq_entry", 1100)
+    kernel.add("irq_softirq_exit", 1150)
+    kernel.switch(1500, 41, 0, BLOCKED)
+    kernel.add("irq_softirq_entry", 1600)
+    kernel.add("irq_softirq_exit", 1650)
+    kernel.switch(3000, 0, HOG)
+    call(system, 1000, 1400)
+    model = analyse(system)
+    assert model.rows("SELECT running_ns, irq_ns, softirq_ns FROM callback_schedule") == [
+        (400, 10, 50)
+    ]
+
+
+def test_interrupts_that_were_not_recorded_are_not_known(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    recorded(system)
+    assert analyse(system).rows("SELECT irq_ns, softirq_ns FROM callback_schedule") == [
+        (None, None)
+    ]
+
+
+def test_a_priority_tells_the_policy(system: RosSystem, analyse: Analyse) -> None:
+    kernel = Kernel(system)
+    for ts, prio in ((900, -80), (1100, -101), (1300, 20)):
+        kernel.add(
+            "sched_switch", ts, prev_tid=0, prev_prio=20, prev_state=0, next_tid=41,
+            next_prio=prio, next_comm="main",
+        )  # fmt: skip
+        kernel.add(
+            "sched_switch", ts + 100, prev_tid=41, prev_prio=prio, prev_state=1, next_tid=0,
+            next_prio=20, next_comm="idle",
+        )  # fmt: skip
+    call(system, 910, 950, MAIN)
+    states = analyse(system).rows(
+        "SELECT priority, policy FROM thread_state WHERE state = 'running' ORDER BY start_ns"
+    )
+    assert states == [(20, "real_time"), (-1, "deadline"), (120, "normal")]
