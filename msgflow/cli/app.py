@@ -21,6 +21,7 @@ COMMANDS = {
     "record": (
         "Record a ROS 2 system with LTTng, then print what is wrong and how long messages took."
     ),
+    "watch": "See a ROS 2 system while it runs: latency of every path, window by window.",
     "ingest": "Read LTTng traces of a ROS 2 system into a database, each recording as a run.",
     "query": "Run a named query; `msgflow query NAME --help` explains it.",
     "why": "Explain why a topic is late: its slowest path, where the time goes, what to ask next.",

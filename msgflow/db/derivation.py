@@ -29,6 +29,7 @@ def derive(
     run_id: int,
     *,
     synchronise: Callable[[], None] | None = None,
+    findings: bool = True,
 ) -> None:
     """Derive the links of a run anew, inside the open transaction.
 
@@ -37,6 +38,7 @@ def derive(
         run_id: the run; other runs stay as they are.
         synchronise: called once messages are linked, to correct the clocks; None leaves them as
             they are.
+        findings: also find what the recording shows.
     """
     learn_topics(con, run_id)
     for name in derived_tables():
@@ -44,7 +46,9 @@ def derive(
             derive_table(con, name, run_id)
     if synchronise is not None:
         synchronise()
-    derive_from_clocks(con, run_id)
+    _derive_on_clocks(con, run_id)
+    if findings:
+        derive_findings(con, run_id)
     con.execute(
         "UPDATE store.run SET derivation_hash = ? WHERE run_id = ?",
         [derivation_hash(), run_id],
@@ -56,10 +60,14 @@ def derive_from_clocks(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
 
     This happens inside the open transaction.
     """
+    _derive_on_clocks(con, run_id)
+    derive_findings(con, run_id)
+
+
+def _derive_on_clocks(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
     for name in derived_tables():
         if reads_clocks(name):
             derive_table(con, name, run_id)
-    derive_findings(con, run_id)
 
 
 def derive_findings(con: duckdb.DuckDBPyConnection, run_id: int) -> None:

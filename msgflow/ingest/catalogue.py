@@ -93,6 +93,8 @@ class Tracepoint:
         where: other places that have it, None if there are no others.
         is_kernel: the kernel emits it: it has no provider, and nothing to do with the thread that
             it interrupted.
+        is_lasting: what it says stays true: of objects, their names and states. Who reads a part of
+            a recording needs it from all that came before.
     """
 
     name: str
@@ -106,6 +108,7 @@ class Tracepoint:
     until: str | None = None
     where: str | None = None
     is_kernel: bool = False
+    is_lasting: bool = False
 
     @property
     def provider(self) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import itertools
 import os
 import time
 from dataclasses import dataclass
@@ -16,7 +15,7 @@ from msgflow import trace as trace_package
 from msgflow.clocks import read_clock_sync, set_clocks
 from msgflow.db import migration
 from msgflow.db.connection import attach
-from msgflow.db.derivation import derivation_hash, derive
+from msgflow.db.derivation import derive
 from msgflow.db.finding import read_findings, store_broken_rules
 from msgflow.db.memory import (
     default_limit,
@@ -26,20 +25,16 @@ from msgflow.db.memory import (
 )
 from msgflow.db.runs import require_run_name
 from msgflow.db.sandbox import open_memory, shut_in
-from msgflow.db.store import delete, store
 from msgflow.db.transaction import transaction
 from msgflow.db.workspace import creating, workspace
 from msgflow.errors import DatabaseError, UsageError
 from msgflow.ingest import model, refusals, staging
 from msgflow.ingest.hostnames import hostnames_of
 from msgflow.ingest.load import Loaded, load_traces
-from msgflow.ingest.recordings import session_folder
+from msgflow.ingest.stored_run import fallback_name, require_free_name, store_run
 from msgflow.links import declare_links, read_links
-from msgflow.run.choice import is_run_name
 from msgflow.sql.failure import database_errors, in_words
 from msgflow.sql.interrupt import interruptible, noted_interrupts
-from msgflow.trace import archive
-from msgflow.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -265,7 +260,7 @@ def _write_run(
 ) -> tuple[int, str, tuple[Finding, ...]]:
     with transaction(con):
         watch.enter("storing the run")
-        run_id, run_name = _store(con, *names, loaded)
+        run_id, run_name = store_run(con, *names, loaded)
         watch.enter("linking messages")
         declared, clocks = given
         if declared is not None:
@@ -276,55 +271,6 @@ def _write_run(
         findings = tuple(read_findings(con, [run_id], info=True))
         interrupts.make_final()
     return run_id, run_name, findings
-
-
-def _store(
-    con: duckdb.DuckDBPyConnection, name: str | None, fallback: str, loaded: Loaded
-) -> tuple[int, str]:
-    run_id = int(con.execute("SELECT coalesce(max(run_id), 0) + 1 FROM store.run").fetchall()[0][0])
-    replaced = set(loaded.replaced_runs)
-    if name is not None:
-        named = con.execute("SELECT run_id FROM store.run WHERE name = ?", [name]).fetchall()
-        replaced |= {number for (number,) in named}
-    store(con, run_id)
-    delete(con, sorted(replaced))
-    run_name = name or free_name(con, fallback)
-    con.execute(
-        "INSERT INTO store.run (run_id, name, created_at, msgflow_version, derivation_hash, "
-        "start_ns, end_ns, event_count) SELECT ?, ?, now() AT TIME ZONE 'UTC', ?, ?, "
-        "min(start_ns) FILTER (domain IS DISTINCT FROM 'kernel'), "
-        "max(end_ns) FILTER (domain IS DISTINCT FROM 'kernel'), sum(event_count) "
-        "FROM store.trace WHERE run_id = ?",
-        [run_id, run_name, __version__, derivation_hash(), run_id],
-    )
-    return run_id, run_name
-
-
-def fallback_name(paths: Sequence[str | Path]) -> str:
-    """Return the name of a run for which none is given: that of the first session's folder."""
-    first = Path(os.path.realpath(paths[0]))
-    name = session_folder(first.parent / archive.stem(first)).name
-    return name if is_run_name(name) else f"run-{name}".rstrip("-")
-
-
-def require_free_name(con: duckdb.DuckDBPyConnection, name: str) -> None:
-    """Raise a `UsageError` if a run of the database has that name."""
-    if name in _run_names(con):
-        raise UsageError(
-            f"the database has a run of that name already — {name}",
-            "give another --name, or --replace",
-        )
-
-
-def free_name(con: duckdb.DuckDBPyConnection, name: str) -> str:
-    """Return the name, with a number behind it if a run of the database has it."""
-    taken = _run_names(con)
-    candidates = itertools.chain([name], (f"{name}-{number}" for number in itertools.count(2)))
-    return next(candidate for candidate in candidates if candidate not in taken)
-
-
-def _run_names(con: duckdb.DuckDBPyConnection) -> set[str]:
-    return {name for (name,) in con.execute("SELECT name FROM store.run").fetchall()}
 
 
 def _require_usable(paths: Sequence[str | Path], name: str | None) -> None:

@@ -84,12 +84,7 @@ def load_traces(
     """
     catalogue = load()
     user_names = {n for n in names_of(events, traces.traces) if not is_match(n, ignore)}
-    wanted: dict[str, pa.Schema | None] = {
-        name: schema
-        for name, schema in catalogue.arrow_schemas().items()
-        if not is_match(name, ignore)
-    }
-    wanted |= dict.fromkeys(user_names)
+    wanted = wanted_events(ignore) | dict.fromkeys(user_names)
     sources = _sources(traces.traces, hostnames)
     for source in sources:
         con.execute(f"INSERT INTO staging.source VALUES ({', '.join('?' * len(source))})", source)
@@ -161,6 +156,19 @@ def load_traces(
     for repeated in traces.repeated_packet_counts.items():
         con.execute("INSERT INTO staging.packet_read_once VALUES (?, ?)", repeated)
     return Loaded(dict(traces.event_counts), frozenset(tables.replaced))
+
+
+def wanted_events(ignore: Sequence[str] = ()) -> dict[str, pa.Schema | None]:
+    """Return the events that a model needs, and their payload, as `TraceSet.batches` takes them.
+
+    Args:
+        ignore: patterns of event names to leave out, such as 'dds:*'.
+    """
+    return {
+        name: schema
+        for name, schema in load().arrow_schemas().items()
+        if not is_match(name, ignore)
+    }
 
 
 def _placed(

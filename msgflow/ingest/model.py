@@ -19,15 +19,21 @@ if TYPE_CHECKING:
     from msgflow.sql.header import Header
 
 
-def build(con: duckdb.DuckDBPyConnection, *, keep: bool = False) -> None:
+_FINDING = "staging.finding"
+
+
+def build(con: duckdb.DuckDBPyConnection, *, keep: bool = False, findings: bool = True) -> None:
     """Create every object of `schema/model`, each from those before it.
 
     Args:
         con: connection with `raw` and `staging` attached and filled.
         keep: keep all tables; else each is dropped once nothing after it needs it.
+        findings: also look what is worth knowing about the input.
     """
     restore(con)
     headers = objects.load("model")
+    if not findings:
+        headers = tuple(header for header in headers if header.name != _FINDING)
     empty = staging.empty_tables(con)
     staging.narrow(con, empty)
     last_uses = {} if keep else _last_uses(headers)

@@ -74,6 +74,23 @@ def time_point(text: str | int, runs: Sequence[Run], option: str) -> int:
     return _in_range(_read(text, runs, option), text, option)
 
 
+def duration_ns(text: str, option: str) -> int:
+    """Return the nanoseconds of a duration such as '10s', '500ms' or '2' (seconds).
+
+    Args:
+        text: the duration.
+        option: its name in messages, such as '--window'.
+
+    Raises:
+        UsageError: it cannot be read, or is 0.
+    """
+    found = _OFFSET.fullmatch(text.strip())
+    length = _to_ns(found["number"], found["unit"] or "s") if found else 0
+    if not length:
+        raise UsageError(f"cannot read the duration of {option} — {text}", f"{option} 2.5s")
+    return length
+
+
 def skipped_to(seconds: float, runs: Sequence[Run]) -> int:
     """Return the point in time, in epoch ns, that comes so many seconds after the start of a run.
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from msgflow.trace.ctf.continuation import Continuation
 from msgflow.trace.discovery import discover
 from msgflow.trace.model import Damage, EventBatch, Progress, TraceInfo, TraceLocation
 from msgflow.trace.reader_choice import open
@@ -20,6 +21,7 @@ __all__ = [
     "COMMON_SCHEMA",
     "PACKET",
     "PACKET_SCHEMA",
+    "Continuation",
     "Damage",
     "EventBatch",
     "Progress",

@@ -12,13 +12,20 @@ from msgflow.trace.discovery import discover
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from msgflow.trace.ctf.continuation import Continuation
     from msgflow.trace.model import TraceLocation
     from msgflow.trace.trace_set import TraceSet
 
 READERS = ("auto", "msgflow", "bt2")
 
 
-def open(paths: Sequence[str | Path], *, reader: str = "auto", strict: bool = False) -> TraceSet:
+def open(
+    paths: Sequence[str | Path],
+    *,
+    reader: str = "auto",
+    strict: bool = False,
+    after: Continuation | None = None,
+) -> TraceSet:
     """Open all traces below `paths` as one set.
 
     Archives are unpacked to the temporary directory (TMPDIR) until the set is closed.
@@ -29,6 +36,8 @@ def open(paths: Sequence[str | Path], *, reader: str = "auto", strict: bool = Fa
         reader: 'msgflow' (its own decoder), 'bt2' (Babeltrace 2's Python bindings, which end at
             the first damage), or 'auto', which is 'msgflow'.
         strict: end at the first damage.
+        after: the parts of the same recordings that were read before; it takes in these, which can
+            be read only once then. Only msgflow's own decoder can go on like this.
 
     Raises:
         TraceError: there is no readable trace below a path, an archive cannot be unpacked, or
@@ -38,7 +47,7 @@ def open(paths: Sequence[str | Path], *, reader: str = "auto", strict: bool = Fa
     if reader not in READERS:
         raise UsageError(f"there is no reader {reader!r}", hint=f"use one of {', '.join(READERS)}")
     if not any(is_archive(Path(path)) for path in paths):
-        return _open(discover(paths), reader, strict)
+        return _open(discover(paths), reader, strict, after)
     from msgflow.trace.archived_traces import Unpacked, UnpackedTraceSet
 
     unpacked = Unpacked(paths)
@@ -46,17 +55,19 @@ def open(paths: Sequence[str | Path], *, reader: str = "auto", strict: bool = Fa
         with unpacked.explained():
             locations = discover(unpacked.paths)
             locations.sort(key=lambda location: unpacked.shown(location.path))
-            return UnpackedTraceSet(_open(locations, reader, strict), unpacked)
+            return UnpackedTraceSet(_open(locations, reader, strict, after), unpacked)
     except BaseException:
         unpacked.remove()
         raise
 
 
-def _open(locations: Sequence[TraceLocation], reader: str, strict: bool) -> TraceSet:
+def _open(
+    locations: Sequence[TraceLocation], reader: str, strict: bool, after: Continuation | None
+) -> TraceSet:
     if reader == "bt2":
         from msgflow.trace.bt2_reader import Bt2TraceSet
 
         return Bt2TraceSet(locations)
     from msgflow.trace.ctf.reader import CtfTraceSet
 
-    return CtfTraceSet(locations, strict=strict)
+    return CtfTraceSet(locations, strict=strict, after=after)

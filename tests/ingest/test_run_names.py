@@ -10,7 +10,7 @@ import pytest
 
 from msgflow.errors import UsageError
 from msgflow.ingest import ingest
-from msgflow.ingest.ingest import fallback_name
+from msgflow.ingest.stored_run import fallback_name
 
 
 @pytest.mark.parametrize("name", ["all", "7", "-7", ""])

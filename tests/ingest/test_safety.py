@@ -47,7 +47,7 @@ def fail_at(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
 
 FAILURES = {
     "reading": fail_while_reading,
-    "storing": lambda monkeypatch: fail_at(monkeypatch, "free_name"),
+    "storing": lambda monkeypatch: fail_at(monkeypatch, "store_run"),
     "linking": lambda monkeypatch: fail_at(monkeypatch, "derive"),
 }
 

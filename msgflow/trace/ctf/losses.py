@@ -43,6 +43,10 @@ class LossCounter:
         self._of_stream: dict[int, int] = {}
         self._sequences: dict[Recording, int] = {}
 
+    def enter_part(self) -> None:
+        """Begin to read further streams: none of those before goes on, but their recordings do."""
+        self._of_stream.clear()
+
     def losses(self, recording: Recording, stream: Stream, packet: Packet, counts: bool) -> Losses:
         """Return what was lost in a packet and before it.
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from enum import Enum, auto
 from typing import TYPE_CHECKING
 
-from msgflow.trace.ctf.losses import LossCounter, recording_of
+from msgflow.trace.ctf.losses import recording_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from msgflow.trace.ctf.losses import LossCounter
     from msgflow.trace.ctf.packets import Packet
     from msgflow.trace.ctf.streams import Stream
     from msgflow.trace.model import TraceInfo
@@ -108,6 +109,7 @@ def entries_of(
     streams: Sequence[Stream],
     traces: Sequence[TraceInfo],
     begins: Mapping[Packet, tuple[int, int]],
+    counter: LossCounter,
     report: Callable[[Entry, int, str], None],
 ) -> Entries:
     """Return the packets to read, in order of time and without copies.
@@ -120,6 +122,7 @@ def entries_of(
         streams: of all traces.
         traces: what they declare.
         begins: for packets that do not say when they begin, the clock's value and the time.
+        counter: of losses, up to the first of these packets.
         report: called with packet, byte and message for counters that make no sense.
     """
     candidates = []
@@ -141,7 +144,7 @@ def entries_of(
             owners.setdefault((uuid, stream.class_id, stream.instance, begin), stream.trace_index)
 
     entries = []
-    counter = LossCounter()
+    counter.enter_part()
     copies = 0
     repetitions = Repetitions()
     repeated: dict[int, int] = {}

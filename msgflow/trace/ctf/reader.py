@@ -10,6 +10,7 @@ from msgflow.trace.ctf.batches import Iteration
 from msgflow.trace.ctf.declarations import give_order, is_timeless
 from msgflow.trace.ctf.event_positions import BEYOND_END
 from msgflow.trace.ctf.field_types import MetadataError
+from msgflow.trace.ctf.losses import LossCounter
 from msgflow.trace.ctf.packet_header import HeaderReader
 from msgflow.trace.ctf.packet_index import orphans
 from msgflow.trace.ctf.packet_order import entries_of
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 
     import pyarrow as pa
 
+    from msgflow.trace.ctf.continuation import Continuation
     from msgflow.trace.ctf.packet_order import Entry
     from msgflow.trace.ctf.packets import Packet
     from msgflow.trace.ctf.streams import Stream
@@ -39,8 +41,20 @@ if TYPE_CHECKING:
 class CtfTraceSet(ExclusiveTraceSet):
     """Traces read by msgflow itself."""
 
-    def __init__(self, locations: Sequence[TraceLocation], *, strict: bool = False) -> None:
+    def __init__(
+        self,
+        locations: Sequence[TraceLocation],
+        *,
+        strict: bool = False,
+        after: Continuation | None = None,
+    ) -> None:
         """Read the metadata and find the packets; no event is read yet.
+
+        Args:
+            locations: of the traces.
+            strict: end at the first damage.
+            after: the parts of the same recordings that were read before, which takes in these.
+                They can be read only once then.
 
         Raises:
             TraceError: a trace's metadata cannot be understood, or `strict` and it is damaged.
@@ -51,7 +65,8 @@ class CtfTraceSet(ExclusiveTraceSet):
         self._streams: list[Stream] = []
         self._begins: dict[Packet, tuple[int, int]] | None = None
         self._found_early: list[Damage] = []
-        self._time_base = TimeBase()
+        self._time_base = TimeBase() if after is None else after.time_base
+        self._losses = None if after is None else after.losses
         self.damages: list[Damage] = []
         self.traces: tuple[TraceInfo, ...] = tuple(
             self._open(location, index) for index, location in enumerate(locations)
@@ -113,7 +128,10 @@ class CtfTraceSet(ExclusiveTraceSet):
             for stream in self._streams:
                 if stream.has_time:
                     self._begins |= begins_of(stream)
-        entries = entries_of(self._streams, self.traces, self._begins, self._report_in_packet)
+        counter = LossCounter() if self._losses is None else self._losses
+        entries = entries_of(
+            self._streams, self.traces, self._begins, counter, self._report_in_packet
+        )
         self.duplicate_packet_count = entries.copies
         self.repeated_packet_counts = entries.repeated
         iteration = Iteration(

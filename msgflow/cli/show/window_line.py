@@ -1,0 +1,33 @@
+"""A window in one line, for logs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from msgflow.run.window import format_epoch
+from msgflow.text.values import format_duration, printable
+
+if TYPE_CHECKING:
+    from msgflow.watch import WindowReport
+
+# Of format_epoch: hours to milliseconds.
+_TIME = slice(11, 23)
+
+
+def window_line(report: WindowReport) -> str:
+    """Return what matters most in a window."""
+    start, end = (format_epoch(at)[_TIME] for at in report.window.bindings.values())
+    roots = sum(path["roots"] for path in report.paths)
+    reached = sum(path["reached"] for path in report.paths)
+    words = [f"{len(report.paths)} paths", f"{reached:,} of {roots:,} flows arrived"]
+    slow = max(report.paths, key=lambda path: path["max_ns"] or 0, default=None)
+    if slow is not None and slow["max_ns"] is not None:
+        words.append(f"slowest {format_duration(slow['max_ns'])} on {printable(slow['path'])}")
+    missing = sum(loss["dropped"] + loss["lost"] for loss in report.losses)
+    if missing:
+        words.append(f"{missing:,} messages dropped or lost")
+    if report.discarded_events:
+        words.append(f"{report.discarded_events:,} events lost by the tracer")
+    if report.lag_s is not None:
+        words.append(f"lag {report.lag_s:.1f} s")
+    return f"{start} to {end}: {', '.join(words)}"

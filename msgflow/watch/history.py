@@ -1,0 +1,151 @@
+"""The last chunks of all hosts, and the windows over them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from msgflow.run.window import Window
+from msgflow.watch.kept_traces import KeptTraces
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from msgflow.watch.kept_chunk import KeptChunk
+
+# A window may be so much longer, and chunks so much shorter than a step: rotations are never on
+# time. Parts of the whole.
+_SLACK = 0.1
+
+
+class History:
+    """What is kept of a recording: the last chunks, and what lasts of those before.
+
+    *Borders* are the begin of all, and times up to which all hosts had recorded at a step. Windows
+    reach from border to border, so that each moment belongs to a window once its last message can
+    have arrived: at the next border, or later if messages have taken longer.
+
+    Attributes:
+        longest_ns: how long a message, or data that a node kept, was on the way at most.
+        final_ns: the end of the last final window; None before the first.
+    """
+
+    def __init__(self, window_ns: int, step_ns: int) -> None:
+        """Start with nothing.
+
+        Args:
+            window_ns: length of a window.
+            step_ns: least distance of borders.
+        """
+        self._window_ns = window_ns
+        self._step_ns = step_ns
+        self._lasting: list[KeptChunk] = []
+        self._chunks: list[KeptChunk] = []
+        self._borders: list[int] = []
+        self._ends: dict[Path, int] = {}
+        self._last_end_ns = 0
+        self.longest_ns = 0
+        self.final_ns: int | None = None
+
+    @property
+    def complete_ns(self) -> int:
+        """Time up to which all hosts have recorded; there must be a chunk."""
+        return min(self._ends.values())
+
+    @property
+    def last_event_ns(self) -> int:
+        """Time of the last event of all."""
+        return max(chunk.last_event_ns for chunk in self._chunks)
+
+    @property
+    def is_due(self) -> bool:
+        """Whether a further border has come."""
+        if not self._ends:
+            return False
+        return self.complete_ns - self._borders[-1] >= self._step_ns * (1 - _SLACK)
+
+    def add(self, chunk: KeptChunk) -> None:
+        """Add the next chunk of a host."""
+        self._chunks.append(chunk)
+        self._chunks.sort(key=lambda each: each.end_ns)
+        if len(self._borders) < 2:
+            self._borders = [min(each.begin_ns for each in self._chunks)]
+        self._ends[chunk.source] = max(chunk.end_ns, self._ends.get(chunk.source, chunk.end_ns))
+        self._last_end_ns = max(self._last_end_ns, chunk.end_ns)
+
+    def behind(self, patience_ns: int) -> list[Path]:
+        """Return the sources that end so much earlier than the one that has come furthest."""
+        latest = max(self._ends.values(), default=0)
+        return [source for source, end in self._ends.items() if latest - end > patience_ns]
+
+    def go_on_without(self, source: Path) -> None:
+        """Wait for no more chunks of a source; a later chunk of it counts again."""
+        if len(self._ends) > 1:
+            del self._ends[source]
+
+    def add_border(self, *, is_last: bool = False) -> None:
+        """Make a border of the time that all hosts have reached, or of the end of all if it is."""
+        end_ns = self._last_end_ns + 1 if is_last else self.complete_ns
+        if end_ns > self._borders[-1]:
+            self._borders.append(end_ns)
+
+    def newest_window(self) -> Window:
+        """Return the window up to the last border, whose last messages may be on the way."""
+        return self._window_to(self._borders[-1])
+
+    def final_window(self, *, is_last: bool = False) -> Window | None:
+        """Return the window of which all is known; None if there is no further one.
+
+        Args:
+            is_last: nothing more comes.
+        """
+        complete_ns = self._borders[-1]
+        ends = self._borders[1:] if is_last else self._borders[1:-1]
+        known = [end for end in ends if is_last or end <= complete_ns - self.longest_ns]
+        if not known or (self.final_ns is not None and known[-1] <= self.final_ns):
+            return None
+        return self._window_to(known[-1])
+
+    def traces(self, window: Window) -> KeptTraces:
+        """Return what a window needs: itself, and what comes before and after."""
+        needed = self._needed(window)
+        return KeptTraces([*self._lasting, *self._lasting_without(needed)], needed)
+
+    def paths(self, window: Window) -> list[Path]:
+        """Return the directories of the chunks that a window needs."""
+        return [chunk.path for chunk in self._needed(window)]
+
+    def forget(self, window: Window) -> None:
+        """Forget what no window needs that comes after this one, but for what lasts."""
+        needed = self._needed(window)
+        self._lasting += self._lasting_without(needed)
+        self._chunks = needed
+        reach = self._reach(window)
+        self._borders = [border for border in self._borders if border >= reach]
+
+    def _window_to(self, end_ns: int) -> Window:
+        """Return the window that ends at a border, and leaves out nothing since the last one."""
+        before = [border for border in self._borders if border < end_ns]
+        reached = [b for b in before if b >= end_ns - self._window_ns * (1 + _SLACK)]
+        start_ns = reached[0] if reached else before[-1]
+        # Windows as short as steps overlap in nothing.
+        if self.final_ns is not None and (
+            start_ns > self.final_ns or self._window_ns <= self._step_ns
+        ):
+            start_ns = self.final_ns
+        return Window(start_ns, end_ns)
+
+    def _reach(self, window: Window) -> int:
+        """Return the last border that is long enough before a window."""
+        before = [b for b in self._borders if b < window.start_ns]
+        known = [b for b in before if b <= window.start_ns - self.longest_ns]
+        return max(known, default=0)
+
+    def _needed(self, window: Window) -> list[KeptChunk]:
+        reach = self._reach(window)
+        return [chunk for chunk in self._chunks if chunk.end_ns > reach]
+
+    def _lasting_without(self, needed: Sequence[KeptChunk]) -> list[KeptChunk]:
+        """Return what lasts of the chunks that are not needed."""
+        passed = (chunk.lasting() for chunk in self._chunks if chunk not in needed)
+        return [lasting for lasting in passed if lasting is not None]

@@ -1,0 +1,132 @@
+"""A chunk that was read: its events and packets, kept in memory as the reader delivered them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pyarrow as pa
+
+from msgflow import trace as trace_package
+from msgflow.ingest.catalogue import load
+from msgflow.ingest.load import wanted_events
+from msgflow.trace import PACKET
+from msgflow.trace.numpy_arrow import to_arrow, to_numpy
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from msgflow.trace import Continuation, Damage, TraceInfo
+    from msgflow.watch.chunk import Chunk
+
+
+@dataclass(frozen=True, eq=False)
+class KeptChunk:
+    """The content of a chunk.
+
+    Attributes:
+        source: of which recording it is a part.
+        path: its directory, which need not exist any more.
+        traces: what its traces declare.
+        events: by name, in order of `event_id`, which counts those that are kept from 0.
+        times_ns: of all events that are kept, by `event_id`.
+        packets: all packets.
+        event_counts: (trace index, event name) -> events read, kept or not.
+        damages: what is damaged.
+        begin_ns: when its first packet began.
+        end_ns: when its last packet ended.
+    """
+
+    source: Path
+    path: Path
+    traces: tuple[TraceInfo, ...]
+    events: Mapping[str, pa.RecordBatch]
+    times_ns: NDArray[np.int64]
+    packets: tuple[pa.RecordBatch, ...]
+    event_counts: Mapping[tuple[int, str], int]
+    damages: tuple[Damage, ...]
+    begin_ns: int
+    end_ns: int
+
+    @property
+    def last_event_ns(self) -> int:
+        """When its last event happened; its end if it has none."""
+        return int(self.times_ns[-1]) if self.times_ns.size else self.end_ns
+
+    def lasting(self) -> KeptChunk | None:
+        """Return what stays true when the chunk has passed: objects, names; None if there is none.
+
+        It has no packets: nothing of it tells what was lost.
+        """
+        catalogue = load().in_traces
+        kept = {name: batch for name, batch in self.events.items() if catalogue[name].is_lasting}
+        if not kept:
+            return None
+        return replace(self, packets=(), event_counts={}, damages=(), **_renumbered(kept))
+
+
+def read_chunk(chunk: Chunk, after: Continuation) -> KeptChunk | None:
+    """Read a chunk into memory; None if it has no packet at all.
+
+    Args:
+        chunk: which one.
+        after: those that were read before it, which takes it in.
+
+    Raises:
+        TraceError: it cannot be read.
+    """
+    events: dict[str, list[pa.RecordBatch]] = {}
+    packets = []
+    with trace_package.open([chunk.path], after=after) as traces:
+        for batch in traces.batches(wanted_events()):
+            if batch.name == PACKET:
+                packets.append(batch.batch)
+            else:
+                events.setdefault(batch.name, []).append(batch.batch)
+        begins = [trace.begin_ns for trace in traces.traces if trace.begin_ns is not None]
+        ends = [trace.end_ns for trace in traces.traces if trace.end_ns is not None]
+        if not begins or not ends:
+            return None
+        return KeptChunk(
+            source=chunk.source,
+            path=chunk.path,
+            traces=traces.traces,
+            packets=tuple(packets),
+            event_counts=dict(traces.event_counts),
+            damages=tuple(traces.damages),
+            begin_ns=min(begins),
+            end_ns=max(ends),
+            **_renumbered({name: joined(batches) for name, batches in events.items()}),
+        )
+
+
+def joined(batches: list[pa.RecordBatch]) -> pa.RecordBatch:
+    """Return the rows of batches of one schema as one batch."""
+    table = pa.Table.from_batches(batches).unify_dictionaries().combine_chunks()
+    return table.to_batches()[0] if table.num_rows else batches[0]
+
+
+def with_column(batch: pa.RecordBatch, name: str, values: NDArray[Any]) -> pa.RecordBatch:
+    """Return a batch with other values in a column."""
+    place = batch.schema.get_field_index(name)
+    return batch.set_column(place, batch.schema.field(place), to_arrow(values))
+
+
+def _renumbered(events: Mapping[str, pa.RecordBatch]) -> dict[str, Any]:
+    """Return `events` and `times_ns` of a chunk that keeps these events."""
+    nothing = np.empty(0, np.int64)
+    ids = np.concatenate([nothing, *(to_numpy(batch["event_id"]) for batch in events.values())])
+    times = np.concatenate([nothing, *(to_numpy(batch["ts_ns"]) for batch in events.values())])
+    order = np.argsort(ids)
+    ranks = np.empty_like(order)
+    ranks[order] = np.arange(order.size)
+    ends = np.cumsum([batch.num_rows for batch in events.values()])
+    numbered = {
+        name: with_column(batch, "event_id", ranks[end - batch.num_rows : end])
+        for (name, batch), end in zip(events.items(), ends, strict=True)
+    }
+    return {"events": numbered, "times_ns": times[order]}

@@ -1,0 +1,121 @@
+"""What a window shows: rows of the named queries, as `msgflow query` prints them."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from msgflow.query.catalogue import load_query
+from msgflow.query.runner import run_query
+from msgflow.run.slice import Slice
+from msgflow.text.json_value import json_value
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import duckdb
+
+    from msgflow.run.window import Window
+
+Row = dict[str, Any]
+
+_PATH = (
+    "path", "roots", "reached", "superseded", "dropped", "lost", "no_output", "not_connected",
+    "unknown", "cut_by_recording", "loss_affected", "median_ns", "p99_ns", "max_ns", "reasons",
+)  # fmt: skip
+_EXECUTOR = (
+    "host", "process", "pid", "tid", "executor_kind", "callback_share", "callbacks", "seen_ns",
+    "callback_ns", "blocked_ns",
+)  # fmt: skip
+_LOSS = ("topic", "subscriber", "published", "delivered", "dropped", "lost", "reasons")
+_DISCARDED = """
+SELECT coalesce(sum(event_count), 0)::BIGINT
+FROM main.gap
+WHERE kind = 'loss' AND start_ns >= $start_ns AND start_ns < $end_ns
+"""
+# How long messages were on the way, and data that nodes kept.
+_LONGEST = """
+SELECT greatest(
+    (SELECT coalesce(max(latency_ns), 0) FROM main.link_transport),
+    (SELECT coalesce(max(wait_ns), 0) FROM main.link_causal)
+)
+"""
+
+
+@dataclass(frozen=True)
+class WindowReport:
+    """What happened in a window.
+
+    Attributes:
+        window: from when to when.
+        is_final: all is known of it; else messages of its end may be on the way.
+        lag_s: how old its last event is [s]; None of a recording that is finished.
+        paths: rows of `e2e-latency`.
+        executors: rows of `executor-usage`, the busiest first.
+        losses: rows of `topics --measure delivery` with messages that were dropped or lost.
+        discarded_events: events that the tracer lost.
+        violations: what is not as the targets demand.
+        longest_ns: how long a message or data that a node kept was on the way at most.
+    """
+
+    window: Window
+    is_final: bool
+    lag_s: float | None
+    paths: Sequence[Row]
+    executors: Sequence[Row]
+    losses: Sequence[Row]
+    discarded_events: int
+    longest_ns: int
+    violations: Sequence[Row] = field(default=())
+
+    def to_json(self) -> str:
+        """Return it as one line of JSON."""
+        shown = {
+            **self.window.bindings,
+            "is_final": self.is_final,
+            "lag_s": self.lag_s if self.lag_s is None else round(self.lag_s, 3),
+            "paths": self.paths,
+            "executors": self.executors,
+            "losses": self.losses,
+            "discarded_events": self.discarded_events,
+            "violations": self.violations,
+        }
+        return json.dumps(shown, ensure_ascii=False, default=json_value)
+
+
+def report_of(
+    con: duckdb.DuckDBPyConnection, window: Window, *, is_final: bool, lag_s: float | None
+) -> WindowReport:
+    """Ask a database in memory what happened in a window.
+
+    Args:
+        con: with one run.
+        window: which part of it counts.
+        is_final: see `WindowReport`.
+        lag_s: likewise.
+    """
+
+    def ask(name: str, columns: Sequence[str]) -> list[Row]:
+        part = Slice(start=window.start_ns, end=window.end_ns)
+        table = run_query(con, load_query(name), {}, part).table
+        if "topic_name" in table.column_names:
+            table = table.rename_columns({"topic_name": "topic"})
+        rows: list[Row] = table.select(list(columns)).to_pylist()
+        return rows
+
+    paths = ask("e2e-latency", _PATH)
+    executors = ask("executor-usage", _EXECUTOR)
+    losses = ask("topics-delivery", _LOSS)
+    ((discarded,),) = con.execute(_DISCARDED, window.bindings).fetchall()
+    ((longest,),) = con.execute(_LONGEST).fetchall()
+    return WindowReport(
+        window=window,
+        is_final=is_final,
+        lag_s=lag_s,
+        paths=paths,
+        executors=sorted(executors, key=lambda row: -(row["callback_share"] or 0)),
+        losses=[row for row in losses if row["dropped"] or row["lost"]],
+        discarded_events=discarded,
+        longest_ns=max(longest, *(row["max_ns"] or 0 for row in paths), 0),
+    )

@@ -1,0 +1,126 @@
+"""Windows over the chunks of a recording have the numbers of an ingest of the whole."""
+
+from __future__ import annotations
+
+import shutil
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from msgflow.clocks import read_clock_sync
+from msgflow.database import Database
+from msgflow.errors import TraceError
+from msgflow.sim import Recording, simulate
+from msgflow.watch import Watcher, WindowReport, watch_finished
+
+SECOND = 1_000_000_000
+Row = dict[str, Any]
+
+
+def reports(
+    directory: Path, *, window: float, step: float, notes: list[str] | None = None
+) -> list[WindowReport]:
+    watcher = Watcher(
+        window_ns=round(window * SECOND),
+        step_ns=round(step * SECOND),
+        links=None,
+        clocks=read_clock_sync("none"),
+        note=lambda text: None if notes is None else notes.append(text),
+    )
+    return list(watch_finished(directory, watcher))
+
+
+def asked(database: Database, query: str, report: WindowReport) -> list[Row]:
+    window = report.window
+    result = database.query(query, start=window.start_ns, end=window.end_ns)
+    return result.to_arrow().to_pylist()
+
+
+def by_path(rows: list[Row]) -> dict[str, Row]:
+    """Return the rows of paths with roots: others say that nothing happened."""
+    return {row["path"]: row for row in rows if row["roots"]}
+
+
+def require_equal(database: Database, report: WindowReport) -> None:
+    expected = by_path(asked(database, "e2e-latency", report))
+    found = by_path(list(report.paths))
+    assert found == {
+        path: {name: row[name] for name in found[path]} for path, row in expected.items()
+    }
+    executors = asked(database, "executor-usage", report)
+    assert Counter((row["tid"], row["callbacks"], row["callback_ns"]) for row in executors) == (
+        Counter((row["tid"], row["callbacks"], row["callback_ns"]) for row in report.executors)
+    )
+    losses = asked(database, "topics-delivery", report)
+    assert [(row["topic"], row["dropped"], row["lost"]) for row in report.losses] == [
+        (row["topic_name"], row["dropped"], row["lost"])
+        for row in losses
+        if row["dropped"] or row["lost"]
+    ]
+
+
+def require_same_as_whole(directory: Path, database: Path, length: float) -> list[WindowReport]:
+    """Require that each window has the numbers of the whole, and each root is counted once."""
+    found = reports(directory, window=length, step=length)
+    assert len(found) > 2
+    roots: Counter[str] = Counter()
+    with Database(database) as whole:
+        whole.ingest([directory])
+        for report in found:
+            require_equal(whole, report)
+            roots.update({row["path"]: row["roots"] for row in report.paths})
+        rows = whole.query("e2e-latency").to_arrow().to_pylist()
+    assert +roots == Counter({row["path"]: row["roots"] for row in rows if row["roots"]})
+    return found
+
+
+def test_a_real_recording(shared_traces: Path, tmp_path: Path) -> None:
+    """It lost 12 events in its fourth chunk, which is no reason to call a border a gap."""
+    directory = shared_traces / "real_rotate"
+    found = require_same_as_whole(directory, tmp_path / "whole.duckdb", 2)
+    assert sum(report.discarded_events for report in found) == 12
+
+
+@pytest.fixture(scope="module")
+def simulated(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A robot of two hosts, rotated into four chunks each."""
+    directory = tmp_path_factory.mktemp("simulated") / "trace"
+    rotations = tuple(SECOND // 2 * number for number in (1, 2, 3))
+    simulate("two_hosts", directory, factor=0.2, recording=Recording(rotations=rotations))
+    return directory
+
+
+def test_a_simulated_recording(simulated: Path, tmp_path: Path) -> None:
+    require_same_as_whole(simulated, tmp_path / "whole.duckdb", 0.5)
+
+
+def test_windows_that_overlap(simulated: Path) -> None:
+    """A window of two steps has what each of both has."""
+    single = reports(simulated, window=0.5, step=0.5)
+    double = reports(simulated, window=1.0, step=0.5)
+    assert [report.window.end_ns for report in double] == [r.window.end_ns for r in single]
+    both = by_path(list(double[1].paths))
+    halves = [by_path(list(report.paths)) for report in single[:2]]
+    for path, row in both.items():
+        assert row["roots"] == sum(half[path]["roots"] for half in halves if path in half)
+
+
+def test_a_damaged_and_a_missing_chunk_are_said(simulated: Path, tmp_path: Path) -> None:
+    directory = tmp_path / "trace"
+    shutil.copytree(simulated, directory)
+    second, third = sorted(directory.glob("*/archives/*"))[1:3]
+    shutil.rmtree(second)
+    for metadata in third.rglob("metadata"):
+        metadata.write_bytes(b"nothing of CTF")
+    notes: list[str] = []
+    found = reports(directory, window=0.5, step=0.5, notes=notes)
+    assert any("1 chunks are missing before number 3" in note for note in notes)
+    assert any("a chunk cannot be read" in note for note in notes)
+    assert sum(row["roots"] for report in found for row in report.paths) > 0
+
+
+def test_a_recording_without_chunks(tmp_path: Path) -> None:
+    with pytest.raises(TraceError, match="no chunks of a rotated recording"):
+        reports(tmp_path, window=1, step=1)
