@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from msgflow.live import Status
 
 # Of ROS 2; of an instrumented DDS; of CARET.
-_EVENTS = ("ros2:*", "dds:*", "ros2_caret:*")
+EVENTS = ("ros2:*", "dds:*", "ros2_caret:*")
+"""The events that a recording has."""
 
 
 def command(
@@ -93,7 +94,7 @@ def command(
         recorded = record(
             target.absolute(),
             name=name,
-            channel=Channel((*_EVENTS, *(events or [])), sub_buffer_size, sub_buffers),
+            channel=Channel((*EVENTS, *(events or [])), sub_buffer_size, sub_buffers),
             program=program or (),
             seconds=duration,
             kernel=kernel,

@@ -2,22 +2,39 @@
 
 from __future__ import annotations
 
+import tempfile
+import time
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
+from threading import Event
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from msgflow.cli.options import OUTPUT, LinksOption, path_of
+from msgflow.cli.options import OUTPUT, LinksOption, output_option, path_of
+from msgflow.cli.record import EVENTS
+from msgflow.default_files import DEFAULT_PATHS
+from msgflow.errors import ExitCode, RecordingError
 
 if TYPE_CHECKING:
-    from msgflow.watch import WindowReport
+    from collections.abc import Callable, Iterator
+
+    from msgflow.live import Status
+    from msgflow.sql.interrupt import Interrupts
+    from msgflow.watch import Alarm, WindowReport
+
+# Seconds between two looks whether a session is still there.
+_BETWEEN_LOOKS = 1.0
 
 
 def command(
-    directory: Annotated[
-        Path,
+    words: Annotated[
+        list[str],
         typer.Argument(
-            metavar="DIR", help="Directory of a rotated LTTng recording, or above several"
+            metavar="SESSION|DIR|-- COMMAND...",
+            help="An LTTng session, a directory into which rotated recordings come, or what to"
+            " start, record and watch",
         ),
     ],
     window: Annotated[
@@ -39,32 +56,240 @@ def command(
         bool,
         typer.Option("--once", help="Read a finished recording from its first to its last chunk"),
     ] = False,
+    targets: Annotated[
+        Path | None,
+        typer.Option(
+            "--targets",
+            metavar="FILE",
+            parser=path_of,
+            help="Requirements, as `msgflow verify` takes them: what is violated is said at once",
+        ),
+    ] = None,
+    paths: Annotated[
+        Path,
+        typer.Option(
+            "--paths",
+            metavar="FILE",
+            parser=path_of,
+            help="The file with the paths that have names",
+        ),
+    ] = Path(DEFAULT_PATHS),
+    keep: Annotated[
+        Path | None,
+        typer.Option(
+            "--keep-on-violation",
+            metavar="DIR",
+            parser=path_of,
+            help="Keep the chunks around a violation there, with a database of them",
+        ),
+    ] = None,
+    most_kept: Annotated[
+        int,
+        typer.Option("--keep-most", min=1, help="Most violations that are kept, the last ones"),
+    ] = 20,
     as_json: Annotated[
         bool,
         typer.Option("--json", help="Print one JSON object per window", rich_help_panel=OUTPUT),
     ] = False,
+    directory: Annotated[
+        Path | None,
+        output_option(
+            "DIR",
+            "Directory to record COMMAND into",
+            show_default="a temporary one, of the last chunks",
+        ),
+    ] = None,
 ) -> None:
     """See a ROS 2 system while it runs: latency of every path, window by window.
 
-    The recording has to be rotated by LTTng (`lttng enable-rotation --timer 2s`).
+    Ctrl-C ends it. `msgflow watch -- ros2 launch …` starts, records and watches a system; Ctrl-C
+    ends that, too. With --targets the exit code is that of `msgflow verify`.
     """
-    from msgflow.cli.output import print_lines, print_note
+    from msgflow.cli.output import is_screen, print_lines, print_note
+    from msgflow.cli.show.watch_screen import show_screen
     from msgflow.cli.show.window_line import window_line
     from msgflow.clocks import read_clock_sync
     from msgflow.links import read_links
     from msgflow.run.window import duration_ns
-    from msgflow.watch import Watcher, watch_finished
+    from msgflow.verify import Verdict
+    from msgflow.watch import (
+        FlightRecorder,
+        Watcher,
+        remove_chunk,
+        violation_line,
+        watch_finished,
+        watch_live,
+    )
 
+    step_ns = duration_ns(step, "--step")
+    window_ns = duration_ns(window, "--window")
+    alarm = None if targets is None else _alarm(targets, paths)
+    recorder = None
+    if keep is not None:
+        recorder = FlightRecorder(
+            keep.absolute(), most=most_kept, window_ns=window_ns, note=print_note
+        )
     watcher = Watcher(
-        window_ns=duration_ns(window, "--window"),
-        step_ns=duration_ns(step, "--step"),
+        window_ns=window_ns,
+        step_ns=step_ns,
         links=None if links is None else read_links(links),
         clocks=read_clock_sync(clock_sync),
         note=print_note,
+        alarm=alarm,
+        recorder=recorder,
     )
 
-    def show(report: WindowReport) -> None:
-        print_lines([report.to_json() if as_json else window_line(report)])
+    def show(reports: Iterator[WindowReport]) -> None:
+        if as_json:
+            for report in reports:
+                print_lines([report.to_json()])
+        elif is_screen():
+            show_screen(reports)
+        else:
+            for report in reports:
+                violated = [f"violation: {violation_line(each)}" for each in report.violations]
+                print_lines([window_line(report), *violated])
 
-    for report in watch_finished(path_of(directory).absolute(), watcher):
-        show(report)
+    def live(place: Path, is_over: Callable[[], bool]) -> None:
+        show(watch_live(place, watcher, step_ns=step_ns, is_over=is_over, note=print_note))
+
+    place = path_of(words[0]).absolute()
+    if once:
+        show(watch_finished(place, watcher))
+    elif len(words) == 1 and (source := _source(words[0], place)) is not None:
+        found, session = source
+        if session is not None:
+            from msgflow.live import rotate
+
+            rotate(session, step_ns)
+        with _until_interrupted() as interrupts:
+            is_over = _session_is_over(session)
+
+            def ends() -> bool:
+                interrupts.check()
+                return is_over()
+
+            live(found, ends)
+    else:
+        if directory is None:
+            # The recording is ours alone: it need not grow.
+            watcher.on_passed = remove_chunk
+        _record(words, directory, step_ns, live)
+    if alarm is not None and alarm.count(Verdict.FAILED):
+        raise typer.Exit(ExitCode.FAILED)
+    if alarm is not None and alarm.count(Verdict.NOT_MEASURED):
+        raise typer.Exit(ExitCode.NOT_MEASURED)
+
+
+def _alarm(targets: Path, paths: Path) -> Alarm:
+    """Return the alarm of a file of targets."""
+    from msgflow.paths import read_paths
+    from msgflow.verify import read_targets
+    from msgflow.watch import Alarm
+
+    file = read_targets(targets)
+    named = [target.path_name for target in file.targets if target.path_name is not None]
+    known = read_paths(paths) if named else None
+    places = {}
+    for name in named:
+        assert known is not None
+        path = known.named(name.value)
+        places[name.value] = {
+            word: [text.value for text in texts] for word, texts in path.places.items()
+        }
+    return Alarm(file, places)
+
+
+def _record(
+    words: list[str],
+    directory: Path | None,
+    step_ns: int,
+    live: Callable[[Path, Callable[[], bool]], None],
+) -> None:
+    """Start a program, record it, and watch the recording until it ends."""
+    from msgflow.cli.output import print_note
+    from msgflow.live import Channel, record
+
+    ended = Event()
+    with (
+        tempfile.TemporaryDirectory(prefix="msgflow-watch-") as temporary,
+        ThreadPoolExecutor(1) as beside,
+    ):
+        target = (directory or Path(temporary) / "recording").absolute()
+        # The main thread records: it has the signals.
+        watching = beside.submit(live, target, ended.is_set)
+
+        def show(status: Status) -> None:
+            if watching.done():
+                # It has failed: it ends with the recording only.
+                watching.result()
+
+        try:
+            record(
+                target,
+                name=time.strftime("watch-%Y%m%d-%H%M%S"),
+                channel=Channel(EVENTS, "1M", 4, rotation_ns=step_ns),
+                program=words,
+                note=print_note,
+                show=show,
+            )
+        finally:
+            ended.set()
+        watching.result()
+
+
+@contextmanager
+def _until_interrupted() -> Iterator[Interrupts]:
+    """Do what is in the block until Ctrl-C, which is how a view ends."""
+    from msgflow.sql.interrupt import Terminated, noted_interrupts
+
+    with noted_interrupts() as interrupts:
+        try:
+            yield interrupts
+        except Terminated:
+            raise
+        except KeyboardInterrupt:
+            interrupts.answer()
+
+
+def _source(word: str, place: Path) -> tuple[Path, str | None] | None:
+    """Return a directory to watch, and the LTTng session that writes there, if one does.
+
+    Args:
+        word: the name of a session, or a directory.
+        place: the word as a path.
+
+    Returns:
+        None if it is neither.
+    """
+    from msgflow.live import sessions
+
+    try:
+        found = [(each.directory, each.name) for each in sessions() if each.directory is not None]
+    except RecordingError:
+        # LTTng is elsewhere.
+        found = []
+    by_name = next(((path, name) for path, name in found if name == word), None)
+    if by_name is not None or not place.is_dir():
+        return by_name
+    below = (name for path, name in found if path.is_relative_to(place))
+    return place, next(below, None)
+
+
+def _session_is_over(name: str | None) -> Callable[[], bool]:
+    """Return a function that tells whether a session has ended; without one, nothing tells."""
+    from msgflow.live import sessions
+
+    last = time.monotonic()
+
+    def is_over() -> bool:
+        nonlocal last
+        if name is None or time.monotonic() - last < _BETWEEN_LOOKS:
+            return False
+        last = time.monotonic()
+        try:
+            return all(each.name != name for each in sessions())
+        except RecordingError:
+            return True
+
+    return is_over

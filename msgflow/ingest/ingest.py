@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from msgflow.db.finding import Finding
     from msgflow.links import LinksFile
     from msgflow.sql.interrupt import Interrupts
-    from msgflow.trace import Progress
+    from msgflow.trace import Progress, TraceSet
 
 
 @dataclass(frozen=True)
@@ -105,6 +105,7 @@ def ingest(
     events: Sequence[str] = (),
     memory_limit: str | None = None,
     progress: Callable[[IngestProgress], None] | None = None,
+    traces: TraceSet | None = None,
 ) -> IngestReport:
     """Read all traces below `paths` into `database` as one run.
 
@@ -131,6 +132,7 @@ def ingest(
         memory_limit: most memory that the database takes, such as '4GB'; when None a quarter of
             that of the machine, at least 500 MB and at most 4 GB.
         progress: called every now and then.
+        traces: what to read, if it was opened before; `paths` only give the run its name then.
 
     Raises:
         TraceError: a path holds no trace, or none that can be read and used.
@@ -154,7 +156,7 @@ def ingest(
     ):
         watch = _Watch(progress, interrupts)
         watch.enter("opening the traces")
-        with trace_package.open(paths, reader=reader, strict=strict) as traces:
+        with traces or trace_package.open(paths, reader=reader, strict=strict) as traces:
             refusals.require_ros_traces(traces.traces)
             hostnames = hostnames_of(traces.traces, hosts or {})
             migration.require_ingestable(database)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
+from msgflow.live.lttng import sessions
 from msgflow.live.recording import BYTES_OF_EVENT, Recorded, Status, record
-from msgflow.live.session import Channel
+from msgflow.live.session import Channel, rotate
 
-__all__ = ["BYTES_OF_EVENT", "Channel", "Recorded", "Status", "record"]
+__all__ = ["BYTES_OF_EVENT", "Channel", "Recorded", "Status", "record", "rotate", "sessions"]

@@ -32,11 +32,13 @@ class Channel:
         events: names, or patterns of them, such as `ros2:*`.
         sub_buffer_size: of each CPU, in the words of LTTng, such as `1M`.
         sub_buffers: their number.
+        rotation_ns: length of the chunks that the recording is cut into; None: it is not.
     """
 
     events: tuple[str, ...]
     sub_buffer_size: str
     sub_buffers: int
+    rotation_ns: int | None = None
 
 
 @contextmanager
@@ -71,6 +73,8 @@ def recording_session(
         _set_up(name, channel)
         if with_kernel:
             _set_up_kernel(name, channel)
+        if channel.rotation_ns is not None:
+            rotate(name, channel.rotation_ns)
         lttng("start", name)
         yield
     finally:
@@ -78,6 +82,19 @@ def recording_session(
         # named: the next recording removes the session.
         lttng("destroy", name)
         owner.unlink()
+
+
+def rotate(name: str, length_ns: int) -> None:
+    """Let a session cut its recording into chunks from now on; one that does so already goes on.
+
+    Raises:
+        RecordingError: it cannot, as one with a live connection or a snapshot session.
+    """
+    try:
+        lttng("enable-rotation", f"--session={name}", f"--timer={length_ns // 1000}us")
+    except RecordingError as error:
+        if "already set" not in error.message:
+            raise
 
 
 def record_snapshot(name: str, directory: Path) -> None:

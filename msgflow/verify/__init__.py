@@ -2,5 +2,6 @@
 
 from msgflow.verify.file import TargetsFile, read_targets
 from msgflow.verify.verify import Verdict, Verification, verify
+from msgflow.verify.worst_case import take_of
 
-__all__ = ["TargetsFile", "Verdict", "Verification", "read_targets", "verify"]
+__all__ = ["TargetsFile", "Verdict", "Verification", "read_targets", "take_of", "verify"]

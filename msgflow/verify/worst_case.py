@@ -72,6 +72,17 @@ def find_worst_case(
     return worst_case_of(rows[0]) if rows else None
 
 
+def take_of(command: str | None) -> int | None:
+    """Return the take at the end of the flow that the command of a worst case shows.
+
+    None where it shows something else.
+    """
+    match shlex.split(command or ""):
+        case ["msgflow", "flow", "--take", identity]:
+            return int(identity)
+    return None
+
+
 def worst_case_of(row: Sequence[Any]) -> WorstCase:
     """Return the worst case in a row of such a statement."""
     duration, at_ns, identity, kind = row

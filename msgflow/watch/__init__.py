@@ -2,8 +2,21 @@
 
 from __future__ import annotations
 
-from msgflow.watch.chunk import finished_chunks
-from msgflow.watch.watcher import Watcher, watch_finished
+from msgflow.watch.alarm import Alarm, violation_line
+from msgflow.watch.chunk import finished_chunks, remove_chunk
+from msgflow.watch.flight_recorder import FlightRecorder
+from msgflow.watch.follow import watch_finished, watch_live
+from msgflow.watch.watcher import Watcher
 from msgflow.watch.window_report import WindowReport
 
-__all__ = ["Watcher", "WindowReport", "finished_chunks", "watch_finished"]
+__all__ = [
+    "Alarm",
+    "FlightRecorder",
+    "Watcher",
+    "WindowReport",
+    "finished_chunks",
+    "remove_chunk",
+    "violation_line",
+    "watch_finished",
+    "watch_live",
+]

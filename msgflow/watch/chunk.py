@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator
+    from collections.abc import Iterator, Mapping
 
 _ARCHIVES = "archives"
 # Begin, end, number; see "Session rotation" of lttng-rotate(1).
@@ -31,14 +32,24 @@ class Chunk:
     path: Path
 
 
-def finished_chunks(directory: Path, known: Collection[Path] = ()) -> list[Chunk]:
+def finished_chunks(directory: Path, after: Mapping[Path, int] | None = None) -> list[Chunk]:
     """Return the finished chunks below a directory, of all hosts, by number.
 
     Args:
         directory: of a session, or above several, such as that of lttng-relayd.
-        known: paths of chunks that are left out.
+        after: source -> number of the last chunk that is left out, with all before it.
     """
-    return sorted(chunk for chunk in _chunks(directory) if chunk.path not in known)
+    last = after or {}
+    return sorted(
+        chunk
+        for chunk in _chunks(directory)
+        if chunk.source not in last or chunk.number > last[chunk.source]
+    )
+
+
+def remove_chunk(path: Path) -> None:
+    """Remove a chunk from the disk; its session goes on."""
+    shutil.rmtree(path, ignore_errors=True)
 
 
 def _chunks(directory: Path) -> Iterator[Chunk]:

@@ -26,7 +26,8 @@ class History:
     have arrived: at the next border, or later if messages have taken longer.
 
     Attributes:
-        longest_ns: how long a message, or data that a node kept, was on the way at most.
+        longest_ns: how long a message, or data that a node kept, was on the way at most; no longer
+            than a window.
         final_ns: the end of the last final window; None before the first.
     """
 
@@ -48,9 +49,19 @@ class History:
         self.final_ns: int | None = None
 
     @property
+    def is_empty(self) -> bool:
+        """Whether there was no chunk yet."""
+        return not self._chunks
+
+    @property
     def complete_ns(self) -> int:
         """Time up to which all hosts have recorded; there must be a chunk."""
         return min(self._ends.values())
+
+    @property
+    def border_ns(self) -> int:
+        """The last border."""
+        return self._borders[-1]
 
     @property
     def last_event_ns(self) -> int:
@@ -83,6 +94,10 @@ class History:
         if len(self._ends) > 1:
             del self._ends[source]
 
+    def note_longest(self, longest_ns: int) -> None:
+        """Note how long a message was on the way, which windows wait for: a window at the most."""
+        self.longest_ns = max(self.longest_ns, min(longest_ns, self._window_ns))
+
     def add_border(self, *, is_last: bool = False) -> None:
         """Make a border of the time that all hosts have reached, or of the end of all if it is."""
         end_ns = self._last_end_ns + 1 if is_last else self.complete_ns
@@ -99,6 +114,8 @@ class History:
         Args:
             is_last: nothing more comes.
         """
+        if not self._borders:
+            return None
         complete_ns = self._borders[-1]
         ends = self._borders[1:] if is_last else self._borders[1:-1]
         known = [end for end in ends if is_last or end <= complete_ns - self.longest_ns]
@@ -115,13 +132,19 @@ class History:
         """Return the directories of the chunks that a window needs."""
         return [chunk.path for chunk in self._needed(window)]
 
-    def forget(self, window: Window) -> None:
-        """Forget what no window needs that comes after this one, but for what lasts."""
+    def forget(self, window: Window) -> list[Path]:
+        """Forget what no window needs that comes after this one, but for what lasts.
+
+        Returns:
+            The directories of the chunks that are forgotten.
+        """
         needed = self._needed(window)
         self._lasting += self._lasting_without(needed)
+        passed = [chunk.path for chunk in self._chunks if chunk not in needed]
         self._chunks = needed
         reach = self._reach(window)
         self._borders = [border for border in self._borders if border >= reach]
+        return passed
 
     def _window_to(self, end_ns: int) -> Window:
         """Return the window that ends at a border, and leaves out nothing since the last one."""

@@ -3,31 +3,40 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
 from msgflow.ingest.memory import ingested_in_memory
+from msgflow.run.window import Window
 from msgflow.trace import Continuation
-from msgflow.watch.chunk import finished_chunks
 from msgflow.watch.history import History
 from msgflow.watch.kept_chunk import read_chunk
 from msgflow.watch.window_report import report_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
     from pathlib import Path
 
     from msgflow.clocks import ClockSync
     from msgflow.links import LinksFile
-    from msgflow.run.window import Window
+    from msgflow.watch.alarm import Alarm
     from msgflow.watch.chunk import Chunk
+    from msgflow.watch.flight_recorder import FlightRecorder
     from msgflow.watch.window_report import WindowReport
 
 _RUN = "watch"
+_SECOND_NS = 1_000_000_000
 
 
 class Watcher:
-    """What is known of a recording so far, and the windows over it."""
+    """What is known of a recording so far, and the windows over it.
+
+    Attributes:
+        history: the last chunks.
+        numbers: of the last chunk of each source.
+        on_passed: gets the directory of each chunk that no window needs any more.
+    """
 
     def __init__(
         self,
@@ -37,6 +46,8 @@ class Watcher:
         links: LinksFile | None,
         clocks: ClockSync,
         note: Callable[[str], None],
+        alarm: Alarm | None = None,
+        recorder: FlightRecorder | None = None,
     ) -> None:
         """Start before the first chunk.
 
@@ -46,18 +57,23 @@ class Watcher:
             links: indirect links to declare.
             clocks: how clocks of several hosts are brought together.
             note: gets sentences about what is wrong with the recording.
+            alarm: the targets of each window.
+            recorder: keeps the chunks around a violation.
         """
         self.history = History(window_ns, step_ns)
         self._links = links
         self._clocks = clocks
         self._note = note
+        self._alarm = alarm
+        self._recorder = recorder
+        self.on_passed: Callable[[Path], None] | None = None
         self._after = Continuation()
-        self._numbers: dict[Path, int] = {}
+        self.numbers: dict[Path, int] = {}
 
     def read(self, chunk: Chunk) -> None:
         """Read the next chunk of a host; what is wrong with it is noted, and the others go on."""
-        before = self._numbers.get(chunk.source)
-        self._numbers[chunk.source] = chunk.number
+        before = self.numbers.get(chunk.source)
+        self.numbers[chunk.source] = chunk.number
         if before is not None and chunk.number > before + 1:
             self._note(
                 f"{chunk.number - before - 1} chunks are missing before number {chunk.number}"
@@ -75,6 +91,15 @@ class Watcher:
             self._note(f"{len(kept.damages)} damages in {chunk.path}, the first: {first.message}")
         self.history.add(kept)
 
+    def go_on(self) -> None:
+        """Make a border if one is due, and forget what no window needs."""
+        if not self.history.is_due:
+            return
+        self.history.add_border()
+        if self.history.final_ns is None:
+            # So much has been recorded before we came.
+            self._forget(self.history.newest_window())
+
     def final_report(self, *, is_live: bool, is_last: bool = False) -> WindowReport | None:
         """Return the next window of which all is known; None if there is none yet.
 
@@ -87,41 +112,28 @@ class Watcher:
             return None
         report = self._report(window, is_final=True, is_live=is_live)
         self.history.final_ns = window.end_ns
-        self.history.forget(window)
+        self._forget(window)
         return report
+
+    def _forget(self, window: Window) -> None:
+        for path in self.history.forget(window):
+            if self.on_passed is not None:
+                self.on_passed(path)
 
     def _report(self, window: Window, *, is_final: bool, is_live: bool) -> WindowReport:
         traces = self.history.traces(window)
         with ingested_in_memory(traces, _RUN, links=self._links, clocks=self._clocks) as con:
-            lag_s = (time.time_ns() - self.history.last_event_ns) / 1e9 if is_live else None
-            report = report_of(con, window, is_final=is_final, lag_s=lag_s)
-        self.history.longest_ns = max(self.history.longest_ns, report.longest_ns)
+            report = report_of(con, window, is_final=is_final)
+            if self._alarm is not None:
+                # What came after the window counts, too: an alarm must be early.
+                whole = Window(window.start_ns, self.history.border_ns)
+                found = self._alarm.violations(con, whole, window.end_ns)
+                report = replace(report, violations=found)
+        if report.violations and self._recorder is not None:
+            chunks = self.history.paths(window)
+            self._recorder.keep(self.history.border_ns, traces, chunks)
+        self.history.note_longest(report.longest_ns)
+        if is_live:
+            lag_s = (time.time_ns() - self.history.last_event_ns) / _SECOND_NS
+            report = replace(report, lag_s=lag_s)
         return report
-
-
-def watch_finished(directory: Path, watcher: Watcher) -> Iterator[WindowReport]:
-    """Watch a recording that has ended, from its first to its last chunk.
-
-    Raises:
-        TraceError: there is no chunk.
-    """
-    chunks = finished_chunks(directory)
-    if not chunks:
-        raise TraceError(
-            f"there are no chunks of a rotated recording — {directory}",
-            f"msgflow ingest {directory} reads what was recorded as a whole",
-        )
-    left = [chunk.source for chunk in chunks]
-    for chunk in chunks:
-        watcher.read(chunk)
-        left.remove(chunk.source)
-        # A host whose chunks begin with a higher number is waited for.
-        if chunk.source not in left:
-            watcher.history.go_on_without(chunk.source)
-        if watcher.history.is_due:
-            watcher.history.add_border()
-            if (report := watcher.final_report(is_live=False)) is not None:
-                yield report
-    watcher.history.add_border(is_last=True)
-    if (report := watcher.final_report(is_live=False, is_last=True)) is not None:
-        yield report

@@ -61,13 +61,13 @@ class WindowReport:
 
     window: Window
     is_final: bool
-    lag_s: float | None
     paths: Sequence[Row]
     executors: Sequence[Row]
     losses: Sequence[Row]
     discarded_events: int
     longest_ns: int
     violations: Sequence[Row] = field(default=())
+    lag_s: float | None = None
 
     def to_json(self) -> str:
         """Return it as one line of JSON."""
@@ -84,16 +84,13 @@ class WindowReport:
         return json.dumps(shown, ensure_ascii=False, default=json_value)
 
 
-def report_of(
-    con: duckdb.DuckDBPyConnection, window: Window, *, is_final: bool, lag_s: float | None
-) -> WindowReport:
+def report_of(con: duckdb.DuckDBPyConnection, window: Window, *, is_final: bool) -> WindowReport:
     """Ask a database in memory what happened in a window.
 
     Args:
         con: with one run.
         window: which part of it counts.
         is_final: see `WindowReport`.
-        lag_s: likewise.
     """
 
     def ask(name: str, columns: Sequence[str]) -> list[Row]:
@@ -112,7 +109,6 @@ def report_of(
     return WindowReport(
         window=window,
         is_final=is_final,
-        lag_s=lag_s,
         paths=paths,
         executors=sorted(executors, key=lambda row: -(row["callback_share"] or 0)),
         losses=[row for row in losses if row["dropped"] or row["lost"]],

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -13,32 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from recording.recorder import NotPossibleError, one_at_a_time, require, ros_environment
-from recording.tracetools import build_tracetools
-
-# `make` installs the wheels of ROS 2 there.
-ROS = Path(sys.prefix) / "ros" / "bin" / "python"
-NODE = """
-import sys
-import rclpy
-from rclpy.executors import ExternalShutdownException
-from rclpy.node import Node
-from std_msgs.msg import UInt64
-
-rclpy.init()
-camera, detector = Node("camera"), Node("detector")
-image = camera.create_publisher(UInt64, "/image", 10)
-objects = detector.create_publisher(UInt64, "/objects", 10)
-detector.create_subscription(UInt64, "/image", objects.publish, 10)
-camera.create_timer(float(sys.argv[1]), lambda: image.publish(UInt64()))
-executor = rclpy.executors.SingleThreadedExecutor()
-executor.add_node(camera)
-executor.add_node(detector)
-try:
-    executor.spin()
-except (ExternalShutdownException, KeyboardInterrupt):
-    pass
-"""
+from lttng_program import lttng
 
 
 @dataclass
@@ -51,15 +25,6 @@ class Ended:
 
 
 Record = Callable[..., Ended]
-
-
-@pytest.fixture(autouse=True)
-def _alone() -> Iterator[None]:
-    if shutil.which("lttng-sessiond") is None:
-        pytest.skip("no LTTng")
-    with one_at_a_time():
-        yield
-        assert daemons() == []
 
 
 @pytest.fixture
@@ -86,49 +51,6 @@ def record(tmp_path: Path) -> Record:
         return Ended(process.returncode, out, err)
 
     return run
-
-
-@pytest.fixture
-def robot(tmp_path: Path) -> list[str]:
-    """Start of a command: two nodes, which have tracepoints, of a period to name."""
-    try:
-        require(ROS)
-    except NotPossibleError as error:
-        pytest.skip(f"cannot record: {error}")
-    (tmp_path / "library").mkdir()
-    library = build_tracetools(tmp_path / "library")
-    environment = ros_environment(ROS) | {"LD_PRELOAD": str(library)}
-    changed = {name: value for name, value in environment.items() if value != os.environ.get(name)}
-    return ["env", *(f"{name}={value}" for name, value in changed.items()), str(ROS), "-c", NODE]
-
-
-@pytest.fixture
-def daemon() -> Iterator[None]:
-    """A session daemon that someone else started."""
-    process = subprocess.Popen(["lttng-sessiond", "--no-kernel", "--quiet"])
-    end = time.monotonic() + 20
-    while lttng("list").returncode and time.monotonic() < end:
-        time.sleep(0.1)
-    yield
-    process.terminate()
-    process.wait()
-
-
-def lttng(*words: str) -> subprocess.CompletedProcess[str]:
-    command = ["lttng", "--no-sessiond", *words]
-    return subprocess.run(command, capture_output=True, text=True)
-
-
-def daemons() -> list[str]:
-    """Return the numbers of session daemons, once those that end have ended."""
-    end = time.monotonic() + 10
-    while found := subprocess.run(
-        ["pgrep", "-x", "-r", "D,R,S", "lttng-sessiond"], capture_output=True, text=True
-    ).stdout.split():
-        if time.monotonic() > end:
-            break
-        time.sleep(0.1)
-    return found
 
 
 def test_from_a_robot_to_an_answer(record: Record, robot: list[str], tmp_path: Path) -> None:

@@ -1,0 +1,144 @@
+"""Alarms: targets that a window does not meet, and what was to blame."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from msgflow.query.catalogue import load_query
+from msgflow.query.runner import run_query
+from msgflow.run.slice import Slice
+from msgflow.text.values import format_duration
+from msgflow.verify import Verdict, take_of, verify
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    import duckdb
+
+    from msgflow.run.window import Window
+    from msgflow.verify import TargetsFile
+
+Row = dict[str, Any]
+
+# By the activity of a piece of a flow, see the query critical-path.
+_BLAME = {
+    "callback": "{node} ran {time}",
+    "network_or_idle": "{what} took {time} to {node}",
+    "executor_busy": "kept waiting {time} by {node}, which ran {what}",
+    "all_threads_busy": "kept waiting {time} for a thread, one ran {what} of {node}",
+    "blocked": "kept waiting {time} by {what} of {node}, which excludes it",
+    "undecided": "{node} did not take it for {time}",
+    "take_to_callback": "{node} took it {time} before it used it",
+    "timer": "{node} waited {time} for its timer",
+    "unpublished": "{node} waited {time} for {what}",
+}
+_OTHER = "{node} spent {time} on {activity}"
+# A piece that took a smaller part of the latency is not to blame.
+_LEAST_SHARE = 0.2
+_MOST_PIECES = 2
+
+
+class Alarm:
+    """The targets, and which of them were met since the begin."""
+
+    def __init__(
+        self, targets: TargetsFile, paths: Mapping[str, Mapping[str, Sequence[str]]]
+    ) -> None:
+        """Start without a verdict.
+
+        Args:
+            targets: the requirements.
+            paths: places of the named paths of the requirements, as `verify` takes them.
+        """
+        self._targets = targets
+        self._paths = paths
+        # By (target, metric, condition).
+        self._verdicts: dict[tuple[str, str, str], Verdict] = {}
+        self._failing: set[tuple[Any, ...]] = set()
+
+    def count(self, verdict: Verdict) -> int:
+        """Return how many requirements have a verdict: one that failed once has failed."""
+        return list(self._verdicts.values()).count(verdict)
+
+    def violations(
+        self, con: duckdb.DuckDBPyConnection, window: Window, final_ns: int
+    ) -> list[Row]:
+        """Verify a window, and return what is violated there and was not before.
+
+        Args:
+            con: to a database with one run.
+            window: the window, with the part of it that is not final yet.
+            final_ns: where this part begins.
+        """
+        part = Slice(start=window.start_ns, end=window.end_ns)
+        rows = verify(con, self._targets, part, paths=self._paths).result.table.to_pylist()
+        found = []
+        failing = set()
+        for row in rows:
+            self._note(row)
+            if row["verdict"] != Verdict.FAILED:
+                continue
+            # A worst case is told once, however long windows show it.
+            names = ("target", "metric", "condition", "subject", "worst_at_ns")
+            key = tuple(row[name] for name in names)
+            failing.add(key)
+            if key not in self._failing:
+                found.append(self._violation(con, row, part, final_ns))
+        self._failing = failing
+        return found
+
+    def _note(self, row: Row) -> None:
+        key = (row["target"], row["metric"], row["condition"])
+        before = self._verdicts.get(key)
+        verdict = Verdict(row["verdict"])
+        if before is None or verdict is Verdict.FAILED or before is Verdict.NOT_MEASURED:
+            self._verdicts[key] = verdict
+
+    @staticmethod
+    def _violation(con: duckdb.DuckDBPyConnection, row: Row, part: Slice, final_ns: int) -> Row:
+        take_id = take_of(row["see"])
+        pieces: list[Row] = []
+        if take_id is not None:
+            asked = {"take": take_id}
+            pieces = run_query(con, load_query("critical-path"), asked, part).table.to_pylist()
+        at_ns = row["worst_at_ns"]
+        return {
+            "subject": row["subject"] or row["target"],
+            "path": row["path"],
+            "metric": row["metric"],
+            "condition": row["condition"],
+            "measured": row["measured"],
+            "worst_ns": row["worst_ns"],
+            "at_ns": at_ns,
+            "is_final": at_ns is None or at_ns < final_ns,
+            "culprit": ", ".join(_blamed(pieces)) or None,
+        }
+
+
+def violation_line(violation: Row) -> str:
+    """Return a violation in one line: what, how much, and what was to blame."""
+    worst = violation["worst_ns"]
+    longest = "" if worst is None else format_duration(worst)
+    longest = f", up to {longest}" if longest not in ("", violation["measured"]) else ""
+    words = (
+        f"{violation['subject']}: {violation['metric']} {violation['measured']}{longest}, required"
+        f" {violation['condition']}"
+    )
+    if violation["culprit"]:
+        words += f": {violation['culprit']}"
+    if violation["path"] and violation["path"] != violation["subject"]:
+        words += f" — {violation['path']}"
+    return words if violation["is_final"] else f"{words} (provisional)"
+
+
+def _blamed(pieces: Sequence[Row]) -> Iterator[str]:
+    """Yield what took longest of a flow."""
+    slowest = sorted(pieces, key=lambda piece: -piece["duration_ns"])
+    for piece in slowest[:_MOST_PIECES]:
+        if piece["activity"] != "rest" and (piece["share"] or 0) >= _LEAST_SHARE:
+            yield _BLAME.get(piece["activity"], _OTHER).format(
+                node=piece["node"] or "an unknown node",
+                what=piece["what"] or "a message",
+                activity=piece["activity"].replace("_", " "),
+                time=format_duration(piece["duration_ns"]),
+            )

@@ -1,0 +1,73 @@
+"""Flight recorder: keeps the chunks around a violation, and a database of them."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from typing import TYPE_CHECKING
+
+from msgflow.errors import MsgflowError
+from msgflow.ingest import ingest
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from pathlib import Path
+
+    from msgflow.watch.kept_traces import KeptTraces
+
+_DATABASE = "msgflow.duckdb"
+
+
+class FlightRecorder:
+    """Directories of violations, the oldest of which are removed.
+
+    A violation that goes on is kept once per window.
+    """
+
+    def __init__(
+        self, directory: Path, *, most: int, window_ns: int, note: Callable[[str], None]
+    ) -> None:
+        """Keep nothing yet.
+
+        Args:
+            directory: gets a directory per violation.
+            most: how many of them stay.
+            window_ns: length of a window.
+            note: gets a sentence about what was kept, or why not.
+        """
+        self._directory = directory
+        self._most = most
+        self._window_ns = window_ns
+        self._note = note
+        self._kept: list[Path] = []
+        self._until_ns = 0
+
+    def keep(self, end_ns: int, traces: KeptTraces, chunks: Sequence[Path]) -> None:
+        """Keep the last chunks, unless a violation in the same window has kept them.
+
+        Args:
+            end_ns: until when they were recorded.
+            traces: their events, with the names of all objects.
+            chunks: their directories; of those that are gone only the events are kept.
+        """
+        if end_ns < self._until_ns:
+            return
+        self._until_ns = end_ns + self._window_ns
+        moment = time.strftime("%Y%m%d-%H%M%S", time.gmtime(end_ns // 1_000_000_000))
+        target = self._directory / f"violation-{moment}"
+        try:
+            target.mkdir(parents=True)
+            for chunk in chunks:
+                if chunk.is_dir():
+                    place = target / "archives" / chunk.parent.parent.name / chunk.name
+                    shutil.copytree(chunk, place)
+            ingest([target], target / _DATABASE, name=target.name, traces=traces)
+        except (OSError, MsgflowError) as error:
+            # A disk that is full must not end the view.
+            shutil.rmtree(target, ignore_errors=True)
+            self._note(f"the violation is not kept: {error}")
+            return
+        self._kept.append(target)
+        while len(self._kept) > self._most:
+            shutil.rmtree(self._kept.pop(0), ignore_errors=True)
+        self._note(f"kept: msgflow why --db {target / _DATABASE}")

@@ -1,0 +1,80 @@
+"""The screen of `msgflow watch`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from rich.console import Console
+
+from msgflow.cli.show.watch_screen import WatchScreen
+from msgflow.run.window import Window
+from msgflow.watch import WindowReport
+
+START_NS = 1_700_000_000_000_000_000
+MS = 1_000_000
+
+
+def path(name: str, max_ms: int, lost: int = 0) -> dict[str, Any]:
+    others = ("roots", "superseded", "dropped", "no_output", "not_connected", "unknown")
+    return dict.fromkeys(others, 0) | {
+        "path": name,
+        "reached": 100,
+        "lost": lost,
+        "median_ns": max_ms * MS // 2,
+        "p99_ns": max_ms * MS,
+        "max_ns": max_ms * MS,
+        "reasons": None,
+    }
+
+
+def report(*paths: dict[str, Any], **more: Any) -> WindowReport:
+    executor = {"process": "detector", "tid": 77, "callback_share": 0.5, "callbacks": 100}
+    executor |= {"callback_ns": 5_000 * MS, "blocked_ns": 0}
+    window = Window(START_NS, START_NS + 10_000 * MS)
+    given = {"losses": (), "discarded_events": 0, "longest_ns": 0, "lag_s": 1.25} | more
+    return WindowReport(window, True, paths, [executor], **given)
+
+
+def lines(screen: WatchScreen, shown: WindowReport) -> list[str]:
+    console = Console(width=80, record=True, file=None, force_terminal=False, quiet=False)
+    with console.capture() as capture:
+        console.print(screen.of(shown))
+    return [line.rstrip() for line in capture.get().splitlines()]
+
+
+def test_what_is_worst_comes_first() -> None:
+    found = lines(WatchScreen(), report(path("/a → /b", 80), path("/c → /d", 5, lost=3)))
+    assert found[0] == "22:13:20 to 22:13:30   2 paths   lag 1.2 s   0 events lost by the tracer"
+    order = [line.split()[0] for line in found if line.startswith("/")]
+    assert order == ["/c", "/a"]
+    assert next(line for line in found if line.startswith("/a")).split()[3:10] == [
+        "10", "40", "ms", "80", "ms", "80", "ms"
+    ]  # fmt: skip
+    assert any(line.split()[:3] == ["detector", "77", "50"] for line in found)
+
+
+@pytest.mark.parametrize("length", [10, 300])
+def test_it_fits_80_columns(length: int) -> None:
+    screen = WatchScreen()
+    losses = [
+        {"topic": "/t" * length, "subscriber": "/n", "dropped": 12, "lost": 0, "reasons": "r" * 99}
+    ]
+    for _ in range(12):
+        found = lines(screen, report(path("/x" * length, 99_999), losses=losses))
+    assert max(map(len, found)) <= 80
+    # Ten steps, all of them as slow.
+    assert any("█" * 10 in line for line in found)
+
+
+def test_a_violation_stays_on_the_screen() -> None:
+    violation = {
+        "subject": "/cmd", "path": None, "metric": "latency", "condition": "max < 80 ms",
+        "measured": "182.000 ms", "worst_ns": 182 * MS, "is_final": False,
+        "culprit": "/detector ran 141.000 ms",
+    }  # fmt: skip
+    screen = WatchScreen()
+    lines(screen, report(violations=[violation]))
+    text = " ".join(lines(screen, report()))
+    assert "22:13:30 /cmd: latency 182.000 ms, required max < 80 ms: /detector ran" in text
+    assert "(provisional)" in text

@@ -1,0 +1,122 @@
+"""`msgflow watch` with the real LTTng, while nodes run: what it shows, and that it ends."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from lttng_program import lttng
+
+PATH = "/camera → /image → /detector"
+Watch = Callable[..., subprocess.Popen[str]]
+
+
+@pytest.fixture
+def watch(tmp_path: Path) -> Iterator[Watch]:
+    """Starts the command in an empty directory, with windows of a second, as JSON."""
+    started = []
+
+    def run(*words: object) -> subprocess.Popen[str]:
+        options = ("--json", "--window", "1s", "--step", "1s")
+        process = subprocess.Popen(
+            [sys.executable, "-m", "msgflow", "watch", *options, *map(str, words)],
+            cwd=tmp_path,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        started.append(process)
+        return process
+
+    yield run
+    for process in started:
+        process.kill()
+        process.wait()
+
+
+def windows(process: subprocess.Popen[str]) -> tuple[list[dict[str, Any]], str]:
+    """Return the windows of a command that ends, and what it said."""
+    out, err = process.communicate(timeout=200)
+    assert process.returncode == 0, err
+    return [json.loads(line) for line in out.splitlines()], err
+
+
+def require_whole(found: list[dict[str, Any]]) -> None:
+    """Require windows without a hole, and messages on their way to the end."""
+    for before, after in itertools.pairwise(found):
+        assert before["end_ns"] == after["start_ns"]
+    assert all(window["is_final"] for window in found)
+    assert sum(path["reached"] for window in found for path in window["paths"]) > 30
+    assert not any(window["losses"] for window in found)
+
+
+def test_a_program_is_recorded_and_watched(watch: Watch, robot: list[str], tmp_path: Path) -> None:
+    found, _ = windows(watch("--", "timeout", "-s", "INT", "8", *robot, "0.05"))
+    assert len(found) > 1
+    require_whole(found)
+    # The recording was temporary.
+    assert [path.name for path in tmp_path.iterdir()] == ["library"]
+
+
+@pytest.fixture
+def session(daemon: None, tmp_path: Path) -> Iterator[Path]:
+    """Session `drive` of someone else, which is not rotated yet."""
+    directory = tmp_path / "drive"
+    lttng("create", "drive", f"--output={directory}")
+    lttng("enable-event", "--userspace", "ros2:*", "--session=drive")
+    types = [f"--type={name}" for name in ("vpid", "vtid", "procname")]
+    lttng("add-context", "--userspace", "--session=drive", *types)
+    lttng("start", "drive")
+    yield directory
+    lttng("destroy", "drive")
+
+
+def wait_for_window(process: subprocess.Popen[str]) -> dict[str, Any]:
+    """Return the next window that has messages."""
+    assert process.stdout is not None
+    for line in process.stdout:
+        window = json.loads(line)
+        if any(path["reached"] for path in window["paths"]):
+            return window
+    raise AssertionError(process.stderr and process.stderr.read())
+
+
+def test_a_session_is_rotated_and_its_end_noticed(
+    watch: Watch, session: Path, robot: list[str]
+) -> None:
+    """A watcher that is killed does no harm; the next one knows the names of all nodes."""
+    with subprocess.Popen([*robot, "0.05"]) as node:
+        try:
+            first = watch("drive")
+            wait_for_window(first)
+            first.kill()
+            second = watch(session)
+            window = wait_for_window(second)
+            assert any(PATH in path["path"] for path in window["paths"])
+            assert window["lag_s"] > 0
+            lttng("destroy", "drive")
+            found, _ = windows(second)
+        finally:
+            node.kill()
+    assert found[-1]["lag_s"] is None
+    assert found[-1]["end_ns"] > window["end_ns"]
+
+
+def test_ctrl_c_ends_the_view_and_not_the_session(watch: Watch, session: Path) -> None:
+    process = watch("drive")
+    time.sleep(6)
+    process.send_signal(signal.SIGINT)
+    _, err = windows(process)
+    assert "error" not in err
+    assert "drive" in lttng("list").stdout
+    assert os.path.isdir(session)

@@ -1,0 +1,67 @@
+"""Targets of windows: what is violated, by whom, and what is kept of it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from msgflow.cli.app import app
+from msgflow.database import Database
+
+TARGETS = """
+targets:
+  - path: [/scan, /filtered]
+    latency: max < 80 ms
+"""
+
+
+@pytest.fixture
+def watched(shared_traces: Path, tmp_path: Path):
+    """Run `msgflow watch --once` on a real recording with targets."""
+
+    def run(text: str, *options: object) -> Result:
+        file = tmp_path / "targets.yaml"
+        file.write_text(text)
+        words = ["watch", shared_traces / "real_rotate", "--once", "--targets", file, *options]
+        return CliRunner().invoke(app, [str(word) for word in words])
+
+    return run
+
+
+def test_a_violation_names_the_culprit_and_is_kept(watched, tmp_path: Path) -> None:
+    """A window of three seconds: in the other ones nothing took so long."""
+    kept = tmp_path / "kept"
+    result = watched(
+        TARGETS, "--window", "3s", "--step", "3s", "--json", "--keep-on-violation", kept
+    )
+    assert result.exit_code == 1
+    first, *others = map(json.loads, result.stdout.splitlines())
+    (violation,) = first["violations"]
+    assert violation["subject"] == "/scan → /filtered"
+    assert violation["worst_ns"] == 99_343_279
+    assert "/filter ran 48.084 ms" in violation["culprit"]
+    assert not any(window["violations"] for window in others)
+    (directory,) = kept.iterdir()
+    assert len(list(directory.glob("archives/*/*"))) > 2
+    with Database(directory / "msgflow.duckdb") as database:
+        rows = database.query("e2e-latency").to_arrow().to_pylist()
+        assert max(row["max_ns"] or 0 for row in rows) == violation["worst_ns"]
+    assert f"kept: msgflow why --db {directory}" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("condition", "exit_code"), [("max < 1 s", 0), ("max < 80 ms", 1)], ids=["met", "failed"]
+)
+def test_the_exit_code_is_that_of_verify(watched, condition: str, exit_code: int) -> None:
+    text = TARGETS.replace("max < 80 ms", condition)
+    result = watched(text, "--window", "8s", "--step", "8s")
+    assert result.exit_code == exit_code
+    assert ("violation: /scan → /filtered: latency 99.343 ms" in result.stdout) == bool(exit_code)
+
+
+def test_what_was_never_measured(watched) -> None:
+    text = TARGETS.replace("/scan", "/no_such_topic")
+    assert watched(text, "--window", "8s", "--step", "8s").exit_code == 5
