@@ -87,6 +87,14 @@ def command(
         int,
         typer.Option("--keep-most", min=1, help="Most violations that are kept, the last ones"),
     ] = 20,
+    prometheus: Annotated[
+        str | None,
+        typer.Option(
+            "--prometheus",
+            metavar="[ADDRESS:]PORT",
+            help="Serve metrics for Prometheus, on 127.0.0.1 without an address",
+        ),
+    ] = None,
     as_json: Annotated[
         bool,
         typer.Option("--json", help="Print one JSON object per window", rich_help_panel=OUTPUT),
@@ -113,6 +121,7 @@ def command(
     from msgflow.run.window import duration_ns
     from msgflow.verify import Verdict
     from msgflow.watch import (
+        Exporter,
         FlightRecorder,
         Watcher,
         remove_chunk,
@@ -129,6 +138,10 @@ def command(
         recorder = FlightRecorder(
             keep.absolute(), most=most_kept, window_ns=window_ns, note=print_note
         )
+    exporter = None
+    if prometheus is not None:
+        exporter = Exporter()
+        exporter.serve(prometheus)
     watcher = Watcher(
         window_ns=window_ns,
         step_ns=step_ns,
@@ -137,6 +150,7 @@ def command(
         note=print_note,
         alarm=alarm,
         recorder=recorder,
+        exporter=exporter,
     )
 
     def show(reports: Iterator[WindowReport]) -> None:

@@ -6,11 +6,13 @@ from msgflow.watch.alarm import Alarm, violation_line
 from msgflow.watch.chunk import finished_chunks, remove_chunk
 from msgflow.watch.flight_recorder import FlightRecorder
 from msgflow.watch.follow import watch_finished, watch_live
+from msgflow.watch.prometheus import Exporter
 from msgflow.watch.watcher import Watcher
 from msgflow.watch.window_report import WindowReport
 
 __all__ = [
     "Alarm",
+    "Exporter",
     "FlightRecorder",
     "Watcher",
     "WindowReport",

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from msgflow.watch.alarm import Alarm
     from msgflow.watch.chunk import Chunk
     from msgflow.watch.flight_recorder import FlightRecorder
+    from msgflow.watch.prometheus import Exporter
     from msgflow.watch.window_report import WindowReport
 
 _RUN = "watch"
@@ -48,6 +49,7 @@ class Watcher:
         note: Callable[[str], None],
         alarm: Alarm | None = None,
         recorder: FlightRecorder | None = None,
+        exporter: Exporter | None = None,
     ) -> None:
         """Start before the first chunk.
 
@@ -59,6 +61,7 @@ class Watcher:
             note: gets sentences about what is wrong with the recording.
             alarm: the targets of each window.
             recorder: keeps the chunks around a violation.
+            exporter: counts each moment once.
         """
         self.history = History(window_ns, step_ns)
         self._links = links
@@ -66,6 +69,7 @@ class Watcher:
         self._note = note
         self._alarm = alarm
         self._recorder = recorder
+        self._exporter = exporter
         self.on_passed: Callable[[Path], None] | None = None
         self._after = Continuation()
         self.numbers: dict[Path, int] = {}
@@ -129,6 +133,10 @@ class Watcher:
                 whole = Window(window.start_ns, self.history.border_ns)
                 found = self._alarm.violations(con, whole, window.end_ns)
                 report = replace(report, violations=found)
+            if self._exporter is not None:
+                since_ns = self.history.final_ns
+                start_ns = window.start_ns if since_ns is None else since_ns
+                self._exporter.count(con, Window(start_ns, window.end_ns))
         if report.violations and self._recorder is not None:
             chunks = self.history.paths(window)
             self._recorder.keep(self.history.border_ns, traces, chunks)
@@ -136,4 +144,6 @@ class Watcher:
         if is_live:
             lag_s = (time.time_ns() - self.history.last_event_ns) / _SECOND_NS
             report = replace(report, lag_s=lag_s)
+        if self._exporter is not None:
+            self._exporter.show(report)
         return report

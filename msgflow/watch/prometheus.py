@@ -1,0 +1,180 @@
+"""Metrics for Prometheus: what was counted since the begin, and how it is now."""
+
+from __future__ import annotations
+
+from collections import Counter
+from threading import Lock
+from typing import TYPE_CHECKING
+
+from msgflow.errors import UsageError
+from msgflow.query.catalogue import load_query
+from msgflow.query.runner import run_query
+from msgflow.run.slice import Slice
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    import duckdb
+    from prometheus_client.metrics_core import Metric
+
+    from msgflow.run.window import Window
+    from msgflow.watch.window_report import WindowReport
+
+BOUNDS_S = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
+"""Bounds of the buckets of latencies [s]."""
+
+_SECOND_NS = 1_000_000_000
+_STATUSES = "SELECT path, status, count(*) FROM watched_flow GROUP BY ALL"
+_SUMS = "SELECT path, sum(latency_ns)::BIGINT FROM watched_flow WHERE latency_ns IS NOT NULL GROUP BY ALL"
+_BUCKETS = """
+SELECT f.path, b.bound, count(*) FILTER (f.latency_ns <= b.bound * 1e9)
+FROM watched_flow AS f, unnest($bounds) AS b (bound)
+WHERE f.latency_ns IS NOT NULL
+GROUP BY ALL
+"""
+_COUNTS = "SELECT path, count(latency_ns) FROM watched_flow GROUP BY ALL"
+_DISCARDED = """
+SELECT coalesce(sum(event_count), 0)::BIGINT
+FROM main.gap
+WHERE kind = 'loss' AND start_ns >= $start_ns AND start_ns < $end_ns
+"""
+
+
+class Exporter:
+    """Metrics of a recording that is watched; `serve` lets Prometheus read them."""
+
+    def __init__(self) -> None:
+        """Start with nothing counted."""
+        # The server reads in threads of its own.
+        self._lock = Lock()
+        self._statuses: Counter[tuple[str, str]] = Counter()
+        self._buckets: Counter[tuple[str, float]] = Counter()
+        self._counts: Counter[str] = Counter()
+        self._sums_ns: Counter[str] = Counter()
+        self._losses: Counter[tuple[str, str, str]] = Counter()
+        self._violations: Counter[tuple[str, str]] = Counter()
+        self._discarded = 0
+        self._last: WindowReport | None = None
+
+    def serve(self, place: str) -> None:
+        """Serve /metrics in a thread, until the process ends.
+
+        Args:
+            place: a port of 127.0.0.1, or ADDRESS:PORT.
+
+        Raises:
+            UsageError: prometheus-client is missing, or the port cannot be used.
+        """
+        try:
+            from prometheus_client import CollectorRegistry, start_http_server
+        except ImportError:
+            raise UsageError(
+                "prometheus-client is not installed", "pip install 'ros2-msgflow[prometheus]'"
+            ) from None
+        address, _, port = place.rpartition(":")
+        registry = CollectorRegistry()
+        registry.register(self)
+        try:
+            start_http_server(int(port), address or "127.0.0.1", registry)
+        except (OSError, ValueError, OverflowError) as error:
+            raise UsageError(
+                f"cannot serve metrics at {place}: {error}", "--prometheus 9464"
+            ) from error
+
+    def count(self, con: duckdb.DuckDBPyConnection, part: Window) -> None:
+        """Count what happened in a further part of the recording, of which all is known.
+
+        Args:
+            con: to a database with one run.
+            part: from the end of the part before.
+        """
+        times = Slice(start=part.start_ns, end=part.end_ns)
+        flows = run_query(con, load_query("flows"), {}, times).table
+        losses = run_query(con, load_query("topics-delivery"), {}, times).table.to_pylist()
+        con.register("watched_flow", flows)
+        try:
+            statuses = con.execute(_STATUSES).fetchall()
+            sums = con.execute(_SUMS).fetchall()
+            counts = con.execute(_COUNTS).fetchall()
+            buckets = con.execute(_BUCKETS, {"bounds": list(BOUNDS_S)}).fetchall()
+        finally:
+            con.unregister("watched_flow")
+        ((discarded,),) = con.execute(_DISCARDED, part.bindings).fetchall()
+        with self._lock:
+            self._statuses.update({(path, status): number for path, status, number in statuses})
+            self._sums_ns.update(dict(sums))
+            self._counts.update(dict(counts))
+            self._buckets.update({(path, bound): number for path, bound, number in buckets})
+            for row in losses:
+                for kind in ("dropped", "lost"):
+                    self._losses[row["topic_name"], row["subscriber"], kind] += row[kind]
+            self._discarded += discarded
+
+    def show(self, report: WindowReport) -> None:
+        """Take over how it is now."""
+        with self._lock:
+            self._last = report
+            self._violations.update((each["subject"], each["metric"]) for each in report.violations)
+
+    def collect(self) -> Iterator[Metric]:
+        """Yield all metrics, as a registry of prometheus-client asks for them."""
+        with self._lock:
+            metrics = [*self._flows(), *self._counters(), *self._gauges()]
+        yield from metrics
+
+    def _flows(self) -> Iterator[Metric]:
+        from prometheus_client.core import CounterMetricFamily, HistogramMetricFamily
+
+        latency = HistogramMetricFamily(
+            "msgflow_path_latency_seconds", "Latency from end to end", labels=["path"]
+        )
+        for path, number in self._counts.items():
+            buckets = [(str(bound), self._buckets[path, bound]) for bound in BOUNDS_S]
+            latency.add_metric(
+                [path], [*buckets, ("+Inf", number)], self._sums_ns[path] / _SECOND_NS
+            )
+        yield latency
+        flows = CounterMetricFamily(
+            "msgflow_path_flows", "Flows by what became of them", labels=["path", "status"]
+        )
+        for labels, number in self._statuses.items():
+            flows.add_metric(list(labels), number)
+        yield flows
+
+    def _counters(self) -> Iterator[Metric]:
+        from prometheus_client.core import CounterMetricFamily
+
+        messages = CounterMetricFamily(
+            "msgflow_messages_undelivered", "Messages that a subscription did not get",
+            labels=["topic", "subscriber", "kind"],
+        )  # fmt: skip
+        for labels, number in self._losses.items():
+            messages.add_metric(list(labels), number)
+        yield messages
+        violations = CounterMetricFamily(
+            "msgflow_violations", "Targets that were not met", labels=["subject", "metric"]
+        )
+        for names, number in self._violations.items():
+            violations.add_metric(list(names), number)
+        yield violations
+        yield CounterMetricFamily(
+            "msgflow_discarded_events", "Events that the tracer lost", value=self._discarded
+        )
+
+    def _gauges(self) -> Iterator[Metric]:
+        from prometheus_client.core import GaugeMetricFamily
+
+        busy = GaugeMetricFamily(
+            "msgflow_executor_busy_ratio", "Part of its time that a thread is in callbacks",
+            labels=["host", "process", "tid"],
+        )  # fmt: skip
+        lag = GaugeMetricFamily(
+            "msgflow_watch_lag_seconds", "Age of the last event when a window was ready"
+        )
+        for row in self._last.executors if self._last is not None else ():
+            labels = [row["host"] or "", row["process"] or "", str(row["tid"])]
+            busy.add_metric(labels, row["callback_share"] or 0)
+        if self._last is not None and self._last.lag_s is not None:
+            lag.add_metric([], self._last.lag_s)
+        yield busy
+        yield lag
