@@ -136,7 +136,12 @@ def command(
     recorder = None
     if keep is not None:
         recorder = FlightRecorder(
-            keep.absolute(), most=most_kept, window_ns=window_ns, note=print_note
+            keep.absolute(),
+            most=most_kept,
+            window_ns=window_ns,
+            links=links,
+            clock_sync=clock_sync,
+            note=print_note,
         )
     exporter = None
     if prometheus is not None:

@@ -111,7 +111,7 @@ class Alarm:
             "worst_ns": row["worst_ns"],
             "at_ns": at_ns,
             "is_final": at_ns is None or at_ns < final_ns,
-            "culprit": ", ".join(_blamed(pieces)) or None,
+            "culprit": ", ".join(_blamed(pieces, row["path"])) or None,
         }
 
 
@@ -131,14 +131,25 @@ def violation_line(violation: Row) -> str:
     return words if violation["is_final"] else f"{words} (provisional)"
 
 
-def _blamed(pieces: Sequence[Row]) -> Iterator[str]:
-    """Yield what took longest of a flow."""
+def _blamed(pieces: Sequence[Row], path: str | None) -> Iterator[str]:
+    """Yield what took longest of a flow.
+
+    Args:
+        pieces: of its critical path.
+        path: its nodes and topics.
+    """
     slowest = sorted(pieces, key=lambda piece: -piece["duration_ns"])
     for piece in slowest[:_MOST_PIECES]:
         if piece["activity"] != "rest" and (piece["share"] or 0) >= _LEAST_SHARE:
             yield _BLAME.get(piece["activity"], _OTHER).format(
-                node=piece["node"] or "an unknown node",
+                node=piece["node"] or _sender(piece["hop"], path) or "an unknown node",
                 what=piece["what"] or "a message",
                 activity=piece["activity"].replace("_", " "),
                 time=format_duration(piece["duration_ns"]),
             )
+
+
+def _sender(hop: int | None, path: str | None) -> str | None:
+    """Return the node that sends a message of a path: rclpy does not record its callbacks."""
+    nodes = (path or "").split(" → ")[::2]
+    return nodes[hop - 1] if hop is not None and 0 < hop <= len(nodes) else None

@@ -25,7 +25,14 @@ class FlightRecorder:
     """
 
     def __init__(
-        self, directory: Path, *, most: int, window_ns: int, note: Callable[[str], None]
+        self,
+        directory: Path,
+        *,
+        most: int,
+        window_ns: int,
+        links: Path | None,
+        clock_sync: str,
+        note: Callable[[str], None],
     ) -> None:
         """Keep nothing yet.
 
@@ -33,11 +40,15 @@ class FlightRecorder:
             directory: gets a directory per violation.
             most: how many of them stay.
             window_ns: length of a window.
+            links: file with indirect links to declare.
+            clock_sync: how clocks of several hosts are brought together, as `ingest` takes it.
             note: gets a sentence about what was kept, or why not.
         """
         self._directory = directory
         self._most = most
         self._window_ns = window_ns
+        self._links = links
+        self._clock_sync = clock_sync
         self._note = note
         self._kept: list[Path] = []
         self._until_ns = 0
@@ -61,7 +72,14 @@ class FlightRecorder:
                 if chunk.is_dir():
                     place = target / "archives" / chunk.parent.parent.name / chunk.name
                     shutil.copytree(chunk, place)
-            ingest([target], target / _DATABASE, name=target.name, traces=traces)
+            ingest(
+                [target],
+                target / _DATABASE,
+                name=target.name,
+                links=self._links,
+                clock_sync=self._clock_sync,
+                traces=traces,
+            )
         except (OSError, MsgflowError) as error:
             # A disk that is full must not end the view.
             shutil.rmtree(target, ignore_errors=True)

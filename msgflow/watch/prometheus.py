@@ -25,7 +25,12 @@ BOUNDS_S = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
 
 _SECOND_NS = 1_000_000_000
 _STATUSES = "SELECT path, status, count(*) FROM watched_flow GROUP BY ALL"
-_SUMS = "SELECT path, sum(latency_ns)::BIGINT FROM watched_flow WHERE latency_ns IS NOT NULL GROUP BY ALL"
+_SUMS = """
+SELECT path, sum(latency_ns)::BIGINT
+FROM watched_flow
+WHERE latency_ns IS NOT NULL
+GROUP BY ALL
+"""
 _BUCKETS = """
 SELECT f.path, b.bound, count(*) FILTER (f.latency_ns <= b.bound * 1e9)
 FROM watched_flow AS f, unnest($bounds) AS b (bound)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import time
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from msgflow.errors import TraceError
+from msgflow.errors import TraceError, UsageError
 from msgflow.ingest.memory import ingested_in_memory
 from msgflow.run.window import Window
 from msgflow.trace import Continuation
@@ -15,14 +16,17 @@ from msgflow.watch.kept_chunk import read_chunk
 from msgflow.watch.window_report import report_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
     from pathlib import Path
+
+    import duckdb
 
     from msgflow.clocks import ClockSync
     from msgflow.links import LinksFile
     from msgflow.watch.alarm import Alarm
     from msgflow.watch.chunk import Chunk
     from msgflow.watch.flight_recorder import FlightRecorder
+    from msgflow.watch.kept_traces import KeptTraces
     from msgflow.watch.prometheus import Exporter
     from msgflow.watch.window_report import WindowReport
 
@@ -71,6 +75,7 @@ class Watcher:
         self._recorder = recorder
         self._exporter = exporter
         self.on_passed: Callable[[Path], None] | None = None
+        self._lacks_links = False
         self._after = Continuation()
         self.numbers: dict[Path, int] = {}
 
@@ -124,9 +129,31 @@ class Watcher:
             if self.on_passed is not None:
                 self.on_passed(path)
 
+    @contextmanager
+    def _database(self, traces: KeptTraces) -> Iterator[duckdb.DuckDBPyConnection]:
+        """Have a database of a window; links of nodes that are not there yet are left out."""
+        with ExitStack() as stack:
+
+            def opened(links: LinksFile | None) -> duckdb.DuckDBPyConnection:
+                made = ingested_in_memory(traces, _RUN, links=links, clocks=self._clocks)
+                return stack.enter_context(made)
+
+            try:
+                con = opened(self._links)
+            except UsageError as error:
+                if self._links is None:
+                    raise
+                if not self._lacks_links:
+                    self._note(f"the declared links are left out for now: {error.message}")
+                self._lacks_links = True
+                con = opened(None)
+            else:
+                self._lacks_links = False
+            yield con
+
     def _report(self, window: Window, *, is_final: bool, is_live: bool) -> WindowReport:
         traces = self.history.traces(window)
-        with ingested_in_memory(traces, _RUN, links=self._links, clocks=self._clocks) as con:
+        with self._database(traces) as con:
             report = report_of(con, window, is_final=is_final)
             if self._alarm is not None:
                 # What came after the window counts, too: an alarm must be early.
