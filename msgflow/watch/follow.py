@@ -45,6 +45,7 @@ def watch_finished(directory: Path, watcher: Watcher) -> Iterator[WindowReport]:
         watcher.go_on()
         if (report := watcher.final_report(is_live=False)) is not None:
             yield report
+            watcher.keep_violation()
     yield from _last(watcher)
 
 
@@ -87,6 +88,7 @@ def watch_live(
         if lags != (lags := (report.lag_s or 0) * _SECOND_NS > _MOST_LAG * step_ns) and lags:
             note(f"the view lags by {report.lag_s:.0f} s: steps are longer until it has caught up")
         yield report
+        watcher.keep_violation()
 
 
 def _last(watcher: Watcher) -> Iterator[WindowReport]:
@@ -95,3 +97,4 @@ def _last(watcher: Watcher) -> Iterator[WindowReport]:
     watcher.history.add_border(is_last=True)
     if (report := watcher.final_report(is_live=False, is_last=True)) is not None:
         yield report
+        watcher.keep_violation()

@@ -76,6 +76,7 @@ class Watcher:
         self._exporter = exporter
         self.on_passed: Callable[[Path], None] | None = None
         self._lacks_links = False
+        self._violated: tuple[int, KeptTraces, list[Path]] | None = None
         self._after = Continuation()
         self.numbers: dict[Path, int] = {}
 
@@ -124,6 +125,12 @@ class Watcher:
         self._forget(window)
         return report
 
+    def keep_violation(self) -> None:
+        """Keep the chunks of the last report if it has a violation, once it has been told."""
+        if self._violated is not None and self._recorder is not None:
+            self._recorder.keep(*self._violated)
+        self._violated = None
+
     def _forget(self, window: Window) -> None:
         for path in self.history.forget(window):
             if self.on_passed is not None:
@@ -164,9 +171,8 @@ class Watcher:
                 since_ns = self.history.final_ns
                 start_ns = window.start_ns if since_ns is None else since_ns
                 self._exporter.count(con, Window(start_ns, window.end_ns))
-        if report.violations and self._recorder is not None:
-            chunks = self.history.paths(window)
-            self._recorder.keep(self.history.border_ns, traces, chunks)
+        if report.violations:
+            self._violated = (self.history.border_ns, traces, self.history.paths(window))
         self.history.note_longest(report.longest_ns)
         if is_live:
             lag_s = (time.time_ns() - self.history.last_event_ns) / _SECOND_NS
