@@ -100,3 +100,38 @@ def test_of_perf(shared_kernel: Path, tmp_path: Path, name: str) -> None:
     assert con.execute(
         "SELECT count(*) FILTER (WHERE unknown_ns > 0) < 0.01 * count(*) FROM compared"
     ).fetchall() == [(True,)]
+
+
+@pytest.mark.parametrize("name", few(("pipeline", "autoware"), "pipeline"))
+def test_arrivals(shared_kernel: Path, tmp_path: Path, name: str) -> None:
+    """All that are exact have the waker that the truth has before their callback."""
+    con = compared(tmp_path / "run.duckdb", shared_kernel / name, "trace-chrisnux")
+    ((callbacks, exact, wrong),) = con.execute(
+        "SELECT count(*), count(*) FILTER (a.is_exact), count(*) FILTER (a.is_exact AND "
+        "split_part(c.start_wake_waker, '/', 1) IS DISTINCT FROM "
+        "a.waker_kind || ':' || a.waker_name) "
+        "FROM compared AS c "
+        "JOIN callback_instance AS i ON c.callback_instance_id = i.callback_instance_id "
+        "LEFT JOIN arrival AS a ON i.take_id = a.take_id WHERE i.take_id IS NOT NULL"
+    ).fetchall()
+    assert wrong == 0
+    # Of others the thread was awake, or did something else first.
+    assert exact > 0.45 * callbacks
+
+
+@pytest.mark.parametrize("name", few(("real_jazzy_pipeline", "real_py_timer"), "real_py_timer"))
+def test_arrivals_of_real_systems(shared_traces: Path, tmp_path: Path, name: str) -> None:
+    path, recording = tmp_path / "run.duckdb", shared_traces / name
+    ingest([recording / "ust", recording / "kernel.tar.xz"], path)
+    with duckdb.connect(str(path), read_only=True) as con:
+        ((takes, exact, wrong),) = con.execute(
+            "SELECT count(*), count(*) FILTER (a.is_exact), count(*) FILTER ("
+            "a.arrived_ns NOT BETWEEN p.start_ns AND t.taken_ns OR l.latency_ns <> "
+            "a.until_arrival_ns + a.run_queue_ns + a.executor_ns) "
+            "FROM link_transport AS l "
+            "JOIN take AS t ON l.take_id = t.take_id "
+            "JOIN publication AS p ON l.publication_id = p.publication_id "
+            "LEFT JOIN arrival AS a ON l.take_id = a.take_id"
+        ).fetchall()
+    assert wrong == 0
+    assert exact > 0.8 * takes

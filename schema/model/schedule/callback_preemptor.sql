@@ -11,7 +11,8 @@
 WITH overlap AS (
     SELECT
         c.callback_instance_id, p.preemptor_thread_id, p.preemptor_other_thread_id,
-        p.preemptor_priority, p.state, least(c.end_ns, p.end_ns) - greatest(c.start_ns, p.start_ns) AS length_ns
+        p.preemptor_priority, p.state,
+        least(c.end_ns, p.end_ns) - greatest(c.start_ns, p.start_ns) AS length_ns
     FROM staging.callback_state AS c
     JOIN staging.thread_state AS s ON c.state_number = s.number
     JOIN staging.preemptor AS p

@@ -1,0 +1,90 @@
+-- name: main.arrival
+-- description: When messages arrived, where a kernel trace tells: the last waking of the thread
+--     before it took the message. Without one after the begin of the publication the thread was
+--     awake when the message came, and there is no row. It is exact where the take is the first
+--     thing that the thread did then, and a thread of the middleware, the publishing thread or an
+--     interrupt woke it; else the waking may have been for something else. Threads of the
+--     middleware have its names or that of the process, and execute no callbacks.
+-- grain: one row per take whose publication is known and before which its thread was woken
+-- column: run_id BIGINT  Run that the row belongs to
+-- column: take_id BIGINT  The take
+-- column: publication_id BIGINT  The publication
+-- column: arrived_ns BIGINT [epoch ns]  When the thread was woken
+-- column: waker_kind VARCHAR  'thread', 'timer', 'interrupt' or 'softirq'
+-- column: waker_thread_id BIGINT  Thread of a ROS process that woke it, or that was interrupted
+-- column: waker_name VARCHAR  Name of the thread that woke it, or that was interrupted
+-- column: is_exact BOOLEAN  Nothing else explains the waking
+-- column: until_arrival_ns BIGINT [ns]  From the end of the publication until the waking; negative:
+--     before publish() returned
+-- column: run_queue_ns BIGINT [ns]  From the waking until the thread had a CPU
+-- column: executor_ns BIGINT [ns]  From there until the take; with the two before it is the latency
+WITH waking AS (
+    SELECT
+        s.thread_id, s.end_ns AS at_ns, s.waker_kind, s.waker_thread_id,
+        s.waker_other_thread_id
+    FROM main.thread_state AS s
+    WHERE s.state = 'sleeping' AND s.waker_kind IS NOT NULL
+),
+-- What a thread does has begun before it takes a message, unless that is all it woke for.
+done AS (
+    SELECT thread_id, taken_ns AS at_ns FROM main.take
+    UNION ALL
+    SELECT thread_id, start_ns FROM main.callback_instance
+    UNION ALL
+    SELECT thread_id, start_ns FROM main.publication
+),
+taken AS (
+    SELECT
+        l.run_id, l.take_id, l.publication_id, t.thread_id, t.taken_ns, b.start_ns, b.end_ns,
+        b.thread_id AS publishing_thread_id
+    FROM main.link_transport AS l
+    JOIN main.take AS t ON l.take_id = t.take_id
+    JOIN main.publication AS b ON l.publication_id = b.publication_id
+    WHERE l.latency_ns IS NOT NULL
+        AND t.thread_id IN (SELECT thread_id FROM main.thread_state)
+),
+woken AS (
+    SELECT k.*, w.at_ns AS arrived_ns, w.waker_kind, w.waker_thread_id, w.waker_other_thread_id
+    FROM taken AS k
+    ASOF JOIN waking AS w ON k.thread_id = w.thread_id AND k.taken_ns >= w.at_ns
+    WHERE w.at_ns >= k.start_ns
+),
+behind AS (
+    SELECT w.take_id, d.at_ns
+    FROM woken AS w
+    ASOF JOIN done AS d ON w.thread_id = d.thread_id AND w.taken_ns > d.at_ns
+),
+on_cpu AS (
+    SELECT w.take_id, r.start_ns AS on_cpu_ns
+    FROM woken AS w
+    ASOF JOIN (SELECT * FROM main.thread_state WHERE state = 'running') AS r
+        ON w.thread_id = r.thread_id AND w.arrived_ns <= r.start_ns
+)
+SELECT
+    w.run_id,
+    w.take_id,
+    w.publication_id,
+    w.arrived_ns,
+    w.waker_kind,
+    w.waker_thread_id,
+    coalesce(x.name, o.name) AS waker_name,
+    coalesce(d.at_ns < w.arrived_ns, true) AND CASE w.waker_kind
+        WHEN 'thread' THEN coalesce(
+            w.waker_thread_id = w.publishing_thread_id
+            OR x.process_id = t.process_id
+            AND x.thread_id NOT IN (SELECT thread_id FROM main.callback_instance),
+            o.name LIKE 'dds.%' OR o.name LIKE 'recv%' OR o.name LIKE 'dq.%'
+            OR o.name = p.name
+        )
+        ELSE w.waker_kind IN ('interrupt', 'softirq')
+    END AS is_exact,
+    w.arrived_ns - w.end_ns AS until_arrival_ns,
+    c.on_cpu_ns - w.arrived_ns AS run_queue_ns,
+    w.taken_ns - c.on_cpu_ns AS executor_ns
+FROM woken AS w
+JOIN main.thread AS t ON w.thread_id = t.thread_id
+JOIN main.process AS p ON t.process_id = p.process_id
+LEFT JOIN main.thread AS x ON w.waker_thread_id = x.thread_id
+LEFT JOIN main.other_thread AS o ON w.waker_other_thread_id = o.other_thread_id
+LEFT JOIN behind AS d ON w.take_id = d.take_id
+LEFT JOIN on_cpu AS c ON w.take_id = c.take_id AND c.on_cpu_ns <= w.taken_ns
