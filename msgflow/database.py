@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import duckdb
 
@@ -189,9 +189,9 @@ class Database:
     def apply_links(
         self, file: str | Path, *, run: str | int | None = None, content: str | None = None
     ) -> tuple[AppliedLinks, ...]:
-        """Declare the indirect links of a file and derive all links anew, in one transaction.
+        """Declare the links and topics of a file and derive all links anew, in one transaction.
 
-        Links that an earlier file declared for these runs are removed.
+        What an earlier file declared for these runs is removed.
 
         Args:
             file: YAML; docs/causes.md has its form.
@@ -209,7 +209,7 @@ class Database:
         return apply_links(self.path, links, run=run, memory_limit=self._memory_limit)
 
     def suggest_links(self, *, run: str | int | None = None) -> LinkSuggestions:
-        """Return candidates for links of a run, and the links that a file declared for it.
+        """Return candidates for links of a run, its unnamed topics, and what a file declared.
 
         Args:
             run: a name or an id; the latest run when None.
@@ -223,17 +223,22 @@ class Database:
         from msgflow.sql.statement import internal_sql
 
         found = self.query("links-suggested", run=run)
-        return LinkSuggestions(
-            found.runs,
-            found.to_arrow().to_pylist(),
-            [
+
+        def of_file(name: str) -> list[dict[str, Any]]:
+            return [
                 row
                 for one in found.runs
                 for row in internal_sql()
-                .run(self.connection, "link_of_file", {"run_id": one.run_id})
+                .run(self.connection, name, {"run_id": one.run_id})
                 .to_arrow_table()
                 .to_pylist()
-            ],
+            ]
+
+        return LinkSuggestions(
+            found.runs,
+            found.to_arrow().to_pylist(),
+            of_file("link_of_file"),
+            of_file("topic_of_file"),
         )
 
     def apply_clocks(

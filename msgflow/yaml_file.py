@@ -47,8 +47,8 @@ class YamlFile:
         """Raise the error of a line."""
         raise UsageError(f"{self.path}, line {line}: {what}", hint)
 
-    def entries(self, name: str) -> list[Any]:
-        """Return the nodes of the list `name`, the only key of the file.
+    def entries(self, *names: str) -> tuple[list[Any], ...]:
+        """Return the nodes of each list, of which the file has at least one, and no other keys.
 
         Raises:
             UsageError: the file cannot be read, is not YAML, or of another form.
@@ -56,8 +56,13 @@ class YamlFile:
         root = self._compose()
         if root is None:
             self.fail(1, "the file is empty", self.example)
-        entries = self.mapping(root, "the file", (name,), (), may_be_null=(name,))[name]
-        if is_null(entries):
+        lists = self.mapping(root, "the file", (), names, may_be_null=names)
+        if not lists:
+            self.fail(line_of(root), f"the file lacks {' or '.join(names)}", self.example)
+        return tuple(self._list(name, lists.get(name)) for name in names)
+
+    def _list(self, name: str, entries: Any) -> list[Any]:
+        if entries is None or is_null(entries):
             return []
         if entries.id != "sequence":
             self.fail(line_of(entries), f"{name} is not a list", self.example)

@@ -30,7 +30,10 @@ def apply(
     run: RunOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
-    """Declare the links of a file and derive all links of the run again, without the trace."""
+    """Declare the links and topics of a file and derive all links of the run again.
+
+    The trace is not needed.
+    """
     from msgflow.cli.output import print_runs
     from msgflow.database import Database
 
@@ -46,6 +49,8 @@ def print_applied(opened: Database, one: AppliedLinks) -> None:
 
     known = f", {one.known_count} of them by the trace itself" if one.known_count else ""
     traced = f", and {one.traced_link_count} that the trace declares itself"
+    if one.topic_count:
+        print_status(f"{count(one.topic_count, 'topic')} named")
     print_status(
         f"{count(one.annotation_count, 'link')} declared{known}:"
         f" {count(one.link_count, 'indirect link')} between messages"

@@ -1,4 +1,4 @@
-"""Annotations of a run from declared links, stored in place of those of an earlier file."""
+"""Annotations and topics of a run from a file, stored in place of those of an earlier file."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from msgflow.db.derivation import derive
 from msgflow.db.runs import change_runs
 from msgflow.links.matching import match_links
+from msgflow.links.topics import declare_topics
 from msgflow.sql.statement import internal_sql
 
 if TYPE_CHECKING:
@@ -28,6 +29,7 @@ class AppliedLinks:
         run: the run.
         annotation_count: declared links, one per node that an entry matches.
         known_count: those that the trace declares, too; they are not stored again.
+        topic_count: topics that the file names.
         link_count: indirect links of messages that come from the file only.
         traced_link_count: indirect links of messages that come from the trace.
     """
@@ -35,6 +37,7 @@ class AppliedLinks:
     run: Run
     annotation_count: int
     known_count: int
+    topic_count: int
     link_count: int
     traced_link_count: int
 
@@ -69,17 +72,20 @@ def apply_links(
     return change_runs(path, run, apply, memory_limit=memory_limit)
 
 
-def declare_links(con: duckdb.DuckDBPyConnection, run_id: int, file: LinksFile) -> tuple[int, int]:
-    """Store the links of a file as the annotations of a run, inside the open transaction.
+def declare_links(
+    con: duckdb.DuckDBPyConnection, run_id: int, file: LinksFile
+) -> tuple[int, int, int]:
+    """Name topics, and store links as the annotations of a run, inside the open transaction.
 
     The caller derives the links between messages afterwards.
 
     Returns:
-        The number of annotations, and the number of those that the trace declares, too.
+        The number of annotations, of those that the trace declares, too, and of named topics.
 
     Raises:
         UsageError: a link that does not fit the run.
     """
+    topic_count = declare_topics(con, run_id, file)
     matched = match_links(con, run_id, file)
     # Before we delete any: one transaction cannot use a key twice.
     first = int(
@@ -104,7 +110,7 @@ def declare_links(con: duckdb.DuckDBPyConnection, run_id: int, file: LinksFile) 
     added = [link for key, link in unique.items() if key not in traced]
     for annotation_id, link in enumerate(added, start=first):
         _insert(con, run_id, annotation_id, link)
-    return len(unique), len(unique) - len(added)
+    return len(unique), len(unique) - len(added), topic_count
 
 
 def _insert(

@@ -1,4 +1,4 @@
-"""File of links, which a user declares or reviews: YAML; errors name the line.
+"""File of links and topics, which a user declares or reviews: YAML; errors name the line.
 
 links:
   - kind: periodic_async
@@ -9,6 +9,9 @@ links:
     node: /filter
     inputs: [/scan]
     outputs: [/tick]
+topics:
+  - name: /scan
+    publisher: 0x55bb52684970
 """
 
 from __future__ import annotations
@@ -30,7 +33,9 @@ INDIRECT_KINDS = ("periodic_async", *SYNCHRONOUS_KINDS)
 KINDS = (*INDIRECT_KINDS, "direct", "independent")
 _REQUIRED = ("kind", "node", "inputs", "outputs")
 _OPTIONAL = ("inputs_of", "process", "host")
+_ENDPOINTS = ("publisher", "subscription")
 _EXAMPLE = "links: [{kind: periodic_async, node: /fusion, inputs: [/lidar], outputs: [/objects]}]"
+_TOPIC_EXAMPLE = "topics: [{name: /scan, publisher: 0x55bb52684970}], as in msgflow check"
 _QUOTING = "quote patterns that begin with *, as in '*_raw'"
 
 
@@ -62,16 +67,39 @@ class DeclaredLink:
 
 
 @dataclass(frozen=True)
+class DeclaredTopic:
+    """The name of a topic for which the trace has none.
+
+    Attributes:
+        name: the topic.
+        kind: 'publisher' or 'subscription'.
+        handle: handle of one of its publishers or subscriptions.
+        handle_text: the same, as the file has it.
+        process: name or pid of its process, if several have the handle.
+        host: its host, likewise.
+    """
+
+    name: Text
+    kind: str
+    handle: int
+    handle_text: Text
+    process: Text | None
+    host: Text | None
+
+
+@dataclass(frozen=True)
 class LinksFile:
     """A file with declared links.
 
     Attributes:
         path: the file.
-        links: its entries, in order.
+        links: its links, in order.
+        topics: its topics, in order.
     """
 
     path: Path
     links: tuple[DeclaredLink, ...]
+    topics: tuple[DeclaredTopic, ...] = ()
 
     def fail(self, line: int, what: str, hint: str | None = None) -> NoReturn:
         """Raise the error of a line."""
@@ -89,7 +117,12 @@ def read_links(path: Path, content: str | None = None) -> LinksFile:
         UsageError: the file cannot be read, is not YAML, or not of the form above.
     """
     file = YamlFile(path, _EXAMPLE, _QUOTING, content)
-    return LinksFile(path, tuple(_link(file, entry) for entry in file.entries("links")))
+    links, topics = file.entries("links", "topics")
+    return LinksFile(
+        path,
+        tuple(_link(file, entry) for entry in links),
+        tuple(_topic(file, entry) for entry in topics),
+    )
 
 
 def _link(file: YamlFile, node: Any) -> DeclaredLink:
@@ -108,4 +141,31 @@ def _link(file: YamlFile, node: Any) -> DeclaredLink:
         file.optional(fields, "process"),
         file.optional(fields, "host"),
         line_of(node),
+    )
+
+
+def _topic(file: YamlFile, node: Any) -> DeclaredTopic:
+    fields = file.mapping(node, "a topic", ("name",), (*_ENDPOINTS, "process", "host"))
+    name = file.text(fields["name"], "name", "a topic")
+    if not name.value.startswith("/"):
+        file.fail(name.line, f"a topic begins with / — {name.value}", _TOPIC_EXAMPLE)
+    kinds = [kind for kind in _ENDPOINTS if kind in fields]
+    if len(kinds) != 1:
+        file.fail(
+            line_of(node),
+            f"a topic has a publisher or a subscription — {name.value}",
+            _TOPIC_EXAMPLE,
+        )
+    text = file.text(fields[kinds[0]], kinds[0], "a handle")
+    try:
+        handle = int(text.value, 16)
+    except ValueError:
+        file.fail(text.line, f"{kinds[0]} is not a handle — {text.value}", _TOPIC_EXAMPLE)
+    return DeclaredTopic(
+        name,
+        kinds[0],
+        handle,
+        text,
+        file.optional(fields, "process"),
+        file.optional(fields, "host"),
     )

@@ -155,7 +155,7 @@ def _match(file: LinksFile, link: DeclaredLink, nodes: Sequence[Node]) -> Iterat
 
 
 def _choose(file: LinksFile, link: DeclaredLink, nodes: Sequence[Node]) -> Sequence[Node]:
-    named = [node for node in nodes if _matches(node.name, link.node.value)]
+    named = [node for node in nodes if matches(node.name, link.node.value)]
     if not named:
         names = [node.name for node in nodes]
         file.fail(
@@ -163,7 +163,7 @@ def _choose(file: LinksFile, link: DeclaredLink, nodes: Sequence[Node]) -> Seque
         )
     placed = named
     if link.host is not None:
-        placed = [node for node in placed if _matches(node.host, link.host.value)]
+        placed = [node for node in placed if matches(node.host, link.host.value)]
         if not placed:
             hosts = sorted({node.host for node in named})
             file.fail(
@@ -175,7 +175,7 @@ def _choose(file: LinksFile, link: DeclaredLink, nodes: Sequence[Node]) -> Seque
         wanted = link.process.value
         before, placed = (
             placed,
-            [node for node in placed if str(node.pid) == wanted or _matches(node.process, wanted)],
+            [node for node in placed if str(node.pid) == wanted or matches(node.process, wanted)],
         )
         if not placed:
             file.fail(
@@ -194,7 +194,7 @@ def _received(
         return node.subscriptions
     wanted = link.inputs_of
     beside = [other for other in nodes if other.process_id == node.process_id and other != node]
-    others = [other for other in beside if _matches(other.name, wanted.value)]
+    others = [other for other in beside if matches(other.name, wanted.value)]
     if not others and not _is_pattern(link.node.value):
         file.fail(
             wanted.line,
@@ -230,7 +230,7 @@ def _endpoints(wanted: Sequence[Text], there: Sequence[Endpoint]) -> tuple[Endpo
 
 def _means(text: Text, endpoint: Endpoint) -> bool:
     return endpoint.topic == text.value or (
-        not endpoint.is_internal and _matches(endpoint.topic, text.value)
+        not endpoint.is_internal and matches(endpoint.topic, text.value)
     )
 
 
@@ -302,7 +302,8 @@ def _refuse_cycles(file: LinksFile, links: Sequence[MatchedLink]) -> None:
         )
 
 
-def _matches(name: str, wanted: str) -> bool:
+def matches(name: str, wanted: str) -> bool:
+    """Tell whether a name is the wanted one, or fits the wanted pattern."""
     return name == wanted or (_is_pattern(wanted) and fnmatchcase(name, wanted))
 
 

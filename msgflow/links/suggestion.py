@@ -19,6 +19,7 @@ _HEAD = (
     " entries are comments: take their # away to declare them. Not everything is found: messages"
     " that also lead elsewhere, such as those that two links of a node share, may be missing."
 )
+_SIDES = (("from", "publishers"), ("to", "subscribers"))
 # With the indent of an entry, no comment is wider than a terminal of 80 columns.
 _WIDTH = 76
 
@@ -31,11 +32,13 @@ class LinkSuggestions:
         runs: the run; none if the database holds none.
         candidates: rows of the query `links --suggested`.
         declared: links that a file declared before; they stay.
+        topics: topics that it named, which stay, and those without a name.
     """
 
     runs: Sequence[Run]
     candidates: Sequence[Mapping[str, Any]]
     declared: Sequence[Mapping[str, Any]] = ()
+    topics: Sequence[Mapping[str, Any]] = ()
 
     @property
     def certain(self) -> list[Mapping[str, Any]]:
@@ -55,7 +58,7 @@ class LinkSuggestions:
         """
         lines = [*_comment(_HEAD), f"#   {command}"]
         if not self.candidates and not self.declared:
-            return "\n".join([*lines, "# There are none.", "links: []"])
+            return "\n".join([*lines, "# There are none.", "links: []", *self._topics()])
         lines.append("links:")
         for row in self.declared:
             lines += _indented([*_comment(f"{row['node']}: declared before"), *_entry(row)])
@@ -66,7 +69,20 @@ class LinkSuggestions:
                 lines += _indented([f"# {line}" for line in _entry(row)])
             else:
                 lines += _indented(_entry(row))
-        return "\n".join(lines)
+        return "\n".join([*lines, *self._topics()])
+
+    def _topics(self) -> list[str]:
+        lines = ["topics:"] if self.topics else []
+        for row in self.topics:
+            if row["name"] is not None:
+                lines.append(f"  - {{name: {quoted(row['name'])}, {row['entry']}}}")
+                continue
+            ends = [f"{word} {row[side]}" for word, side in _SIDES if row[side]]
+            lines += _indented(
+                _comment(f"Without a name: {row['message_count']:,} messages {' '.join(ends)}.")
+            )
+            lines += _indented([f"# - {{name: /NAME, {row['entry']}}}"])
+        return lines
 
 
 def _entry(row: Mapping[str, Any]) -> list[str]:

@@ -99,7 +99,8 @@ def read_paths(path: Path) -> PathsFile:
     """
     file = YamlFile(path, _EXAMPLE, _QUOTING)
     paths: dict[str, NamedPath] = {}
-    for node in file.entries("paths"):
+    (entries,) = file.entries("paths")
+    for node in entries:
         one = _path(file, node)
         if one.name.value in paths:
             before = paths[one.name.value].name.line

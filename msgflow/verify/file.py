@@ -85,7 +85,7 @@ def read_targets(path: Path) -> TargetsFile:
         UsageError: the file cannot be read, is not YAML, or not of the form above.
     """
     file = YamlFile(path, _EXAMPLE, _QUOTING)
-    entries = file.entries("targets")
+    (entries,) = file.entries("targets")
     if not entries:
         file.fail(1, "the file has no target", _EXAMPLE)
     targets = tuple(_target(file, entry) for entry in entries)

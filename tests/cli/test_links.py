@@ -13,7 +13,7 @@ from typer.testing import Result
 
 from msgflow.db.derivation import derive
 from msgflow.errors import UsageError
-from msgflow.sim import simulate
+from msgflow.sim import Recording, simulate
 
 Msgflow = Callable[..., Result]
 
@@ -104,6 +104,24 @@ def test_suggestions_are_written_and_applied_in_one_go(
         line.rpartition(",")[0] for line in listed.splitlines()
     ]
     assert text.count("- kind:") == Path("again.yaml").read_text().count("- kind:")
+
+
+def test_topics_without_a_name_are_named(msgflow: Msgflow, tmp_path: Path) -> None:
+    late = Recording(start_ns=300_000_000)
+    trace = simulate("pipeline", tmp_path / "trace", factor=0.1, recording=late).directory
+    ingested = msgflow("ingest", trace)
+    assert "topic_unnamed" in ingested.stderr
+    (offered, *_) = [
+        line for line in msgflow("suggest", "links").stdout.splitlines() if "/NAME" in line
+    ]
+    file = tmp_path / "links.yaml"
+    file.write_text(f"topics:\n{offered.replace('# ', '').replace('/NAME', '/scan')}")
+    applied = msgflow("links", "apply", file)
+    assert applied.exit_code == 0, applied.stderr
+    assert "1 topic named\n" in applied.stderr
+    answer = msgflow("query", "e2e-latency", "--from", "/scan")
+    assert answer.exit_code == 0, answer.stderr
+    assert "/scan" in answer.stdout
 
 
 def test_a_file_that_cannot_be_applied_is_not_written(

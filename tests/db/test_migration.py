@@ -163,6 +163,8 @@ def older(path: Path) -> dict[int, str]:
         con.execute("ALTER TABLE store.run DROP COLUMN clock_sync")
         con.execute("ALTER TABLE store.trace DROP COLUMN has_request_events")
         con.execute("ALTER TABLE store.process DROP COLUMN is_ambiguous")
+        con.execute("ALTER TABLE store.publisher DROP COLUMN is_topic_declared")
+        con.execute("ALTER TABLE store.subscription DROP COLUMN is_topic_declared")
         con.execute("DROP TABLE store.user_event")
         con.execute("DROP TABLE store.link_call")
         con.execute("DROP TABLE store.other_thread")

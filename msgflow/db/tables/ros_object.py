@@ -38,6 +38,7 @@ Table(
     flag("is_internal", "Infrastructure of ROS (/rosout, /parameter_events, ...)"),
     flag("is_inferred", "Its initialisation was not traced"),
     flag("is_topic_learned", "Its topic was deduced from a link", hidden=True),
+    flag("is_topic_declared", "Its topic was given by a file of links"),
     comment="One row per publisher",
     info={"view": "Publishers, those of ROS itself marked as internal."},
 )
@@ -58,6 +59,7 @@ Table(
     flag("is_internal", "Infrastructure of ROS (/parameter_events, /clock, ...)"),
     flag("is_inferred", "Its initialisation was not traced"),
     flag("is_topic_learned", "Its topic was deduced from a link", hidden=True),
+    flag("is_topic_declared", "Its topic was given by a file of links"),
     comment="One row per subscription",
     info={"view": "Subscriptions, those of ROS itself marked as internal."},
 )

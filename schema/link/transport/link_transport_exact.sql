@@ -1,12 +1,12 @@
 -- name: derive.link_transport_exact
 -- kind: macro
 -- description: Messages matched by equal, non-zero source stamps, and equal topics where both are
---     known, whether from their own initialisation or from other messages of the two (then
---     `exact_stamp`). If the topic of a side is not known, the pair counts only if the stamp has
---     a single candidate in the run, and if the pair does not put one publication on two topics.
---     If several publications have the same topic and stamp, the k-th belongs to the k-th such
---     take of a subscription, so that none is received twice. If there are more such takes than
---     publications, some publications were lost, and each take may be of one of those. Equal
+--     known, whether from their own initialisation, or from other messages of the two or a file of
+--     links (then `exact_stamp`). If the topic of a side is not known, the pair counts only if the
+--     stamp has a single candidate in the run, and if the pair does not put one publication on two
+--     topics. If several publications have the same topic and stamp, the k-th belongs to the k-th
+--     such take of a subscription, so that none is received twice. If there are more such takes
+--     than publications, some publications were lost, and each take may be of one of those. Equal
 --     values need no clocks: a take may seem to come before its publication.
 -- grain: one row per take whose publication is known by its stamp
 -- param: only_run BIGINT  Run to look at
@@ -20,7 +20,8 @@ published AS (
     SELECT
         b.publication_id, b.publisher_id, b.source_timestamp_ns, b.start_event_id,
         coalesce(p.topic_name, g.topic_name) AS topic_name,
-        p.topic_name IS NOT NULL AND NOT coalesce(p.is_topic_learned, false) AS is_own_topic
+        p.topic_name IS NOT NULL
+        AND NOT coalesce(p.is_topic_learned OR p.is_topic_declared, false) AS is_own_topic
     FROM store.publication AS b
     LEFT JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
     LEFT JOIN unnamed AS g ON b.publisher_id = g.id AND g.kind = 'publisher'
@@ -30,7 +31,8 @@ received AS (
     SELECT
         t.run_id, t.take_id, t.source_timestamp_ns, t.subscription_id, t.start_event_id,
         coalesce(s.topic_name, g.topic_name) AS topic_name,
-        s.topic_name IS NOT NULL AND NOT coalesce(s.is_topic_learned, false) AS is_own_topic
+        s.topic_name IS NOT NULL
+        AND NOT coalesce(s.is_topic_learned OR s.is_topic_declared, false) AS is_own_topic
     FROM store.take AS t
     LEFT JOIN store.subscription AS s ON t.subscription_id = s.subscription_id
     LEFT JOIN unnamed AS g ON t.subscription_id = g.id AND g.kind = 'subscription'

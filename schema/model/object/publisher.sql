@@ -27,5 +27,6 @@ WITH every_publisher AS (
 SELECT
     row_number() OVER (ORDER BY event_id) AS publisher_id,
     process_id, node_id, topic_name, publisher_handle, rmw_handle, gid, queue_depth, created_ns,
-    is_internal, is_inferred, false AS is_topic_learned, event_id
+    is_internal, is_inferred, false AS is_topic_learned,
+    false AS is_topic_declared, event_id
 FROM every_publisher

@@ -24,5 +24,6 @@ WITH every_subscription AS (
 SELECT
     row_number() OVER (ORDER BY event_id) AS subscription_id,
     process_id, node_id, topic_name, subscription_handle, rmw_handle, gid, queue_depth,
-    created_ns, is_internal, is_inferred, false AS is_topic_learned, event_id
+    created_ns, is_internal, is_inferred, false AS is_topic_learned,
+    false AS is_topic_declared, event_id
 FROM every_subscription

@@ -1,0 +1,21 @@
+-- name: finding.topic_unnamed
+-- title: A topic has no name
+-- description: Its publishers and subscriptions were created before the recording, or their events
+--     were lost. Its messages are in flows and paths as ?, and no query can ask for it by name.
+-- cause: The session was started after the nodes, or events of initialisation were lost.
+-- cure: Name it in a file of links: write the line shown below topics:, with the topic in place of
+--     /NAME, then msgflow links apply FILE. msgflow suggest links writes a file with a line for
+--     each (docs/causes.md).
+-- grain: one row per topic
+-- severity: warning
+-- param: run_id BIGINT  Run
+SELECT
+    run_id,
+    CASE WHEN publishers IS NULL THEN 'to ' || subscribers
+        WHEN subscribers IS NULL THEN 'from ' || publishers
+        ELSE publishers || ' → ' || subscribers END AS subject,
+    message_count AS count,
+    printf(
+        '%s without a topic: - {name: /NAME, %s}', derive.counted(message_count, 'message'), entry
+    ) AS detail
+FROM main.unnamed_topic($run_id)
