@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from msgflow.db.finding import Finding
     from msgflow.export.flow import Flow
     from msgflow.export.graph import Graph
+    from msgflow.export.mcap import ExportedMcap
     from msgflow.export.otlp import ExportedTraces
     from msgflow.export.perfetto import PerfettoTrace
     from msgflow.export.views import ExportedView
@@ -963,6 +964,52 @@ class Database:
         connection = self.connection
         part = Slice(run, start, end, skip_first)
         return self._ask(lambda: write_perfetto(connection, Path(path), part))
+
+    def export_mcap(
+        self,
+        path: str | Path,
+        *,
+        run: str | int | None = None,
+        start: str | int | None = None,
+        end: str | int | None = None,
+        skip_first: float | None = None,
+        targets: str | Path | None = None,
+        paths: str | Path = DEFAULT_PATHS,
+    ) -> ExportedMcap:
+        """Write measured values of a run, and what was lost, as messages of an MCAP file.
+
+        Args:
+            path: the file; one that exists is replaced.
+            run, start, end, skip_first: what to read, see `msgflow.Slice`; one run.
+            targets: file with requirements (docs/verify.md): each that is not met is a message at
+                the time of its worst case.
+            paths: the file with the named paths of `targets`.
+
+        Raises:
+            UsageError: not exactly one run, a time that cannot be read, a file that cannot be
+                written, requirements that cannot be read, or the package mcap-ros2-support is not
+                installed.
+            DatabaseError: the file cannot be opened.
+        """
+        from msgflow.export.mcap import Violation, write_mcap
+
+        connection = self.connection
+        part = Slice(run, start, end, skip_first)
+        violations: list[Violation] = []
+        if targets is not None:
+            verdicts = self.verify(
+                targets, paths=paths, run=run, start=start, end=end, skip_first=skip_first
+            )
+            violations = [
+                Violation(
+                    row["worst_at_ns"],
+                    row["subject"],
+                    f"{row['metric']} is {row['measured']}, required is {row['condition']}",
+                )
+                for row in verdicts.result.to_arrow().to_pylist()
+                if row["verdict"] == "failed" and row["worst_at_ns"] is not None
+            ]
+        return self._ask(lambda: write_mcap(connection, Path(path), part, violations))
 
     def export_otlp(
         self,

@@ -152,6 +152,45 @@ def perfetto(
     )
 
 
+@app.command("mcap")
+@with_slice()
+def mcap(
+    output: Annotated[Path, output_option("FILE.mcap")] = Path("msgflow.mcap"),
+    targets: Annotated[
+        Path | None,
+        _flow_option(
+            "--targets", "FILE", "Requirements: those not met get a message", parser=path_of
+        ),
+    ] = None,
+    paths: Annotated[
+        Path, _flow_option("--paths", "FILE", "File of named paths", parser=path_of)
+    ] = Path(DEFAULT_PATHS),
+    part: Slice = LATEST,
+    memory_limit: MemoryLimitOption = None,
+    database: DatabaseOption = DEFAULT_DATABASE,
+) -> None:
+    """Write measured values of a run for Foxglove, Lichtblick, PlotJuggler and Rerun.
+
+    They show them beside the bag of the same drive. Topics below /msgflow have latency and age
+    of paths, latency of topics, and duration and waits of callbacks, in milliseconds.
+    /msgflow/log has a warning for each message that was dropped or lost.
+
+    Needs the package mcap-ros2-support: pip install mcap-ros2-support, or in a checkout
+    '.\\[mcap]'.
+    """
+    from msgflow.cli.output import count, print_runs, print_status
+    from msgflow.database import Database
+
+    with Database(database, memory_limit=memory_limit) as opened:
+        written = opened.export_mcap(output, **asdict(part), targets=targets, paths=paths)
+    print_runs([written.run])
+    unmet = f", {count(written.violations, 'violation')}" if targets is not None else ""
+    print_status(
+        f"{count(written.values, 'value')} of {count(written.topics, 'topic')},"
+        f" {count(written.losses, 'warning')}{unmet} written to {output}"
+    )
+
+
 @app.command("otlp")
 @with_slice()
 def otlp(

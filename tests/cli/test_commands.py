@@ -58,6 +58,7 @@ def test_every_command_has_help(msgflow: Msgflow, command: str) -> None:
         "export parquet -o views",
         "export perfetto -o trace.pftrace",
         "export otlp -o traces.json",
+        "export mcap -o run.mcap",
         "export csv -o rows",
         "export series -o series.csv",
         "ui --no-browser",

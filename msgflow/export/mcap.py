@@ -1,0 +1,148 @@
+"""MCAP file of measured values and losses, for programs that show recordings of robots.
+
+It has messages of ROS 2 (CDR), as a bag has: Foxglove, Lichtblick, PlotJuggler and Rerun all decode
+these, while not all of them decode JSON, or plot messages of protobuf without configuration.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from msgflow.atomic import replacing
+from msgflow.errors import UsageError
+from msgflow.sql.statement import internal_sql
+from msgflow.version import __version__
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+    from pathlib import Path
+
+    import duckdb
+
+    from msgflow.run.choice import Run
+    from msgflow.run.slice import Slice
+
+LOG_TOPIC = "/msgflow/log"
+_AT_ONCE = 20_000
+_NS_IN_S = 1_000_000_000
+_VALUE = ("std_msgs/msg/Float64", "float64 data")
+_LOG = (
+    "rcl_interfaces/msg/Log",
+    """builtin_interfaces/Time stamp
+uint8 level
+string name
+string msg
+string file
+string function
+uint32 line
+================================================================================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec""",
+)
+_WARNING = 30
+_ERROR = 40
+
+
+@dataclass(frozen=True)
+class Violation:
+    """A requirement that the run does not meet.
+
+    Attributes:
+        at_ns: when its worst case began, epoch ns.
+        subject: what of the run it is.
+        message: what was required and measured.
+    """
+
+    at_ns: int
+    subject: str
+    message: str
+
+
+@dataclass(frozen=True)
+class ExportedMcap:
+    """An MCAP file that was written.
+
+    Attributes:
+        path: the file.
+        run: what it is of.
+        topics: topics with values.
+        values: measured values, a message each.
+        losses: messages about messages that were dropped or lost.
+        violations: messages about requirements that are not met.
+    """
+
+    path: Path
+    run: Run
+    topics: int
+    values: int
+    losses: int
+    violations: int
+
+
+def write_mcap(
+    connection: duckdb.DuckDBPyConnection,
+    path: Path,
+    part: Slice,
+    violations: Sequence[Violation] = (),
+) -> ExportedMcap:
+    """Write values and losses of a run as an MCAP file, batch by batch.
+
+    Args:
+        connection: to a database with the public views.
+        path: the file; one that exists is replaced.
+        part: one run, and the times to write.
+        violations: what else the log has.
+
+    Raises:
+        UsageError: not exactly one run, a time that cannot be read, a file that cannot be written,
+            or the package mcap-ros2-support is not installed.
+    """
+    run = part.one_run(connection, "an MCAP file")
+    bindings = {"runs": [run.run_id], **part.window([run]).bindings}
+    try:
+        from mcap_ros2.writer import Writer
+    except ImportError:
+        raise UsageError(
+            "the package that writes MCAP files is not installed — mcap-ros2-support",
+            "pip install mcap-ros2-support; or in a checkout of msgflow: uv tool install '.[mcap]'",
+        ) from None
+    topics: set[str] = set()
+    values = losses = 0
+    with replacing(path) as temporary, temporary.open("wb") as file:
+        writer: Any = Writer(file)
+        writer.add_metadata("msgflow", {"run": run.name, "version": __version__})
+        schema = writer.register_msgdef(*_VALUE)
+        for row in _rows(connection, "mcap_value", bindings):
+            topics.add(row["topic"])
+            message = {"data": row["value_ms"]}
+            writer.write_message(row["topic"], schema, message, row["at_ns"], sequence=values)
+            values += 1
+        schema = writer.register_msgdef(*_LOG)
+        for row in _rows(connection, "mcap_loss", bindings):
+            message = _log(row["at_ns"], _WARNING, row["node"], row["message"])
+            writer.write_message(LOG_TOPIC, schema, message, row["at_ns"])
+            losses += 1
+        for each in violations:
+            message = _log(each.at_ns, _ERROR, each.subject, each.message)
+            writer.write_message(LOG_TOPIC, schema, message, each.at_ns)
+        writer.finish()
+    return ExportedMcap(path, run, len(topics), values, losses, len(violations))
+
+
+def _rows(
+    connection: duckdb.DuckDBPyConnection, name: str, bindings: dict[str, Any]
+) -> Iterator[dict[str, Any]]:
+    relation = internal_sql().run(connection, name, bindings)
+    with relation.to_arrow_reader(_AT_ONCE) as reader:
+        for batch in reader:
+            yield from batch.to_pylist()
+
+
+def _log(at_ns: int, level: int, name: str, text: str) -> dict[str, Any]:
+    seconds, nanoseconds = divmod(at_ns, _NS_IN_S)
+    return {
+        "stamp": {"sec": seconds, "nanosec": nanoseconds},
+        "level": level, "name": name, "msg": text, "file": "", "function": "", "line": 0,
+    }  # fmt: skip
