@@ -28,6 +28,7 @@ TRACEPOINT_KEYS = {
     "until",
     "where",
     "is_kernel",
+    "is_lasting",
     "role",
     "interrupt",
     "label",
