@@ -37,7 +37,7 @@ help:
 
 demo: $(VENV)/.installed
 	rm -rf $(DEMO)
-	$(BIN)/msgflow simulate demo $(DEMO)/trace
+	$(BIN)/msgflow simulate demo -o $(DEMO)/trace
 	$(BIN)/msgflow ingest $(DEMO)/trace --db $(DEMO)/msgflow.duckdb --clock-sync messages
 	$(BIN)/msgflow query e2e-latency --db $(DEMO)/msgflow.duckdb
 	@echo

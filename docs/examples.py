@@ -26,7 +26,7 @@ HERE = Path(__file__).parent
 PAGES = ("why-late.md", "tour.md", "cookbook.md", "own-events.md", "../README.md")
 # What pages without a setup of their own start from: the database of `make demo`.
 DEMO = """\
-msgflow simulate demo trace
+msgflow simulate demo -o trace
 msgflow ingest trace --clock-sync messages
 """
 COLUMNS = 100

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -683,7 +684,8 @@ class Database:
         connection = self.connection
         part = Slice(run, start, end, skip_first)
         places = self._ask(lambda: self._places(file, Path(paths), part))
-        return self._ask(lambda: verify(connection, file, part, paths=places, case=case))
+        found = self._ask(lambda: verify(connection, file, part, paths=places, case=case))
+        return replace(found, paths=str(paths))
 
     def _places(
         self, targets: TargetsFile, file: Path, part: Slice

@@ -10,7 +10,8 @@
 -- column: callback VARCHAR [callback]  What triggers it
 -- column: count BIGINT              Callback instances that began in the time window
 -- column: open BIGINT               Instances without an end
--- column: rate_hz DOUBLE [Hz]      Instances per second, from the first start to the last
+-- column: rate_hz DOUBLE [Hz]      Instances per second, from the first start to the last; NULL:
+--     these are less than half of the recording or time window apart, such as in a burst
 -- column: period_min_ns BIGINT [ns]     Shortest time from one start to the next
 -- column: period_median_ns BIGINT [ns]  Median time from one start to the next
 -- column: period_max_ns BIGINT [ns]     Longest time from one start to the next
@@ -52,7 +53,7 @@ measured AS (
         callback_id,
         count(*) AS count,
         count(*) - count(duration_ns) AS open,
-        (count(*) - 1) * 1e9 / nullif(max(start_ns) - min(start_ns), 0) AS rate_hz,
+        max(start_ns) - min(start_ns) AS span_ns,
         min(period_ns) AS period_min_ns,
         quantile_disc(period_ns, 0.5) AS period_median_ns,
         max(period_ns) AS period_max_ns,
@@ -73,7 +74,11 @@ SELECT
     l.label AS callback,
     m.count,
     m.open,
-    m.rate_hz,
+    CASE WHEN
+            2 * m.span_ns
+            >= coalesce(r.end_ns + least(0, $end_ns - r.end_ns) - greatest(r.start_ns, $start_ns), 0)
+            THEN (m.count - 1) * 1e9 / nullif(m.span_ns, 0)
+    END AS rate_hz,
     m.period_min_ns,
     m.period_median_ns,
     m.period_max_ns,
@@ -93,5 +98,6 @@ SELECT
     l.is_internal
 FROM measured AS m
 JOIN main.callback_label AS l ON m.callback_id = l.callback_id
+JOIN main.run AS r ON m.run_id = r.run_id
 JOIN main.callback AS c ON m.callback_id = c.callback_id
 ORDER BY m.run_id, p99_ns DESC NULLS LAST, l.node, l.label, m.callback_id

@@ -18,6 +18,7 @@ from msgflow.cli.options import (
     MemoryLimitOption,
     OutputOption,
     RunOption,
+    WideOption,
     case_option,
     format_option,
 )
@@ -160,6 +161,7 @@ def command(
             show_default="by the suffix of FILE, else table",
         ),
     ] = None,
+    wide: WideOption = False,
     output: OutputOption = None,
     memory_limit: MemoryLimitOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
@@ -195,6 +197,8 @@ def command(
             raise UsageError(f"--why goes without --{refused[0]}", "leave out one of them")
         if form is FlowFormat.HTML:
             raise UsageError("--why writes rows, no page", "--format table or json")
+    elif wide:
+        raise UsageError("--wide shows all columns of a table; a flow is a tree", "--why --wide")
     if slowest is not None and slowest > 1 and why:
         raise UsageError(
             f"--why is about one flow — --slowest {slowest}",
@@ -226,7 +230,8 @@ def command(
             start = {name: value for name, value in found[0].items() if name not in ids}
             counted = case or ("every_pair" if slowest is None else "first")
             result = opened.flow_why(**start, case=counted, internal=internal)
-            print_result(result, None if form is None else Format(form.value), output)
+            shown = None if form is None else Format(form.value)
+            print_result(result, shown, output, wide=wide)
             return
         if slowest is not None and direction is None:
             direction = "backward"

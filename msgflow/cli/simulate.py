@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from msgflow.cli.options import output_option
+
 _RECORDING = "How it is recorded"
 _SECOND = 1_000_000_000
 
@@ -29,7 +31,6 @@ def command(
             metavar="SCENARIO", help="Name of the system", autocompletion=lambda: _scenarios()
         ),
     ],
-    directory: Annotated[Path, typer.Argument(metavar="DIR", help="Where to write the trace")],
     _: Annotated[
         bool,
         typer.Option(
@@ -152,11 +153,16 @@ def command(
             rich_help_panel=_RECORDING,
         ),
     ] = 0,
+    output: Annotated[
+        Path | None,
+        output_option("DIR", "Folder to write the trace into", show_default="SCENARIO"),
+    ] = None,
 ) -> None:
     """Write the trace of a simulated ROS 2 system, and the links that really happened."""
     from msgflow.cli.output import count, print_status
     from msgflow.sim import Buffers, Recording, simulate
 
+    directory = output or Path(scenario)
     recording = Recording(
         start_ns=_nanoseconds(start_late),
         is_dual_session=dual_session,

@@ -19,21 +19,25 @@ if TYPE_CHECKING:
 PLACE_PARAMETERS = ("from", "to", "via", "without")
 _SHOWN = 3
 _TOPICS = """
-SELECT topic_name AS name FROM main.publisher WHERE list_contains($runs, run_id)
+SELECT topic_name AS name, is_internal FROM main.publisher WHERE list_contains($runs, run_id)
 UNION
-SELECT topic_name FROM main.subscription WHERE list_contains($runs, run_id)
+SELECT topic_name, is_internal FROM main.subscription WHERE list_contains($runs, run_id)
 """
 _NODES = """
-SELECT full_name AS name FROM main.node WHERE list_contains($runs, run_id)
+SELECT full_name AS name, false AS is_internal FROM main.node WHERE list_contains($runs, run_id)
 UNION
-SELECT node FROM main.callback_label WHERE list_contains($runs, run_id)
+SELECT node, false FROM main.callback_label WHERE list_contains($runs, run_id)
 UNION
-SELECT main.node_label(NULL, name, pid) FROM main.process
+SELECT main.node_label(NULL, name, pid), false FROM main.process
 WHERE list_contains($runs, run_id)
 """
-_CALLBACKS = "SELECT label AS name FROM main.callback_label WHERE list_contains($runs, run_id)"
-_HOSTS = "SELECT hostname AS name FROM main.host WHERE list_contains($runs, run_id)"
-_SERVICES = "SELECT service_name AS name FROM main.service WHERE list_contains($runs, run_id)"
+_CALLBACKS = """
+SELECT label AS name, is_internal FROM main.callback_label WHERE list_contains($runs, run_id)
+"""
+_HOSTS = "SELECT hostname AS name, false FROM main.host WHERE list_contains($runs, run_id)"
+_SERVICES = """
+SELECT service_name AS name, is_internal FROM main.service WHERE list_contains($runs, run_id)
+"""
 # By kind of name: the names of a run, and the command that lists them.
 _KNOWN = {
     "topic": (_TOPICS, "msgflow query topics"),
@@ -104,12 +108,19 @@ def require_names(
     name = missing[0][0]
     rows = connection.execute(sql, values).fetchall()
     # A name in brackets is a process whose node is unknown: it is no help.
-    known = sorted({each for (each,) in rows if each is not None and not each.startswith("[")})
+    there = {
+        (bool(is_internal), each)
+        for each, is_internal in rows
+        if each is not None and not each.startswith("[")
+    }
+    # Names of ROS itself, such as services of parameters, come last.
+    known = list(dict.fromkeys(each for _, each in sorted(there)))
+    ordinary = [each for is_internal, each in sorted(there) if not is_internal]
     what = _WORDS.get(kind, kind)
     where = "the run" if len(runs) == 1 else "these runs"
     is_pattern = any(character in name for character in "*?[")
     problem = f"no {what} in {where} fits" if is_pattern else f"there is no such {what} in {where}"
-    raise UsageError(f"{problem} — {name}", _hint(name, known, what, source))
+    raise UsageError(f"{problem} — {name}", _hint(name, ordinary, known, what, source))
 
 
 def require_ids(
@@ -138,10 +149,11 @@ def require_ids(
             raise UsageError(f"there is no such {view} in {where} — {number}", f"see {hint}")
 
 
-def _hint(name: str, known: list[str], what: str, source: str) -> str:
+def _hint(name: str, ordinary: list[str], known: list[str], what: str, source: str) -> str:
     if not known:
         return source
     more = len(known) - _SHOWN
     rest = f" and {more} more ({source})" if more > 0 else ""
     plural = "topics and nodes" if what == "topic or node" else f"{what}s"
-    return did_you_mean(name, known, f"the {plural} are {', '.join(known[:_SHOWN])}{rest}")
+    there = f"the {plural} are {', '.join(known[:_SHOWN])}{rest}"
+    return did_you_mean(name, ordinary, did_you_mean(name, known, there))

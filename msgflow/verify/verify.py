@@ -9,6 +9,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from msgflow.default_files import DEFAULT_PATHS
 from msgflow.name_suggestions import did_you_mean
 from msgflow.query.catalogue import load_query
 from msgflow.query.result import QueryResult
@@ -77,11 +78,13 @@ class Verification:
         result: one row per requirement and measured thing; its header describes the columns.
         run: the run.
         file: the name of the file with the requirements.
+        paths: the name of the file with the named paths.
     """
 
     result: QueryResult
     run: Run
     file: str
+    paths: str = DEFAULT_PATHS
 
     def __str__(self) -> str:
         return str(self.result)

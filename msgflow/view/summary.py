@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import pyarrow as pa
 
+from msgflow.default_files import DEFAULT_PATHS
 from msgflow.errors import UsageError
 from msgflow.query.catalogue import load_query
 from msgflow.query.result import QueryResult
@@ -233,6 +234,8 @@ def verdict_section(verification: Verification, part: Part) -> Section:
         for verdict in ("failed", "not measured", "passed")
     ]
     words = ["msgflow", "verify", verification.file, *part.options]
+    if verification.paths != DEFAULT_PATHS:
+        words += ["--paths", verification.paths]
     command = shlex.join([*words, "--run", verification.run.name])
     return Section("verdicts", verification.result, (command,), ", ".join(numbers))
 

@@ -101,10 +101,22 @@ def test_version(msgflow: Msgflow) -> None:
         (("sql",), "give SQL, or a file with -f", "msgflow sql"),
         (("sql", "SELECT 1", "-f", "x"), "give SQL, or a file with -f", "msgflow sql"),
         (("sql", "-f", "none.sql"), "no such file or directory — none.sql", ""),
-        (("simulate", "nothing", "out"), "nothing", ""),
-        (("simulate", "pipeline", "out", "--layout", "turtle"), "layout — turtle", "galactic"),
-        (("simulate", "pipeline", "out", "--pause", "2", "1"), "must end after", "begin first"),
-        (("simulate", "pipeline", "out", "--dual-session"), "needs a late start", "session starts"),
+        (("simulate", "nothing", "-o", "out"), "nothing", ""),
+        (
+            ("simulate", "pipeline", "-o", "out", "--layout", "turtle"),
+            "layout — turtle",
+            "galactic",
+        ),
+        (
+            ("simulate", "pipeline", "-o", "out", "--pause", "2", "1"),
+            "must end after",
+            "begin first",
+        ),
+        (
+            ("simulate", "pipeline", "-o", "out", "--dual-session"),
+            "needs a late start",
+            "session starts",
+        ),
     ],
 )
 def test_usage_errors(msgflow: Msgflow, arguments: tuple[str, ...], error: str, hint: str) -> None:
@@ -278,17 +290,24 @@ def test_a_trace_that_is_not_there_has_code_3(msgflow: Msgflow) -> None:
 
 
 def test_simulate(msgflow: Msgflow) -> None:
-    result = msgflow("simulate", "pipeline", "out", "--factor", 0.02)
+    result = msgflow("simulate", "pipeline", "-o", "out", "--factor", 0.02)
     assert result.exit_code == 0
     assert result.stdout == ""
     assert result.stderr.startswith("1 trace, ")
     assert list(Path("out").rglob("metadata"))
 
 
+def test_simulate_into_a_folder_of_the_name_of_the_system(msgflow: Msgflow) -> None:
+    result = msgflow("simulate", "pipeline", "--factor", 0.02)
+    assert result.exit_code == 0
+    assert result.stderr.endswith(" written to pipeline\n")
+    assert list(Path("pipeline").rglob("metadata"))
+
+
 def test_simulate_a_layout_and_a_recording_with_faults(msgflow: Msgflow) -> None:
     arguments = ("--factor", 0.03, "--layout", "humble-fastdds", "--start-late", 0.05)
     result = msgflow(
-        "simulate", "pipeline", "out", *arguments, "--pause", 0.1, 0.15, "--rotate", 0.2,
+        "simulate", "pipeline", "-o", "out", *arguments, "--pause", 0.1, 0.15, "--rotate", 0.2,
         "--rotate", 0.25, "--lose-events", 0.1, "--lose-packets", 0.1, "--per-process",
         "--cut", 1, "--slew", 20,
     )  # fmt: skip

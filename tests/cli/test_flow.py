@@ -67,6 +67,7 @@ def test_json_and_files(msgflow: Msgflow, small_database: Path, tmp_path: Path) 
         (("--slowest", "1"), "no flow arrived"),
         (("/chatter", "--why", "--depth", "3"), "--why goes without --depth"),
         (("/chatter", "--why"), "no subscription took this message"),
+        (("/chatter", "--wide"), "a flow is a tree"),
         (("--slowest", "2", "--why"), "critical-path --slowest 2"),
         (("--case", "last"), "choose among the slowest"),
         (("--slowest", "1", "--to", "/nothing"), "/nothing"),
@@ -149,7 +150,11 @@ def test_why_is_the_critical_path_of_the_flow(
             .as_py()
         )
         by_instance = database.flow_why(callback_instance_id=instance).table
-    rows = msgflow("flow", "--slowest", 1, "--to", "/control/cmd", "--why", "--format", "json")
+    why = ("flow", "--slowest", 1, "--to", "/control/cmd", "--why")
+    narrow, wide = (msgflow(*why, *more) for more in ((), ("--wide",)))
+    assert "publication_id" in wide.stdout
+    assert "publication_id" not in narrow.stdout
+    rows = msgflow(*why, "--format", "json")
     assert rows.exit_code == 0
     assert [row["duration_ns"] for row in json.loads(rows.stdout)] == (
         expected["duration_ns"].to_pylist()

@@ -79,7 +79,7 @@ def test_from_the_trace_to_every_kind_of_file(tmp_path: Path) -> None:
     (tmp_path / "links.yaml").write_text(LINKS, "utf-8")
     said = run(
         [
-            ["simulate", "demo", "trace", "--factor", "0.02"],
+            ["simulate", "demo", "-o", "trace", "--factor", "0.02"],
             ["ingest", "trace", "--links", "links.yaml"],
             ["clocks", "apply", "messages"],
             ["query", "e2e-latency"],

@@ -46,7 +46,7 @@ def test_the_home_directory_in_the_path_of_a_host(
     msgflow: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("HOME", HOME)
-    msgflow("simulate", "pipeline", "out", "--factor", 0.02)
+    msgflow("simulate", "pipeline", "-o", "out", "--factor", 0.02)
     done = msgflow("ingest", "out", "--host=robot=~/traces")
     assert f"host robot — {HOME}/traces" in done.stderr
 

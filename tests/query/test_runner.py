@@ -160,19 +160,28 @@ SELECT $from AS first, $to AS last, $runs AS runs
 @pytest.fixture
 def with_topics(connection: duckdb.DuckDBPyConnection) -> duckdb.DuckDBPyConnection:
     """Run 1 has /camera, /scan and two more, run 2 has /lidar."""
-    connection.execute("CREATE TABLE publisher (run_id BIGINT, topic_name VARCHAR)")
-    connection.execute("CREATE TABLE subscription (run_id BIGINT, topic_name VARCHAR)")
     connection.execute(
-        "INSERT INTO publisher VALUES (1, '/camera'), (1, '/a'), (1, '/b'), (2, '/lidar'), "
-        "(1, NULL)"
+        "CREATE TABLE publisher (run_id BIGINT, topic_name VARCHAR, is_internal BOOLEAN)"
     )
-    connection.execute("INSERT INTO subscription VALUES (1, '/scan'), (1, '/camera')")
+    connection.execute(
+        "CREATE TABLE subscription (run_id BIGINT, topic_name VARCHAR, is_internal BOOLEAN)"
+    )
+    connection.execute(
+        "INSERT INTO publisher VALUES (1, '/camera', false), (1, '/a', false), (1, '/b', false), "
+        "(2, '/lidar', false), (1, NULL, false)"
+    )
+    connection.execute("INSERT INTO subscription VALUES (1, '/scan', false), (1, '/camera', false)")
     connection.execute("CREATE TABLE node AS SELECT 1 AS run_id, '/driver' AS full_name")
     connection.execute("CREATE TABLE process AS SELECT 1 AS run_id, 'main' AS name, 812 AS pid")
-    connection.execute("CREATE TABLE service AS SELECT 1 AS run_id, '/reset' AS service_name")
+    connection.execute(
+        "CREATE TABLE service AS SELECT 1 AS run_id, '/reset' AS service_name, false AS is_internal"
+    )
+    # Of ROS itself: no hint where there are others, although it comes first by name.
+    connection.execute("INSERT INTO service VALUES (1, '/Xyz/get_parameters', true)")
     connection.execute(
         "CREATE TABLE callback_label AS"
-        " SELECT 1 AS run_id, '[main 812]' AS node, 'Timer(10 ms)' AS label"
+        " SELECT 1 AS run_id, '[main 812]' AS node, 'Timer(10 ms)' AS label,"
+        " false AS is_internal"
     )
     connection.execute("CREATE TABLE host AS SELECT 1 AS run_id, 'robot' AS hostname")
     (label,) = (one for one in objects.load("public") if one.name == "main.node_label")
@@ -205,7 +214,7 @@ def test_topics_of_the_chosen_runs_will_do(
             "first",
             {"to": "/scan,xyz"},
             "in the run — xyz",
-            "the topics and nodes are /a, /b, /camera and 3 more (msgflow query graph)",
+            "the topics and nodes are /a, /b, /camera and 4 more (msgflow query graph)",
         ),
         ("second", {"from": "/scan"}, "in the run — /scan", "the topics and nodes are /lidar"),
         ("all", {"from_": "/none!"}, "in these runs — /none!", "the topics and nodes are"),

@@ -150,6 +150,19 @@ def test_another_suffix_is_no_report(dropping: Path, tmp_path: Path) -> None:
     assert ".html or .md" in result.stderr
 
 
+def test_the_command_of_verdicts_names_the_file_of_paths(dropping: Path, tmp_path: Path) -> None:
+    targets, paths, summary = (tmp_path / name for name in ("t.yaml", "p.yaml", "summary.md"))
+    targets.write_text(_TARGETS, encoding="utf-8")
+    paths.write_text("paths: []", encoding="utf-8")
+    words = ["report", "-o", summary, "--targets", targets, "--db", dropping]
+    for more, is_named in ((["--paths", paths], True), ([], False)):
+        result = CliRunner().invoke(app, [str(word) for word in [*words, *more]])
+        assert result.exit_code == 0, result.stderr
+        text = summary.read_text(encoding="utf-8")
+        assert f"msgflow verify {targets}" in text
+        assert (f"--paths {paths}" in text) == is_named
+
+
 def test_the_first_page_of_a_report_has_it(
     dropping: Path, report: Report, page: Page, tmp_path_factory: pytest.TempPathFactory
 ) -> None:

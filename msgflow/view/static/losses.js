@@ -70,9 +70,11 @@ export class LossesPage {
     if (!rows.length) return h("p", {}, "Nothing was lost.");
     const width = points.length[rows[0]];
     const { start, end } = this.app.extent;
+    // Pieces count from the begin of what was asked for, which a report cut by --start moves.
+    const first = start + (((points.start_at[rows[0]] - start) % width) + width) % width;
     const times = [];
-    for (let at = start; at < end; at += width) times.push(at);
-    const place = (row) => Math.min(Math.round((points.start_at[row] - start) / width), times.length - 1);
+    for (let at = first > start ? first - width : start; at < end; at += width) times.push(at);
+    const place = (row) => Math.min(Math.round((points.start_at[row] - times[0]) / width), times.length - 1);
     const series = FATES_OF_MESSAGES.map(([status, label, color]) => {
       const values = times.map(() => 0);
       for (const row of rows) if (points.status[row] === status) values[place(row)] += points.count[row];
