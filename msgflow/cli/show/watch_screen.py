@@ -28,7 +28,7 @@ _TIME = slice(11, 19)
 _SPARKS = "▁▂▃▄▅▆▇█"
 _STEPS = 10
 _PATHS, _THREADS, _LOSSES, _VIOLATIONS = 12, 5, 5, 5
-_PATH_WIDTH, _NAME_WIDTH = 30, 46
+_PATH_WIDTH, _NAME_WIDTH = 26, 40
 _MISSING = ("dropped", "lost", "no_output", "unknown")
 
 
@@ -57,7 +57,7 @@ class WatchScreen:
 
     def _paths(self, report: WindowReport) -> Table:
         seconds = (report.window.end_ns - report.window.start_ns) / 1_000_000_000
-        table = _table("path", "/s", "median", "p99", "max", "missing", "max by step")
+        table = _table("path", "/s", "median", "p99", "max", "missing", "steps")
         worst = sorted(report.paths, key=lambda path: (-missing(path), -(path["max_ns"] or 0)))
         for path in worst[:_PATHS]:
             lost = missing(path)

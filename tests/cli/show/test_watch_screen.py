@@ -15,15 +15,15 @@ START_NS = 1_700_000_000_000_000_000
 MS = 1_000_000
 
 
-def path(name: str, max_ms: int, lost: int = 0) -> dict[str, Any]:
+def path(name: str, max_ms: float, lost: int = 0) -> dict[str, Any]:
     others = ("roots", "superseded", "dropped", "no_output", "not_connected", "unknown")
     return dict.fromkeys(others, 0) | {
         "path": name,
         "reached": 100,
         "lost": lost,
-        "median_ns": max_ms * MS // 2,
-        "p99_ns": max_ms * MS,
-        "max_ns": max_ms * MS,
+        "median_ns": int(max_ms * MS / 2),
+        "p99_ns": int(max_ms * MS),
+        "max_ns": int(max_ms * MS),
         "reasons": None,
     }
 
@@ -61,8 +61,9 @@ def test_it_fits_80_columns(length: int) -> None:
         {"topic": "/t" * length, "subscriber": "/n", "dropped": 12, "lost": 0, "reasons": "r" * 99}
     ]
     for _ in range(12):
-        found = lines(screen, report(path("/x" * length, 99_999), losses=losses))
+        found = lines(screen, report(path("/x" * length, 175.6), losses=losses))
     assert max(map(len, found)) <= 80
+    assert sum(line.count("  176 ms") for line in found) == 2
     # Ten steps, all of them as slow.
     assert any("█" * 10 in line for line in found)
 
