@@ -7,6 +7,8 @@
 -- column: run_id BIGINT             Run
 -- column: start_ns BIGINT [epoch ns]  Start of the callback
 -- column: duration_ns BIGINT [ns]   From its start to its end; empty: never seen to end
+-- column: running_ns BIGINT [ns]    Of that, on a CPU; empty: not traced by the kernel
+-- column: preempted_ns BIGINT [ns]  Of that, another thread had the CPU
 -- column: node VARCHAR [node]       Node of the callback
 -- column: callback VARCHAR [callback]  What triggers it
 -- column: published VARCHAR         Topics of the messages it published itself, and how many of
@@ -23,8 +25,8 @@
 -- column: callback_id BIGINT        Identity of the callback
 -- column: is_internal BOOLEAN       Infrastructure of ROS
 -- slowest: duration_ns
--- brief: duration_ns, node, callback, start_ns, take_id, published, tid, callback_instance_id,
---     process, host
+-- brief: duration_ns, running_ns, preempted_ns, node, callback, start_ns, take_id, published, tid,
+--     callback_instance_id, process, host
 -- note: callbacks
 WITH instance AS (
     SELECT
@@ -57,6 +59,8 @@ SELECT
     i.run_id,
     i.start_ns,
     i.duration_ns,
+    s.running_ns,
+    s.preempted_ns,
     l.node,
     l.label AS callback,
     p.topics AS published,
@@ -75,5 +79,6 @@ JOIN main.callback_label AS l ON i.callback_id = l.callback_id
 JOIN main.process AS r ON i.process_id = r.process_id
 JOIN main.host AS h ON r.host_id = h.host_id
 LEFT JOIN main.thread AS t ON i.thread_id = t.thread_id
+LEFT JOIN main.callback_schedule AS s ON i.callback_instance_id = s.callback_instance_id
 LEFT JOIN published AS p ON i.callback_instance_id = p.callback_instance_id
 ORDER BY i.run_id, i.duration_ns DESC NULLS LAST, i.start_ns, i.callback_instance_id

@@ -1,7 +1,8 @@
 -- name: callbacks
 -- title: Callback durations and periods
 -- description: How long callbacks ran, and how far apart their starts were. Instances without an
---     end are counted separately. The longest 99th percentile comes first.
+--     end are counted separately. Where the kernel was traced, CPU time and the time without a CPU
+--     stand beside the duration. The longest 99th percentile comes first.
 -- grain: one row per callback object that ran
 -- variant: each BOOLEAN = false  Each callback instance, the longest first
 -- column: run_id BIGINT             Run
@@ -20,22 +21,30 @@
 -- column: p99_ns BIGINT [ns]        99 % of the durations are at most this
 -- column: max_ns BIGINT [ns]        Longest duration
 -- column: total_ns BIGINT [ns]      Sum of the durations
+-- column: running_median_ns BIGINT [ns]  Median CPU time; empty: not traced by the kernel
+-- column: running_p99_ns BIGINT [ns]    99 % of the CPU times are at most this
+-- column: preempted_p99_ns BIGINT [ns]  99 % lost the CPU to other threads for at most this long
+-- column: preempted_ns BIGINT [ns]      Sum of the time for which others had the CPU
 -- column: symbol VARCHAR            Function registered for the callback
 -- column: callback_id BIGINT        Identity of the callback
 -- column: is_internal BOOLEAN       Infrastructure of ROS
--- brief: node, callback, count, median_ns, p99_ns, max_ns, p95_ns, period_median_ns, mean_ns
+-- brief: node, callback, count, median_ns, p99_ns, running_p99_ns, preempted_p99_ns, max_ns,
+--     p95_ns, period_median_ns, mean_ns
 -- note: callbacks
 WITH instance AS (
     SELECT
-        run_id,
-        callback_id,
-        start_ns,
-        end_ns - start_ns AS duration_ns,
-        start_ns - lag(start_ns) OVER (
-            PARTITION BY callback_id ORDER BY start_ns, callback_instance_id
-        ) AS period_ns
-    FROM main.callback_instance
-    WHERE list_contains($runs, run_id) AND start_ns >= $start_ns AND start_ns < $end_ns
+        i.run_id,
+        i.callback_id,
+        i.start_ns,
+        i.end_ns - i.start_ns AS duration_ns,
+        i.start_ns - lag(i.start_ns) OVER (
+            PARTITION BY i.callback_id ORDER BY i.start_ns, i.callback_instance_id
+        ) AS period_ns,
+        s.running_ns,
+        s.preempted_ns
+    FROM main.callback_instance AS i
+    LEFT JOIN main.callback_schedule AS s ON i.callback_instance_id = s.callback_instance_id
+    WHERE list_contains($runs, i.run_id) AND i.start_ns >= $start_ns AND i.start_ns < $end_ns
 ),
 measured AS (
     SELECT
@@ -51,7 +60,10 @@ measured AS (
         quantile_disc(duration_ns, [0.5, 0.95, 0.99]) AS quantiles,
         round(avg(duration_ns))::BIGINT AS mean_ns,
         max(duration_ns) AS max_ns,
-        sum(duration_ns)::BIGINT AS total_ns
+        sum(duration_ns)::BIGINT AS total_ns,
+        quantile_disc(running_ns, [0.5, 0.99]) AS running,
+        quantile_disc(preempted_ns, 0.99) AS preempted_p99_ns,
+        sum(preempted_ns)::BIGINT AS preempted_ns
     FROM instance
     GROUP BY run_id, callback_id
 )
@@ -72,6 +84,10 @@ SELECT
     m.quantiles[3] AS p99_ns,
     m.max_ns,
     m.total_ns,
+    m.running[1] AS running_median_ns,
+    m.running[2] AS running_p99_ns,
+    m.preempted_p99_ns,
+    m.preempted_ns,
     c.symbol,
     m.callback_id,
     l.is_internal

@@ -3,8 +3,10 @@
 -- description: The slowest flows, piece by piece; msgflow flow --why shows that of one message.
 --     Waits are replaced by what they waited for, as far as the trace shows: what the executor ran
 --     meanwhile, the timer that was not due yet, or the message that was still missing and how that
---     came about. The pieces add up to the latency. Unless detail is full, pieces below 1 %
---     of the latency are summed up in one line, 'rest', and the layers of publishing are one piece.
+--     came about. Where the kernel was traced, what a thread did is divided into its states: on a
+--     CPU, preempted and by what, or waiting and for what (docs/scheduling.md). The pieces add up
+--     to the latency. Unless detail is full, pieces below 1 % of the latency are summed up in one
+--     line, 'rest', and the layers of publishing are one piece, as are equal states of a callback.
 --     Flows with a message that was stored until its subscription existed come after all others.
 -- grain: one row per flow and piece, node or activity
 -- param: from VARCHAR = NULL  Topics or nodes where flows start: globs, with commas between
@@ -18,7 +20,7 @@
 -- param: case VARCHAR {first|last|newest|every_pair} = 'first'  Arrivals that count: the
 --     first or last of each root, that of the newest root, or all
 -- param: by VARCHAR {piece|node|part} = 'piece'  One row for each piece, or totals by node or
---     by activity
+--     by activity and state
 -- param: detail VARCHAR {short|full} = 'short'  full: every piece and layer of publishing
 -- param: from_event VARCHAR {callback_start|publish} = 'callback_start'  Event that starts
 --     the clock
@@ -40,12 +42,23 @@
 --     the message arrived); in a cache 'timer' (not due yet), 'unpublished' (the message that was
 --     waited for had not been published), or a part of that message's own flow; 'rest': pieces too
 --     short for a line of their own
+-- column: state VARCHAR            What the thread did, where the kernel was traced: 'running',
+--     'preempted' (another thread had the CPU), 'runnable' (woken, waits for a CPU), 'sleeping'
+--     (waits for something), 'uninterruptible' (waits for a page or a disk) or 'unknown'
+-- column: who VARCHAR              What took the CPU, or ended the sleep: a thread, or 'timer',
+--     'interrupt' or 'softirq'; of a ROS process with its tid
 -- column: node VARCHAR [node]      Node that did it, or that waited
 -- column: what VARCHAR             The callback, or the topic of the message
 -- column: share DOUBLE [share]     Part of the latency, rounded to 4 places
 -- column: pieces BIGINT            Number of pieces in the row
 -- column: is_certain BOOLEAN       For 'executor_busy', 'all_threads_busy' and 'blocked': what
 --     waited was ready by then; no: it may have arrived during this piece
+-- column: thread VARCHAR           Thread in that state; where a thread of a ROS process ended a
+--     sleep, that thread, with what it did meanwhile
+-- column: wakers BIGINT            How many wakers lead to it: 0 for the thread of the piece itself
+-- column: priority INTEGER         Its priority, as the kernel has it: 0 to 99 real-time, 100 to
+--     139 nice -20 to 19
+-- column: who_priority INTEGER     Priority of what took the CPU
 -- column: from_ns BIGINT [epoch ns]  Begin
 -- column: callback_instance_id BIGINT  Callback instance
 -- column: publication_id BIGINT    Message
@@ -53,7 +66,8 @@
 -- column: latency_ns BIGINT [ns]   Latency of the whole flow
 -- column: path VARCHAR [path]      Nodes and topics of the flow; only in its first row
 -- heading: rank, latency_ns, take_id, path
--- brief: rank, at_ns, duration_ns, share, activity, node, what, is_certain, pieces, hop, part
+-- brief: rank, at_ns, duration_ns, share, activity, state, who, node, what, is_certain, pieces,
+--     hop, part, thread, priority, who_priority, wakers
 -- note: clocks
 CREATE OR REPLACE TEMP TABLE critical_part AS
 WITH path AS (
@@ -116,9 +130,22 @@ WITH piece AS (
         c.take_id,
         c.latency_ns,
         c.path_id,
+        c.state,
+        c.wakers,
+        printf('%s %d', coalesce(t.name, '?'), t.tid) AS thread,
+        c.priority,
+        CASE
+            WHEN bt.thread_id IS NOT NULL THEN printf('%s %d', coalesce(bt.name, '?'), bt.tid)
+            WHEN c.by_kind = 'thread' THEN bo.name
+            ELSE c.by_kind
+        END AS who,
+        c.by_priority AS who_priority,
         $detail = 'short' AND c.activity IN ('intra', 'rclcpp', 'rcl', 'rmw', 'dds')
             AND c.part = c.activity AS is_layer
     FROM main.critical_piece('critical_part', $runs) AS c
+    LEFT JOIN main.thread AS t ON c.state_thread_id = t.thread_id
+    LEFT JOIN main.thread AS bt ON c.by_thread_id = bt.thread_id
+    LEFT JOIN main.other_thread AS bo ON c.by_other_thread_id = bo.other_thread_id
     LEFT JOIN main.callback_instance AS i ON c.callback_instance_id = i.callback_instance_id
     LEFT JOIN main.callback_label AS l ON i.callback_id = l.callback_id
     LEFT JOIN main.publication AS b ON c.publication_id = b.publication_id
@@ -126,7 +153,7 @@ WITH piece AS (
     LEFT JOIN main.process AS r ON b.process_id = r.process_id
     LEFT JOIN main.node AS n ON p.node_id = n.node_id
 ),
--- The layers of one publication follow each other.
+-- The layers of one publication follow each other. States of a callback alternate.
 folded AS (
     SELECT
         run_id, flow_rank, min(position) AS position, min(at_ns) AS at_ns,
@@ -134,19 +161,24 @@ folded AS (
         CASE WHEN is_layer THEN 'publish' ELSE any_value(part) END AS part,
         CASE WHEN is_layer THEN 'publish' ELSE any_value(activity) END AS activity,
         node, what, is_certain, min(from_ns) AS from_ns, callback_instance_id, publication_id,
-        take_id, latency_ns, path_id
+        take_id, latency_ns, path_id, state, who, thread, wakers, priority, who_priority,
+        count(*) FILTER (WHERE NOT is_layer) AS pieces
     FROM piece
     GROUP BY
         run_id, flow_rank, hop, node, what, is_certain, callback_instance_id, publication_id,
-        take_id, latency_ns, path_id, is_layer, CASE WHEN is_layer THEN 0 ELSE position END
+        take_id, latency_ns, path_id, state, who, thread, wakers, priority, who_priority, is_layer,
+        CASE WHEN NOT is_layer THEN part END,
+        CASE WHEN NOT is_layer THEN activity END,
+        CASE WHEN NOT is_layer AND ($detail = 'full' OR state IS NULL) THEN position END
 ),
 sorted AS (
     SELECT
         run_id, flow_rank, position, at_ns, duration_ns, hop, part, activity, node, what,
         is_certain, from_ns, callback_instance_id, publication_id, take_id, latency_ns, path_id,
+        state, who, thread, wakers, priority, who_priority, greatest(pieces, 1) AS pieces,
         CASE
             WHEN $by = 'node' THEN coalesce(node, '')
-            WHEN $by = 'part' THEN activity
+            WHEN $by = 'part' THEN concat_ws(' ', activity, state)
             WHEN $detail = 'short' AND abs(duration_ns) < 0.01 * latency_ns THEN 'rest'
             ELSE position::VARCHAR
         END AS row_key
@@ -168,8 +200,18 @@ summed AS MATERIALIZED (
             WHEN $by = 'node' OR $by = 'piece' AND row_key <> 'rest' THEN any_value(node)
         END AS node,
         CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(what) END AS what,
+        CASE
+            WHEN $by = 'part' OR $by = 'piece' AND row_key <> 'rest' THEN any_value(state)
+        END AS state,
+        CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(who) END AS who,
+        CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(thread) END AS thread,
+        CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(wakers) END AS wakers,
+        CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(priority) END AS priority,
+        CASE
+            WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(who_priority)
+        END AS who_priority,
         round(sum(duration_ns) / nullif(latency_ns, 0), 4) AS share,
-        count(*) AS pieces,
+        sum(pieces)::BIGINT AS pieces,
         CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(is_certain) END AS is_certain,
         CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(from_ns) END AS from_ns,
         CASE
@@ -214,11 +256,17 @@ SELECT
     s.hop,
     s.part,
     s.activity,
+    s.state,
+    s.who,
     s.node,
     s.what,
     s.share,
     s.pieces,
     s.is_certain,
+    s.thread,
+    s.wakers,
+    s.priority,
+    s.who_priority,
     s.from_ns,
     s.callback_instance_id,
     s.publication_id,

@@ -32,6 +32,8 @@
 --     idle; 'clock', since it runs more often than its period allows (simulated time)
 -- column: busy_share DOUBLE [share] Share of all lateness for which the executor was busy with
 --     callbacks, 0 to 1
+-- column: run_queue_share DOUBLE [share] Share of all lateness for which its thread waited for a
+--     CPU outside of callbacks, 0 to 1; empty: not traced by the kernel
 -- column: meanwhile VARCHAR         What ran in that time: the three with the largest share, with
 --     their node if it is another one
 -- column: unknown BIGINT            Of count, those whose due moment is not known, such as the
@@ -42,7 +44,7 @@
 -- column: callback_id BIGINT        Identity of the callback
 -- column: is_internal BOOLEAN       Infrastructure of ROS
 -- brief: node, callback, count, missed, lateness_p99_ns, lateness_max_ns, off_grid, jitter_p99_ns,
---     meanwhile, lateness_median_ns, busy_share, rate_hz, bunched
+--     meanwhile, busy_share, run_queue_share, lateness_median_ns, rate_hz, bunched
 WITH asked AS (
     SELECT c.run_id, c.callback_id, c.timer_id, c.symbol, t.period_ns, t.created_ns
     FROM main.callback AS c
@@ -53,6 +55,7 @@ called AS (
     SELECT
         i.callback_id,
         i.callback_instance_id,
+        i.thread_id,
         x.executor_id,
         i.start_ns,
         lag(i.start_ns) OVER (
@@ -71,6 +74,7 @@ instance AS (
     SELECT
         c.callback_id,
         c.callback_instance_id,
+        c.thread_id,
         c.start_ns,
         c.start_ns - c.previous_ns AS interval_ns,
         coalesce(b.resumed_ns > c.previous_ns, false) AS is_loss_affected
@@ -81,11 +85,45 @@ instance AS (
 -- Behind a gap the call before may be missing, and with it when this one was due.
 late AS MATERIALIZED (
     SELECT
-        i.callback_id, w.wait_ns AS lateness_ns, w.busy_max_ns AS busy_ns,
-        w.meanwhile_callback_ids, w.meanwhile_ns
+        i.callback_id, i.callback_instance_id, i.thread_id, i.start_ns,
+        w.wait_ns AS lateness_ns, w.busy_max_ns AS busy_ns, w.meanwhile_callback_ids,
+        w.meanwhile_ns
     FROM instance AS i
     JOIN main.executor_wait_explained($runs) AS w ON i.callback_instance_id = w.callback_instance_id
     WHERE w.since = 'timer' AND NOT i.is_loss_affected
+),
+-- When their threads waited for a CPU. What begins and ends a callback needs one: such a wait lies
+-- inside of a callback, or outside.
+queued AS (
+    SELECT
+        s.thread_id, s.start_ns, s.end_ns,
+        sum(s.end_ns - s.start_ns) OVER (
+            PARTITION BY s.thread_id ORDER BY s.start_ns
+        ) AS total_ns
+    FROM main.thread_state AS s
+    ASOF LEFT JOIN (
+        SELECT thread_id, start_ns, end_ns FROM main.callback_instance WHERE parent_id IS NULL
+    ) AS i
+        ON s.thread_id = i.thread_id AND s.start_ns >= i.start_ns
+    WHERE s.state IN ('preempted', 'runnable')
+        AND s.thread_id IN (SELECT thread_id FROM late)
+        AND coalesce(i.end_ns <= s.start_ns, true)
+),
+edge AS (
+    SELECT callback_id, thread_id, start_ns AS at_ns, 1 AS sign FROM late
+    UNION ALL
+    SELECT callback_id, thread_id, start_ns - lateness_ns, -1 FROM late
+),
+in_queue AS (
+    SELECT
+        e.callback_id,
+        sum(
+            e.sign * coalesce(q.total_ns - greatest(q.end_ns - e.at_ns, 0), 0)
+        ) AS queue_ns
+    FROM edge AS e
+    ASOF LEFT JOIN queued AS q ON e.thread_id = q.thread_id AND e.at_ns >= q.start_ns
+    WHERE e.thread_id IN (SELECT thread_id FROM main.thread_state)
+    GROUP BY e.callback_id
 ),
 usual AS (
     SELECT callback_id, quantile_disc(interval_ns, 0.5) AS median_ns
@@ -135,9 +173,11 @@ delayed AS (
         count(*) AS known,
         quantile_disc(l.lateness_ns, [0.5, 0.95, 0.99, 1]) AS lateness,
         sum(l.lateness_ns // nullif(a.period_ns, 0))::BIGINT AS missed,
-        sum(l.busy_ns) / nullif(sum(l.lateness_ns), 0) AS busy_share
+        sum(l.busy_ns) / nullif(sum(l.lateness_ns), 0) AS busy_share,
+        any_value(q.queue_ns) / nullif(sum(l.lateness_ns), 0) AS run_queue_share
     FROM late AS l
     JOIN asked AS a ON l.callback_id = a.callback_id
+    LEFT JOIN in_queue AS q ON l.callback_id = q.callback_id
     GROUP BY l.callback_id
 ),
 ran AS (
@@ -209,6 +249,7 @@ SELECT
             THEN 'reset'
     END AS off_grid,
     d.busy_share,
+    d.run_queue_share,
     m.shares AS meanwhile,
     coalesce(c.count - c.loss_affected - coalesce(d.known, 0), 0) AS unknown,
     coalesce(c.loss_affected, 0) AS loss_affected,

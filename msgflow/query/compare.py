@@ -14,6 +14,7 @@ from msgflow.query.clock_notes import clock_notes
 from msgflow.query.names import require_places
 from msgflow.query.result import QueryResult
 from msgflow.query.runner import bind
+from msgflow.query.schedule_notes import schedule_notes
 from msgflow.query.selection import CUT_COLUMN
 from msgflow.resources import resource_directory
 from msgflow.run.choice import Run, choose_one, read_runs
@@ -297,6 +298,8 @@ def _compared(
     result = QueryResult(table, _header(), (first, second))
     if is_strict:
         result.notes.extend(_one_sided(result, what, first, second))
+    if what == "callbacks":
+        result.notes.extend(schedule_notes(connection, asked, result))
     result.notes.extend(_doubts(connection, result, what, first, second))
     if len(result):
         result.notes.extend(clock_notes(connection, list(dict.fromkeys((first, second)))))

@@ -4,8 +4,9 @@
 --     with waits replaced by what they waited for, as far as the trace shows. While a message or
 --     request waited for its callback: the callback instances that its executor was busy with, or
 --     that exclude the callback. In a cache: the timer until it was due, or the message that
---     completed the set, from the callback that published it. The pieces follow each other and add
---     up to the latency of the flow exactly. A negative part is one piece.
+--     completed the set, from the callback that published it. Where the kernel was traced, what a
+--     thread did is divided into its states. The pieces follow each other and add up to the latency
+--     of the flow exactly. A negative part is one piece.
 -- grain: one row per piece of the flow
 -- param: runs BIGINT[]  Runs to look at
 -- param: from_topic VARCHAR = NULL  Topics or nodes where flows start: names or globs, separated by
@@ -50,6 +51,16 @@
 --     was ready by then; false: it may have arrived during this piece. NULL for others
 -- column: callback_instance_id BIGINT  Callback instance that it is, or that it waits for
 -- column: publication_id BIGINT  Message that is published, under way or waited for
+-- column: state VARCHAR  State of the thread, as in main.schedule_piece: of the one that ran the
+--     callback or published, or that waited. NULL: not traced by the kernel, or no thread's doing
+-- column: wakers BIGINT  How many wakers lead to the thread: 0 for the one that the piece is of
+-- column: state_thread_id BIGINT  The thread in that state
+-- column: priority INTEGER  Its priority, as the kernel has it: 0 to 99 real-time, 100 to 139 nice
+-- column: by_kind VARCHAR  What took the CPU, or ended the sleep: 'thread', 'timer', 'interrupt' or
+--     'softirq'. NULL: not known, or the state needs none
+-- column: by_thread_id BIGINT  That thread, of a ROS process
+-- column: by_other_thread_id BIGINT  That thread, of another process
+-- column: by_priority INTEGER  Its priority; known for what took the CPU
 CREATE OR REPLACE MACRO main.critical_path(
     runs, from_topic := NULL, to_topic := NULL, from_event := 'callback_start',
     to_event := 'callback_end', window_start_ns := NULL, window_end_ns := NULL,
@@ -68,5 +79,6 @@ WITH flow_part AS MATERIALIZED (
 )
 SELECT
     run_id, path_id, root_kind, root_id, take_id, latency_ns, flow_rank, hop, position, part,
-    activity, from_ns, to_ns, duration_ns, is_certain, callback_instance_id, publication_id
+    activity, from_ns, to_ns, duration_ns, is_certain, callback_instance_id, publication_id,
+    state, wakers, state_thread_id, priority, by_kind, by_thread_id, by_other_thread_id, by_priority
 FROM main.critical_piece('flow_part', runs)

@@ -1,7 +1,8 @@
 -- name: main.critical_piece
 -- kind: macro
 -- description: What flows had to wait for, moment by moment: the last step of main.critical_path.
---     It replaces each wait of a flow by the parts of what the flow waited for.
+--     It replaces each wait of a flow by the parts of what the flow waited for. Where the kernel
+--     was traced, what a thread did is divided into its states (main.schedule_piece).
 -- grain: one row per piece of a flow
 -- param: parts VARCHAR  Name of the rows of main.end_to_end_part: a table, or a part of the query
 -- param: runs BIGINT[]  Runs that they are of
@@ -28,6 +29,16 @@
 --     was ready by then; false: it may have arrived during this piece. NULL for others
 -- column: callback_instance_id BIGINT  Callback instance that it is, or that it waits for
 -- column: publication_id BIGINT  Message that is published, under way or waited for
+-- column: state VARCHAR  State of the thread, as in main.schedule_piece: of the one that ran the
+--     callback or published, or that waited. NULL: not traced by the kernel, or no thread's doing
+-- column: wakers BIGINT  How many wakers lead to the thread: 0 for the one that the piece is of
+-- column: state_thread_id BIGINT  The thread in that state
+-- column: priority INTEGER  Its priority, as the kernel has it: 0 to 99 real-time, 100 to 139 nice
+-- column: by_kind VARCHAR  What took the CPU, or ended the sleep: 'thread', 'timer', 'interrupt' or
+--     'softirq'. NULL: not known, or the state needs none
+-- column: by_thread_id BIGINT  That thread, of a ROS process
+-- column: by_other_thread_id BIGINT  That thread, of another process
+-- column: by_priority INTEGER  Its priority; known for what took the CPU
 CREATE OR REPLACE MACRO main.critical_piece(parts, runs) AS TABLE
 -- Here positions go on from flow to flow.
 WITH part AS MATERIALIZED (
@@ -282,26 +293,62 @@ numbered AS (
             ORDER BY from_ns
         ) AS island
     FROM named
+),
+whole AS MATERIALIZED (
+    SELECT
+        run_id, path_id, root_kind, root_id, take_id, latency_ns, flow_rank, hop, part, activity,
+        is_certain, callback_instance_id, publication_id,
+        row_number() OVER (ORDER BY position, min(from_ns)) AS interval_id,
+        min(from_ns) AS from_ns,
+        arg_max(to_ns, from_ns) AS to_ns,
+        sum(to_ns - from_ns)::BIGINT AS duration_ns
+    FROM numbered
+    GROUP BY
+        run_id, path_id, root_kind, root_id, take_id, latency_ns, flow_rank, hop, position, part,
+        activity, is_certain, callback_instance_id, publication_id, island
+),
+-- In the others no thread did anything, or the trace does not show which one.
+interval AS MATERIALIZED (
+    SELECT
+        w.interval_id, w.from_ns, w.to_ns,
+        CASE
+            WHEN w.activity IN ('publish', 'intra', 'rclcpp', 'rcl', 'rmw', 'dds') THEN p.thread_id
+            ELSE i.thread_id
+        END AS thread_id
+    FROM whole AS w
+    LEFT JOIN store.callback_instance AS i ON w.callback_instance_id = i.callback_instance_id
+    LEFT JOIN store.publication AS p ON w.publication_id = p.publication_id
+    WHERE w.activity NOT IN ('cache', 'timer', 'unpublished', 'stored', 'response_to_take')
+        AND w.to_ns > w.from_ns
 )
 SELECT
-    run_id,
-    path_id,
-    root_kind,
-    root_id,
-    take_id,
-    latency_ns,
-    flow_rank,
-    hop,
-    row_number() OVER (PARTITION BY flow_rank ORDER BY position, min(from_ns)) AS position,
-    part,
-    activity,
-    min(from_ns) AS from_ns,
-    arg_max(to_ns, from_ns) AS to_ns,
-    sum(to_ns - from_ns)::BIGINT AS duration_ns,
-    is_certain,
-    callback_instance_id,
-    publication_id
-FROM numbered
-GROUP BY
-    run_id, path_id, root_kind, root_id, take_id, latency_ns, flow_rank, hop, position, part,
-    activity, is_certain, callback_instance_id, publication_id, island
+    w.run_id,
+    w.path_id,
+    w.root_kind,
+    w.root_id,
+    w.take_id,
+    w.latency_ns,
+    w.flow_rank,
+    w.hop,
+    row_number() OVER (
+        PARTITION BY w.flow_rank ORDER BY w.interval_id, s.from_ns
+    ) AS position,
+    w.part,
+    w.activity,
+    coalesce(s.from_ns, w.from_ns) AS from_ns,
+    coalesce(s.to_ns, w.to_ns) AS to_ns,
+    coalesce(s.to_ns - s.from_ns, w.duration_ns) AS duration_ns,
+    w.is_certain,
+    w.callback_instance_id,
+    w.publication_id,
+    s.state,
+    s.wakers,
+    s.thread_id AS state_thread_id,
+    s.priority,
+    s.by_kind,
+    s.by_thread_id,
+    s.by_other_thread_id,
+    s.by_priority
+FROM whole AS w
+LEFT JOIN main.schedule_piece('interval', runs) AS s
+    ON w.interval_id = s.interval_id AND s.state IS NOT NULL

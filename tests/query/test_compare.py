@@ -313,6 +313,32 @@ def test_a_verdict_is_of_the_recordings_alone(fresh_database: Path) -> None:
         assert database.compare("before", "before", what="callbacks").result.notes == []
 
 
+@pytest.mark.parametrize(
+    ("waited", "said"),
+    [
+        ("preempted_ns", "300.000 µs more waiting for a CPU"),
+        ("running_ns", "300.000 µs more CPU time"),
+        ("sleeping_ns", "300.000 µs more sleeping or blocked"),
+    ],
+)
+def test_longer_callbacks_computed_or_waited(fresh_database: Path, waited: str, said: str) -> None:
+    _fill(fresh_database, shift_ns=300_000, callbacks=1)
+    parts = ("running_ns", "preempted_ns", "runnable_ns", "sleeping_ns", "uninterruptible_ns")
+    longer = "CASE run_id WHEN 2 THEN 300_000 ELSE 0 END"
+    values = ", ".join(f"{longer if part == waited else 0} AS {part}" for part in parts)
+    with duckdb.connect(str(fresh_database)) as connection:
+        connection.execute(
+            f"INSERT INTO store.callback_schedule BY NAME SELECT run_id, callback_instance_id, "
+            f"{values}, 0 AS unknown_ns, 0 AS preemption_count, 0 AS migration_count, "
+            "false AS is_loss_affected FROM store.callback_instance"
+        )
+    with msgflow.open_db(fresh_database) as database:
+        notes = database.compare("before", "after", what="callbacks").result.notes
+    told = [note for note in notes if note.startswith("/n · ")]
+    assert len(told) == 1
+    assert told[0].endswith(said)
+
+
 def test_lost_events_are_told(fresh_database: Path) -> None:
     _fill(fresh_database, shift_ns=0, callbacks=2)
     with duckdb.connect(str(fresh_database)) as connection:

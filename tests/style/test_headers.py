@@ -32,6 +32,8 @@ TABLES = {
     "trail": "main.end_to_end_trail('flows', [1])",
     "callbacks": "(SELECT *, 1::BIGINT AS busy_min_ns, 1::BIGINT AS busy_max_ns"
     " FROM main.callback_instance)",
+    "intervals": "(SELECT callback_instance_id AS interval_id, thread_id, start_ns AS from_ns,"
+    " end_ns AS to_ns FROM main.callback_instance)",
     "parts": "main.end_to_end_part([1])",
     "vertices": "(SELECT 8::BIGINT AS key, 'take' AS kind, 1::BIGINT AS id, 0 AS depth)",
 }

@@ -1,0 +1,53 @@
+"""Notes of a comparison of callbacks: did they compute longer, or wait longer for a CPU?"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from msgflow.sql.statement import internal_sql
+from msgflow.text.values import format_duration
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    import duckdb
+
+    from msgflow.query.result import QueryResult
+    from msgflow.sql.value import Value
+
+_MOST = 3
+_PARTS = {
+    "running_ns": "CPU time",
+    "queue_ns": "waiting for a CPU",
+    "blocked_ns": "sleeping or blocked",
+}
+
+
+def schedule_notes(
+    connection: duckdb.DuckDBPyConnection, asked: Mapping[str, Value], result: QueryResult
+) -> Iterator[str]:
+    """Yield a sentence for each of the callbacks that changed most, where the kernel was traced.
+
+    Args:
+        connection: to a database with the public views.
+        asked: what the comparison was asked with.
+        result: its rows.
+    """
+    rows = result.table.select(["subject", "verdict"]).to_pylist()
+    changed = {row["subject"] for row in rows if row["verdict"] in ("B is longer", "B is shorter")}
+    if not changed:
+        return
+    given = {name: asked[name] for name in ("run_a", "run_b", "skip_first")}
+    found = internal_sql().run(connection, "callback_time", {**given, "subjects": sorted(changed)})
+    for row in found.to_arrow_table().to_pylist()[:_MOST]:
+        yield f"{row['subject']}, on average {_change(row, 'duration_ns')}: {_parts(row)}"
+
+
+def _parts(row: Mapping[str, Any]) -> str:
+    parts = sorted(_PARTS, key=lambda name: -abs(row[name]))
+    return ", ".join(f"{_change(row, name)} {_PARTS[name]}" for name in parts if row[name])
+
+
+def _change(row: Mapping[str, Any], name: str) -> str:
+    value = row[name]
+    return f"{format_duration(abs(value))} {'more' if value >= 0 else 'less'}"

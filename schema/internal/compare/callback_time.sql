@@ -1,0 +1,37 @@
+-- name: internal.callback_time
+-- title: What callbacks that changed spent their time on
+-- description: How the mean duration of callbacks differs between two runs, by what their threads
+--     did. Only callbacks whose duration is known to differ, and that the kernel's trace of both
+--     runs shows, the greatest difference first.
+-- grain: one row per callback that two runs have
+-- param: run_a BIGINT  Run that the other one is compared with
+-- param: run_b BIGINT  The other one
+-- param: subjects VARCHAR[]  Callbacks, as main.comparison names them
+-- param: skip_first DOUBLE = 0.0  Skip the first seconds of each run
+WITH mean AS (
+    SELECT
+        i.run_id,
+        l.node || ' · ' || l.label AS subject,
+        avg(i.end_ns - i.start_ns) AS duration_ns,
+        avg(s.running_ns) AS running_ns,
+        avg(s.preempted_ns + s.runnable_ns) AS queue_ns,
+        avg(s.sleeping_ns + s.uninterruptible_ns) AS blocked_ns
+    FROM main.callback_instance AS i
+    JOIN main.callback_schedule AS s ON i.callback_instance_id = s.callback_instance_id
+    JOIN main.callback_label AS l ON i.callback_id = l.callback_id
+    JOIN main.run AS r ON i.run_id = r.run_id
+    WHERE list_contains([$run_a, $run_b], i.run_id)
+        AND i.start_ns >= r.start_ns + $skip_first * 1e9
+        AND list_contains($subjects, l.node || ' · ' || l.label)
+    GROUP BY ALL
+)
+SELECT
+    a.subject,
+    round(b.duration_ns - a.duration_ns)::BIGINT AS duration_ns,
+    round(b.running_ns - a.running_ns)::BIGINT AS running_ns,
+    round(b.queue_ns - a.queue_ns)::BIGINT AS queue_ns,
+    round(b.blocked_ns - a.blocked_ns)::BIGINT AS blocked_ns
+FROM mean AS a
+JOIN mean AS b ON a.subject = b.subject
+WHERE a.run_id = $run_a AND b.run_id = $run_b
+ORDER BY abs(b.duration_ns - a.duration_ns) DESC, a.subject
