@@ -86,7 +86,8 @@ def write_flow_page(
     runs = run_page_query(connection, "run", {})
     parts.add("run", encode(runs.filter(compute.equal(runs["run_id"], run.run_id))))
     parts.add("row?", encode(rows.filter(compute.is_in(rows["row_key"], shown["row_key"]))))
-    parts.add("gap?", pages.answer(connection, "gap", params))
+    for name in ("gap", "thread_name"):
+        parts.add(f"{name}?", pages.answer(connection, name, params))
     parts.add(
         f"critical?id={number}&kind={kind}",
         critical_path(connection, run, extent.origin_ns, kind, number),

@@ -172,7 +172,7 @@ class _Maker:
             self.parts.add(f"query?name={name}", content)
         for name in (
             "row", "gap", "path", "executor_node", "executor_share", "callback", "loss",
-            "loss_point",
+            "loss_point", "thread_name",
         ):  # fmt: skip
             self.keep(name)
         self.panels()
@@ -450,7 +450,8 @@ class _Maker:
                 row["kind"] in ("timer", "event", "state")
                 and (row["process_id"], row["node"]) in nodes
             )
-            or (row["kind"] == "thread" and row["process_id"] in processes)
+            or (row["kind"] in ("thread", "schedule") and row["process_id"] in processes)
+            or row["kind"] == "core"
         ]
 
     def thinned(self, head: dict[str, Any], window: Window, room: int, count: int) -> None:

@@ -1,7 +1,7 @@
 -- name: bar
 -- description: What the timeline draws as a bar: callback instances, publications, takes, requests
 --     and responses of services, from sending to taking, what executor threads did, states of
---     managed nodes, and, without a length, events of the user's own tracepoints and messages that
+--     threads to the kernel, states of managed nodes, and, without a length, events of the user's own tracepoints and messages that
 --     were not taken. Threads have their states as recorded, but
 --     for the time after the callback: main.executor_activity would take far longer for a window.
 -- grain: one row per bar
@@ -12,7 +12,7 @@
 -- column: kind UTINYINT  0 callback instance, 1 publication, 2 take, 3 request, 4 response; of
 --     a thread of an executor: 5 wait, 6 select, 7 take and callback, 9 blocked; 8 event of the
 --     user; of a managed node: 10 active, 11 not active; 12 message that a subscription did not take,
---     at the end of its publication
+--     at the end of its publication; 13 to 18: see thread_bar.sql
 -- column: id BIGINT  Identity of the thing within its kind; of threads the first callback instance
 --     in it, of events the one inside which they happened, -1: none
 -- column: start_ns BIGINT [epoch ns]  Begin
@@ -89,7 +89,7 @@ JOIN event_row AS r
     AND u.name = r.name
 UNION ALL
 SELECT
-    run_id, -2 * node_id - 1, CASE WHEN state = 'active' THEN 10 ELSE 11 END, -1, start_ns, end_ns, 0
+    run_id, -4 * node_id - 1, CASE WHEN state = 'active' THEN 10 ELSE 11 END, -1, start_ns, end_ns, 0
 FROM main.node_state
 UNION ALL
 SELECT
@@ -98,3 +98,5 @@ SELECT
 FROM main.stat_delivery AS d
 JOIN main.publication AS p ON d.publication_id = p.publication_id
 WHERE d.status IN ('dropped', 'lost', 'unknown')
+UNION ALL
+SELECT run_id, row_key, kind, id, start_ns, end_ns, flags FROM thread_bar

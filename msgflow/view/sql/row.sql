@@ -2,19 +2,23 @@
 -- title: Rows of the timeline
 -- description: Everything that has a row in the timeline, in its order: by host, process and node;
 --     there the states of a managed node, timers, subscriptions, services, clients, publishers and
---     events of the user, and below each process the threads of its executors.
+--     events of the user, and below each process the threads of its executors. Where the kernel was
+--     traced: below that each thread as the kernel saw it, and at the end of a host its cores.
 -- grain: one row per row of the timeline
 -- param: run BIGINT  Run
 -- column: row_key BIGINT  Identity of the row: eight times that of the object, plus its kind; of
---     events see event_row.sql; of states -2 times that of the node, less 1
+--     events see event_row.sql; of states -4 times that of the node, less 1, of threads to the
+--     kernel -4 times that of the thread, less 2, of cores -4 times the object_id, less 3
 -- column: kind VARCHAR  'timer', 'subscription', 'service', 'client', 'publisher', 'callback' (of
---     an unknown kind), 'event' (of the user), 'state' (of a managed node), 'thread' or
---     'middleware' (what belongs to no object of a node)
+--     an unknown kind), 'event' (of the user), 'state' (of a managed node), 'thread' (of an
+--     executor), 'schedule' (a thread to the kernel), 'core' or 'middleware' (what belongs to no
+--     object of a node)
 -- column: object_id BIGINT  Identity of the timer, subscription, …; of 'middleware' the process, of
---     'state' the node, of 'event' the first
+--     'state' the node, of 'event' the first, of 'core' its number and 8192 times that of its host
+--     (Linux has no more cores)
 -- column: host VARCHAR  Machine or container
--- column: process VARCHAR  Name of the process and its pid
--- column: process_id BIGINT  Identity of the process
+-- column: process VARCHAR  Name of the process and its pid; of cores 'cores'
+-- column: process_id BIGINT  Identity of the process; of cores minus that of the host
 -- column: node VARCHAR  Full name of the node; NULL: none, or not known
 -- column: label VARCHAR  Period, topic, service, name of the event, or thread
 -- column: symbol VARCHAR  Functions registered for its callbacks
@@ -76,12 +80,12 @@ object AS (
             END
         ) IS NULL
     UNION ALL
-    SELECT row_key, 'event', -row_key // 2, process_id, node_id, name, NULL, false, 9
+    SELECT row_key, 'event', -row_key // 4, process_id, node_id, name, NULL, false, 9
     FROM event_row
     WHERE run_id = $run
     UNION ALL
     SELECT DISTINCT
-        -2 * n.node_id - 1, 'state', n.node_id, n.process_id, n.node_id, 'state', NULL, false, 0
+        -4 * n.node_id - 1, 'state', n.node_id, n.process_id, n.node_id, 'state', NULL, false, 0
     FROM main.node_state AS s
     JOIN main.node AS n ON s.node_id = n.node_id
     WHERE s.run_id = $run
@@ -96,6 +100,12 @@ object AS (
     WHERE x.run_id = $run
     QUALIFY row_number() OVER (PARTITION BY x.thread_id ORDER BY x.executor_id) = 1
     UNION ALL
+    SELECT
+        -4 * t.thread_id - 2, 'schedule', t.thread_id, t.process_id, NULL,
+        printf('%s %d (kernel)', coalesce(t.name, '?'), t.tid), NULL, false, 8
+    FROM main.thread AS t
+    WHERE t.run_id = $run AND t.thread_id IN (SELECT thread_id FROM main.thread_state)
+    UNION ALL
     SELECT 8 * process_id + 7, 'middleware', process_id, process_id, NULL, 'not of a node', NULL,
         true, 7
     FROM (
@@ -103,23 +113,35 @@ object AS (
         UNION
         SELECT process_id FROM main.take WHERE run_id = $run AND subscription_id IS NULL
     )
+),
+core AS (
+    SELECT DISTINCT p.host_id, s.cpu
+    FROM main.thread_state AS s
+    JOIN main.thread AS t ON s.thread_id = t.thread_id
+    JOIN main.process AS p ON t.process_id = p.process_id
+    WHERE s.run_id = $run AND s.cpu IS NOT NULL
+),
+placed AS (
+    SELECT
+        o.row_key, o.kind, o.object_id, h.host_id, h.hostname AS host,
+        printf('%s %d', coalesce(p.name, '?'), p.pid)
+            || CASE WHEN p.life > 1 THEN printf(' (life %d)', p.life) ELSE '' END AS process,
+        o.process_id, n.full_name AS node, o.label, o.symbol, o.is_internal, o.place,
+        p.first_seen_ns, n.created_ns, n.node_id
+    FROM object AS o
+    JOIN main.process AS p ON o.process_id = p.process_id
+    JOIN main.host AS h ON p.host_id = h.host_id
+    LEFT JOIN main.node AS n ON o.node_id = n.node_id
+    UNION ALL
+    SELECT
+        -4 * (8192 * c.host_id + c.cpu) - 3, 'core', 8192 * c.host_id + c.cpu, c.host_id,
+        h.hostname, 'cores', -c.host_id, NULL, printf('CPU %d', c.cpu), NULL, false, 10, NULL, NULL,
+        NULL
+    FROM core AS c
+    JOIN main.host AS h ON c.host_id = h.host_id
 )
-SELECT
-    o.row_key,
-    o.kind,
-    o.object_id,
-    h.hostname AS host,
-    printf('%s %d', coalesce(p.name, '?'), p.pid)
-        || CASE WHEN p.life > 1 THEN printf(' (life %d)', p.life) ELSE '' END AS process,
-    o.process_id,
-    n.full_name AS node,
-    o.label,
-    o.symbol,
-    o.is_internal
-FROM object AS o
-JOIN main.process AS p ON o.process_id = p.process_id
-JOIN main.host AS h ON p.host_id = h.host_id
-LEFT JOIN main.node AS n ON o.node_id = n.node_id
+SELECT row_key, kind, object_id, host, process, process_id, node, label, symbol, is_internal
+FROM placed
 ORDER BY
-    h.hostname, h.host_id, p.first_seen_ns, p.process_id, o.place = 8, o.place = 7,
-    n.created_ns NULLS LAST, n.node_id NULLS LAST, o.place, o.object_id
+    host, host_id, kind = 'core', first_seen_ns, process_id, place = 8, place = 7,
+    created_ns NULLS LAST, node_id NULLS LAST, place, object_id, kind DESC

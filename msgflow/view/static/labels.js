@@ -2,12 +2,33 @@
 
 export const KINDS = [
   "callback instance", "publication", "take", "request", "response", "wait", "select", "take and callback", "event", "blocked", "node active", "node not active", "untaken message",
+  "running", "preempted", "runnable", "sleeping", "uninterruptible", "not known",
 ];
 export const EVENT = 8;
 export const BLOCKED = 9;
 export const ACTIVE = 10;
 export const INACTIVE = 11;
 export const MISSING = 12;
+// States of threads to the kernel; of a core, what ran there, and who lost it.
+export const RUNNING = 13;
+export const PREEMPTED = 14;
+export const RUNNABLE = 15;
+export const SLEEPING = 16;
+export const UNINTERRUPTIBLE = 17;
+const WAKERS = ["", "a timer", "an interrupt", "a softirq"];
+export const wakerName = (flags, name) => WAKERS[(flags >> 4) & 3] || name;
+
+// What a thread did in a piece of the critical path.
+export function stateText(state, who) {
+  switch (state) {
+    case "preempted": return `preempted by ${who ?? "?"}`;
+    case "runnable": return `waits for a CPU${who ? `, woken by ${who}` : ""}`;
+    case "sleeping": return `sleeps${who ? `, until ${who} wakes it` : ""}`;
+    case "uninterruptible": return `waits for a page or a disk${who ? `, until ${who} wakes it` : ""}`;
+    default: return state;
+  }
+}
+export const STATE_COLORS = { running: "running", preempted: "preempted", runnable: "runnable", sleeping: "wait", uninterruptible: "uninterruptible", unknown: "faint" };
 export const KIND_NAMES = ["callback_instance", "publication", "take", "request", "response"];
 
 export const LINKS = {

@@ -3,7 +3,7 @@
 import { color } from "./dom.js";
 import { lowerBound } from "./timeline_rows.js";
 import { Crosses } from "./missing.js";
-import { ACTIVE, BLOCKED, EVENT, INACTIVE, MISSING, PALE, PART_COLORS, duration, partTitle } from "./labels.js";
+import { ACTIVE, BLOCKED, EVENT, INACTIVE, MISSING, PALE, PART_COLORS, PREEMPTED, RUNNABLE, RUNNING, SLEEPING, STATE_COLORS, UNINTERRUPTIBLE, duration, partTitle, stateText } from "./labels.js";
 
 export const AXIS = 30;
 const BAR_TOP = 3;
@@ -12,7 +12,8 @@ const LEAST_WIDTH = 1;
 export function palette() {
   const names = [
     "ink", "soft", "faint", "page", "panel", "line", "stripe", "timer", "subscription", "service",
-    "publication", "take", "call", "wait", "process", "execute", "blocked", "event", "active", "stored", "transport", "direct", "indirect",
+    "publication", "take", "call", "wait", "process", "execute", "blocked", "event", "active", "stored",
+    "running", "preempted", "runnable", "uninterruptible", "transport", "direct", "indirect",
     "critical", "gap", "pick", "focus", "error",
   ];
   return Object.fromEntries(names.map((name) => [name, color(name)]));
@@ -31,6 +32,7 @@ export class Renderer {
     this.links = null;
     this.gaps = [];
     this.flow = null;
+    this.names = new Map();
     this.hover = null;
     this.measure = null;
     this.drawn = { bars: 0, columns: 0 };
@@ -86,10 +88,12 @@ export class Renderer {
     c.clip();
     for (const lane of shown) {
       if (lane.type !== "row") continue;
-      c.globalAlpha = this.flow && !["thread", "event", "state"].includes(lane.kind) ? 0.22 : 1;
+      c.globalAlpha = this.flow && !["thread", "event", "state", "schedule", "core"].includes(lane.kind) ? 0.22 : 1;
       this.drawRow(lane);
     }
     if (this.links && !this.flow) this.drawLinks();
+    c.globalAlpha = 1;
+    if (this.names.size) this.drawWakings(shown);
     c.globalAlpha = 1;
     if (this.flow) this.drawFlow();
     for (const lane of shown) if (lane.type === "critical") this.drawPieces(lane);
@@ -136,7 +140,7 @@ export class Renderer {
     }
     c.fillStyle = lane.type === "row" && (lane.isInternal || lane.isBeside) ? colors.soft : colors.ink;
     const room = this.labelWidth - left - 6;
-    c.fillText(fit(c, lane.label, room, lane.type !== "process" && lane.kind !== "thread"), left, y + lane.height / 2);
+    c.fillText(fit(c, lane.label, room, lane.type !== "process" && !["thread", "schedule"].includes(lane.kind)), left, y + lane.height / 2);
     c.fillStyle = colors.line;
     c.fillRect(this.labelWidth - 1, y, 1, lane.height);
   }
@@ -145,7 +149,7 @@ export class Renderer {
     const { colors } = this;
     return { timer: colors.timer, subscription: colors.subscription, service: colors.service,
       client: colors.call, publisher: colors.publication, callback: colors.timer,
-      thread: colors.execute, event: colors.event, state: colors.active, middleware: colors.soft }[kind] ?? colors.soft;
+      thread: colors.execute, schedule: colors.running, core: colors.running, event: colors.event, state: colors.active, middleware: colors.soft }[kind] ?? colors.soft;
   }
 
   barColor(kind, laneKind) {
@@ -162,6 +166,12 @@ export class Renderer {
       case EVENT: return colors.event;
       case ACTIVE: return colors.active;
       case MISSING: return colors.error;
+      case RUNNING: return colors.running;
+      case PREEMPTED: return colors.preempted;
+      case RUNNABLE: return colors.runnable;
+      case SLEEPING: return colors.wait;
+      case UNINTERRUPTIBLE: return colors.uninterruptible;
+      case UNINTERRUPTIBLE + 1: return colors.faint;
       default: return colors.execute;
     }
   }
@@ -180,7 +190,7 @@ export class Renderer {
     const full = lane.height - 2 * BAR_TOP;
     const end = lowerBound(starts, range[0], range[1], to);
     let at = lowerBound(reach, range[0], end, from);
-    const shares = new Float64Array(13);
+    const shares = new Float64Array(ORDER.length + 8);
     const crosses = new Crosses(c, colors);
     let column = -1;
     const flush = () => {
@@ -226,10 +236,12 @@ export class Renderer {
         const x = Math.max(x0, -2);
         const width = Math.min(x0 + wide, this.plotWidth + 2) - x;
         c.fillStyle = this.barColor(kind, lane.kind);
-        const inset = flags && flags[at] & 8 ? 4 : 0;
+        const inset = kind >= RUNNING ? (1 - STATE_SHARE[kind - RUNNING]) * full : flags && flags[at] & 8 ? 4 : 0;
         c.fillRect(this.labelWidth + x, top + inset, width, full - inset);
         if (flags && flags[at] & 1 && width > 3) hatch(c, this.labelWidth + x, top, width, full, this.colors.page);
-        if (wide > 46 && kind < 5) this.nameBar(kind, length, this.labelWidth + x, top, width, full);
+        if (kind === PREEMPTED && width > 3) hatch(c, this.labelWidth + x, top + inset, width, full - inset, this.colors.page);
+        if (wide > 46 && kind < 5) this.nameBar(duration(length), this.labelWidth + x, top, width, full);
+        else if (wide > 46 && (kind === PREEMPTED || (kind === RUNNING && lane.kind === "core"))) this.nameBar(this.names.get(id[at]) ?? "", this.labelWidth + x, top, width, full, kind === PREEMPTED ? colors.preempted : undefined);
         this.drawn.bars++;
       } else {
         const own = Math.max(Math.floor(x0), 0);
@@ -256,15 +268,18 @@ export class Renderer {
     return Math.min(offset, full - 2);
   }
 
-  nameBar(kind, length, x, y, width, height) {
+  nameBar(text, x, y, width, height, plate) {
     const { context: c } = this;
     c.font = "11px system-ui, sans-serif";
     c.textAlign = "left";
     c.textBaseline = "middle";
     c.fillStyle = this.colors.page;
     const left = Math.max(x, this.labelWidth) + 4;
-    const text = duration(length);
-    if (left + c.measureText(text).width < x + width - 2) c.fillText(text, left, y + height / 2 + 0.5);
+    const { width: needed } = c.measureText(text);
+    if (left + needed >= x + width - 2) return;
+    // Text on a hatched bar stands on a plain one.
+    if (plate) { c.fillStyle = plate; c.fillRect(left - 2, y, needed + 4, height); c.fillStyle = this.colors.page; }
+    c.fillText(text, left, y + height / 2 + 0.5);
   }
 
   center(key) {
@@ -292,6 +307,28 @@ export class Renderer {
       this.arrow(this.x(froms[at]), y0, this.x(tos[at]), y1, LINK_STYLE[kinds[at]], 1);
     }
     this.context.globalAlpha = 1;
+  }
+
+  // From the thread that woke another one, where both have a row, at the moment of waking.
+  drawWakings(shown) {
+    const { from, to } = this.view;
+    const { table, ranges } = this.bars ?? {};
+    if (!table) return;
+    const found = [];
+    for (const lane of shown) {
+      if (lane.kind !== "schedule") continue;
+      const [first, last] = ranges.get(lane.key) ?? [0, 0];
+      for (let at = first; at < last && found.length <= MOST_WAKINGS; at++) {
+        const end = table.start_at[at] + table.length[at];
+        const waker = table.id[at];
+        if (table.start_at[at] > to) break;
+        if (table.kind[at] !== SLEEPING || end < from || end > to || !(waker > 0) || waker % 2) continue;
+        const y = this.center(-2 * waker - 2);
+        if (y !== null && y !== undefined) found.push([this.x(end), y, this.center(lane.key)]);
+      }
+    }
+    if (found.length > MOST_WAKINGS) return;
+    for (const [x, y0, y1] of found) this.arrow(x, y0, x, y1, { color: "soft", dash: [3, 2] }, 1);
   }
 
   arrow(x0, y0, x1, y1, style, width) {
@@ -353,14 +390,14 @@ export class Renderer {
         c.lineWidth = 2;
         c.strokeRect(x0 - 2.5, y - 2.5, width + 5, full + 5);
       }
-      if (width > 46) this.nameBar(vertex.kind, vertex.length, x0, y, width, full);
+      if (width > 46) this.nameBar(duration(vertex.length), x0, y, width, full);
     }
   }
 
   // One piece of the critical path after the other, with a line below that makes them one.
   drawPieces(lane) {
     const { context: c, colors } = this;
-    const { rows, from_ns: froms, duration_ns: lengths, activity } = this.flow.pieces;
+    const { rows, from_ns: froms, duration_ns: lengths, activity, state, who } = this.flow.pieces;
     const y = AXIS + lane.y - this.scroll + 4;
     const high = lane.height - 10;
     for (let row = 0; row < rows; row++) {
@@ -368,7 +405,10 @@ export class Renderer {
       if (x1 < this.labelWidth || x0 > this.width || lengths[row] <= 0) continue;
       const left = Math.max(x0, this.labelWidth - 2);
       const width = Math.max(Math.min(x1, this.width + 2) - left, 0.5);
-      const shade = colors[PART_COLORS[activity[row]]] ?? colors.faint;
+      // What ran has the colour of what it did, what did not run that of why.
+      const isStill = state?.[row] && state[row] !== "running";
+      const name = isStill ? STATE_COLORS[state[row]] : PART_COLORS[activity[row]];
+      const shade = colors[name] ?? colors.faint;
       c.fillStyle = shade;
       c.fillRect(left, y, width, high);
       if (width > 3) { c.fillStyle = colors.page; c.fillRect(left + width - 0.75, y, 0.75, high); }
@@ -378,9 +418,9 @@ export class Renderer {
       c.font = "11px system-ui, sans-serif";
       c.textAlign = "left";
       c.textBaseline = "middle";
-      c.fillStyle = PALE.has(PART_COLORS[activity[row]]) ? colors.ink : colors.page;
+      c.fillStyle = PALE.has(name) ? colors.ink : colors.page;
       const took = duration(lengths[row]);
-      for (const said of [`${partTitle(activity[row])} ${took}`, `${activity[row].replaceAll("_", " ")} ${took}`, took]) {
+      for (const said of [...(isStill ? [`${stateText(state[row], who[row])} ${took}`, stateText(state[row], who[row])] : []), `${partTitle(activity[row])} ${took}`, `${activity[row].replaceAll("_", " ")} ${took}`, took]) {
         if (c.measureText(said).width < width - 8) { c.fillText(said, left + 4, y + high / 2 + 0.5); break; }
       }
     }
@@ -542,11 +582,14 @@ export class Renderer {
 }
 
 // Waiting may be nothing; an event has no length, and no other bar beside it.
-const leastHeight = (kind, full) => (kind === 5 ? 0 : kind === EVENT ? full : 4);
+const leastHeight = (kind, full) => (kind === 5 || kind === SLEEPING ? 0 : kind === EVENT ? full : 4);
 const HEIGHT_HALF = 10;
 // Drawn from below: what an executor does for callbacks first.
 // Messages that were not taken are crosses, not columns.
-const ORDER = [7, BLOCKED, 6, 0, 1, 2, 3, 4, 5, EVENT, ACTIVE, INACTIVE];
+const ORDER = [7, BLOCKED, 6, 0, 1, 2, 3, 4, 5, EVENT, ACTIVE, INACTIVE, RUNNING, PREEMPTED, RUNNABLE, UNINTERRUPTIBLE, SLEEPING, 18];
+// States differ by height, not by colour alone.
+const STATE_SHARE = [1, 1, 0.6, 0.2, 0.4, 0.4];
+const MOST_WAKINGS = 400;
 const LINK_STYLE = [
   { color: "transport" }, { color: "direct" }, { color: "indirect", dash: [6, 3] },
   { color: "indirect", dash: [2, 3] }, { color: "direct", dash: [4, 2] },
@@ -590,6 +633,8 @@ function mark(c, kind, x, y) {
   else if (kind === "service" || kind === "client") { c.moveTo(x, y - 4); c.lineTo(x + 4, y); c.lineTo(x, y + 4); c.lineTo(x - 4, y); }
   else if (kind === "event") { c.moveTo(x - 4, y - 4); c.lineTo(x + 4, y - 4); c.lineTo(x, y + 4); }
   else if (kind === "state") c.rect(x - 4, y - 2, 8, 4);
+  else if (kind === "core") { c.rect(x - 4, y - 4, 8, 8); c.rect(x - 1.5, y - 1.5, 3, 3); c.fill("evenodd"); return; }
+  else if (kind === "schedule") { c.rect(x - 4, y - 3, 8, 1.5); c.rect(x - 4, y - 0.75, 5, 1.5); c.rect(x - 4, y + 1.5, 8, 1.5); }
   else if (kind === "thread") { c.rect(x - 4, y - 3, 8, 2); c.rect(x - 4, y + 1, 8, 2); }
   else c.rect(x - 3.5, y - 3.5, 7, 7);
   c.fill();

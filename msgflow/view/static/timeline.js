@@ -7,9 +7,9 @@ import { Minimap } from "./minimap.js";
 import { missingWords } from "./missing.js";
 import { helpDialog } from "./help.js";
 import { shortSymbol } from "./symbols.js";
-import { EVENT, KINDS, KIND_NAMES, LINKS, MISSING, count, duration, moment, partTitle, pathText, wallClock, percent } from "./labels.js";
+import { EVENT, KINDS, KIND_NAMES, LINKS, MISSING, PREEMPTED, RUNNING, count, duration, moment, partTitle, pathText, stateText, wakerName, wallClock, percent } from "./labels.js";
 import { Renderer, AXIS } from "./renderer.js";
-import { ROW_KINDS, indexBars, layout } from "./timeline_rows.js";
+import { KERNEL_KINDS, ROW_KINDS, indexBars, layout } from "./timeline_rows.js";
 import { buildFlow, extent, markCritical } from "./flow.js";
 import { besides, scrolls } from "./table.js";
 import { command, failed, notes, waiting } from "./notice.js";
@@ -71,6 +71,7 @@ export class TimelinePage {
     this.renderer.gaps = Array.from({ length: gaps.rows }, (_, row) => ({
       host: gaps.host[row], kind: gaps.kind[row], at: gaps.start_at[row], length: gaps.length[row],
     }));
+    await this.kernel();
     this.gapsCut = gaps.rows ? gaps.total[0] - gaps.rows : 0;
     this.relayout();
     await this.load();
@@ -79,6 +80,16 @@ export class TimelinePage {
     if (asked.flow) await this.pickText(asked.flow, !asked.from);
     // Where only one flow is at hand there is no other one to go to.
     if (this.app.source.pages) this.worst.hidden = true; else this.slowest();
+  }
+
+  // Names, boxes and colours of what only a recording with a kernel trace has.
+  async kernel() {
+    const isTraced = this.rows.kind.some((kind) => KERNEL_KINDS.has(kind));
+    for (const { kind, label } of this.kindBoxes) if (KERNEL_KINDS.has(kind)) label.hidden = !isTraced;
+    this.states.hidden = !isTraced;
+    if (!isTraced) return;
+    const names = await this.app.fetch("thread_name");
+    for (let row = 0; row < names.rows; row++) this.renderer.names.set(names.id[row], names.name[row]);
   }
 
   tools() {
@@ -116,13 +127,15 @@ export class TimelinePage {
   legend() {
     const item = (name, text, shape = "swatch") => h("span", { className: "legend-item" },
       h("span", { className: `${shape} color-${name}` }), text);
+    this.states = h("span", { className: "legend-states", hidden: true }, item("running", "running"), item("preempted", "preempted: another thread has the CPU"),
+      item("runnable", "runnable: waits for a CPU"), item("wait", "sleeping"), item("uninterruptible", "uninterruptible: page or disk"), item("soft", "woken by", "stroke dashed"));
     return h("div", { className: "legend", "aria-label": "colours" },
       item("timer", "timer callback"), item("subscription", "subscription callback"), item("service", "service callback"),
       item("publication", "publication"), item("take", "take"), item("call", "request, response"),
       item("execute", "executor thread: take and callback"), item("blocked", "blocked: waits for the executor's lock"), item("process", "select: looks for work"), item("wait", "wait: for work"), item("event", "event of your own"), item("active", "managed node: active"), item("wait", "not active"),
       item("transport", "publish to take", "stroke"), item("direct", "direct link", "stroke"),
       item("indirect", "indirect link", "stroke dashed"), item("critical", "critical path", "stroke"),
-      item("gap", "not recorded"), h("span", { className: "legend-item" }, h("b", { className: "color-error" }, "✕"), "message dropped or lost; grey: not known"), h("span", { className: "legend-item" }, "low columns: several bars, as high as their share of the time; hatched: lost events may hide a part"));
+      item("gap", "not recorded"), this.states, h("span", { className: "legend-item" }, h("b", { className: "color-error" }, "✕"), "message dropped or lost; grey: not known"), h("span", { className: "legend-item" }, "low columns: several bars, as high as their share of the time; hatched: lost events may hide a part"));
   }
 
   remember() {
@@ -151,7 +164,7 @@ export class TimelinePage {
     if (only && this.withExecutors) {
       const processes = new Set([...only].map((key) => this.rows.process_id[this.rowAt.get(key)]));
       for (let row = 0; row < this.rows.rows; row++) {
-        if (this.rows.kind[row] === "thread" && processes.has(this.rows.process_id[row])) only.add(this.rows.row_key[row]);
+        if (["thread", "schedule"].includes(this.rows.kind[row]) && processes.has(this.rows.process_id[row])) only.add(this.rows.row_key[row]);
       }
     }
     if (only) for (const { row } of this.eventsOf(flow)) only.add(row);
@@ -496,7 +509,8 @@ export class TimelinePage {
 
   describePiece(row) {
     const { pieces } = this.renderer.flow;
-    return [h("strong", {}, partTitle(pieces.activity[row])), h("span", {}, `${pieces.what[row] ?? ""} · ${pieces.node[row] ?? ""}`),
+    const state = pieces.state?.[row];
+    return [h("strong", {}, partTitle(pieces.activity[row])), state && h("span", {}, `${pieces.thread[row] ?? "its thread"}: ${stateText(state, pieces.who[row])}`), h("span", {}, `${pieces.what[row] ?? ""} · ${pieces.node[row] ?? ""}`),
       h("span", {}, `${duration(pieces.duration_ns[row])}, ${percent(pieces.share[row])} of the latency`), h("span", {}, `begins at ${moment(pieces.from_ns[row])}`),
       pieces.is_certain[row] === false && h("span", { className: "soft" }, "what waited may have come during it")].filter(Boolean);
   }
@@ -518,6 +532,7 @@ export class TimelinePage {
       const end = hit.flags & 2 ? "end not seen" : duration(hit.length);
       if (hit.kind === MISSING) lines.push(h("span", { className: "warn" }, `message ${hit.id} ${missingWords(hit.flags)}`));
       else if (hit.kind === EVENT) lines.push(h("span", {}, hit.id >= 0 ? `event in callback instance ${hit.id}` : "event in no callback"));
+      else if (hit.kind >= RUNNING) lines.push(h("span", {}, `${this.kernelText(hit)}: ${end}`));
       else lines.push(h("span", {}, `${KINDS[hit.kind]}${hit.id >= 0 ? ` ${hit.id}` : ""}: ${end}`));
       if (hit.together > 1) lines.push(h("span", {}, `one of ${hit.together} in this column`));
     }
@@ -525,9 +540,18 @@ export class TimelinePage {
     const wall = wallClock(this.app.run.start_text, hit.at);
     if (wall) lines.push(h("span", { className: "soft" }, wall));
     if (hit.flags & 1) lines.push(h("span", { className: "warn" }, "lost events may hide a part of it"));
+    if (hit.kind >= RUNNING) return lines;
     if (hit.flags & 4) lines.push(h("span", { className: "soft" }, "message from the same process"));
     if (hit.flags & 8) lines.push(h("span", { className: "soft" }, "runs inside another callback"));
     return lines;
+  }
+
+  // What a thread did, or what a core ran, with the name of what took the CPU or woke the thread.
+  kernelText(hit) {
+    const name = this.renderer.names.get(hit.id);
+    if (hit.lane.kind === "core") return hit.kind === RUNNING ? `${name ?? "?"} runs` : `${name ?? "another thread"} took it`;
+    const woken = hit.kind > PREEMPTED;
+    return stateText(KINDS[hit.kind], woken ? wakerName(hit.flags, name) : name);
   }
 
   click(x, y) {
@@ -545,6 +569,7 @@ export class TimelinePage {
     }
     if (hit.kind === undefined) return;
     if (hit.isBin) { this.setView(hit.at, hit.at + hit.length); return; }
+    if (hit.kind >= RUNNING) { this.centerAt(hit.at, hit.length); return; }
     const kind = hit.kind === MISSING ? "publication" : hit.kind >= 5 ? "callback_instance" : KIND_NAMES[hit.kind];
     if (hit.id < 0) return;
     this.source = null;
@@ -617,7 +642,7 @@ export class TimelinePage {
     if (!pieces.rows) return h("p", { className: "soft" }, "No path leads to where this flow ends: there is no critical path.");
     const rows = Array.from({ length: pieces.rows }, (_, row) => h("tr", { className: "can-pick", on: { click: () => this.centerAt(pieces.from_ns[row], pieces.duration_ns[row]) } },
       h("td", { className: "number" }, `+${duration(pieces.at_ns[row])}`),
-      h("td", {}, h("button", { type: "button", className: "pick" }, partTitle(pieces.activity[row])), h("div", { className: "soft" }, `${pieces.what[row] ?? ""} · ${pieces.node[row] ?? ""}`)),
+      h("td", {}, h("button", { type: "button", className: "pick" }, partTitle(pieces.activity[row])), pieces.state?.[row] && h("div", {}, stateText(pieces.state[row], pieces.who[row])), h("div", { className: "soft" }, `${pieces.what[row] ?? ""} · ${pieces.node[row] ?? ""}`)),
       h("td", { className: "number" }, duration(pieces.duration_ns[row]))));
     return [
       h("p", {}, `${duration(pieces.latency_ns[0])} from ${pieces.meta.from} to ${pieces.meta.to}, take ${pieces.meta.take_id}: the longest flow that ends with it, and what it waited for.`),

@@ -6,7 +6,11 @@ export const HEIGHTS = { critical: 26, host: 22, process: 20, node: 20, row: 20 
 export const ROW_KINDS = {
   timer: "timers", subscription: "subscriptions", service: "services", client: "clients",
   publisher: "publishers", event: "events of your own", state: "states of managed nodes", thread: "executors",
+  schedule: "threads to the kernel", core: "cores",
 };
+// Kinds of rows that only recordings with a kernel trace have.
+export const KERNEL_KINDS = new Set(["schedule", "core"]);
+const OF_PROCESS = new Set(["thread", "schedule", "core"]);
 
 // Options: internal, query, hidden (Set of row keys), folded (Set of header keys), kinds (Set that
 // is hidden), pinned (Set of row keys that come first), only (Set of row keys, or null), critical (whether there is a critical path).
@@ -41,8 +45,8 @@ export function layout(rows, options) {
     }
     const hostKey = `host:${rows.host[row]}`;
     const processKey = `process:${rows.process_id[row]}`;
-    // Threads of executors stand below the process, without a node.
-    const nodeKey = kind === "thread" ? null : `node:${rows.process_id[row]}:${rows.node[row]}`;
+    // Threads stand below the process, and cores below the host, without a node.
+    const nodeKey = OF_PROCESS.has(kind) ? null : `node:${rows.process_id[row]}:${rows.node[row]}`;
     if (hostKey !== host) {
       host = hostKey;
       process = node = null;

@@ -1,0 +1,16 @@
+-- name: thread_name
+-- title: Names of threads that the kernel saw
+-- description: What bars of thread_bar.sql call by number. Without kernel traces there are none.
+-- grain: one row per thread with known states, and per other thread
+-- param: run BIGINT  Run
+-- column: id BIGINT  Twice the thread_id; of a thread of another process one more than twice its
+--     other_thread_id
+-- column: name VARCHAR  Its name, and its number
+SELECT 2 * thread_id AS id, printf('%s %d', coalesce(name, '?'), tid) AS name
+FROM main.thread
+WHERE run_id = $run AND thread_id IN (SELECT thread_id FROM main.thread_state)
+UNION ALL
+SELECT 2 * other_thread_id + 1, printf('%s %d', coalesce(name, '?'), tid)
+FROM main.other_thread
+WHERE run_id = $run
+ORDER BY id
