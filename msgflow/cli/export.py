@@ -134,6 +134,7 @@ def perfetto(
         trace = opened.export_perfetto(output, **asdict(part))
     print_runs([trace.run])
     own = f", {count(trace.events, 'event')} of your own" if trace.events else ""
+    own += f", {count(trace.states, 'state')} of threads and cores" if trace.states else ""
     print_status(
         f"{count(trace.slices, 'slice')}, {count(trace.arrows, 'arrow')},"
         f" {count(trace.values, 'value')} of counters{own} written to {output}:"

@@ -50,6 +50,7 @@ class PerfettoTrace:
         values: values of counters.
         gaps: stretches of a host in which something was not recorded.
         events: events of the user's own tracepoints.
+        states: states of threads to the kernel, and stretches in which a core ran one of them.
     """
 
     path: Path
@@ -59,6 +60,7 @@ class PerfettoTrace:
     values: int
     gaps: int
     events: int
+    states: int
 
 
 def write_perfetto(connection: duckdb.DuckDBPyConnection, path: Path, part: Slice) -> PerfettoTrace:
@@ -89,7 +91,8 @@ def write_perfetto(connection: duckdb.DuckDBPyConnection, path: Path, part: Slic
         values = writer.values()
         gaps = writer.gaps()
         events = writer.user_events()
-    return PerfettoTrace(path, run, slices, arrows, values, gaps, events)
+        states = writer.states()
+    return PerfettoTrace(path, run, slices, arrows, values, gaps, events, states)
 
 
 class _Writer:
@@ -216,22 +219,36 @@ class _Writer:
 
     def gaps(self) -> int:
         """Write a track of gaps for each host that has any; return how many gaps."""
+        return self.named_slices("perfetto_gap", "gap", {"lost_events": "event_count"})
+
+    def states(self) -> int:
+        """Write states of threads to the kernel, and what cores ran; return how many slices."""
+        noted = {name: name for name in ("cpu", "priority", "woken_by")}
+        return self.named_slices("perfetto_state", "schedule", noted)
+
+    def named_slices(self, query: str, category: str, noted: Mapping[str, str]) -> int:
+        """Write slices that bring their names and tracks; return how many.
+
+        Args:
+            query: whose rows they are, by track.
+            category: of the slices.
+            noted: names of their arguments, and the columns that these are in.
+        """
         kind = self.packets.TrackEvent
         count = 0
         known = None
-        for row in self.rows("perfetto_gap"):
+        for row in self.rows(query):
             if row["track"] != known:
                 known = row["track"]
-                track = self.track(known)
+                track = self.track(known, row.get("parent"))
                 track.track_descriptor.name = row["track_name"]
                 self.builder.write_packet(track)
             begin = self.event(row | {"at_ns": row["start_ns"]}, kind.TYPE_SLICE_BEGIN)
             begin.track_event.name = row["name"]
-            begin.track_event.categories.append("gap")
-            if row["event_count"] is not None:
-                begin.track_event.debug_annotations.add(
-                    name="lost_events", int_value=row["event_count"]
-                )
+            begin.track_event.categories.append(category)
+            for name, column in noted.items():
+                if row[column] is not None:
+                    _add_argument(begin.track_event, name, row[column])
             self.builder.write_packet(begin)
             self.builder.write_packet(
                 self.event(row | {"at_ns": row["end_ns"]}, kind.TYPE_SLICE_END)

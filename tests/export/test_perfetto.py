@@ -42,6 +42,7 @@ class Decoded:
     tracks: dict[int, Any] = field(default_factory=dict)
     slices: list[Slice] = field(default_factory=list)
     gaps: list[Slice] = field(default_factory=list)
+    states: list[Slice] = field(default_factory=list)
     arrows: set[tuple[int, int]] = field(default_factory=set)
     values: dict[int, list[tuple[int, float]]] = field(default_factory=lambda: defaultdict(list))
 
@@ -78,12 +79,14 @@ def decode(path: Path) -> Decoded:
         if event.type == event.TYPE_COUNTER:
             value = (packet.timestamp, event.double_counter_value)
             decoded.values[event.track_uuid].append(value)
-        elif "gap" in event.categories:
-            said = {note.name: note.int_value for note in event.debug_annotations}
+        elif {"gap", "schedule"} & set(event.categories):
+            said = {
+                note.name: note.string_value or note.int_value for note in event.debug_annotations
+            }
             one = Slice(event.track_uuid, event.name, packet.timestamp, packet.timestamp, said, 0)
             assert not open_slices[event.track_uuid]
             open_slices[event.track_uuid].append(one)
-            decoded.gaps.append(one)
+            (decoded.gaps if "gap" in event.categories else decoded.states).append(one)
         elif event.type == event.TYPE_SLICE_END:
             open_slices[event.track_uuid].pop().end = packet.timestamp
         else:
@@ -369,3 +372,51 @@ def test_events_of_the_user_are_instants_on_their_thread(
         "no": "null", "l": "[1]",
     }  # fmt: skip
     assert written.events == 1
+
+
+def test_states_of_threads_and_cores_have_tracks(
+    simulated: Callable[..., Path], tmp_path: Path
+) -> None:
+    pytest.importorskip("perfetto.trace_builder.proto_builder")
+    path = Path(shutil.copy(simulated("pipeline", 0.1), tmp_path / "run.duckdb"))
+    with duckdb.connect(str(path)) as connection:
+        ((thread, host, name, begin),) = connection.execute(
+            "SELECT thread_id, host_id, hostname, r.start_ns FROM thread JOIN process USING "
+            "(process_id) JOIN host USING (host_id) CROSS JOIN run AS r ORDER BY thread_id LIMIT 1"
+        ).fetchall()
+        connection.execute(
+            "INSERT INTO store.other_thread BY NAME SELECT 1 AS other_thread_id, 1 AS run_id, "
+            "? AS host_id, 911 AS tid, 'stress' AS name",
+            [host],
+        )
+        connection.executemany(
+            "INSERT INTO store.thread_state BY NAME SELECT 1 AS run_id, ? AS thread_id, "
+            "? AS start_ns, ? AS end_ns, ? AS state, 3 AS cpu, 120 AS priority, "
+            "? AS preempted_by_other_thread_id, ? AS waker_kind, false AS is_loss_affected",
+            [
+                (thread, begin + start, begin + end, state, other, kind)
+                for start, end, state, other, kind in (
+                    (10, 20, "running", None, None),
+                    (20, 50, "preempted", 1, None),
+                    (50, 60, "running", None, None),
+                    (60, 90, "sleeping", None, "timer"),
+                )
+            ],
+        )
+    with open_db(path) as database:
+        written = database.export_perfetto(tmp_path / "run.pftrace")
+    decoded = decode(written.path)
+    core, own = (8192 * host + 3) * 8, thread * 8 + 7
+    assert decoded.tracks[core].name == f"{name}: CPU 3"
+    assert (decoded.tracks[own].name, decoded.tracks[own].parent_uuid) == ("kernel", thread * 8 + 2)
+    assert written.states == 6
+    by_track: dict[int, list[tuple[str, int, int]]] = defaultdict(list)
+    for one in decoded.states:
+        by_track[one.track].append((one.name, one.begin - begin, one.end - begin))
+    assert by_track[own] == [
+        ("running", 10, 20), ("preempted by stress 911", 20, 50), ("running", 50, 60),
+        ("sleeping", 60, 90),
+    ]  # fmt: skip
+    assert [(start, end) for _, start, end in by_track[core]] == [(10, 20), (50, 60)]
+    (asleep,) = (one for one in decoded.states if one.name == "sleeping")
+    assert asleep.notes == {"cpu": 3, "priority": 120, "woken_by": "timer"}

@@ -1,0 +1,42 @@
+-- name: finding.real_time_threads_share_cpu
+-- title: Several executors with real-time priority share a CPU
+-- description: Threads of executors with real-time priority ran on one CPU nearly all of the time.
+--     While one of them runs, those of the same priority and the less urgent ones have to wait, even
+--     if other CPUs are idle.
+-- cause: They were bound to the same CPU (taskset, cpusets), or the machine has no other one.
+-- cure: Give each of them a CPU of its own, or leave the choice to the kernel; or give them
+--     priorities in the order of their deadlines, and check that all fit into the time there is.
+-- grain: one row per CPU
+-- severity: info
+-- when: store.thread_state
+WITH ran AS (
+    SELECT s.run_id, s.thread_id, s.cpu, sum(s.end_ns - s.start_ns) AS length_ns
+    FROM main.thread_state AS s
+    WHERE s.state = 'running'
+        AND s.priority < 100
+        AND s.thread_id IN (SELECT thread_id FROM main.executor_thread)
+    GROUP BY s.run_id, s.thread_id, s.cpu
+),
+placed AS (
+    SELECT
+        run_id, thread_id, cpu,
+        length_ns / sum(length_ns) OVER (PARTITION BY thread_id) AS share
+    FROM ran
+)
+SELECT
+    a.run_id,
+    printf('CPU %d of %s', a.cpu, h.hostname) AS subject,
+    count(*) AS count,
+    printf(
+        '%s ran there: %s',
+        derive.counted(count(*), 'thread'),
+        string_agg(printf('%s %d', coalesce(t.name, '?'), t.tid), ', ' ORDER BY a.thread_id)
+    ) AS detail
+FROM placed AS a
+JOIN main.thread AS t ON a.thread_id = t.thread_id
+JOIN main.process AS p ON t.process_id = p.process_id
+JOIN main.host AS h ON p.host_id = h.host_id
+-- One that may run elsewhere does so when its CPU is taken.
+WHERE a.share >= 0.99
+GROUP BY a.run_id, h.host_id, h.hostname, a.cpu
+HAVING count(*) > 1

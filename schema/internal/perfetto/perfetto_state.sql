@@ -1,0 +1,56 @@
+-- name: internal.perfetto_state
+-- title: Scheduling in Perfetto
+-- description: States of threads, as the kernel recorded them, and what of that ran on which core.
+--     Slices of a track are disjoint.
+-- grain: one row per state of a thread, and per stretch in which a thread ran on a core
+-- param: run_id BIGINT  Run
+-- param: start_ns BIGINT  Begin of the window, epoch ns
+-- param: end_ns BIGINT  End of the window, epoch ns
+-- column: track BIGINT  Its track
+-- column: parent BIGINT  Track of its thread; NULL: of a core
+-- column: track_name VARCHAR  What Perfetto calls the track
+-- column: name VARCHAR  The state, and what took the CPU; of a core the thread
+-- column: start_ns BIGINT [epoch ns]  Begin
+-- column: end_ns BIGINT [epoch ns]  End
+-- column: cpu INTEGER  CPU it ran on, or left
+-- column: priority INTEGER  Priority of the thread
+-- column: woken_by VARCHAR  What ended the sleep
+WITH state AS MATERIALIZED (
+    SELECT
+        s.thread_id, s.state, s.start_ns, s.end_ns, s.cpu, s.priority, s.waker_kind, p.host_id,
+        h.hostname,
+        printf('%s %d', coalesce(t.name, '?'), t.tid) AS thread,
+        printf('%s %d', coalesce(b.name, o.name, '?'), coalesce(b.tid, o.tid)) AS who
+    FROM main.thread_state AS s
+    JOIN main.thread AS t ON s.thread_id = t.thread_id
+    JOIN main.process AS p ON t.process_id = p.process_id
+    JOIN main.host AS h ON p.host_id = h.host_id
+    LEFT JOIN main.thread AS b
+        ON coalesce(s.preempted_by_thread_id, s.waker_thread_id) = b.thread_id
+    LEFT JOIN main.other_thread AS o
+        ON coalesce(s.preempted_by_other_thread_id, s.waker_other_thread_id) = o.other_thread_id
+    WHERE s.run_id = $run_id AND s.start_ns >= $start_ns AND s.start_ns < $end_ns
+)
+SELECT
+    thread_id * 8 + 7 AS track,
+    thread_id * 8 + 2 AS parent,
+    'kernel' AS track_name,
+    CASE WHEN state = 'preempted' THEN concat_ws(' by ', state, who) ELSE state END AS name,
+    start_ns,
+    end_ns,
+    cpu,
+    priority,
+    CASE
+        WHEN waker_kind = 'thread' THEN who
+        ELSE waker_kind
+    END AS woken_by
+FROM state
+UNION ALL
+-- Linux has at most 8192 CPUs.
+SELECT
+    (8192 * host_id + cpu) * 8, NULL, printf('%s: CPU %d', hostname, cpu), thread, start_ns,
+    least(end_ns, lead(start_ns) OVER (PARTITION BY host_id, cpu ORDER BY start_ns)), cpu, priority,
+    NULL
+FROM state
+WHERE state = 'running' AND cpu IS NOT NULL
+ORDER BY track, start_ns
