@@ -84,6 +84,7 @@ WHERE l.run_id = $run_id AND c.kind = 'timer'
 """
 _CALLBACKS = "SELECT DISTINCT label FROM main.callback_label WHERE run_id = $run_id"
 _PROCESSES = "SELECT DISTINCT name FROM main.process WHERE run_id = $run_id"
+_NOT_TRACED = "the kernel was not traced, or not during it"
 _NOT_DUE = "when it was due is not known: one call only, or its creation was not recorded"
 # Roots and messages that could arrive, as far as the recording shows.
 _ARRIVALS = "roots - not_connected - cut_by_recording"
@@ -139,15 +140,28 @@ SUBJECTS: dict[str, Subject] = {
                 "callbacks", "period_{}_ns", Dimension.TIME, ("min", "median", "max")
             ),
             "wait": Metric("waits", "wait_{}_ns", Dimension.TIME, ("median", "max")),
+            "cpu": Metric(
+                "callback-schedule", "running_{}_ns", Dimension.TIME, ("median", "p99", "max"),
+                missing=_NOT_TRACED,
+            ),
+            "preempted": Metric(
+                "callback-schedule", "preempted_ns / nullif(total_ns, 0)", Dimension.SHARE,
+                worst="preemption", missing=_NOT_TRACED,
+            ),
         },
-        dict.fromkeys(("callbacks", "waits"), "node || ' ' || callback"),
+        dict.fromkeys(("callbacks", "waits", "callback-schedule"), "node || ' ' || callback"),
         {
             "callback": Filter(
-                {"callbacks": ("callback", "symbol"), "waits": ("callback",)},
+                {
+                    "callbacks": ("callback", "symbol"),
+                    "waits": ("callback",),
+                    "callback-schedule": ("callback",),
+                },
                 _CALLBACKS, "callback",
             ),
             "node": Filter(
-                {"callbacks": ("node",), "waits": ("node",)}, _NODES, "node"
+                dict.fromkeys(("callbacks", "waits", "callback-schedule"), ("node",)),
+                _NODES, "node",
             ),
         },
     ),
@@ -229,8 +243,19 @@ SUBJECTS: dict[str, Subject] = {
             "utilisation": Metric(
                 "executor-usage", "callback_share", Dimension.SHARE, (), "callbacks"
             ),
+            "wakeup": Metric(
+                "wakeup-latency", "{}_ns", Dimension.TIME, ("median", "p99", "max"),
+                missing=_NOT_TRACED,
+            ),
         },
-        {"executor-usage": "printf('%s, thread %d', process, tid)"},
-        {"process": Filter({"executor-usage": ("process",)}, _PROCESSES, "process")},
+        dict.fromkeys(
+            ("executor-usage", "wakeup-latency"), "printf('%s, thread %d', process, tid)"
+        ),
+        {
+            "process": Filter(
+                dict.fromkeys(("executor-usage", "wakeup-latency"), ("process",)),
+                _PROCESSES, "process",
+            ),
+        },
     ),
 }  # fmt: skip

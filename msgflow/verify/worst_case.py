@@ -38,6 +38,7 @@ KEYS = {
     "lost_flow": "path",
     "callback": "callback_id",
     "late_call": "callback_id",
+    "preemption": "callback_id",
     "message": "subscription_id",
     "request": "[service_id, client_id]",
     "goal": "[action_server_id, action_client_id]",

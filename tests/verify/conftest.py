@@ -44,6 +44,20 @@ def goals(empty_database: Path, tmp_path: Path) -> Path:
 
 
 @pytest.fixture
+def traced(empty_database: Path, tmp_path: Path) -> Path:
+    """A database with callbacks that the kernel's trace covers."""
+    path = Path(shutil.copy(empty_database, tmp_path / "traced.duckdb"))
+    cases = Path(__file__).parents[1] / "query" / "cases"
+    with duckdb.connect(str(path)) as connection:
+        fill_case(connection, cases / "callbacks" / "traced_by_the_kernel.case")
+        connection.execute(
+            "INSERT INTO store.thread_state BY NAME SELECT 1 AS run_id, 1 AS thread_id, "
+            "100 AS start_ns, 130 AS end_ns, 'runnable' AS state, false AS is_loss_affected"
+        )
+    return path
+
+
+@pytest.fixture
 def overwritten(empty_database: Path, tmp_path: Path) -> Path:
     """A database with a queue that is full now and then."""
     path = Path(shutil.copy(empty_database, tmp_path / "overwritten.duckdb"))

@@ -357,3 +357,31 @@ def test_without_the_file_a_name_means_nothing(system: Path, tmp_path: Path) -> 
     (tmp_path / "targets.yaml").write_text("targets: [{path: there, latency: max < 1 s}]")
     with Database(system) as database, pytest.raises(UsageError, match=r"none\.yaml"):
         database.verify(tmp_path / "targets.yaml", paths=tmp_path / "none.yaml")
+
+
+def test_scheduling_where_the_kernel_was_traced(check: Check, traced: Path) -> None:
+    text = """
+targets:
+  - callback: Timer(5 ms)
+    cpu: [median < 151 ns, p99 < 180 ns]
+    preempted: < 24 %
+  - callback: Subscription(/goal)
+    preempted: < 50 %
+  - process: process
+    wakeup: p99 < 31 ns
+"""
+    found = {
+        (row["subject"], row["condition"]): (row["verdict"], row["value"], row["see"])
+        for row in rows(check(text, traced))
+    }
+    assert found == {
+        ("/planner Timer(5 ms)", "median < 151 ns"): ("passed", 150, None),
+        ("/planner Timer(5 ms)", "p99 < 180 ns"): ("failed", 180, None),
+        ("/planner Timer(5 ms)", "< 24 %"): ("passed", 140 / 600, None),
+        ("/planner Subscription(/goal)", "< 50 %"): (
+            "failed", 0.6, "msgflow flow --callback-instance 5",
+        ),
+        ("process, thread 1", "p99 < 31 ns"): ("passed", 30, None),
+    }  # fmt: skip
+    without = rows(check(text))
+    assert {row["verdict"] for row in without} == {"not measured"}

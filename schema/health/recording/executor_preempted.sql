@@ -49,8 +49,8 @@ SELECT
     printf('%s %d on %s', coalesce(t.name, '?'), t.tid, h.hostname) AS subject,
     s.number AS count,
     printf(
-        'another thread had the CPU for %.3f s of %.3f s in which callbacks had work to do (%.0f %%)'
-        || ', most of it %s',
+        'another thread had the CPU for %.3f s of %.3f s in which callbacks had work to do '
+        || '(%.0f %%), most of it %s',
         s.preempted_ns / 1e9, (s.running_ns + s.preempted_ns) / 1e9,
         100 * s.preempted_ns / (s.running_ns + s.preempted_ns), f.name
     ) AS detail

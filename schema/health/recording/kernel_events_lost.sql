@@ -3,8 +3,8 @@
 -- description: Kernel events are missing, on any CPU. States of threads meanwhile are marked
 --     is_loss_affected: a switch or a waking in them may not be seen.
 -- cause: The buffers of the kernel trace were full, or it was written too slowly.
--- cure: Record with larger buffers (lttng enable-channel --kernel --subbuf-size; perf record -m), or
---     fewer events.
+-- cure: Record with larger buffers (lttng enable-channel --kernel --subbuf-size; perf record -m),
+--     or fewer events.
 -- grain: one row per run
 -- severity: warning
 -- when: store.thread_state

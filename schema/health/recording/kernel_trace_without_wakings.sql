@@ -1,8 +1,8 @@
 -- name: finding.kernel_trace_without_wakings
 -- title: The kernel trace does not show what woke threads
--- description: The kernel trace has switches alone. A sleep includes the wait for a CPU that follows
---     it, and what ended it is not known: there is no wake-up latency, and critical paths end at
---     sleeps.
+-- description: The kernel trace has switches alone. A sleep includes the wait for a CPU that
+--     follows it, and what ended it is not known: there is no wake-up latency, and critical paths
+--     end at sleeps.
 -- cause: The event sched_waking was not recorded.
 -- cure: Record sched_waking too (msgflow record --kernel; docs/scheduling.md has the commands).
 -- grain: one row per run

@@ -1,9 +1,9 @@
 -- name: finding.priority_inversion
 -- title: Less urgent threads delay an executor with real-time priority
--- description: An executor with real-time priority lost the CPU to a less urgent thread, or slept in
---     a callback until a less urgent thread of a ROS process woke it.
--- cause: The callback waits for a lock or a condition that a less urgent thread holds. Or the kernel
---     throttles real-time threads (/proc/sys/kernel/sched_rt_runtime_us).
+-- description: An executor with real-time priority lost the CPU to a less urgent thread, or slept
+--     in a callback until a less urgent thread of a ROS process woke it.
+-- cause: The callback waits for a lock or a condition that a less urgent thread holds. Or the
+--     kernel throttles real-time threads (/proc/sys/kernel/sched_rt_runtime_us).
 -- cure: Use mutexes with priority inheritance (PTHREAD_PRIO_INHERIT), raise the priority of the
 --     thread that holds the lock, or share no lock with it. msgflow query critical-path says what
 --     that thread did meanwhile.

@@ -1,8 +1,8 @@
 -- name: finding.real_time_threads_share_cpu
 -- title: Several executors with real-time priority share a CPU
 -- description: Threads of executors with real-time priority ran on one CPU nearly all of the time.
---     While one of them runs, those of the same priority and the less urgent ones have to wait, even
---     if other CPUs are idle.
+--     While one of them runs, those of the same priority and the less urgent ones have to wait,
+--     even if other CPUs are idle.
 -- cause: They were bound to the same CPU (taskset, cpusets), or the machine has no other one.
 -- cure: Give each of them a CPU of its own, or leave the choice to the kernel; or give them
 --     priorities in the order of their deadlines, and check that all fit into the time there is.

@@ -1,0 +1,22 @@
+-- name: internal.worst_preemption
+-- title: The run of a callback that lost the CPU for longest
+-- description: Of the instances of a callback that began in the window, the one in which other
+--     threads had the CPU for longest.
+-- grain: one row, or none
+-- param: key BIGINT  Callback
+-- param: start_ns BIGINT  Begin of the window, epoch ns
+-- param: end_ns BIGINT  End of the window, epoch ns
+-- column: duration_ns BIGINT [ns]  How long it had lost the CPU
+-- column: at_ns BIGINT [epoch ns]  When it began
+-- column: id BIGINT  Its identity
+-- column: kind VARCHAR  What it is: 'callback_instance'
+SELECT
+    s.preempted_ns AS duration_ns,
+    i.start_ns AS at_ns,
+    i.callback_instance_id AS id,
+    'callback_instance' AS kind
+FROM main.callback_schedule AS s
+JOIN main.callback_instance AS i ON s.callback_instance_id = i.callback_instance_id
+WHERE i.callback_id = $key AND i.start_ns >= $start_ns AND i.start_ns < $end_ns
+ORDER BY s.preempted_ns DESC, i.start_ns, i.callback_instance_id
+LIMIT 1
