@@ -115,7 +115,7 @@ WITH piece AS (
         c.hop,
         c.part,
         c.activity,
-        coalesce(l.node, main.node_label(n.full_name, r.name, r.pid)) AS node,
+        coalesce(l.node, main.node_label(n.full_name, r.name, r.pid), o.node) AS node,
         CASE
             WHEN c.activity IN (
                 'callback', 'cache', 'take_to_callback', 'service', 'executor_busy',
@@ -144,6 +144,14 @@ WITH piece AS (
             AND c.part = c.activity AS is_layer
     FROM main.critical_piece('critical_part', $runs) AS c
     LEFT JOIN main.thread AS t ON c.state_thread_id = t.thread_id
+    -- Where no callback is traced, the only node of the process that did it.
+    LEFT JOIN (
+        SELECT process_id, any_value(full_name) AS node
+        FROM main.node
+        GROUP BY process_id
+        HAVING count(*) = 1
+    ) AS o
+        ON t.process_id = o.process_id AND c.wakers = 0
     LEFT JOIN main.thread AS bt ON c.by_thread_id = bt.thread_id
     LEFT JOIN main.other_thread AS bo ON c.by_other_thread_id = bo.other_thread_id
     LEFT JOIN main.callback_instance AS i ON c.callback_instance_id = i.callback_instance_id

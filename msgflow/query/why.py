@@ -7,6 +7,7 @@ from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 from msgflow.errors import UsageError
+from msgflow.text.values import format_duration
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -29,6 +30,7 @@ _BY_NODE = {
     "timer": ("timers",),
     "service": ("service-latency",),
 }
+_BY_STATE = {"preempted": ("preemption",), "runnable": ("wakeup-latency",)}
 _BY_TOPIC = {"network_or_idle": ("topics", "--measure", "latency")}
 
 
@@ -111,7 +113,27 @@ def explain(ask: Ask, run: Run, place: str | None) -> Explanation:
         waits=waits,
         losses=losses,
         steps=tuple(_steps(pieces, losses)),
-        notes=tuple(dict.fromkeys([*paths.notes, *flow.notes])),
+        notes=tuple(dict.fromkeys([*_preempted(pieces), *paths.notes, *flow.notes])),
+    )
+
+
+def _preempted(pieces: Sequence[dict[str, Any]]) -> Iterator[str]:
+    """Yield what took the CPU, if most of the slowest flow was over while others had it."""
+    lost = [row for row in pieces if row["state"] == "preempted"]
+    latency_ns = pieces[0]["latency_ns"]
+    total_ns = sum(row["duration_ns"] for row in lost)
+    if 2 * total_ns <= latency_ns:
+        return
+    by: dict[str, int] = {}
+    for row in lost:
+        who = row["who"] or "?"
+        if row["who_priority"] is not None:
+            who += f" (priority {row['who_priority']}, taken from {row['priority']})"
+        by[who] = by.get(who, 0) + row["duration_ns"]
+    names = sorted(by, key=lambda who: -by[who])[:_WAITS]
+    yield (
+        f"for {100 * total_ns / latency_ns:.0f} % of the slowest flow another thread had the CPU: "
+        + ", ".join(f"{who} for {format_duration(by[who])}" for who in names)
     )
 
 
@@ -171,8 +193,10 @@ def _longest(flow: QueryResult) -> QueryResult:
 def _steps(pieces: Sequence[dict[str, Any]], losses: QueryResult) -> Iterator[tuple[str, ...]]:
     """Yield the commands that show more: of the longest piece, the flow, and lost messages."""
     longest = max(pieces, key=lambda row: row["duration_ns"])
+    if query := _BY_STATE.get(longest["state"] or ""):
+        yield ("query", *query)
     # What the trace has no name for cannot be asked for.
-    if longest["node"] is not None and (query := _BY_NODE.get(longest["activity"])):
+    elif longest["node"] is not None and (query := _BY_NODE.get(longest["activity"])):
         yield ("query", *query, "--node", longest["node"])
     elif longest["what"] is not None and (query := _BY_TOPIC.get(longest["activity"])):
         yield ("query", *query, "--topic", longest["what"])

@@ -307,10 +307,9 @@ whole AS MATERIALIZED (
         run_id, path_id, root_kind, root_id, take_id, latency_ns, flow_rank, hop, position, part,
         activity, is_certain, callback_instance_id, publication_id, island
 ),
--- In the others no thread did anything, or the trace does not show which one.
-interval AS MATERIALIZED (
+owned AS (
     SELECT
-        w.interval_id, w.from_ns, w.to_ns,
+        w.interval_id, w.flow_rank, w.take_id, w.part, w.activity, w.from_ns, w.to_ns,
         CASE
             WHEN w.activity IN ('publish', 'intra', 'rclcpp', 'rcl', 'rmw', 'dds') THEN p.thread_id
             ELSE i.thread_id
@@ -318,7 +317,23 @@ interval AS MATERIALIZED (
     FROM whole AS w
     LEFT JOIN store.callback_instance AS i ON w.callback_instance_id = i.callback_instance_id
     LEFT JOIN store.publication AS p ON w.publication_id = p.publication_id
-    WHERE w.activity NOT IN ('cache', 'timer', 'unpublished', 'stored', 'response_to_take')
+),
+-- What a thread did for a message without a traced callback ends with what it published, and at the
+-- end of the flow with the take. Out of a cache another thread may have published.
+interval AS MATERIALIZED (
+    SELECT
+        w.interval_id, w.from_ns, w.to_ns,
+        coalesce(
+            w.thread_id,
+            nullif(lead(
+                CASE WHEN w.part = 'cache' THEN -1 ELSE w.thread_id END IGNORE NULLS
+            ) OVER (PARTITION BY w.flow_rank ORDER BY w.interval_id), -1),
+            CASE WHEN w.interval_id = max(w.interval_id) OVER (PARTITION BY w.flow_rank)
+                THEN t.thread_id END
+        ) AS thread_id
+    FROM owned AS w
+    LEFT JOIN store.take AS t ON w.take_id = t.take_id
+    QUALIFY w.activity NOT IN ('cache', 'timer', 'unpublished', 'stored', 'response_to_take')
         AND w.to_ns > w.from_ns
 )
 SELECT

@@ -2,9 +2,12 @@ from __future__ import annotations
 
 import json
 import shlex
+import shutil
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+import duckdb
 import pytest
 from rich.cells import cell_len
 from typer.testing import Result
@@ -50,6 +53,46 @@ def test_the_numbers_are_those_of_the_queries(demo: Path) -> None:
     assert 0 < len(why.waits) <= 3
     for row in why.waits.table.to_pylist():
         assert (row["node"], row["callback"]) in nodes
+
+
+def test_it_names_what_took_the_cpu(demo: Path, tmp_path: Path, msgflow: Msgflow) -> None:
+    path = tmp_path / "traced.duckdb"
+    shutil.copyfile(demo, path)
+    with Database(demo) as database:
+        pieces = database.query("critical-path").table.to_pylist()
+    longest = max((row for row in pieces if row["callback_instance_id"]), key=_duration)
+    assert 2 * longest["duration_ns"] > longest["latency_ns"]
+    with duckdb.connect(str(path)) as connection:
+        ((run, thread, host, begin, end),) = connection.execute(
+            "SELECT i.run_id, i.thread_id, p.host_id, i.start_ns, i.end_ns "
+            "FROM store.callback_instance AS i JOIN store.process AS p USING (process_id) "
+            "WHERE callback_instance_id = ?",
+            [longest["callback_instance_id"]],
+        ).fetchall()
+        connection.execute(
+            "INSERT INTO store.other_thread BY NAME SELECT 1 AS other_thread_id, ? AS run_id, "
+            "? AS host_id, 911 AS tid, 'stress' AS name",
+            [run, host],
+        )
+        connection.execute(
+            "INSERT INTO store.thread_state BY NAME SELECT ? AS run_id, ? AS thread_id, "
+            "? AS start_ns, ? AS end_ns, 'preempted' AS state, 0 AS cpu, 120 AS priority, "
+            "1 AS preempted_by_other_thread_id, 100 AS preempted_by_priority, "
+            "false AS is_loss_affected",
+            [run, thread, begin, end],
+        )
+    result = msgflow("why", "--db", str(path))
+    said = " ".join(result.stderr.split())
+    assert (
+        "of the slowest flow another thread had the CPU: stress (priority 100, taken from" in said
+    )
+    assert f"next: msgflow query preemption --db {path}" in said
+    assert "preempted stress" in " ".join(result.stdout.split())
+
+
+def _duration(row: dict[str, Any]) -> int:
+    duration: int = row["duration_ns"]
+    return duration
 
 
 def test_without_a_place_it_is_the_path_of_the_slowest_flow(demo: Path) -> None:

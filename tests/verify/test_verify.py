@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+import duckdb
 import pytest
 from hostile import HOSTILE, renamed
 from thorough import few
@@ -156,8 +157,21 @@ def test_a_path_passes_every_topic_that_is_named(check: Check) -> None:
     assert [row["verdict"] for row in rows(check(text))] == ["not measured"]
 
 
-def test_every_metric_reads_columns_that_its_query_has(check: Check, goals: Path) -> None:
+def test_every_metric_reads_columns_that_its_query_has(
+    check: Check, system: Path, goals: Path
+) -> None:
     """With a condition that nothing meets, so that worst cases are looked for, too."""
+    with duckdb.connect(str(system)) as connection:
+        connection.execute(
+            "INSERT INTO store.callback_schedule BY NAME SELECT run_id, callback_instance_id, "
+            "90 AS running_ns, 10 AS preempted_ns, 0 AS runnable_ns, 0 AS sleeping_ns, "
+            "0 AS uninterruptible_ns, 0 AS unknown_ns, 1 AS preemption_count, "
+            "0 AS migration_count, false AS is_loss_affected FROM store.callback_instance"
+        )
+        connection.execute(
+            "INSERT INTO store.thread_state BY NAME SELECT run_id, thread_id, 100 AS start_ns, "
+            "130 AS end_ns, 'runnable' AS state, false AS is_loss_affected FROM store.thread"
+        )
     units = {"ns": "1 ns", "Hz": "1 Hz", "share": "1 %", "count": "1"}
     names = {"path": "[/a, /b]", "timer": "/source", "callback": "Sub*", "topic": "/a"}
     names |= {"service": "/add", "action": "/dock", "process": "process"}
