@@ -28,7 +28,7 @@
 -- column: symbol VARCHAR            Function registered for the callback
 -- column: callback_id BIGINT        Identity of the callback
 -- column: is_internal BOOLEAN       Infrastructure of ROS
--- brief: node, callback, count, median_ns, p99_ns, running_p99_ns, preempted_p99_ns, max_ns,
+-- brief: node, callback, count, median_ns, p99_ns, max_ns, running_p99_ns, preempted_p99_ns,
 --     p95_ns, period_median_ns, mean_ns
 -- note: callbacks
 WITH instance AS (

@@ -1,32 +1,29 @@
 -- name: critical-path
 -- title: What the slowest flows waited for
 -- description: The slowest flows, piece by piece; msgflow flow --why shows that of one message.
---     Waits are replaced by what they waited for, as far as the trace shows: what the executor ran
---     meanwhile, the timer that was not due yet, or the message that was still missing and how that
---     came about. Where the kernel was traced, what a thread did is divided into its states: on a
---     CPU, preempted and by what, or waiting and for what (docs/scheduling.md). The pieces add up
---     to the latency. Unless detail is full, pieces below 1 % of the latency are summed up in one
---     line, 'rest', and the layers of publishing are one piece, as are equal states of a callback.
---     Flows with a message that was stored until its subscription existed come after all others.
+--     Waits are replaced by what they waited for, as far as the trace shows; where the kernel was
+--     traced, what a thread did by its states (docs/scheduling.md). The pieces add up to the
+--     latency. Unless detail is full, pieces below 1 % of it are summed up as 'rest'. Flows with a
+--     message that was stored until its subscription existed come last.
 -- grain: one row per flow and piece, node or activity
--- param: from VARCHAR = NULL  Topics or nodes where flows start: globs, with commas between
+-- param: from VARCHAR = NULL  Topics or nodes where flows start
 -- param: to VARCHAR = NULL  Topics or nodes where flows end, likewise
 -- param: via VARCHAR = NULL  Only flows through all of these topics or nodes
 -- param: without VARCHAR = NULL  Only flows through none of these
 -- param: slowest BIGINT {1..} = 1  Number of flows
 -- param: quantile VARCHAR {median|p90|p95|p99|max} = NULL  Instead, the flow at this quantile of
 --     the latency
--- param: take BIGINT = NULL  Instead, the longest flow that ends with this take_id
+-- param: take BIGINT = NULL  Instead, the longest flow to this take_id
 -- param: case VARCHAR {first|last|newest|every_pair} = 'first'  Arrivals that count: the
 --     first or last of each root, that of the newest root, or all
--- param: by VARCHAR {piece|node|part} = 'piece'  One row for each piece, or totals by node or
---     by activity and state
+-- param: by VARCHAR {piece|node|part} = 'piece'  Rows by piece, by node, or by activity
+--     and state
 -- param: detail VARCHAR {short|full} = 'short'  full: every piece and layer of publishing
 -- param: from_event VARCHAR {callback_start|publish} = 'callback_start'  Event that starts
 --     the clock
 -- param: to_event VARCHAR {take|callback_start|callback_end} = 'callback_end'  Event that
 --     stops it
--- param: max_depth BIGINT {1..} = 32     Longest path, in topics
+-- param: max_depth BIGINT {1..} = 32     Longest path
 -- param: max_paths BIGINT {1..} = 1000   Most paths, shortest first, and chains of a length
 -- column: run_id BIGINT            Run
 -- column: rank BIGINT              Number of the flow, the slowest first
@@ -42,22 +39,17 @@
 --     the message arrived); in a cache 'timer' (not due yet), 'unpublished' (the message that was
 --     waited for had not been published), or a part of that message's own flow; 'rest': pieces too
 --     short for a line of their own
--- column: state VARCHAR            What the thread did, where the kernel was traced: 'running',
---     'preempted' (another thread had the CPU), 'runnable' (woken, waits for a CPU), 'sleeping'
---     (waits for something), 'uninterruptible' (waits for a page or a disk) or 'unknown'
--- column: who VARCHAR              What took the CPU, or ended the sleep: a thread, or 'timer',
---     'interrupt' or 'softirq'; of a ROS process with its tid
+-- column: state VARCHAR            What the thread did, as in thread_state, where the kernel was
+--     traced
+-- column: who VARCHAR              What took the CPU, or ended the sleep: thread or interrupt
 -- column: node VARCHAR [node]      Node that did it, or that waited
 -- column: what VARCHAR             The callback, or the topic of the message
 -- column: share DOUBLE [share]     Part of the latency, rounded to 4 places
 -- column: pieces BIGINT            Number of pieces in the row
 -- column: is_certain BOOLEAN       For 'executor_busy', 'all_threads_busy' and 'blocked': what
 --     waited was ready by then; no: it may have arrived during this piece
--- column: thread VARCHAR           Thread in that state; where a thread of a ROS process ended a
---     sleep, that thread, with what it did meanwhile
--- column: wakers BIGINT            How many wakers lead to it: 0 for the thread of the piece itself
--- column: priority INTEGER         Its priority, as the kernel has it: 0 to 99 real-time, 100 to
---     139 nice -20 to 19
+-- column: thread VARCHAR           Thread in that state
+-- column: priority INTEGER         Its priority to the kernel; below 100 real-time
 -- column: who_priority INTEGER     Priority of what took the CPU
 -- column: from_ns BIGINT [epoch ns]  Begin
 -- column: callback_instance_id BIGINT  Callback instance
@@ -67,7 +59,7 @@
 -- column: path VARCHAR [path]      Nodes and topics of the flow; only in its first row
 -- heading: rank, latency_ns, take_id, path
 -- brief: rank, at_ns, duration_ns, share, activity, state, who, node, what, is_certain, pieces,
---     hop, part, thread, priority, who_priority, wakers
+--     hop, part, thread, priority, who_priority
 -- note: clocks
 CREATE OR REPLACE TEMP TABLE critical_part AS
 WITH path AS (
@@ -213,7 +205,6 @@ summed AS MATERIALIZED (
         END AS state,
         CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(who) END AS who,
         CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(thread) END AS thread,
-        CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(wakers) END AS wakers,
         CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(priority) END AS priority,
         CASE
             WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(who_priority)
@@ -272,7 +263,6 @@ SELECT
     s.pieces,
     s.is_certain,
     s.thread,
-    s.wakers,
     s.priority,
     s.who_priority,
     s.from_ns,
