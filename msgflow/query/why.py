@@ -30,7 +30,7 @@ _BY_NODE = {
     "timer": ("timers",),
     "service": ("service-latency",),
 }
-_BY_STATE = {"preempted": ("preemption",), "runnable": ("wakeup-latency",)}
+_BY_STATE = {"preempted": "preemption", "runnable": "wakeup-latency"}
 _BY_TOPIC = {"network_or_idle": ("topics", "--measure", "latency")}
 
 
@@ -193,13 +193,13 @@ def _longest(flow: QueryResult) -> QueryResult:
 def _steps(pieces: Sequence[dict[str, Any]], losses: QueryResult) -> Iterator[tuple[str, ...]]:
     """Yield the commands that show more: of the longest piece, the flow, and lost messages."""
     longest = max(pieces, key=lambda row: row["duration_ns"])
-    if query := _BY_STATE.get(longest["state"] or ""):
-        yield ("query", *query)
+    if of_state := _BY_STATE.get(longest["state"] or ""):
+        yield ("query", of_state)
     # What the trace has no name for cannot be asked for.
-    elif longest["node"] is not None and (query := _BY_NODE.get(longest["activity"])):
-        yield ("query", *query, "--node", longest["node"])
-    elif longest["what"] is not None and (query := _BY_TOPIC.get(longest["activity"])):
-        yield ("query", *query, "--topic", longest["what"])
+    elif longest["node"] is not None and (of_node := _BY_NODE.get(longest["activity"])):
+        yield ("query", *of_node, "--node", longest["node"])
+    elif longest["what"] is not None and (of_topic := _BY_TOPIC.get(longest["activity"])):
+        yield ("query", *of_topic, "--topic", longest["what"])
     yield ("flow", "--take", str(pieces[0]["take_id"]), "--why")
     if len(losses):
         topics = sorted(set(losses.table["topic_name"].to_pylist()))
