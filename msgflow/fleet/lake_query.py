@@ -18,7 +18,7 @@ import duckdb
 
 from msgflow.database import capped, sql_error
 from msgflow.db.sql_guard import guarded_query
-from msgflow.errors import QueryError, UsageError
+from msgflow.errors import DatabaseError, QueryError, UsageError
 from msgflow.fleet.answers import answers
 from msgflow.fleet.lake_connection import (
     Reading,
@@ -53,6 +53,8 @@ DEFAULT_LIMIT = 10
 _LISTS = re.compile(
     r"\b(show|describe|summarize|information_schema|duckdb_\w+|pragma_\w+)\b", re.IGNORECASE
 )
+# DuckDB says this of a statement when files have other columns.
+_LACKING = re.compile(r'does not have a column named "(\w+)"')
 _BUCKETS = "distributed"
 
 
@@ -337,4 +339,11 @@ def _asked(lake: Lake, name: str, con: duckdb.DuckDBPyConnection, ask: Any) -> A
         with lake_errors(lake, is_query=True):
             return interruptible(con, ask)
     except duckdb.Error as error:
+        lacking = _LACKING.search(str(error))
+        if lacking is not None and name in names():
+            raise DatabaseError(
+                f"the lake lacks what {name} needs ({lacking[1]}): an earlier msgflow wrote it"
+                f" — {lake.store.url}",
+                "ingest the recordings into a new lake: msgflow fleet ingest SOURCE --lake LAKE",
+            ) from error
         raise QueryError(f"the query failed: {first_line(error)} — {name}") from error

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import dataclasses
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import duckdb
 import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from typer.testing import CliRunner, Result
 
 from msgflow import Database
 from msgflow.cli.app import app
-from msgflow.errors import QueryError, UsageError
+from msgflow.errors import DatabaseError, QueryError, UsageError
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.lake_connection import Reading, choose
 from msgflow.fleet.lake_query import (
@@ -341,3 +343,18 @@ def test_columns_of_headers_have_meanings() -> None:
     for name in statements().names():
         header = statements().header(name)
         assert all(dataclasses.astuple(column)[3] for column in header.columns), name
+
+
+def test_a_lake_of_an_earlier_version_that_lacks_a_column(night: Lake, tmp_path: Path) -> None:
+    """The error names the column and what to do; what does not need it is answered."""
+    folder = tmp_path / "lake"
+    shutil.copytree(night.store.url, folder)
+    for file in folder.glob("topics_delivery/*/*.parquet"):
+        rows = pq.read_table(file, partitioning=None)
+        pq.write_table(rows.drop_columns(["cut_by_recording"]), file)
+    lake = Lake.open(folder)
+    assert len(fleet_query(lake, "e2e-latency"))
+    with pytest.raises(DatabaseError) as refused:
+        fleet_query(lake, "topics-delivery")
+    assert "lacks what topics-delivery needs (cut_by_recording): an earlier" in str(refused.value)
+    assert "msgflow fleet ingest SOURCE --lake" in str(refused.value.hint)
