@@ -12,6 +12,7 @@ import pytest
 from msgflow.clocks import read_clock_sync
 from msgflow.database import Database
 from msgflow.errors import TraceError
+from msgflow.links import read_links
 from msgflow.sim import Recording, simulate
 from msgflow.watch import Watcher, WindowReport, watch_finished
 
@@ -119,6 +120,23 @@ def test_a_damaged_and_a_missing_chunk_are_said(simulated: Path, tmp_path: Path)
     assert any("1 chunks are missing before number 3" in note for note in notes)
     assert any("a chunk cannot be read" in note for note in notes)
     assert sum(row["roots"] for report in found for row in report.paths) > 0
+
+
+def test_links_of_a_node_that_is_not_there_are_said(simulated: Path, tmp_path: Path) -> None:
+    """It may start later: the view goes on."""
+    file = tmp_path / "links.yaml"
+    file.write_text("links: [{kind: direct, node: /later, inputs: [/a], outputs: [/b]}]")
+    notes: list[str] = []
+    watcher = Watcher(
+        window_ns=9 * SECOND,
+        step_ns=9 * SECOND,
+        links=read_links(file),
+        clocks=read_clock_sync("none"),
+        note=notes.append,
+    )
+    (report,) = watch_finished(simulated, watcher)
+    assert sum(path["reached"] for path in report.paths) > 0
+    assert [note for note in notes if "left out for now" in note and "/later" in note]
 
 
 def test_a_recording_without_chunks(tmp_path: Path) -> None:

@@ -1,0 +1,107 @@
+"""Borders and windows of chunks, without their events."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from msgflow.run.window import Window
+from msgflow.watch.history import History
+from msgflow.watch.kept_chunk import KeptChunk
+
+ROBOT, LAPTOP = Path("robot"), Path("laptop")
+STEP, WINDOW = 100, 300
+
+
+def chunk(begin: int, end: int, source: Path = ROBOT) -> KeptChunk:
+    return KeptChunk(
+        source=source,
+        path=source / f"{begin}",
+        traces=(),
+        events={},
+        times_ns=np.empty(0, np.int64),
+        packets=(),
+        event_counts={},
+        damages=(),
+        begin_ns=begin,
+        end_ns=end,
+    )
+
+
+def filled(*ends: int, window: int = WINDOW) -> History:
+    """Return a history with a border at each end."""
+    history = History(window, STEP)
+    begin = 0
+    for end in ends:
+        history.add(chunk(begin, end))
+        assert history.is_due
+        history.add_border()
+        begin = end
+    return history
+
+
+def test_a_window_is_final_once_the_next_border_has_come() -> None:
+    assert filled(100).final_window() is None
+    assert filled(100, 200).final_window() == Window(0, 100)
+    assert filled(100, 200, 300, 400, 500).final_window() == Window(100, 400)
+    assert filled(100, 200).final_window(is_last=True) == Window(0, 200)
+
+
+def test_messages_that_take_longer_make_windows_wait() -> None:
+    history = filled(100, 200, 300, 400)
+    history.note_longest(150)
+    assert history.final_window() == Window(0, 200)
+    assert [path.name for path in history.paths(Window(300, 400))] == ["100", "200", "300"]
+    # No message is waited for longer than a window.
+    history.note_longest(10_000)
+    assert history.longest_ns == WINDOW
+
+
+def test_windows_as_short_as_steps_meet() -> None:
+    """Rotations are never on time."""
+    history = History(STEP, STEP)
+    windows = []
+    begin = 0
+    for end in (97, 203, 295, 412, 498):
+        history.add(chunk(begin, end))
+        history.add_border()
+        if (window := history.final_window()) is not None:
+            windows.append(window)
+            history.final_ns = window.end_ns
+            history.forget(window)
+        begin = end
+    assert windows == [Window(0, 97), Window(97, 203), Window(203, 295), Window(295, 412)]
+
+
+def test_a_window_leaves_out_nothing_where_steps_were_late() -> None:
+    history = filled(100, 200)
+    history.final_ns = 100
+    for begin, end in ((200, 700), (700, 1_300)):
+        history.add(chunk(begin, end))
+    history.add_border()
+    history.add(chunk(1_300, 1_400))
+    history.add_border()
+    assert history.final_window() == Window(100, 1_300)
+
+
+def test_chunks_that_are_forgotten_are_named_once() -> None:
+    history = filled(100, 200, 300, 400, 500, 600)
+    assert [path.name for path in history.forget(Window(400, 500))] == ["0", "100", "200"]
+    assert history.forget(Window(400, 500)) == []
+
+
+def test_a_host_is_waited_for_until_patience_ends() -> None:
+    history = filled(100)
+    history.add(chunk(0, 100, LAPTOP))
+    for begin in (100, 200, 300):
+        history.add(chunk(begin, begin + 100))
+    assert not history.is_due
+    assert history.behind(400) == []
+    assert history.behind(200) == [LAPTOP]
+    history.go_on_without(LAPTOP)
+    assert history.is_due
+    assert history.complete_ns == 400
+    # Of the last host, the view does not go on alone.
+    history.go_on_without(ROBOT)
+    assert history.complete_ns == 400
