@@ -85,8 +85,10 @@ def watch_live(
         if (report := watcher.final_report(is_live=True)) is None:
             time.sleep(_BETWEEN_LOOKS)
             continue
-        if lags != (lags := (report.lag_s or 0) * _SECOND_NS > _MOST_LAG * step_ns) and lags:
+        is_late = report.lag_s is not None and report.lag_s * _SECOND_NS > _MOST_LAG * step_ns
+        if is_late and not lags:
             note(f"the view lags by {report.lag_s:.0f} s: steps are longer until it has caught up")
+        lags = is_late
         yield report
         watcher.keep_violation()
 
