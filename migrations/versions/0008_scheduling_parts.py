@@ -1,4 +1,4 @@
-"""What had the CPU while threads waited for it, and interrupts during callbacks.
+"""What had the CPU while threads waited for it, interrupts during callbacks, CPU usage.
 
 Older runs have none: they have to be read again, with their kernel traces.
 """
@@ -28,5 +28,11 @@ def upgrade() -> None:
             run_id BIGINT NOT NULL, callback_instance_id BIGINT NOT NULL,
             preemptor_thread_id BIGINT, preemptor_other_thread_id BIGINT,
             preemptor_priority INTEGER, preempted_ns BIGINT NOT NULL, runnable_ns BIGINT NOT NULL
+        )
+    """)
+    op.execute("""
+        CREATE TABLE store.cpu_usage (
+            run_id BIGINT NOT NULL, host_id BIGINT NOT NULL, cpu INTEGER, start_ns BIGINT NOT NULL,
+            thread_id BIGINT, tid INTEGER NOT NULL, name VARCHAR, running_ns BIGINT NOT NULL
         )
     """)

@@ -172,6 +172,7 @@ def older(path: Path) -> dict[int, str]:
         con.execute("DROP TABLE store.callback_schedule")
         con.execute("DROP TABLE store.preemptor")
         con.execute("DROP TABLE store.callback_preemptor")
+        con.execute("DROP TABLE store.cpu_usage")
         con.execute("ALTER TABLE store.flow_call DROP COLUMN taken_request_id")
         con.execute("ALTER TABLE store.flow_call DROP COLUMN taken_response_id")
         con.execute("ALTER TABLE store.flow_call ALTER COLUMN callback_instance_id SET NOT NULL")

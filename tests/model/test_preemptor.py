@@ -121,3 +121,23 @@ def test_a_priority_tells_the_policy(system: RosSystem, analyse: Analyse) -> Non
         "SELECT priority, policy FROM thread_state WHERE state = 'running' ORDER BY start_ns"
     )
     assert states == [(20, "real_time"), (-1, "deadline"), (120, "normal")]
+
+
+def test_cpu_time_of_all_threads_by_second(system: RosSystem, analyse: Analyse) -> None:
+    """Time before the first switch of a CPU, and after its last one, is not known."""
+    second = 1_000_000_000
+    kernel = Kernel(system)
+    kernel.switch(900, 0, 41)
+    kernel.switch(2000, 41, HOG, BLOCKED)
+    kernel.switch(2 * second + 50, HOG, 0, BLOCKED)
+    kernel.switch(2 * second + 70, 0, 41)
+    call(system, 1000, 1100)
+    assert analyse(system).rows(
+        "SELECT start_ns, tid, thread_id, name, running_ns FROM cpu_usage ORDER BY start_ns, tid"
+    ) == [
+        (0, HOG, None, "thread 7", second - 2000),
+        (0, 41, 1, "thread 41", 1100),
+        (second, HOG, None, "thread 7", second),
+        (2 * second, 0, None, "thread 0", 20),
+        (2 * second, HOG, None, "thread 7", 50),
+    ]

@@ -164,3 +164,20 @@ Table(
         "parts add up to the duration."
     },
 )
+
+Table(
+    "cpu_usage",
+    STORE,
+    run_id(),
+    reference("host_id", "Host", to="host.host_id", required=True),
+    Column("cpu", INTEGER, comment="CPU"),
+    moment("start_ns", "Begin of the second", required=True, clock="host_id"),
+    thread_id("The thread; NULL: of a process without ROS", required=False),
+    Column("tid", INTEGER, nullable=False, comment="Its number to the kernel; 0: idle"),
+    text("name", "Its name"),
+    number("running_ns", "How long it ran", unit="ns", required=True),
+    comment="One row per CPU, second and thread that ran there",
+    info={
+        "view": "What ran on each CPU, second by second, threads of processes without ROS included."
+    },
+)

@@ -1,0 +1,64 @@
+-- name: staging.cpu_usage
+-- description: What ran on each CPU, second by second: all threads, also of processes without ROS.
+-- grain: one row per CPU, second and thread that ran
+-- when: staging.schedule
+-- column: host_id BIGINT  Host
+-- column: cpu INTEGER  CPU
+-- column: start_ns BIGINT [epoch ns]  Begin of the second
+-- column: thread_id BIGINT  The thread, if it is of a ROS process
+-- column: tid INTEGER  Its number to the kernel; 0: idle
+-- column: name VARCHAR  Its name, the latest one
+-- column: running_ns BIGINT [ns]  How long it ran
+WITH run AS (
+    SELECT
+        s.clock_key, w.trace_index, w.cpu_id AS cpu, w.prev_tid AS tid,
+        w.run_start_ns + s.shift_ns AS start_ns, w.ts_ns + s.shift_ns AS end_ns
+    FROM raw.sched_switch AS w
+    JOIN staging.schedule AS s ON w.trace_index = s.trace_index
+    WHERE s.is_joined AND w.run_start_ns < w.ts_ns
+),
+part AS (
+    SELECT
+        clock_key, trace_index, cpu, tid, start_ns, end_ns,
+        unnest(range(start_ns // 1_000_000_000, (end_ns - 1) // 1_000_000_000 + 1)) AS second
+    FROM run
+),
+usage AS (
+    SELECT
+        clock_key, trace_index, cpu, tid, second, min(start_ns) AS first_ns,
+        sum(
+            least(end_ns, (second + 1) * 1_000_000_000)
+            - greatest(start_ns, second * 1_000_000_000)
+        )::BIGINT AS running_ns
+    FROM part
+    GROUP BY ALL
+),
+named AS (
+    SELECT trace_index, next_tid AS tid, arg_max(next_comm, event_id) AS name
+    FROM raw.sched_switch
+    GROUP BY ALL
+),
+host AS (
+    SELECT s.clock_key, min(t.host_id) AS host_id
+    FROM staging.schedule AS s
+    JOIN staging.trace AS t ON s.trace_index + 1 = t.trace_id
+    WHERE s.is_joined
+    GROUP BY s.clock_key
+)
+SELECT
+    h.host_id,
+    u.cpu,
+    u.second * 1_000_000_000 AS start_ns,
+    t.thread_id,
+    u.tid,
+    n.name,
+    u.running_ns
+FROM usage AS u
+JOIN host AS h ON u.clock_key = h.clock_key
+LEFT JOIN named AS n ON u.trace_index = n.trace_index AND u.tid = n.tid
+LEFT JOIN staging.thread_tid AS t
+    ON u.clock_key = t.clock_key
+    AND u.tid = t.tid
+    AND u.first_ns >= t.from_ns
+    AND u.first_ns < t.until_ns
+ORDER BY h.host_id, u.second, u.cpu, u.tid
