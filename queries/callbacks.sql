@@ -75,8 +75,9 @@ SELECT
     m.count,
     m.open,
     CASE WHEN
-            2 * m.span_ns
-            >= coalesce(r.end_ns + least(0, $end_ns - r.end_ns) - greatest(r.start_ns, $start_ns), 0)
+            2 * m.span_ns >= coalesce(
+                r.end_ns + least(0, $end_ns - r.end_ns) - greatest(r.start_ns, $start_ns), 0
+            )
             THEN (m.count - 1) * 1e9 / nullif(m.span_ns, 0)
     END AS rate_hz,
     m.period_min_ns,

@@ -112,8 +112,8 @@ def command(
         bool,
         typer.Option(
             "--why",
-            help="What the message waited for up to its take, piece by piece, in place of the tree:"
-            " the query critical-path for this flow",
+            help="What the message waited for up to its take, in place of the tree: the query"
+            " critical-path for this flow",
             rich_help_panel=OUTPUT,
         ),
     ] = False,
@@ -150,7 +150,7 @@ def command(
         bool,
         typer.Option(
             "--absolute",
-            help="Show points in time (UTC) instead of times since the first line",
+            help="Show points in time, in UTC",
             rich_help_panel=OUTPUT,
         ),
     ] = False,
