@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -49,6 +50,7 @@ def command(
         typer.Option(
             "--clock-sync",
             metavar="none|messages|FILE",
+            parser=os.path.expanduser,
             help="How the clocks of several hosts are brought together",
         ),
     ] = "none",

@@ -6,6 +6,7 @@ import shutil
 from pathlib import Path
 
 import duckdb
+import golden
 import pytest
 from golden import fill, fill_case
 
@@ -119,6 +120,8 @@ def test_without_the_rows_that_when_names_nothing_is_found(
 ) -> None:
     """So that the query need not run."""
     paths = sorted((CASES / header.name).glob("*.case"))
+    # Some say when nothing is found.
+    paths = [path for path in paths if golden.parse_csv(golden.read_case(path).expected)[1:]]
     assert paths
     for path in paths:
         database.begin()

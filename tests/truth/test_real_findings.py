@@ -43,6 +43,8 @@ EXPECTED: dict[str, list[tuple[str, str | None, int]]] = {
         ("started_late", "filter 13086 on vm", 3),
         ("started_late", "sink 13065 on vm", 2),
         ("started_late", "source 13107 on vm", 3),
+        ("topic_unnamed", "[filter 13086] → [sink 13065]", 87),
+        ("topic_unnamed", "[source 13107] → [filter 13086]", 88),
     ],
     "real_lifecycle": [],
     "real_overload": [],

@@ -2,11 +2,11 @@
 -- description: States of threads of ROS processes, with what took the CPU and what woke them.
 -- grain: one row per interval in which a thread had one state
 -- when: staging.schedule_interval
+-- column: number BIGINT  Number of the row
 -- column: thread_id BIGINT  The thread
 -- column: start_ns BIGINT [epoch ns]  Begin
 -- column: end_ns BIGINT [epoch ns]  End
 -- column: state VARCHAR  State
--- column: number BIGINT  Number of the row
 -- column: cpu INTEGER  CPU it ran on, left, or waits for
 -- column: priority INTEGER  Its priority
 -- column: preempted_by_thread_id BIGINT  What took the CPU, a thread of a ROS process
