@@ -92,6 +92,7 @@ def test_objects_have_no_row_without_the_tables_of_their_when(
     have_no_row_without_their_when(headers, (lossy, deferring, own_events))
 
 
+@pytest.mark.thorough
 def test_schedules_have_no_row_without_the_tables_of_their_when(shared_kernel: Path) -> None:
     headers = [header for header in SOMETIMES_EMPTY if header.path.parent.name == "schedule"]
     path = shared_kernel / "mutex" / "trace-chrisnux"

@@ -97,6 +97,7 @@ def test_a_simulated_recording(simulated: Path, tmp_path: Path) -> None:
     require_same_as_whole(simulated, tmp_path / "whole.duckdb", 0.5)
 
 
+@pytest.mark.thorough
 def test_windows_that_overlap(simulated: Path) -> None:
     """A window of two steps has what each of both has."""
     single = reports(simulated, window=0.5, step=0.5)
