@@ -25,7 +25,7 @@
 -- column: callback_id BIGINT        Identity of the callback
 -- column: is_internal BOOLEAN       Infrastructure of ROS
 -- slowest: duration_ns
--- brief: duration_ns, running_ns, preempted_ns, node, callback, start_ns, take_id, published, tid,
+-- brief: duration_ns, node, callback, start_ns, take_id, published, running_ns, preempted_ns, tid,
 --     callback_instance_id, process, host
 -- note: callbacks
 WITH instance AS (
