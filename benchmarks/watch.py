@@ -37,7 +37,7 @@ def main() -> None:
     parser.add_argument("--events", type=int, nargs="+", default=[1_000, 10_000, 100_000])
     parser.add_argument("--chunks", type=int, default=8)
     given = parser.parse_args()
-    print("events per chunk  CPU of a step [s]  of which to read [s]  memory early, late [MB]")
+    print("events per chunk  CPU of a step [s]  CPU of reading [s]     memory early, late [MB]")
     found = []
     for events in given.events:
         cpu, reading, early, late = measured(events, given.chunks)

@@ -12,6 +12,7 @@ import typer
 
 from msgflow.cli.check import PLACES_SHOWN
 from msgflow.cli.options import (
+    ClockSyncOption,
     DatabaseOption,
     LinksOption,
     OwnEventsOption,
@@ -69,16 +70,7 @@ def command(
         ),
     ] = None,
     links: LinksOption = None,
-    clock_sync: Annotated[
-        str,
-        typer.Option(
-            "--clock-sync",
-            metavar="none|messages|FILE",
-            parser=os.path.expanduser,
-            help="Synchronise the clocks of several hosts: by their messages (and the network"
-            " packets of kernel traces), or by offsets in a file",
-        ),
-    ] = "none",
+    clock_sync: ClockSyncOption = "none",
     reader: ReaderOption = Reader.AUTO,
     strict: Annotated[
         bool,

@@ -179,6 +179,25 @@ LinksOption = Annotated[
         "--links", metavar="FILE", parser=path_of, help="Indirect links to declare, as YAML"
     ),
 ]
+ClockSyncOption = Annotated[
+    str,
+    typer.Option(
+        "--clock-sync",
+        metavar="none|messages|FILE",
+        parser=os.path.expanduser,
+        help="Synchronise the clocks of several hosts: by their messages (and the network"
+        " packets of kernel traces), or by offsets in a file",
+    ),
+]
+PathsOption = Annotated[
+    Path,
+    typer.Option(
+        "--paths",
+        metavar="FILE",
+        parser=path_of,
+        help="The file with the paths that have names, for requirements",
+    ),
+]
 OwnEventsOption = Annotated[
     list[str] | None,
     typer.Option(

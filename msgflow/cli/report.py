@@ -14,6 +14,7 @@ from msgflow.cli.options import (
     LakePageOption,
     LakeWhereOption,
     MemoryLimitOption,
+    PathsOption,
     bytes_of,
     output_option,
     path_of,
@@ -70,15 +71,7 @@ def command(
             help="Requirements, as YAML: the summary has the verdicts on them",
         ),
     ] = None,
-    paths: Annotated[
-        Path,
-        typer.Option(
-            "--paths",
-            metavar="FILE",
-            parser=path_of,
-            help="The file with the paths that have names, for --targets",
-        ),
-    ] = Path(DEFAULT_PATHS),
+    paths: PathsOption = Path(DEFAULT_PATHS),
     memory_limit: MemoryLimitOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:

@@ -12,10 +12,10 @@ import typer
 from msgflow.cli.options import (
     DatabaseOption,
     OutputOption,
+    PathsOption,
     WideOption,
     case_option,
     format_option,
-    path_of,
 )
 from msgflow.cli.slice_options import with_slice
 from msgflow.default_files import DEFAULT_DATABASE, DEFAULT_PATHS
@@ -37,15 +37,7 @@ class VerifyFormat(StrEnum):
 def command(
     targets: Annotated[Path, typer.Argument(metavar="TARGETS", help="Requirements, as YAML")],
     part: Slice = LATEST,
-    paths: Annotated[
-        Path,
-        typer.Option(
-            "--paths",
-            metavar="FILE",
-            parser=path_of,
-            help="The file with the paths that have names",
-        ),
-    ] = Path(DEFAULT_PATHS),
+    paths: PathsOption = Path(DEFAULT_PATHS),
     case: Annotated[
         str,
         case_option("Flows that count for latencies of paths"),

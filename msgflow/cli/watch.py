@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -13,7 +12,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from msgflow.cli.options import OUTPUT, LinksOption, output_option, path_of
+from msgflow.cli.options import (
+    OUTPUT,
+    ClockSyncOption,
+    LinksOption,
+    PathsOption,
+    output_option,
+    path_of,
+)
 from msgflow.cli.record import EVENTS
 from msgflow.default_files import DEFAULT_PATHS
 from msgflow.errors import ExitCode, RecordingError
@@ -45,15 +51,7 @@ def command(
         str, typer.Option("--step", metavar="TIME", help="How far a window is from the one before")
     ] = "2s",
     links: LinksOption = None,
-    clock_sync: Annotated[
-        str,
-        typer.Option(
-            "--clock-sync",
-            metavar="none|messages|FILE",
-            parser=os.path.expanduser,
-            help="How the clocks of several hosts are brought together",
-        ),
-    ] = "none",
+    clock_sync: ClockSyncOption = "none",
     once: Annotated[
         bool,
         typer.Option("--once", help="Read a finished recording from its first to its last chunk"),
@@ -67,15 +65,7 @@ def command(
             help="Requirements, as `msgflow verify` takes them: what is violated is said at once",
         ),
     ] = None,
-    paths: Annotated[
-        Path,
-        typer.Option(
-            "--paths",
-            metavar="FILE",
-            parser=path_of,
-            help="The file with the paths that have names",
-        ),
-    ] = Path(DEFAULT_PATHS),
+    paths: PathsOption = Path(DEFAULT_PATHS),
     keep: Annotated[
         Path | None,
         typer.Option(

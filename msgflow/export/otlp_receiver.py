@@ -31,7 +31,7 @@ class Receiver:
         address: 'http://HOST:4318'; with a path, that of the traces.
 
     Raises:
-        UsageError: the address is none, or the package opentelemetry-proto is not installed.
+        UsageError: this is no address, or the package opentelemetry-proto is not installed.
     """
 
     def __init__(self, address: str) -> None:

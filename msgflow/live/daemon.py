@@ -46,7 +46,7 @@ def session_daemon(*, with_kernel: bool, note: Callable[[str], None]) -> Iterato
             try:
                 yield
             finally:
-                # A daemon that does not answer keeps nobody waiting.
+                # We do not wait for a daemon that does not answer.
                 with suppress(RecordingError):
                     _wait_for_others(note)
         finally:

@@ -78,7 +78,7 @@ class Alarm:
             self._note(row)
             if row["verdict"] != Verdict.FAILED:
                 continue
-            # A worst case is told once, however long windows show it.
+            # The first window that shows a worst case says so; later ones stay silent.
             names = ("target", "metric", "condition", "subject", "worst_at_ns")
             key = tuple(row[name] for name in names)
             failing.add(key)

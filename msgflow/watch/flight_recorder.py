@@ -19,7 +19,7 @@ _DATABASE = "msgflow.duckdb"
 
 
 class FlightRecorder:
-    """Directories of violations, the oldest of which are removed.
+    """Directories of violations; the oldest are removed.
 
     A violation that goes on is kept once per window.
     """
