@@ -111,6 +111,7 @@ def command(
     from msgflow.clocks import read_clock_sync
     from msgflow.links import read_links
     from msgflow.run.window import duration_ns
+    from msgflow.text.values import printable
     from msgflow.verify import Verdict
     from msgflow.watch import (
         Exporter,
@@ -158,7 +159,9 @@ def command(
             show_screen(reports)
         else:
             for report in reports:
-                violated = [f"violation: {violation_line(each)}" for each in report.violations]
+                violated = [
+                    f"violation: {printable(violation_line(each))}" for each in report.violations
+                ]
                 print_lines([window_line(report), *violated])
 
     def live(place: Path, is_over: Callable[[], bool]) -> None:

@@ -141,10 +141,10 @@ def _sparkline(values: deque[int]) -> str:
     return "".join(_SPARKS[value * (len(_SPARKS) - 1) // most] for value in values)
 
 
-def _short(text: str, width: int) -> str:
-    """Return a text that fits, without its middle if it is too long."""
+def _short(text: str, width: int) -> Text:
+    """Return a text that fits, without its middle if it is too long; no markup is read from it."""
     text = printable(text)
-    if len(text) <= width:
-        return text
-    half = (width - 1) // 2
-    return f"{text[: width - 1 - half]}…{text[-half:]}"
+    if len(text) > width:
+        half = (width - 1) // 2
+        text = f"{text[: width - 1 - half]}…{text[-half:]}"
+    return Text(text)
