@@ -167,7 +167,7 @@ def simulated(checkout: Path, system: str, factor: float, target: Path) -> None:
     """Write the trace of a system, given as its name and options."""
     name, *options = shlex.split(system)
     length = [] if "--factor" in options else ["--factor", str(factor)]
-    run(checkout, ["-m", "msgflow", "simulate", name, str(target), *length, *options])
+    run(checkout, ["-m", "msgflow", "simulate", name, "-o", str(target), *length, *options])
 
 
 def answer(checkout: Path, trace: Path, folder: Path) -> None:

@@ -143,7 +143,7 @@ class Place:
         self.old, self.stale = root / "old.duckdb", root / "stale.duckdb"
         self.links = root / "links.yaml"
         for system, path in (("pipeline", self.trace), ("two_hosts", self.other)):
-            assert run("simulate", system, path, "--factor", "0.02").code == 0
+            assert run("simulate", system, "-o", path, "--factor", "0.02").code == 0
         assert run("ingest", self.other, "--db", self.old).code == 0
         shutil.copyfile(self.old, self.stale)
         with duckdb.connect(str(self.stale)) as con:
@@ -162,7 +162,10 @@ class Place:
             "links apply": (self.old, ["links", "apply", self.links, *there]),
             "clocks apply": (self.old, ["clocks", "apply", "messages", *there]),
             "db upgrade": (self.stale, ["db", "upgrade", *there]),
-            "export": (self.old, ["export", "parquet", self.directory / "out", "--force", *there]),
+            "export": (
+                self.old,
+                ["export", "parquet", "-o", self.directory / "out", "--force", *there],
+            ),
         }
 
     def prepare(self, before: Path | None) -> None:
@@ -181,14 +184,14 @@ class Place:
             found.append("neither the old nor the new database")
         there = ["--db", self.database]
         if self.database.exists():
-            for command in ("upgrade", "check"):
-                done = run("db", command, *there)
+            for command in (("db", "upgrade"), ("info",)):
+                done = run(*command, *there)
                 if done.code:
-                    found.append(f"db {command}: {done.code} {done.said}")
+                    found.append(f"{' '.join(command)}: {done.code} {done.said}")
         else:
             run("ingest", self.trace, *there)
         if (self.directory / "out").exists():
-            again = run("export", "parquet", self.directory / "out", "--force", *there)
+            again = run("export", "parquet", "-o", self.directory / "out", "--force", *there)
             if again.code:
                 found.append(f"export again: {again.code} {again.said}")
             found += [path.name for path in (self.directory / "out").glob(".*")]

@@ -1,12 +1,13 @@
 """Signal handling of the program: SIGINT (Ctrl-C) and SIGTERM end a command cleanly.
 
-The first signal raises KeyboardInterrupt, so that the command can tidy up. Then both signals have
-their default action again: a second one ends the process at once, as SIGKILL does. No database
-minds that.
+The first signal raises KeyboardInterrupt, so that the command can tidy up; during an import it ends
+the process at once. Then both signals have their default action again: a second one ends the
+process at once, as SIGKILL does. No database minds that.
 """
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 from typing import TYPE_CHECKING
@@ -64,9 +65,11 @@ class SignalHandler:
     def __call__(self, number: int, frame: FrameType | None) -> None:
         """Raise KeyboardInterrupt, or Terminated for SIGTERM."""
         restore_default_actions()
-        if _is_loading_duckdb():
-            # Its C++ code would abort the process at an exception. Nothing has begun yet.
-            signal.raise_signal(number)
+        if _is_importing(frame):
+            # Code in C may lose an exception, and that of DuckDB would abort the process.
+            code = ExitCode.TERMINATED if number == signal.SIGTERM else ExitCode.INTERRUPTED
+            os.write(2, f"error: {code.name.lower()}\n".encode())
+            os._exit(int(code))
         error = (Terminated if number == signal.SIGTERM else KeyboardInterrupt)()
         self.came = _exit_code(error)
         raise error
@@ -84,10 +87,12 @@ def _exit_code(error: KeyboardInterrupt) -> ExitCode:
     return ExitCode.TERMINATED if isinstance(error, Terminated) else ExitCode.INTERRUPTED
 
 
-def _is_loading_duckdb() -> bool:
-    # Its first import is that of its C++ code.
-    module = sys.modules.get("duckdb")
-    return module is not None and not hasattr(module, "DuckDBPyConnection")
+def _is_importing(frame: FrameType | None) -> bool:
+    while frame is not None:
+        if frame.f_code.co_filename == "<frozen importlib._bootstrap>":
+            return True
+        frame = frame.f_back
+    return False
 
 
 def _end_after_lost_signal(unraisable: sys.UnraisableHookArgs) -> None:

@@ -114,7 +114,36 @@ main()
 def test_a_signal_while_duckdb_is_loaded(small_database: Path, number: signal.Signals) -> None:
     """Its C++ code would abort the process at an exception."""
     done = python(_IMPORTING, int(number), small_database)
-    assert (done.returncode, done.stderr) == (-number, "")
+    assert (done.returncode, done.stderr) == _ENDINGS[number]
+
+
+_LOSING = """
+import signal, sys
+from msgflow.__main__ import main
+
+class Losing:
+    def find_spec(name, path=None, target=None):
+        if name == "msgflow.cli.info":
+            try:
+                signal.raise_signal(number)
+            except KeyboardInterrupt:
+                pass
+
+sys.meta_path.insert(0, Losing)
+number, sys.argv[1:] = int(sys.argv[1]), ["info", "--db", sys.argv[2]]
+main()
+"""
+
+
+@pytest.mark.parametrize("number", _ENDINGS)
+def test_a_signal_that_an_import_would_lose(small_database: Path, number: signal.Signals) -> None:
+    """Code in C forgets exceptions of the Python code that it imports."""
+    done = python(_LOSING, int(number), small_database)
+    assert (done.returncode, done.stdout, done.stderr) == (
+        _ENDINGS[number][0],
+        "",
+        _ENDINGS[number][1],
+    )
 
 
 _FAILING = """

@@ -22,7 +22,7 @@ export class Bar {
     this.warmUp = h("button", { type: "button", title: "begin after the warm-up, where compare finds one", on: { click: () => this.skipWarmUp() } }, "skip warm-up");
     this.said = h("span", { className: "bar-said soft", role: "status" });
     this.search = h("input", { type: "search", placeholder: "find a node, topic, 3.25 s …", "aria-label": "find a node, topic, namespace, service or moment", autocomplete: "off",
-      on: { input: () => this.find(), focus: () => this.find(), keydown: (event) => this.keyDown(event) } });
+      on: { input: () => { this.finding = this.find(); }, focus: () => { this.finding = this.find(); }, keydown: (event) => this.keyDown(event) } });
     this.found = h("div", { className: "found", hidden: true });
     this.internal = h("input", { type: "checkbox", on: { change: () => go({ internal: this.internal.checked ? "1" : null }) } });
     this.copy = h("button", { type: "button", title: "copy a link to what is shown", on: { click: () => this.copyLink() } }, "copy link");
@@ -179,12 +179,16 @@ export class Bar {
     return h("a", { href, on: { click: () => { this.found.hidden = true; } } }, h("span", { className: "soft" }, `${kind} `), breakable(name));
   }
 
-  keyDown(event) {
+  async keyDown(event) {
     if (event.key === "Escape") this.found.hidden = true;
+    if (!["Enter", "ArrowDown"].includes(event.key)) return;
+    event.preventDefault();
+    // Who types fast presses the key before the names are read.
+    await this.finding;
     const first = this.found.querySelector("a");
     if (this.found.hidden || !first) return;
     if (event.key === "Enter") first.click();
-    if (event.key === "ArrowDown") { event.preventDefault(); first.focus(); }
+    else first.focus();
   }
 
   async copyLink() {
