@@ -106,6 +106,7 @@ def test_packets_tell_more_than_messages(make: Make, ingest: Ingest, tmp_path: P
     assert "seen on both ends" in details(database)["network_packets_unused"]
 
 
+@pytest.mark.thorough
 def test_what_is_known_of_ros_does_not_change(make: Make, ingest: Ingest) -> None:
     network = make()
     database = ingest(network.directory, clock_sync="none")

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import duckdb
 import pytest
+from thorough import few
 
 from msgflow.db import derivation, migration, objects
 from msgflow.db.connection import connect, recorded_revision
@@ -19,6 +20,8 @@ from msgflow.db.sandbox import open_file
 from msgflow.errors import DatabaseError
 from msgflow.resources import resource_directory
 
+REVISIONS = sorted(objects.known_revisions())
+FIRST_AND_OTHERS = few(REVISIONS, REVISIONS[0], REVISIONS[len(REVISIONS) // 2], REVISIONS[-1])
 # All that a schema is, row by row.
 SCHEMA = {
     "tables": "SELECT schema_name, table_name, comment FROM duckdb_tables()",
@@ -101,7 +104,7 @@ def rows_by_count(path: Path) -> dict[int, dict[str, tuple[object, ...]]]:
     return result
 
 
-@pytest.mark.parametrize("revision", sorted(objects.known_revisions()))
+@pytest.mark.parametrize("revision", FIRST_AND_OTHERS)
 def test_a_file_of_each_revision_becomes_what_a_new_one_is(
     database: Path, tmp_path: Path, revision: str
 ) -> None:
@@ -129,7 +132,7 @@ def test_a_file_of_each_revision_becomes_what_a_new_one_is(
         assert {name: after[count][name] for name in kept} == {name: columns[name] for name in kept}
 
 
-@pytest.mark.parametrize("revision", sorted(objects.known_revisions()))
+@pytest.mark.parametrize("revision", FIRST_AND_OTHERS)
 @pytest.mark.parametrize(
     ("change", "message"),
     [

@@ -71,6 +71,7 @@ def cluster(bucket: ObjectStore) -> Iterator[Any]:
         yield made
 
 
+@pytest.mark.thorough
 def test_much_goes_wrong(
     bucket: ObjectStore, cluster: Any, recordings: Path, tmp_path: Path
 ) -> None:

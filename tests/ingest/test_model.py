@@ -84,6 +84,7 @@ def own_events(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return simulate("own_events", path, factor=0.05).directory
 
 
+@pytest.mark.thorough
 def test_objects_have_no_row_without_the_tables_of_their_when(
     lossy: Path, deferring: Path, own_events: Path
 ) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from mutants import RULES
+from thorough import thorough
 
 ROOT = Path(__file__).resolve().parents[2]
 LIMIT = "schema/delivery/delivery_limit.sql"
@@ -27,7 +28,7 @@ def numbers_of(file: str, text: str) -> list[str]:
 @pytest.mark.parametrize(
     ("file", "options", "tests", "changes", "survived"),
     [
-        (LIMIT, numbers_of(LIMIT, "'least_row'"), QUEUES, 2, 0),
+        thorough(LIMIT, numbers_of(LIMIT, "'least_row'"), QUEUES, 2, 0),
         (LIMIT, numbers_of(LIMIT, "'least_row'"), "tests/sql/test_value.py", 2, 2),
         (ENDS, DROPPED, "tests/schema/cases/finding.stream_ends_early", 1, 0),
     ],

@@ -240,6 +240,7 @@ def plain(field: Any) -> Any:
     return int(field)
 
 
+@pytest.mark.thorough
 def test_memory_is_bounded_by_the_batch(shared_traces: Path, bt2_bindings: Any) -> None:
     def peak(batch_rows: int) -> int:
         with msgflow.trace.open([shared_traces / "services"], reader="bt2") as traces:

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from recording.recorder import NotPossibleError, record, require
 from scoring import Score, compare_real
+from thorough import few
 
 from msgflow.ingest import ingest
 
@@ -35,7 +36,7 @@ def recorded(tmp_path: Path) -> Recorded:
     return scores
 
 
-@pytest.mark.parametrize("system", ["pipeline", "services"])
+@pytest.mark.parametrize("system", few(["pipeline", "services"], "services"))
 def test_links_of_a_robot_are_right(recorded: Recorded, system: str) -> None:
     scores = recorded(system)
     assert scores["transport"].found > 0

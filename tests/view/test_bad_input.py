@@ -93,6 +93,7 @@ def _first_publication(path: Path) -> list[tuple[int]]:
         ).fetchall()
 
 
+@pytest.mark.thorough
 def test_names_in_the_address_are_only_ever_text(
     demo: Path, report: Callable[..., str], page: Page
 ) -> None:
@@ -167,6 +168,7 @@ def test_a_run_without_links(way: str, demo: Path, tmp_path: Path, page: Page) -
         assert ("take", number) in page.flow()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("way", few(["served", "file"], "served"))
 def test_long_names_a_long_gap_and_five_hundred_nodes(
     way: str, demo: Path, tmp_path: Path, page: Page

@@ -163,6 +163,7 @@ def test_the_command_of_verdicts_names_the_file_of_paths(dropping: Path, tmp_pat
         assert (f"--paths {paths}" in text) == is_named
 
 
+@pytest.mark.thorough
 def test_the_first_page_of_a_report_has_it(
     dropping: Path, report: Report, page: Page, tmp_path_factory: pytest.TempPathFactory
 ) -> None:

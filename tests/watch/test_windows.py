@@ -93,6 +93,7 @@ def simulated(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return directory
 
 
+@pytest.mark.thorough
 def test_a_simulated_recording(simulated: Path, tmp_path: Path) -> None:
     require_same_as_whole(simulated, tmp_path / "whole.duckdb", 0.5)
 

@@ -35,6 +35,7 @@ def test_as_bt2(shared_traces: Path, bt2_bindings: Any, name: str) -> None:
     assert not differences(ours, read(path, reader="bt2"))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", few(["tracecompass-ros2", "pingpong"], "pingpong"))
 def test_wanted_columns_as_bt2(shared_traces: Path, bt2_bindings: Any, name: str) -> None:
     wanted = catalogue.load().arrow_schemas()
