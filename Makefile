@@ -1,7 +1,7 @@
-# `make demo` shows msgflow at work, `make test` checks it. Both start on a bare machine: everything
-# is installed into .venv, except what only the distribution has: python3-venv, and for the tests
-# Babeltrace 2 to compare with, Chromium to look with and LTTng to record real ROS 2. apt installs
-# these where that is allowed.
+# `make demo` shows msgflow at work on a real recording, `make test` checks it. Both start on a bare
+# machine: everything is installed into .venv, except what only the distribution has: python3-venv,
+# and for the tests Babeltrace 2 to compare with, Chromium to look with and LTTng to record real
+# ROS 2. apt installs these where that is allowed.
 
 SHELL := /bin/sh
 PYTHON ?= python3
@@ -23,7 +23,7 @@ APT := apt_install() { \
 .PHONY: help demo quick test test-all bench truth real fuzz mutants docs babeltrace chromium ros clean
 
 help:
-	@echo 'make demo    simulate a robot, ingest its trace, print end-to-end latency'
+	@echo 'make demo    read a real recording, print its end-to-end latency'
 	@echo 'make quick   style, types, golden cases of schema, queries and pages: seconds'
 	@echo 'make test    style, types, import contracts, tests: minutes'
 	@echo 'make test-all the same with thorough tests: what others show on one input, on all of them'
@@ -37,18 +37,19 @@ help:
 
 demo: $(VENV)/.installed
 	rm -rf $(DEMO)
-	$(BIN)/msgflow simulate demo -o $(DEMO)/trace
-	$(BIN)/msgflow ingest $(DEMO)/trace --db $(DEMO)/msgflow.duckdb --clock-sync messages
+	mkdir $(DEMO)
+	$(BIN)/msgflow ingest examples/pipeline.tar.xz --db $(DEMO)/msgflow.duckdb
 	$(BIN)/msgflow query e2e-latency --db $(DEMO)/msgflow.duckdb
 	@echo
 	@echo 'What to try next:'
 	@echo '  export MSGFLOW_DB=$(CURDIR)/$(DEMO)/msgflow.duckdb; . $(BIN)/activate'
-	@echo '  msgflow check                                    what is wrong with the recording'
-	@echo '  msgflow why /control/cmd                         why commands are late'
-	@echo '  msgflow query critical-path --to /control/cmd    what the slowest command waited for'
-	@echo '  msgflow query waits --by pair                    which callbacks keep which waiting'
-	@echo '  msgflow flow /camera/image                       one message: its causes and effects'
+	@echo '  msgflow why /filtered                            why its messages are late'
+	@echo '  msgflow query critical-path --to /filtered       what the slowest message waited for'
+	@echo '  msgflow flow /scan --at 2.5s                     one message: its causes and effects'
+	@echo '  msgflow query callbacks                          how long callbacks run, how often'
+	@echo '  msgflow sql "FROM callback_run LIMIT 10"         anything else'
 	@echo 'see it: $(BIN)/msgflow ui --db $(DEMO)/msgflow.duckdb'
+	@echo 'two hosts, simulated: $(BIN)/msgflow simulate demo -o $(DEMO)/two_hosts'
 
 quick: $(VENV)/.developed
 	$(BIN)/ruff check .

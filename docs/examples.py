@@ -5,7 +5,7 @@
 A block that begins with ```console has commands, each behind `$ `, and what they print in a
 terminal of 100 columns. A block ```sql is answered by the block ```text behind it. Blocks that
 begin with ```sh title="Setup" run first, and show nothing; pages with the same setup share what it
-made, and a page without one starts from the database of the demo. A test keeps the pages equal to
+made, and a page without one starts from the simulated demo. A test keeps the pages equal to
 what the commands print.
 """
 
@@ -24,7 +24,7 @@ from pathlib import Path
 
 HERE = Path(__file__).parent
 PAGES = ("why-late.md", "tour.md", "cookbook.md", "own-events.md", "../README.md")
-# What pages without a setup of their own start from: the database of `make demo`.
+# What pages without a setup of their own start from: two hosts.
 DEMO = """\
 msgflow simulate demo -o trace
 msgflow ingest trace --clock-sync messages
@@ -97,6 +97,7 @@ def pages(names: tuple[str, ...] = PAGES) -> dict[str, str]:
             if setup not in prepared:
                 prepared[setup] = Path(temporary) / str(len(prepared))
                 prepared[setup].mkdir()
+                (prepared[setup] / "examples").symlink_to(HERE.parent / "examples")
                 run(f"set -e\n{setup}", prepared[setup])
             found[name] = filled(text, prepared[setup])
     return found

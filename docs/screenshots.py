@@ -1,4 +1,4 @@
-"""Takes pictures of simulated systems, for the README and the documents beside it.
+"""Takes pictures of recordings, real and simulated, for the README and the documents beside it.
 
     python docs/screenshots.py [DIRECTORY [PICTURE …]]
 
@@ -24,6 +24,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "support"))
 from browser import ARGUMENTS, find_browser
 
 IMAGES = Path(__file__).parent / "images"
+EXAMPLES = Path(__file__).parents[1] / "examples"
 EXECUTORS_ALONE = "hide=kind:timer,kind:subscription,kind:service,kind:client,kind:publisher"
 # The callback of a map in rviz, some seconds after the begin.
 _MAP = """
@@ -43,12 +44,12 @@ class Picture:
 
     Attributes:
         name: of the file, without its suffix.
-        system: simulated.
+        system: simulated; one of examples/ where `factor` is 0.
         factor: of its length.
         place: page of the report; the file of a flow alone where it is empty. {from} and {to} are
             the ends of the flow in nanoseconds since the begin of the run.
         flow: topic of the message that is followed from the middle of the run on, or SQL for a
-            callback instance.
+            callback instance; 'slowest' for the slowest flow.
         height: of the picture.
         scheme: 'light' or 'dark'.
     """
@@ -71,6 +72,9 @@ PICTURES = (
         f"timeline?from={{from}}&to={{to}}&{EXECUTORS_ALONE}", "/FrontLidarDriver", 740,
     ),
     Picture("rtabmap_messages", "rtabmap", 0.3, "timeline?from={from}&to={to}", _MAP, 1000),
+    Picture("real_overview", "pipeline", 0, "overview", "", 760),
+    Picture("real_slowest", "pipeline", 0, "timeline?from={from}&to={to}", "slowest", 620, "dark"),
+    Picture("topics", "overload", 1, "topics", "", 560),
     Picture("rtabmap_flow", "rtabmap", 0.3, "", _MAP, 860, "dark"),
 )  # fmt: skip
 
@@ -78,7 +82,9 @@ PICTURES = (
 def database(directory: Path, picture: Picture) -> Path:
     """Return the database of a simulated system, with clocks brought together; made once."""
     path = directory / f"{picture.system}.duckdb"
-    if not path.exists():
+    if not path.exists() and not picture.factor:
+        ingest([EXAMPLES / f"{picture.system}.tar.xz"], path, name=picture.system)
+    elif not path.exists():
         simulate(picture.system, directory / picture.system, factor=picture.factor)
         ingest([directory / picture.system], path, name=picture.system)
         apply_clocks(path, read_clock_sync("messages"), run=None)
@@ -89,7 +95,10 @@ def written(opened: Database, picture: Picture, target: Path) -> str:
     """Write the file that the picture is of; return the address of what is on it."""
     begin = end = 0
     if picture.flow:
-        if picture.flow.startswith("/"):
+        if picture.flow == "slowest":
+            (row,) = opened.query("flows", slowest=1).to_arrow().to_pylist()
+            flow = opened.flow(take_id=row["take_id"], direction="backward")
+        elif picture.flow.startswith("/"):
             flow = opened.flow(picture.flow, at="0.5s")
         else:
             number = opened.sql(picture.flow).to_arrow()[0][0].as_py()

@@ -49,12 +49,13 @@ def test_its_answers_fit_the_terminal_and_are_answers(page: str) -> None:
         assert lines
 
 
-def test_the_demo_is_that_of_the_makefile_and_what_it_suggests_answers(tmp_path: Path) -> None:
+def test_the_demo_is_that_of_the_readme_and_what_it_suggests_answers(tmp_path: Path) -> None:
     makefile = (DOCS.parent / "Makefile").read_text("utf-8")
-    for command in ("simulate demo", "--clock-sync messages"):
-        assert command in makefile
-        assert command in script().DEMO
-    script().run(script().DEMO, tmp_path)
+    command = "msgflow ingest examples/pipeline.tar.xz"
+    assert command in makefile
+    assert script().SETUP.findall((DOCS.parent / "README.md").read_text("utf-8")) == [f"{command}\n"]
+    (tmp_path / "examples").symlink_to(DOCS.parent / "examples")
+    script().run(command, tmp_path)
     suggested = re.findall(r"@echo '  (msgflow .*?)  ", makefile)
     assert len(suggested) > 3
     for command in suggested:
