@@ -157,7 +157,6 @@ def _print_report(report: FleetProgress, lake: str, quiet: bool) -> None:
     from msgflow.cli.output import count, print_note, print_status
 
     if not quiet:
-        rate = report.events / report.seconds if report.seconds else 0.0
         kinds = {
             "added": report.added,
             "replaced": report.replaced,
@@ -169,7 +168,7 @@ def _print_report(report: FleetProgress, lake: str, quiet: bool) -> None:
         words = ", ".join(f"{number:,} {kind}" for kind, number in kinds.items() if number)
         print_status(
             f"{count(report.total, 'recording')} for {lake}: {words}; {report.events:,} events in"
-            f" {report.seconds:.1f} s, {rate:,.0f} events/s"
+            f" {report.seconds:.1f} s"
         )
         for worker, number in sorted(report.workers.items()):
             print_status(f"  {worker}: {count(number, 'recording')}")

@@ -163,10 +163,9 @@ def _require_no_word_for_one(count: int, name: str | None, keep_staging: Path | 
 def _print_report(report: IngestReport, database: Path) -> None:
     from msgflow.cli.output import count, print_note, print_status
 
-    rate = report.event_count / report.seconds if report.seconds else 0.0
     print_status(
         f"{count(report.event_count, 'event')} read into {database} as run"
-        f" {report.run_name} ({report.run_id}) in {report.seconds:.1f} s, {rate:,.0f} events/s"
+        f" {report.run_name} ({report.run_id}) in {report.seconds:.1f} s"
     )
     notable = [finding for finding in report.findings if finding.severity != "info"]
     for name, group in groupby(notable, key=lambda finding: finding.name):

@@ -53,7 +53,9 @@ def test_the_demo_is_that_of_the_readme_and_what_it_suggests_answers(tmp_path: P
     makefile = (DOCS.parent / "Makefile").read_text("utf-8")
     command = "msgflow ingest examples/pipeline.tar.xz"
     assert command in makefile
-    assert script().SETUP.findall((DOCS.parent / "README.md").read_text("utf-8")) == [f"{command}\n"]
+    assert script().SETUP.findall((DOCS.parent / "README.md").read_text("utf-8")) == [
+        f"{command}\n"
+    ]
     (tmp_path / "examples").symlink_to(DOCS.parent / "examples")
     script().run(command, tmp_path)
     suggested = re.findall(r"@echo '  (msgflow .*?)  ", makefile)
