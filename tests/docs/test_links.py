@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 FENCE = re.compile(r"^```.*?^```", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 HEADING = re.compile(r"^#{1,6} (.+)$", re.MULTILINE)
@@ -89,6 +89,7 @@ def test_pages_named_elsewhere_exist() -> None:
 def test_the_site_shows_every_page() -> None:
     site = tomllib.loads((ROOT / "zensical.toml").read_text(encoding="utf-8"))["project"]
     shown = [page for part in site["nav"] for pages in part.values() for page in pages]
-    assert sorted(shown) == sorted(page.name for page in (ROOT / "docs").glob("*.md"))
+    pages = (page.relative_to(ROOT / "docs") for page in (ROOT / "docs").rglob("*.md"))
+    assert sorted(shown) == sorted(map(str, pages))
     assert site["strict"]
     assert site["validation"] == {"invalid_links": True, "invalid_link_anchors": True}
