@@ -97,6 +97,7 @@ _OPTIONS = {
     "critical-path": " --to /control/cmd",
     "flows": " --slowest 5",
     "graph": " --limit 8",
+    "links": " --run declared",
     "objects": " --limit 8",
     "path-breakdown": " --limit 12",
     "topics --measure unmatched": " --limit 5",
@@ -105,7 +106,12 @@ _OPTIONS = {
     "waits --by pair": " --limit 5",
 }
 _SETUPS = {
-    "links": "msgflow simulate periodic_async -o trace\nmsgflow ingest trace\n",
+    "links": (
+        "msgflow simulate periodic_async -o declared\n"
+        "msgflow simulate demo -o undeclared\n"
+        "msgflow ingest declared\n"
+        "msgflow ingest undeclared --clock-sync messages\n"
+    ),
     "action-latency": "msgflow simulate actions -o trace\nmsgflow ingest trace\n",
     "service-latency": (
         "msgflow simulate services -o trace\nmsgflow ingest trace --clock-sync messages\n"
