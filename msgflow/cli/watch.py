@@ -191,7 +191,8 @@ def command(
         _record(words, directory, step_ns, live)
     if alarm is not None and alarm.count(Verdict.FAILED):
         raise typer.Exit(ExitCode.FAILED)
-    if alarm is not None and alarm.count(Verdict.NOT_MEASURED):
+    # Without a window, nothing was measured.
+    if alarm is not None and (alarm.count(Verdict.NOT_MEASURED) or not alarm.count(Verdict.PASSED)):
         raise typer.Exit(ExitCode.NOT_MEASURED)
 
 
@@ -239,7 +240,7 @@ def _record(
                 watching.result()
 
         try:
-            record(
+            recorded = record(
                 target,
                 name=time.strftime("watch-%Y%m%d-%H%M%S"),
                 channel=Channel(EVENTS, "1M", 4, rotation_ns=step_ns),
@@ -250,6 +251,8 @@ def _record(
         finally:
             ended.set()
         watching.result()
+    if recorded.exit_code:
+        print_note(f"{words[0]} ended with exit code {recorded.exit_code}")
 
 
 @contextmanager
