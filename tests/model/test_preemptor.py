@@ -146,3 +146,20 @@ def test_cpu_time_of_all_threads_by_second(system: RosSystem, analyse: Analyse) 
         (2 * second, 0, None, "thread 0", 20),
         (2 * second, HOG, None, "thread 7", 50),
     ]
+
+
+def test_what_two_kernel_traces_show_counts_once(system: RosSystem, analyse: Analyse) -> None:
+    """The second one has the end of the first, too. A second of both is one row."""
+    kernel = Kernel(system)
+    later = Kernel(system, trace=2)
+    kernel.switch(900, 0, 41)
+    kernel.switch(2000, 41, HOG)
+    for trace in (kernel, later):
+        trace.switch(3000, HOG, 41)
+        trace.switch(3300, 41, HOG)
+    later.switch(4000, HOG, 0)
+    call(system, 3100, 3200)
+    assert analyse(system).rows("SELECT tid, name, running_ns FROM cpu_usage ORDER BY tid") == [
+        (HOG, "thread 7", 1000 + 700),
+        (41, "thread 41", 1100 + 300),
+    ]
