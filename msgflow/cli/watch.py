@@ -19,6 +19,7 @@ from msgflow.cli.options import (
     PathsOption,
     output_option,
     path_of,
+    targets_option,
 )
 from msgflow.cli.record import EVENTS
 from msgflow.default_files import DEFAULT_PATHS
@@ -58,12 +59,7 @@ def command(
     ] = False,
     targets: Annotated[
         Path | None,
-        typer.Option(
-            "--targets",
-            metavar="FILE",
-            parser=path_of,
-            help="Requirements, as `msgflow verify` takes them: what is violated is said at once",
-        ),
+        targets_option("what is violated is said at once"),
     ] = None,
     paths: PathsOption = Path(DEFAULT_PATHS),
     keep: Annotated[
