@@ -14,6 +14,7 @@ from msgflow.database import Database
 from msgflow.sim import Recording, simulate
 from msgflow.trace import Continuation
 from msgflow.watch import FlightRecorder
+from msgflow.watch.alarm import blamed
 from msgflow.watch.chunk import Chunk
 from msgflow.watch.kept_chunk import read_chunk
 from msgflow.watch.kept_traces import KeptTraces
@@ -112,3 +113,21 @@ def test_sessions_of_one_name_on_two_hosts_are_kept(tmp_path: Path) -> None:
 def test_without_a_window_nothing_is_measured(watched, monkeypatch) -> None:
     monkeypatch.setattr("msgflow.watch.watch_finished", lambda place, watcher: iter(()))
     assert watched(TARGETS).exit_code == 5
+
+
+@pytest.mark.parametrize(
+    ("state", "words"),
+    [
+        (None, "/filter ran 30.000 ms"),
+        ("running", "/filter ran 30.000 ms"),
+        ("preempted", "/filter waited 30.000 ms for a CPU that logger had"),
+        ("runnable", "/filter waited 30.000 ms for a CPU"),
+        ("sleeping", "/filter slept 30.000 ms"),
+        ("uninterruptible", "/filter waited 30.000 ms for a page or a disk"),
+    ],
+)
+def test_a_callback_that_had_no_cpu_did_not_run(state: str | None, words: str) -> None:
+    """Where the kernel is traced, pieces of a callback have the state of its thread."""
+    piece = {"activity": "callback", "node": "/filter", "what": "Subscription(/scan)", "hop": 1}
+    rest = {"state": state, "who": "logger", "share": 0.6, "duration_ns": 30_000_000}
+    assert list(blamed([piece | rest], None)) == [words]
