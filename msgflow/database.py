@@ -984,7 +984,7 @@ class Database:
             path: the file; one that exists is replaced.
             run, start, end, skip_first: what to read, see `msgflow.Slice`; one run.
             targets: file with requirements (docs/verify.md): each that is not met is a message at
-                the time of its worst case.
+                the time of its worst case, or at the end if it has none.
             paths: the file with the named paths of `targets`.
 
         Raises:
@@ -1005,11 +1005,11 @@ class Database:
             violations = [
                 Violation(
                     row["worst_at_ns"],
-                    row["subject"],
+                    row["subject"] or row["target"],
                     f"{row['metric']} is {row['measured']}, required is {row['condition']}",
                 )
                 for row in verdicts.result.to_arrow().to_pylist()
-                if row["verdict"] == "failed" and row["worst_at_ns"] is not None
+                if row["verdict"] == "failed"
             ]
         return self._ask(lambda: write_mcap(connection, Path(path), part, violations))
 

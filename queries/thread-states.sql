@@ -25,7 +25,12 @@
 --     priority, uninterruptible_ns, pid, host
 WITH state AS (
     SELECT
-        run_id, thread_id, state, start_ns, priority, is_loss_affected,
+        run_id, thread_id, state, priority, is_loss_affected,
+        -- It may go to another CPU while it waits.
+        state = 'preempted'
+        AND start_ns >= $start_ns
+        AND lag(state) OVER (PARTITION BY thread_id ORDER BY start_ns) IS DISTINCT FROM 'preempted'
+            AS is_preemption,
         least(end_ns, $end_ns) - greatest(start_ns, $start_ns) AS length_ns
     FROM main.thread_state
     WHERE list_contains($runs, run_id) AND end_ns > $start_ns AND start_ns < $end_ns
@@ -41,7 +46,7 @@ measured AS (
         coalesce(sum(length_ns) FILTER (WHERE state = 'uninterruptible'), 0)::BIGINT
             AS uninterruptible_ns,
         coalesce(sum(length_ns) FILTER (WHERE state = 'unknown'), 0)::BIGINT AS unknown_ns,
-        count(*) FILTER (WHERE state = 'preempted') AS preemptions,
+        count(*) FILTER (WHERE is_preemption) AS preemptions,
         min(priority) AS priority,
         count(*) FILTER (WHERE is_loss_affected) AS loss_affected
     FROM state

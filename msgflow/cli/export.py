@@ -14,8 +14,9 @@ from msgflow.cli.options import (
     SELECTION,
     DatabaseOption,
     MemoryLimitOption,
+    PathsOption,
     output_option,
-    path_of,
+    targets_option,
 )
 from msgflow.cli.slice_options import with_slice
 from msgflow.default_files import DEFAULT_DATABASE, DEFAULT_PATHS
@@ -52,10 +53,13 @@ _RunOption = Annotated[
 ]
 
 
-def _flow_option(name: str, metavar: str, help: str, kind: str | None = None, **more: Any) -> Any:
-    completion: dict[str, Any] = {} if kind is None else {"autocompletion": complete(kind)}
+def _place_option(name: str, help: str) -> Any:
     return typer.Option(
-        name, metavar=metavar, help=help, rich_help_panel=SELECTION, **completion, **more
+        name,
+        metavar="NAME",
+        help=help,
+        autocompletion=complete("place"),
+        rich_help_panel=SELECTION,
     )
 
 
@@ -156,27 +160,21 @@ def perfetto(
 @with_slice()
 def mcap(
     output: Annotated[Path, output_option("FILE.mcap")] = Path("msgflow.mcap"),
-    targets: Annotated[
-        Path | None,
-        _flow_option(
-            "--targets", "FILE", "Requirements: those not met get a message", parser=path_of
-        ),
-    ] = None,
-    paths: Annotated[
-        Path, _flow_option("--paths", "FILE", "File of named paths", parser=path_of)
-    ] = Path(DEFAULT_PATHS),
+    targets: Annotated[Path | None, targets_option("those that are not met get a message")] = None,
+    paths: PathsOption = Path(DEFAULT_PATHS),
     part: Slice = LATEST,
     memory_limit: MemoryLimitOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
     """Write measured values of a run for Foxglove, Lichtblick, PlotJuggler and Rerun.
 
-    They show them beside the bag of the same drive. Topics below /msgflow have latency and age
-    of paths, latency of topics, and duration and waits of callbacks, in milliseconds.
-    /msgflow/log has a warning for each message that was dropped or lost.
+    They show them beside the bag of the same drive. Topics below /msgflow have
+    latency and age of paths, latency of topics, and duration and waits of
+    callbacks, in milliseconds. /msgflow/log has a warning for each message that
+    was dropped or lost.
 
-    Needs the package mcap-ros2-support: pip install mcap-ros2-support, or in a checkout
-    '.\\[mcap]'.
+    Needs the package mcap-ros2-support: pip install mcap-ros2-support, or in a
+    checkout '.\\[mcap]'.
     """
     from msgflow.cli.output import count, print_runs, print_status
     from msgflow.database import Database
@@ -208,22 +206,29 @@ def otlp(
     ] = None,
     from_: Annotated[
         list[str] | None,
-        _flow_option("--from", "NAME", "Flows that start at this topic or node", "place"),
+        _place_option("--from", "Flows that start at this topic or node"),
     ] = None,
     to: Annotated[
         list[str] | None,
-        _flow_option("--to", "NAME", "Flows that end at this topic or node", "place"),
+        _place_option("--to", "Flows that end at this topic or node"),
     ] = None,
     via: Annotated[
         list[str] | None,
-        _flow_option("--via", "NAME", "Flows through all of these topics and nodes", "place"),
+        _place_option("--via", "Flows through all of these topics and nodes"),
     ] = None,
     without: Annotated[
         list[str] | None,
-        _flow_option("--without", "NAME", "Flows through none of these", "place"),
+        _place_option("--without", "Flows through none of these"),
     ] = None,
     slowest: Annotated[
-        int | None, _flow_option("--slowest", "N", "Only the N slowest flows", min=1)
+        int | None,
+        typer.Option(
+            "--slowest",
+            metavar="N",
+            min=1,
+            help="Only the N slowest flows",
+            rich_help_panel=SELECTION,
+        ),
     ] = None,
     path: Annotated[
         str | None,
@@ -235,21 +240,19 @@ def otlp(
             rich_help_panel=SELECTION,
         ),
     ] = None,
-    paths: Annotated[
-        Path, _flow_option("--paths", "FILE", "File of named paths", parser=path_of)
-    ] = Path(DEFAULT_PATHS),
+    paths: PathsOption = Path(DEFAULT_PATHS),
     part: Slice = LATEST,
     memory_limit: MemoryLimitOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
     """Write a run as traces of OpenTelemetry, for Jaeger, Grafana Tempo and others.
 
-    A trace is a root and all that it led to: callbacks, publications, takes, requests and
-    responses are spans, and further causes are links. If flows are chosen, a trace is a flow
-    that reached the end of its path.
+    A trace is a root and all that it led to: callbacks, publications, takes,
+    requests and responses are spans, and further causes are links. If flows are
+    chosen, a trace is a flow that reached the end of its path.
 
-    --endpoint needs the package opentelemetry-proto: pip install opentelemetry-proto, or in
-    a checkout '.\\[otlp]'.
+    --endpoint needs the package opentelemetry-proto: pip install
+    opentelemetry-proto, or in a checkout '.\\[otlp]'.
     """
     from msgflow.cli.output import count, print_runs, print_status
     from msgflow.database import Database

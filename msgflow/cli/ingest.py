@@ -106,8 +106,8 @@ def command(
         from msgflow.cli.output import print_note
         from msgflow.cli.progress import ingest_progress
         from msgflow.database import Database
-        from msgflow.db.runs import require_run_name
         from msgflow.ingest.recordings import Recording, find_recordings
+        from msgflow.run.choice import require_run_name
 
         if name is not None:
             require_run_name(name)

@@ -195,9 +195,18 @@ PathsOption = Annotated[
         "--paths",
         metavar="FILE",
         parser=path_of,
-        help="The file with the paths that have names, for requirements",
+        help="The file with the paths that have names",
     ),
 ]
+
+
+def targets_option(effect: str) -> Any:
+    """Return the option `--targets`, a file of requirements; `effect` says what they change."""
+    return typer.Option(
+        "--targets", metavar="FILE", parser=path_of, help=f"Requirements, as YAML: {effect}"
+    )
+
+
 OwnEventsOption = Annotated[
     list[str] | None,
     typer.Option(

@@ -84,8 +84,8 @@ def command(
     ends the recording, then COMMAND.
     """
     from msgflow.cli.output import print_note, print_status
-    from msgflow.db.runs import require_run_name
     from msgflow.live import Channel, record
+    from msgflow.run.choice import require_run_name
 
     name = name or time.strftime("recording-%Y%m%d-%H%M%S")
     require_run_name(name)

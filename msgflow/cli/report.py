@@ -17,7 +17,7 @@ from msgflow.cli.options import (
     PathsOption,
     bytes_of,
     output_option,
-    path_of,
+    targets_option,
 )
 from msgflow.cli.slice_options import with_slice
 from msgflow.cli.ui import require_no_where
@@ -64,12 +64,7 @@ def command(
     where: LakeWhereOption = None,
     targets: Annotated[
         Path | None,
-        typer.Option(
-            "--targets",
-            metavar="FILE",
-            parser=path_of,
-            help="Requirements, as YAML: the summary has the verdicts on them",
-        ),
+        targets_option("the summary has the verdicts on them"),
     ] = None,
     paths: PathsOption = Path(DEFAULT_PATHS),
     memory_limit: MemoryLimitOption = None,

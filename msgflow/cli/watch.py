@@ -19,6 +19,7 @@ from msgflow.cli.options import (
     PathsOption,
     output_option,
     path_of,
+    targets_option,
 )
 from msgflow.cli.record import EVENTS
 from msgflow.default_files import DEFAULT_PATHS
@@ -58,12 +59,7 @@ def command(
     ] = False,
     targets: Annotated[
         Path | None,
-        typer.Option(
-            "--targets",
-            metavar="FILE",
-            parser=path_of,
-            help="Requirements, as `msgflow verify` takes them: what is violated is said at once",
-        ),
+        targets_option("what is violated is said at once"),
     ] = None,
     paths: PathsOption = Path(DEFAULT_PATHS),
     keep: Annotated[
@@ -191,7 +187,8 @@ def command(
         _record(words, directory, step_ns, live)
     if alarm is not None and alarm.count(Verdict.FAILED):
         raise typer.Exit(ExitCode.FAILED)
-    if alarm is not None and alarm.count(Verdict.NOT_MEASURED):
+    # Without a window, nothing was measured.
+    if alarm is not None and (alarm.count(Verdict.NOT_MEASURED) or not alarm.count(Verdict.PASSED)):
         raise typer.Exit(ExitCode.NOT_MEASURED)
 
 
@@ -239,7 +236,7 @@ def _record(
                 watching.result()
 
         try:
-            record(
+            recorded = record(
                 target,
                 name=time.strftime("watch-%Y%m%d-%H%M%S"),
                 channel=Channel(EVENTS, "1M", 4, rotation_ns=step_ns),
@@ -250,6 +247,8 @@ def _record(
         finally:
             ended.set()
         watching.result()
+    if recorded.exit_code:
+        print_note(f"{words[0]} ended with exit code {recorded.exit_code}")
 
 
 @contextmanager

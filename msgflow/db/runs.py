@@ -10,7 +10,7 @@ from msgflow.db.connection import connect
 from msgflow.db.store import delete
 from msgflow.db.transaction import transaction
 from msgflow.errors import UsageError
-from msgflow.run.choice import choose_runs, is_run_name, read_runs
+from msgflow.run.choice import choose_runs, read_runs, require_run_name
 from msgflow.sql.failure import database_errors
 from msgflow.sql.interrupt import interruptible
 
@@ -179,16 +179,3 @@ def _is_text(value: str) -> bool:
     except UnicodeEncodeError:
         return False
     return "\0" not in value
-
-
-def require_run_name(name: str) -> None:
-    """Raise unless a run may have this name.
-
-    Raises:
-        UsageError: it means something else to `--run`, or is not valid Unicode.
-    """
-    if not is_run_name(name):
-        raise UsageError(
-            f"a run cannot have a name that --run takes for something else — {name!r}",
-            "give a name that is neither empty, nor 'all', nor a number",
-        )

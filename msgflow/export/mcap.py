@@ -50,12 +50,12 @@ class Violation:
     """A requirement that the run does not meet.
 
     Attributes:
-        at_ns: when its worst case began, epoch ns.
+        at_ns: when its worst case began, epoch ns; None if it has none, such as a rate.
         subject: what of the run it is.
         message: what was required and measured.
     """
 
-    at_ns: int
+    at_ns: int | None
     subject: str
     message: str
 
@@ -93,7 +93,7 @@ def write_mcap(
         connection: to a database with the public views.
         path: the file; one that exists is replaced.
         part: one run, and the times to write.
-        violations: what else the log has.
+        violations: what else the log has; those of no moment come at the end.
 
     Raises:
         UsageError: not exactly one run, a time that cannot be read, a file that cannot be written,
@@ -110,6 +110,7 @@ def write_mcap(
         ) from None
     topics: set[str] = set()
     values = losses = 0
+    end_ns = run.start_ns or 0
     with replacing(path) as temporary, temporary.open("wb") as file:
         writer: Any = Writer(file)
         writer.add_metadata("msgflow", {"run": run.name, "version": __version__})
@@ -119,14 +120,16 @@ def write_mcap(
             message = {"data": row["value_ms"]}
             writer.write_message(row["topic"], schema, message, row["at_ns"], sequence=values)
             values += 1
+            end_ns = row["at_ns"]
         schema = writer.register_msgdef(*_LOG)
         for row in _rows(connection, "mcap_loss", bindings):
             message = _log(row["at_ns"], _WARNING, row["node"], row["message"])
             writer.write_message(LOG_TOPIC, schema, message, row["at_ns"])
             losses += 1
         for each in violations:
-            message = _log(each.at_ns, _ERROR, each.subject, each.message)
-            writer.write_message(LOG_TOPIC, schema, message, each.at_ns)
+            at_ns = end_ns if each.at_ns is None else each.at_ns
+            message = _log(at_ns, _ERROR, each.subject, each.message)
+            writer.write_message(LOG_TOPIC, schema, message, at_ns)
         writer.finish()
     return ExportedMcap(path, run, len(topics), values, losses, len(violations))
 

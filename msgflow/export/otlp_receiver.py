@@ -6,6 +6,7 @@ import os
 import time
 import urllib.error
 import urllib.request
+from http.client import HTTPException
 from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote, urlsplit
 
@@ -14,6 +15,7 @@ from msgflow.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
+    from urllib.parse import SplitResult
 
 _PATH = "/v1/traces"
 # All programs that send OTLP read their additional headers there, such as those with a key.
@@ -35,12 +37,13 @@ class Receiver:
     """
 
     def __init__(self, address: str) -> None:
-        parts = urlsplit(address)
-        if parts.scheme not in ("http", "https") or not parts.hostname:
+        parts = _parts(address)
+        if parts is None:
             raise UsageError(
                 f"that is no address of a receiver — {address}", "--endpoint http://localhost:4318"
             )
         try:
+            from google.protobuf.message import DecodeError
             from opentelemetry.proto.collector.trace.v1 import trace_service_pb2
             from opentelemetry.proto.trace.v1 import trace_pb2
         except ImportError:
@@ -52,6 +55,7 @@ class Receiver:
         self._request = trace_service_pb2.ExportTraceServiceRequest
         self._response = trace_service_pb2.ExportTraceServiceResponse
         self._spans = trace_pb2.ResourceSpans
+        self._decode_error = DecodeError
         path = parts.path.rstrip("/") or _PATH
         self._address = parts._replace(path=path).geturl()
         self._headers = {
@@ -70,7 +74,11 @@ class Receiver:
             UsageError: the receiver cannot be reached, or does not take them.
         """
         body = self._request(resource_spans=[self._spans(**each) for each in spans])
-        answer = self._response.FromString(self._post(body.SerializeToString()))
+        content = self._post(body.SerializeToString())
+        try:
+            answer = self._response.FromString(content)
+        except self._decode_error as error:
+            raise self._no_receiver() from error
         return int(answer.partial_success.rejected_spans)
 
     def _post(self, body: bytes) -> bytes:
@@ -87,6 +95,8 @@ class Receiver:
                         f"its address ends with {_PATH}, as a rule; keys go into {_HEADERS}",
                     ) from error
                 time.sleep(wait_s)
+            except HTTPException as error:
+                raise self._no_receiver() from error
             except OSError as error:
                 reason = getattr(error, "reason", error)
                 raise UsageError(
@@ -94,6 +104,22 @@ class Receiver:
                     "start it, or give the address where it takes OTLP/HTTP",
                 ) from error
         raise AssertionError("the last try returns or raises")
+
+    def _no_receiver(self) -> UsageError:
+        return UsageError(
+            f"what answers there is no receiver of OTLP/HTTP — {self._address}",
+            "its port is 4318, as a rule; 4317 is that of gRPC",
+        )
+
+
+def _parts(address: str) -> SplitResult | None:
+    """Return the parts of an address; None if it is none of HTTP."""
+    try:
+        parts = urlsplit(address)
+        port = parts.port
+    except ValueError:
+        return None
+    return parts if parts.scheme in ("http", "https") and parts.hostname and port != 0 else None
 
 
 def _given_headers(environment: Mapping[str, str]) -> dict[str, str]:

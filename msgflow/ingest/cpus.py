@@ -30,7 +30,6 @@ INTERRUPT = "interrupt"
 INTERRUPT_SCHEMA = pa.schema(
     [
         pa.field("trace_index", pa.int32(), nullable=False),
-        pa.field("cpu_id", pa.int32()),
         pa.field("kind", pa.dictionary(pa.int32(), pa.string())),
         pa.field("start_ns", pa.int64(), nullable=False),
         pa.field("end_ns", pa.int64(), nullable=False),
@@ -144,7 +143,6 @@ class Cpus:
         return pa.RecordBatch.from_arrays(
             [
                 to_arrow(to_numpy(batch["trace_index"])[chosen]),
-                to_arrow(to_numpy(batch["cpu_id"])[chosen]),
                 self._named(np.full(chosen.size, kind, np.int32)),
                 to_arrow(start_ns[chosen]),
                 to_arrow(to_numpy(batch["ts_ns"])[chosen]),

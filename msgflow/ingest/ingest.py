@@ -23,7 +23,6 @@ from msgflow.db.memory import (
     limit_threads,
     set_memory_limit,
 )
-from msgflow.db.runs import require_run_name
 from msgflow.db.sandbox import open_memory, shut_in
 from msgflow.db.transaction import transaction
 from msgflow.db.workspace import creating, workspace
@@ -33,6 +32,7 @@ from msgflow.ingest.hostnames import hostnames_of
 from msgflow.ingest.load import Loaded, load_traces
 from msgflow.ingest.stored_run import fallback_name, require_free_name, store_run
 from msgflow.links import declare_links, read_links
+from msgflow.run.choice import require_run_name
 from msgflow.sql.failure import database_errors, in_words
 from msgflow.sql.interrupt import interruptible, noted_interrupts
 

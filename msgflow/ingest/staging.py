@@ -53,7 +53,7 @@ CREATE TABLE raw.cpu_return (thread_index INTEGER, event_id BIGINT)
 
 _INTERRUPT_TABLE = """
 CREATE TABLE raw.interrupt (
-    trace_index INTEGER, cpu_id INTEGER, kind VARCHAR, start_ns BIGINT, end_ns BIGINT, tid INTEGER
+    trace_index INTEGER, kind VARCHAR, start_ns BIGINT, end_ns BIGINT, tid INTEGER
 )
 """
 

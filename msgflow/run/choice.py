@@ -110,3 +110,16 @@ def integer(text: str) -> int | None:
 def is_run_name(text: str) -> bool:
     """Tell whether a run may have this name: `choose_runs` reads it as a name only."""
     return text not in ("", "all") and not _INTEGER.fullmatch(text)
+
+
+def require_run_name(name: str) -> None:
+    """Raise unless a run may have this name.
+
+    Raises:
+        UsageError: it means something else to `--run`, or is not valid Unicode.
+    """
+    if not is_run_name(name):
+        raise UsageError(
+            f"a run cannot have a name that --run takes for something else — {name!r}",
+            "give a name that is neither empty, nor 'all', nor a number",
+        )

@@ -32,6 +32,13 @@ _BLAME = {
     "timer": "{node} waited {time} for its timer",
     "unpublished": "{node} waited {time} for {what}",
 }
+# What a callback did, by the state of its thread where the kernel was traced; else it ran.
+_BLAME_OF_STATE = {
+    "preempted": "{node} waited {time} for a CPU that {who} had",
+    "runnable": "{node} waited {time} for a CPU",
+    "sleeping": "{node} slept {time}",
+    "uninterruptible": "{node} waited {time} for a page or a disk",
+}
 _OTHER = "{node} spent {time} on {activity}"
 # A piece that took a smaller part of the latency is not to blame.
 _LEAST_SHARE = 0.2
@@ -111,7 +118,7 @@ class Alarm:
             "worst_ns": row["worst_ns"],
             "at_ns": at_ns,
             "is_final": at_ns is None or at_ns < final_ns,
-            "culprit": ", ".join(_blamed(pieces, row["path"])) or None,
+            "culprit": ", ".join(blamed(pieces, row["path"])) or None,
         }
 
 
@@ -131,7 +138,7 @@ def violation_line(violation: Row) -> str:
     return words if violation["is_final"] else f"{words} (provisional)"
 
 
-def _blamed(pieces: Sequence[Row], path: str | None) -> Iterator[str]:
+def blamed(pieces: Sequence[Row], path: str | None) -> Iterator[str]:
     """Yield what took longest of a flow.
 
     Args:
@@ -141,9 +148,13 @@ def _blamed(pieces: Sequence[Row], path: str | None) -> Iterator[str]:
     slowest = sorted(pieces, key=lambda piece: -piece["duration_ns"])
     for piece in slowest[:_MOST_PIECES]:
         if piece["activity"] != "rest" and (piece["share"] or 0) >= _LEAST_SHARE:
-            yield _BLAME.get(piece["activity"], _OTHER).format(
+            words = _BLAME.get(piece["activity"], _OTHER)
+            if piece["activity"] == "callback":
+                words = _BLAME_OF_STATE.get(piece["state"] or "", words)
+            yield words.format(
                 node=piece["node"] or _sender(piece["hop"], path) or "an unknown node",
                 what=piece["what"] or "a message",
+                who=piece["who"] or "another thread",
                 activity=piece["activity"].replace("_", " "),
                 time=format_duration(piece["duration_ns"]),
             )

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import time
+from itertools import count
 from typing import TYPE_CHECKING
 
 from msgflow.errors import MsgflowError
@@ -19,7 +21,7 @@ _DATABASE = "msgflow.duckdb"
 
 
 class FlightRecorder:
-    """Directories of violations; the oldest are removed.
+    """Directories of violations, also of earlier watchers; the oldest are removed.
 
     A violation that goes on is kept once per window.
     """
@@ -50,7 +52,6 @@ class FlightRecorder:
         self._links = links
         self._clock_sync = clock_sync
         self._note = note
-        self._kept: list[Path] = []
         self._until_ns = 0
 
     def keep(self, end_ns: int, traces: KeptTraces, chunks: Sequence[Path]) -> None:
@@ -65,13 +66,16 @@ class FlightRecorder:
             return
         self._until_ns = end_ns + self._window_ns
         moment = time.strftime("%Y%m%d-%H%M%S", time.gmtime(end_ns // 1_000_000_000))
-        target = self._directory / f"violation-{moment}"
+        names = (f"violation-{moment}" + (f"-{n}" if n > 1 else "") for n in count(1))
+        target = next(path for path in map(self._directory.joinpath, names) if not path.exists())
+        # A directory of a session has `archives`, and is below that of its host.
+        common = os.path.commonpath([chunk.parents[2] for chunk in chunks])
         try:
             target.mkdir(parents=True)
             for chunk in chunks:
                 if chunk.is_dir():
-                    place = target / "archives" / chunk.parent.parent.name / chunk.name
-                    shutil.copytree(chunk, place)
+                    session = chunk.parents[1].relative_to(common)
+                    shutil.copytree(chunk, target / "archives" / session / chunk.name)
             ingest(
                 [target],
                 target / _DATABASE,
@@ -85,7 +89,7 @@ class FlightRecorder:
             shutil.rmtree(target, ignore_errors=True)
             self._note(f"the violation is not kept: {error}")
             return
-        self._kept.append(target)
-        while len(self._kept) > self._most:
-            shutil.rmtree(self._kept.pop(0), ignore_errors=True)
+        others = sorted(set(self._directory.glob("violation-*")) - {target})
+        for oldest in others[: max(len(others) + 1 - self._most, 0)]:
+            shutil.rmtree(oldest, ignore_errors=True)
         self._note(f"kept: msgflow why --db {target / _DATABASE}")

@@ -92,7 +92,8 @@ class History:
     def go_on_without(self, source: Path) -> None:
         """Wait for no more chunks of a source; a later chunk of it counts again."""
         if len(self._ends) > 1:
-            del self._ends[source]
+            # One whose chunks cannot be read has no end.
+            self._ends.pop(source, None)
 
     def note_longest(self, longest_ns: int) -> None:
         """Note how long a message was on the way, which windows wait for: a window at the most."""

@@ -111,8 +111,9 @@ class Exporter:
             self._counts.update(dict(counts))
             self._buckets.update({(path, bound): number for path, bound, number in buckets})
             for row in losses:
+                topic = row["topic_name"] or "?"
                 for kind in ("dropped", "lost"):
-                    self._losses[row["topic_name"], row["subscriber"], kind] += row[kind]
+                    self._losses[topic, row["subscriber"], kind] += row[kind]
             self._discarded += discarded
 
     def show(self, report: WindowReport) -> None:

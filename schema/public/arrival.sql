@@ -23,7 +23,7 @@ WITH waking AS (
         s.thread_id, s.end_ns AS at_ns, s.waker_kind, s.waker_thread_id,
         s.waker_other_thread_id
     FROM main.thread_state AS s
-    WHERE s.state = 'sleeping' AND s.waker_kind IS NOT NULL
+    WHERE s.state = 'sleeping'
 ),
 -- What a thread does has begun before it takes a message, unless that is all it woke for.
 done AS (
@@ -47,7 +47,7 @@ woken AS (
     SELECT k.*, w.at_ns AS arrived_ns, w.waker_kind, w.waker_thread_id, w.waker_other_thread_id
     FROM taken AS k
     ASOF JOIN waking AS w ON k.thread_id = w.thread_id AND k.taken_ns >= w.at_ns
-    WHERE w.at_ns >= k.start_ns
+    WHERE w.at_ns >= k.start_ns AND w.waker_kind IS NOT NULL
 ),
 behind AS (
     SELECT w.take_id, d.at_ns

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import socket
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -333,10 +334,40 @@ def test_a_receiver_that_is_none_is_an_error(database: Database, path: str, mess
             database.export_otlp(wrong)
 
 
-@pytest.mark.parametrize("address", ["ftp://robot", "http://", "grpc://robot:4317"])
+@pytest.mark.parametrize(
+    "address", ["ftp://robot", "http://", "grpc://robot:4317", "http://[::1", "http://robot:abc"]
+)
 def test_an_address_is_that_of_http(database: Database, address: str) -> None:
     with pytest.raises(UsageError, match="no address of a receiver"):
         database.export_otlp(address)
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        b"\x00\x00\x12\x04\x00\x00\x00\x00\x00\x00\n",
+        b"HTTP/1.1 200 OK\r\nContent-Length: 8\r\n\r\n<html>\n\n",
+        b"HTTP/1.1 200 OK\r\nContent-Length: 50\r\n\r\nabc",
+    ],
+    ids=["gRPC", "a page", "broken off"],
+)
+def test_what_answers_may_be_no_receiver(database: Database, answer: bytes) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def serve() -> None:
+            connection, _ = server.accept()
+            with connection:
+                connection.recv(1 << 24)
+                connection.sendall(answer)
+                connection.shutdown(socket.SHUT_WR)
+                while connection.recv(1 << 24):
+                    pass
+
+        thread = Thread(target=serve)
+        thread.start()
+        with pytest.raises(UsageError, match="no receiver of OTLP/HTTP"):
+            database.export_otlp(f"http://127.0.0.1:{server.getsockname()[1]}")
+        thread.join()
 
 
 def test_nothing_is_left_in_the_connection(database: Database, tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ from typing import Any
 from analysis import Analyse, Analysis
 from kernel_schedule import BLOCKED, HOG, MAIN, Kernel, call, recorded
 from ros_system import RosSystem
+from staged_events import Thread
 
 OTHER = 6
 
@@ -57,13 +58,17 @@ def test_a_thread_that_migrates_waits_for_another_cpu(system: RosSystem, analyse
     kernel.switch(1100, 41, HOG)
     kernel.add("sched_migrate_task", 1200, tid=41, dest_cpu=1)
     kernel.switch(1300, OTHER, 41, cpu=1)
-    call(system, 1000, 1090)
+    kernel.switch(1500, 41, 0, BLOCKED, cpu=1)
+    system.add("ros2:callback_start", MAIN, ts=1000, callback=0xC1, is_intra_process=0)
+    system.add("ros2:callback_end", Thread(100, cpu=1), ts=1400, callback=0xC1)
     model = analyse(system)
     assert waits(model) == [
         (HOG, "preempted", 0, 1100, 1200, 119, 120),
         (OTHER, "preempted", 1, 1200, 1300, 119, 120),
     ]
     assert model.rows("SELECT count(*) FROM thread_state WHERE state = 'preempted'") == [(2,)]
+    # It lost the CPU once.
+    assert model.rows("SELECT preemption_count, migration_count FROM callback_schedule") == [(1, 1)]
 
 
 def test_a_woken_thread_waits_where_it_goes_on(system: RosSystem, analyse: Analyse) -> None:
@@ -140,4 +145,21 @@ def test_cpu_time_of_all_threads_by_second(system: RosSystem, analyse: Analyse) 
         (second, HOG, None, "thread 7", second),
         (2 * second, 0, None, "thread 0", 20),
         (2 * second, HOG, None, "thread 7", 50),
+    ]
+
+
+def test_what_two_kernel_traces_show_counts_once(system: RosSystem, analyse: Analyse) -> None:
+    """The second one has the end of the first, too. A second of both is one row."""
+    kernel = Kernel(system)
+    later = Kernel(system, trace=2)
+    kernel.switch(900, 0, 41)
+    kernel.switch(2000, 41, HOG)
+    for trace in (kernel, later):
+        trace.switch(3000, HOG, 41)
+        trace.switch(3300, 41, HOG)
+    later.switch(4000, HOG, 0)
+    call(system, 3100, 3200)
+    assert analyse(system).rows("SELECT tid, name, running_ns FROM cpu_usage ORDER BY tid") == [
+        (HOG, "thread 7", 1000 + 700),
+        (41, "thread 41", 1100 + 300),
     ]

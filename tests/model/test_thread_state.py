@@ -231,3 +231,20 @@ def test_without_a_kernel_trace_there_is_nothing(system: RosSystem, analyse: Ana
     model = analyse(system)
     assert model.rows(STATES) == schedules(model) == []
     assert model.rows("FROM other_thread") == []
+
+
+@pytest.mark.parametrize("state", [16, 32])
+def test_a_thread_that_ended_does_not_sleep(
+    system: RosSystem, analyse: Analyse, state: int
+) -> None:
+    """Another one gets its number, of which no event of ROS is known yet."""
+    kernel = Kernel(system)
+    kernel.switch(900, 0, 41)
+    kernel.switch(1200, 41, 0, state)
+    kernel.add("sched_wakeup_new", 2000, tid=41)
+    kernel.switch(2100, 0, 41)
+    kernel.switch(2200, 41, 0, state)
+    kernel.switch(3000, 0, HOG)
+    call(system, 1000, 1100)
+    model = analyse(system)
+    assert model.rows("SELECT state FROM thread_state WHERE start_ns BETWEEN 1200 AND 2050") == []

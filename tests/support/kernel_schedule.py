@@ -17,14 +17,15 @@ BLOCKED, LOST = 1, 0
 class Kernel:
     """Records what CPUs do, in a trace of the kernel."""
 
-    def __init__(self, system: RosSystem, **source: Any) -> None:
+    def __init__(self, system: RosSystem, trace: int = KERNEL, **source: Any) -> None:
         self._system = system
+        self._trace = trace
         self.shift_ns = 0
         given = {"hostname": "alpha", "clock": "boot", "tracer": "lttng-modules 2.13.9"} | source
-        system.add_source(KERNEL, **given)
+        system.add_source(trace, **given)
 
     def add(self, name: str, ts: int, cpu: int = 0, **fields: Any) -> int:
-        where = Thread(-1, cpu=cpu, trace=KERNEL, name=None)
+        where = Thread(-1, cpu=cpu, trace=self._trace, name=None)
         self._system.add(name, where, ts=ts + self.shift_ns, **fields)
         return ts
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,15 @@ from typer.testing import CliRunner, Result
 
 from msgflow.cli.app import app
 from msgflow.database import Database
+from msgflow.sim import Recording, simulate
+from msgflow.trace import Continuation
+from msgflow.watch import FlightRecorder
+from msgflow.watch.alarm import blamed
+from msgflow.watch.chunk import Chunk
+from msgflow.watch.kept_chunk import read_chunk
+from msgflow.watch.kept_traces import KeptTraces
+
+SECOND = 1_000_000_000
 
 TARGETS = """
 targets:
@@ -65,3 +75,59 @@ def test_the_exit_code_is_that_of_verify(watched, condition: str, exit_code: int
 def test_what_was_never_measured(watched) -> None:
     text = TARGETS.replace("/scan", "/no_such_topic")
     assert watched(text, "--window", "8s", "--step", "8s").exit_code == 5
+
+
+def test_what_was_kept_before_stays(watched, tmp_path: Path) -> None:
+    """The same recording is watched twice: the name of its violation is taken."""
+    options = ("--window", "3s", "--step", "3s", "--keep-on-violation", tmp_path / "kept")
+    for count in (1, 2, 2):
+        watched(TARGETS, *options, "--keep-most", 2)
+        kept = list((tmp_path / "kept").iterdir())
+        assert len(kept) == count
+        assert all((directory / "msgflow.duckdb").exists() for directory in kept)
+
+
+def test_sessions_of_one_name_on_two_hosts_are_kept(tmp_path: Path) -> None:
+    """lttng-relayd has a directory for each host; their chunks may have equal names."""
+    directory = tmp_path / "trace"
+    rotations = (SECOND // 2,)
+    simulate("two_hosts", directory, factor=0.1, recording=Recording(rotations=rotations))
+    chunks = []
+    for source in {path.parents[1] for path in directory.glob("**/archives/*")}:
+        moved = tmp_path / source.name / "drive"
+        shutil.copytree(source, moved)
+        first = min((moved / "archives").iterdir())
+        chunks.append(Chunk(0, moved, first.rename(first.with_name("chunk-0"))))
+    read = [read_chunk(chunk, Continuation()) for chunk in chunks]
+    notes: list[str] = []
+    recorder = FlightRecorder(
+        tmp_path / "kept", most=1, window_ns=SECOND, links=None, clock_sync="none",
+        note=notes.append,
+    )  # fmt: skip
+    traces = KeptTraces([], [chunk for chunk in read if chunk is not None])
+    recorder.keep(SECOND, traces, [chunk.path for chunk in chunks])
+    assert notes[0].startswith("kept: ")
+    assert len(list((tmp_path / "kept").glob("*/archives/*/drive/chunk-0"))) == 2
+
+
+def test_without_a_window_nothing_is_measured(watched, monkeypatch) -> None:
+    monkeypatch.setattr("msgflow.watch.watch_finished", lambda place, watcher: iter(()))
+    assert watched(TARGETS).exit_code == 5
+
+
+@pytest.mark.parametrize(
+    ("state", "words"),
+    [
+        (None, "/filter ran 30.000 ms"),
+        ("running", "/filter ran 30.000 ms"),
+        ("preempted", "/filter waited 30.000 ms for a CPU that logger had"),
+        ("runnable", "/filter waited 30.000 ms for a CPU"),
+        ("sleeping", "/filter slept 30.000 ms"),
+        ("uninterruptible", "/filter waited 30.000 ms for a page or a disk"),
+    ],
+)
+def test_a_callback_that_had_no_cpu_did_not_run(state: str | None, words: str) -> None:
+    """Where the kernel is traced, pieces of a callback have the state of its thread."""
+    piece = {"activity": "callback", "node": "/filter", "what": "Subscription(/scan)", "hop": 1}
+    rest = {"state": state, "who": "logger", "share": 0.6, "duration_ns": 30_000_000}
+    assert list(blamed([piece | rest], None)) == [words]

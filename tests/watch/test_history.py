@@ -99,6 +99,7 @@ def test_a_host_is_waited_for_until_patience_ends() -> None:
     assert not history.is_due
     assert history.behind(400) == []
     assert history.behind(200) == [LAPTOP]
+    history.go_on_without(Path("one of which nothing could be read"))
     history.go_on_without(LAPTOP)
     assert history.is_due
     assert history.complete_ns == 400

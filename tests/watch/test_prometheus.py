@@ -13,7 +13,7 @@ import pytest
 from msgflow.clocks import read_clock_sync
 from msgflow.database import Database
 from msgflow.errors import UsageError
-from msgflow.watch import Exporter, Watcher, watch_finished
+from msgflow.watch import Exporter, Watcher, kept_chunk, watch_finished
 
 prometheus = pytest.importorskip("prometheus_client")
 DASHBOARD = Path(__file__).resolve().parents[2] / "docs" / "grafana-dashboard.json"
@@ -84,6 +84,26 @@ def test_the_dashboard_asks_for_what_is_served(exporter: Exporter) -> None:
     }
     assert asked <= served
     assert len(asked) == len(panels) - 1
+
+
+def test_a_topic_may_have_no_name(recording: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its publishers and subscriptions were created before the recording."""
+    exporter = Exporter()
+    watcher = Watcher(
+        window_ns=8 * SECOND,
+        step_ns=8 * SECOND,
+        links=None,
+        clocks=read_clock_sync("none"),
+        note=lambda text: None,
+        exporter=exporter,
+    )
+    wanted = kept_chunk.wanted_events
+    monkeypatch.setattr(kept_chunk, "wanted_events", lambda: wanted(["*:rcl_*_init", "dds:*"]))
+    for _ in watch_finished(recording, watcher):
+        pass
+    registry = prometheus.CollectorRegistry()
+    registry.register(exporter)
+    assert b'topic="?"' in prometheus.generate_latest(registry)
 
 
 def test_metrics_are_served(exporter: Exporter, unused_port: int) -> None:

@@ -10,25 +10,55 @@ from msgflow.cli.show.watch_screen import WatchScreen
 from msgflow.run.window import Window
 from msgflow.watch import WindowReport
 
+FATES = {"dropped": 0, "lost": 0, "no_output": 0, "unknown": 3}
+
+
+def shown(*reports: WindowReport) -> str:
+    """Return the screen after these windows."""
+    screen = WatchScreen()
+    for report in reports:
+        last = screen.of(report)
+    out = io.StringIO()
+    Console(file=out, width=80).print(last)
+    return out.getvalue()
+
 
 def test_names_are_text_and_all_fits() -> None:
     """A program may call itself what it likes: no markup, no control characters."""
-    fates = {"dropped": 0, "lost": 0, "no_output": 0, "unknown": 3}
     times = {"median_ns": 1_000_000, "p99_ns": 2_000_000, "max_ns": 2_000_000}
     thread = {"process": "[/x] \x1b[31m", "tid": 7, "callback_share": 0.5, "callback_ns": 10}
     loss = {"topic": "[/y]", "subscriber": "/s" * 40, "dropped": 4, "lost": 0, "reasons": None}
     report = WindowReport(
         window=Window(0, 2_000_000_000),
         is_final=True,
-        paths=[{"path": "[/z] → \x1b[2J", "reached": 20, **fates, **times}],
+        paths=[{"path": "[/z] → \x1b[2J", "reached": 20, **FATES, **times}],
         executors=[{**thread, "blocked_ns": 0, "callbacks": 3}],
         losses=[loss],
         discarded_events=0,
         longest_ns=0,
     )
-    out = io.StringIO()
-    Console(file=out, width=80).print(WatchScreen().of(report))
-    shown = out.getvalue()
-    assert all(name in shown for name in ("[/x]", "[/y]", "[/z]"))
-    assert "\x1b" not in shown
-    assert max(map(len, shown.splitlines())) <= 80
+    text = shown(report)
+    assert all(name in text for name in ("[/x]", "[/y]", "[/z]"))
+    assert "\x1b" not in text
+    assert max(map(len, text.splitlines())) <= 80
+
+
+def test_latencies_may_be_negative() -> None:
+    """Clocks of two hosts are apart."""
+    reports = [
+        WindowReport(
+            window=Window(0, 2_000_000_000),
+            is_final=True,
+            paths=[
+                {"path": "/z", "reached": 1, **FATES, "median_ns": most, "p99_ns": most}
+                | {"max_ns": most}
+            ],
+            executors=(),
+            losses=(),
+            discarded_events=0,
+            longest_ns=0,
+        )
+        for most in (-7_000_000, 3_000_000, -2_000_000)
+    ]
+    assert "-2 ms" in shown(reports[0], reports[2])
+    assert "▁█▁" in shown(*reports)

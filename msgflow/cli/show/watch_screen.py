@@ -44,7 +44,8 @@ class WatchScreen:
         """Return the screen after a further window."""
         for path in report.paths:
             steps = self._slowest.setdefault(path["path"], deque(maxlen=_STEPS))
-            steps.append(path["max_ns"] or 0)
+            # Clocks that are apart make latencies negative.
+            steps.append(max(path["max_ns"] or 0, 0))
         at = format_epoch(report.window.end_ns)[_TIME]
         self._violations += [f"{at} {violation_line(each)}" for each in report.violations]
         parts: list[RenderableType] = [_heading(report), self._paths(report), _threads(report)]

@@ -1,33 +1,46 @@
 -- name: finding.priority_inversion
 -- title: Less urgent threads delay an executor with real-time priority
--- description: An executor with real-time priority lost the CPU to a less urgent thread, or slept
---     in a callback until a less urgent thread of a ROS process woke it.
--- cause: The callback waits for a lock or a condition that a less urgent thread holds. Or the
---     kernel throttles real-time threads (/proc/sys/kernel/sched_rt_runtime_us).
+-- description: An executor with real-time priority lost the CPU to a less urgent thread. Or it
+--     slept in a callback until another thread woke it, and that one had to wait for a CPU which a
+--     thread had that is less urgent than the executor.
+-- cause: The callback waits for what the waker does: for a lock that it holds, or a condition. With
+--     its own priority the waker gets no CPU before others. Or the kernel throttles real-time
+--     threads (/proc/sys/kernel/sched_rt_runtime_us).
 -- cure: Use mutexes with priority inheritance (PTHREAD_PRIO_INHERIT), raise the priority of the
---     thread that holds the lock, or share no lock with it. msgflow query critical-path says what
---     that thread did meanwhile.
+--     waker, or do not wait for it. msgflow query critical-path says what that thread did
+--     meanwhile.
 -- grain: one row per thread of an executor
 -- severity: warning
 -- when: store.thread_state
 WITH urgent AS (
-    SELECT run_id, thread_id, start_ns, end_ns, state, priority, preempted_by_priority,
+    SELECT
+        run_id, thread_id, start_ns, end_ns, state, priority, preempted_by_priority, waker_kind,
         waker_thread_id
     FROM main.thread_state
     WHERE priority < 100 AND thread_id IN (SELECT thread_id FROM main.executor_thread)
+),
+asleep AS (
+    SELECT u.run_id, u.thread_id, u.start_ns, u.end_ns, u.priority, u.waker_thread_id
+    FROM urgent AS u
+    ASOF JOIN (
+        SELECT thread_id, start_ns, end_ns FROM main.callback_instance WHERE parent_id IS NULL
+    ) AS i
+        ON u.thread_id = i.thread_id AND u.start_ns >= i.start_ns
+    -- Of an interrupt the waker is only what it interrupted.
+    WHERE u.state = 'sleeping' AND u.waker_kind = 'thread' AND i.end_ns >= u.end_ns
 ),
 delay AS (
     SELECT run_id, thread_id, end_ns - start_ns AS length_ns
     FROM urgent
     WHERE state = 'preempted' AND preempted_by_priority > priority
     UNION ALL
-    SELECT u.run_id, u.thread_id, u.end_ns - u.start_ns
-    FROM urgent AS u
-    ASOF JOIN main.thread_state AS w
-        ON u.waker_thread_id = w.thread_id AND u.end_ns >= w.start_ns
-    ASOF JOIN main.callback_instance AS i
-        ON u.thread_id = i.thread_id AND u.start_ns >= i.start_ns
-    WHERE u.state = 'sleeping' AND w.priority > u.priority AND i.end_ns >= u.end_ns
+    SELECT
+        a.run_id, a.thread_id, sum(least(a.end_ns, w.end_ns) - greatest(a.start_ns, w.start_ns))
+    FROM asleep AS a
+    JOIN main.preemptor AS w
+        ON a.waker_thread_id = w.thread_id AND w.start_ns < a.end_ns AND w.end_ns > a.start_ns
+    WHERE w.thread_priority > a.priority AND w.preemptor_priority > a.priority
+    GROUP BY a.run_id, a.thread_id, a.start_ns
 )
 SELECT
     d.run_id,

@@ -14,12 +14,15 @@
 -- column: preemption_count BIGINT  How often it lost the CPU
 -- column: migration_count BIGINT  How often it went on on another CPU
 -- column: is_loss_affected BOOLEAN  Kernel events were lost meanwhile
-WITH migration AS (
+WITH step AS (
     SELECT
         number,
-        cpu <> lag(cpu) OVER (PARTITION BY thread_id ORDER BY start_ns) AS is_migration
+        -- A thread that goes to another CPU while it waits for one does not lose the CPU again.
+        lag(state) OVER thread IS DISTINCT FROM 'preempted' AS is_first,
+        cpu <> lag(CASE WHEN state = 'running' THEN cpu END IGNORE NULLS) OVER thread
+            AS is_migration
     FROM staging.thread_state
-    WHERE state = 'running'
+    WINDOW thread AS (PARTITION BY thread_id ORDER BY start_ns)
 ),
 part AS (
     SELECT
@@ -30,12 +33,14 @@ part AS (
         sum(c.end_ns - c.start_ns) FILTER (WHERE s.state = 'sleeping') AS sleeping_ns,
         sum(c.end_ns - c.start_ns) FILTER (WHERE s.state = 'uninterruptible')
             AS uninterruptible_ns,
-        count(*) FILTER (WHERE s.state = 'preempted' AND c.is_begin) AS preemption_count,
-        count(*) FILTER (WHERE m.is_migration AND c.is_begin) AS migration_count,
+        count(*) FILTER (WHERE s.state = 'preempted' AND m.is_first AND c.is_begin)
+            AS preemption_count,
+        count(*) FILTER (WHERE s.state = 'running' AND m.is_migration AND c.is_begin)
+            AS migration_count,
         bool_or(s.is_loss_affected) AS is_loss_affected
     FROM staging.callback_state AS c
     JOIN staging.thread_state AS s ON c.state_number = s.number
-    LEFT JOIN migration AS m ON c.state_number = m.number
+    JOIN step AS m ON c.state_number = m.number
     GROUP BY c.callback_instance_id
 ),
 handled AS (

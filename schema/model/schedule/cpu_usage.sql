@@ -17,15 +17,33 @@ WITH run AS (
     JOIN staging.schedule AS s ON w.trace_index = s.trace_index
     WHERE s.is_joined AND w.run_start_ns < w.ts_ns
 ),
+-- Several traces of a host may overlap: what an earlier one shows counts.
+extent AS (
+    SELECT
+        trace_index, cpu,
+        coalesce(max(max(end_ns)) OVER (
+            PARTITION BY clock_key, cpu ORDER BY min(start_ns), trace_index
+            ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING
+        ), min(start_ns)) AS from_ns
+    FROM run
+    GROUP BY clock_key, trace_index, cpu
+),
+own AS (
+    SELECT
+        r.clock_key, r.cpu, r.tid, greatest(r.start_ns, e.from_ns) AS start_ns, r.end_ns
+    FROM run AS r
+    JOIN extent AS e ON r.trace_index = e.trace_index AND r.cpu = e.cpu
+    WHERE r.end_ns > e.from_ns
+),
 part AS (
     SELECT
-        clock_key, trace_index, cpu, tid, start_ns, end_ns,
+        clock_key, cpu, tid, start_ns, end_ns,
         unnest(range(start_ns // 1_000_000_000, (end_ns - 1) // 1_000_000_000 + 1)) AS second
-    FROM run
+    FROM own
 ),
 usage AS (
     SELECT
-        clock_key, trace_index, cpu, tid, second, min(start_ns) AS first_ns,
+        clock_key, cpu, tid, second, min(start_ns) AS first_ns,
         sum(
             least(end_ns, (second + 1) * 1_000_000_000)
             - greatest(start_ns, second * 1_000_000_000)
@@ -34,8 +52,10 @@ usage AS (
     GROUP BY ALL
 ),
 named AS (
-    SELECT trace_index, next_tid AS tid, arg_max(next_comm, event_id) AS name
-    FROM raw.sched_switch
+    SELECT s.clock_key, w.next_tid AS tid, arg_max(w.next_comm, w.event_id) AS name
+    FROM raw.sched_switch AS w
+    JOIN staging.schedule AS s ON w.trace_index = s.trace_index
+    WHERE s.is_joined
     GROUP BY ALL
 ),
 host AS (
@@ -55,7 +75,7 @@ SELECT
     u.running_ns
 FROM usage AS u
 JOIN host AS h ON u.clock_key = h.clock_key
-LEFT JOIN named AS n ON u.trace_index = n.trace_index AND u.tid = n.tid
+LEFT JOIN named AS n ON u.clock_key = n.clock_key AND u.tid = n.tid
 LEFT JOIN staging.thread_tid AS t
     ON u.clock_key = t.clock_key
     AND u.tid = t.tid

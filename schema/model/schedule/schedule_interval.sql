@@ -64,7 +64,8 @@ placed AS (
                 WHEN s.is_next_on OR s.next_cpu <> s.cpu THEN 'unknown' ELSE 'running' END
             WHEN NOT s.is_next_on THEN 'unknown'
             WHEN s.prev_state & 255 = 0 THEN 'preempted'
-            WHEN s.next_ns IS NULL AND s.prev_state & 112 <> 0 THEN NULL
+            -- It ended. 64 means that in old kernels; in others it is parked, and may go on.
+            WHEN s.prev_state & 48 <> 0 OR (s.next_ns IS NULL AND s.prev_state & 64 <> 0) THEN NULL
             WHEN s.prev_state & 2 <> 0 THEN 'uninterruptible'
             ELSE 'sleeping'
         END AS state
