@@ -169,7 +169,7 @@ def queries() -> str:
         for base in query_names()
         for header in _variants(base)
     )
-    return _QUERIES.format(index=index)
+    return _QUERIES.format(index=index).rstrip() + "\n"
 
 
 def query_page(base: str) -> str:

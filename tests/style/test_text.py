@@ -7,7 +7,17 @@ from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-FOLDERS = ("msgflow", "schema", "migrations", "queries", "tests", "docs", "benchmarks", ".ci")
+FOLDERS = (
+    "msgflow",
+    "schema",
+    "migrations",
+    "queries",
+    "tests",
+    "docs",
+    "examples",
+    "benchmarks",
+    ".ci",
+)
 TEXTS = {".py", ".sql", ".md", ".toml", ".csv", ".json", ".js", ".html", ".css", ".sh", ""}
 MACHINE_PATH = re.compile(r"(?<![\w.])/(?:home/\w+|root|Users/\w+|work|mnt/\w+)/[\w.]")
 
