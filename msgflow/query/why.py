@@ -113,7 +113,9 @@ def explain(ask: Ask, run: Run, place: str | None) -> Explanation:
         waits=waits,
         losses=losses,
         steps=tuple(_steps(pieces, losses)),
-        notes=tuple(dict.fromkeys([*_preempted(pieces), *paths.notes, *flow.notes])),
+        notes=tuple(
+            dict.fromkeys([*_preempted(pieces), *_unexplained(pieces), *paths.notes, *flow.notes])
+        ),
     )
 
 
@@ -135,6 +137,21 @@ def _preempted(pieces: Sequence[dict[str, Any]]) -> Iterator[str]:
         f"for {100 * total_ns / latency_ns:.0f} % of the slowest flow another thread had the CPU: "
         + ", ".join(f"{who} for {format_duration(by[who])}" for who in names)
     )
+
+
+def _unexplained(pieces: Sequence[dict[str, Any]]) -> Iterator[str]:
+    """Yield what would explain the slowest flow, if most of it was over without a known reason."""
+    latency_ns = pieces[0]["latency_ns"]
+    total_ns = sum(
+        row["duration_ns"]
+        for row in pieces
+        if row["activity"] == "network_or_idle" and row["state"] is None
+    )
+    if 2 * total_ns > latency_ns:
+        yield (
+            f"for {100 * total_ns / latency_ns:.0f} % of the slowest flow the message was on its"
+            " way, or its thread had no CPU: a kernel trace shows which (msgflow record --kernel)"
+        )
 
 
 def _chosen(
