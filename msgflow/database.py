@@ -267,6 +267,30 @@ class Database:
         self.close()
         return apply_clocks(self.path, sync, run=run, memory_limit=self._memory_limit)
 
+    def join_bag(self, bag: str | Path, *, run: str | int | None = None) -> QueryResult:
+        """Store which publications the messages of a bag of the same run are of.
+
+        The view `bag_message` has them, with size, header.stamp and frame_id. What an earlier bag
+        gave to the run is removed.
+
+        Args:
+            bag: directory of a rosbag2, or one of its files (.mcap, .db3).
+            run: a name or an id; the latest run when None.
+
+        Returns:
+            A row per topic of the bag: how many messages were joined, and why others were not.
+
+        Raises:
+            UsageError: no such run or several, clocks that are not synchronised, or the package
+                rosbags is not installed.
+            TraceError: not a bag, or a damaged one.
+            DatabaseError: the file cannot be opened.
+        """
+        from msgflow.bag import join_bag
+
+        self.close()
+        return join_bag(self.path, Path(bag), run=run, memory_limit=self._memory_limit)
+
     def rename_run(self, run: str | int, name: str) -> Run:
         """Give a run another name, and return it as it was.
 
