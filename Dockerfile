@@ -7,6 +7,7 @@ COPY msgflow msgflow
 COPY schema schema
 COPY migrations migrations
 COPY queries queries
+COPY docs/cookbook.md docs/cookbook.md
 RUN python -m venv /opt/msgflow && /opt/msgflow/bin/pip install --no-cache-dir .
 
 FROM python:3.12-slim

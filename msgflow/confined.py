@@ -53,7 +53,7 @@ class ConfinedProcess:
     """A child process that calls functions of one module, one call after the other.
 
     It starts at once, and again when it had to be killed. Use it as a context manager, or call
-    `close`. It is not for several threads at a time.
+    `close`. It is not for several threads at a time, except for `kill`.
     """
 
     def __init__(self, module: str, *, seconds: float | None = None) -> None:
@@ -103,6 +103,10 @@ class ConfinedProcess:
             # What the child still writes belongs to no later call.
             self.close()
             raise
+
+    def kill(self) -> None:
+        """End the call that runs in another thread, which raises a QueryError there."""
+        self._child.kill()
 
     def close(self) -> None:
         """End the child."""

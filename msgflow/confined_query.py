@@ -108,16 +108,31 @@ def _ask_database(
     given: Sequence[Any],
     named: Mapping[str, Any],
 ) -> QueryResult:
-    arguments = {"method": method, "path": str(path), "memory_limit": memory_limit}
-    return _ask("answer", {**arguments, "given": given, "named": named})
+    return _ask("answer", _arguments(path, memory_limit, method, given, named))
+
+
+def _arguments(
+    path: Path,
+    memory_limit: str | None,
+    method: str,
+    given: Sequence[Any],
+    named: Mapping[str, Any],
+) -> dict[str, Any]:
+    of_database = {"method": method, "path": str(path), "memory_limit": memory_limit}
+    return {**of_database, "given": given, "named": named}
 
 
 def _ask(function: str, arguments: dict[str, Any]) -> QueryResult:
     with ConfinedProcess(__name__) as process:
         # Meanwhile the child imports as well.
-        import pyarrow as pa
+        import pyarrow  # noqa: F401
 
-        content = process.call(function, arguments)
+        return _unpack(process.call(function, arguments))
+
+
+def _unpack(content: bytearray) -> QueryResult:
+    import pyarrow as pa
+
     from msgflow.query.catalogue import load_query
     from msgflow.run.choice import Run
 
@@ -148,6 +163,43 @@ def _pack(result: QueryResult, write: Write) -> None:
         pa.ipc.new_stream(stream, result.table.schema) as writer,
     ):
         writer.write_table(result.table, max_chunksize=_ROWS_AT_ONCE)
+
+
+class WarmSql:
+    """SQL on one database, query after query in one child process, which starts with the first.
+
+    Args:
+        path: the database; every query opens it anew.
+        memory_limit: as `confined_sql` has it.
+        seconds: how long a query may take.
+    """
+
+    def __init__(self, path: Path, *, memory_limit: str | None, seconds: float) -> None:
+        self._path = path
+        self._memory_limit = memory_limit
+        self._seconds = seconds
+        self._process: ConfinedProcess | None = None
+
+    def __call__(self, text: str, limit: int) -> QueryResult:
+        """Return the rows of a query, `limit` at most; one thread at a time may ask.
+
+        Raises:
+            MsgflowError: as `confined_sql`, or it took too long, or was interrupted.
+        """
+        if self._process is None:
+            self._process = ConfinedProcess(__name__, seconds=self._seconds)
+        arguments = _arguments(self._path, self._memory_limit, "sql", [text], {"limit": limit})
+        return _unpack(self._process.call("answer", arguments))
+
+    def interrupt(self) -> None:
+        """End the query that runs; for another thread than the one that waits for it."""
+        if self._process is not None:
+            self._process.kill()
+
+    def close(self) -> None:
+        """End the child."""
+        if self._process is not None:
+            self._process.close()
 
 
 class _Stream:

@@ -12,7 +12,7 @@ import duckdb
 
 from msgflow.db.connection import connect
 from msgflow.db.objects import public_names
-from msgflow.db.sql_guard import guarded_query, require_condition
+from msgflow.db.sql_guard import guarded_query, in_own_lines, require_condition
 from msgflow.default_files import DEFAULT_PATHS
 from msgflow.errors import QueryError, UsageError
 from msgflow.name_suggestions import did_you_mean
@@ -28,6 +28,8 @@ from msgflow.sql.interrupt import interruptible
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from types import TracebackType
+
+    import pyarrow as pa
 
     from msgflow.db.finding import Finding
     from msgflow.export.flow import Flow
@@ -264,6 +266,30 @@ class Database:
         sync = read_clock_sync(clock_sync)
         self.close()
         return apply_clocks(self.path, sync, run=run, memory_limit=self._memory_limit)
+
+    def join_bag(self, bag: str | Path, *, run: str | int | None = None) -> QueryResult:
+        """Store which publications the messages of a bag of the same run are of.
+
+        The view `bag_message` has them, with size, header.stamp and frame_id. What an earlier bag
+        gave to the run is removed.
+
+        Args:
+            bag: directory of a rosbag2, or one of its files (.mcap, .db3).
+            run: a name or an id; the latest run when None.
+
+        Returns:
+            A row per topic of the bag: how many messages were joined, and why others were not.
+
+        Raises:
+            UsageError: no such run or several, clocks that are not synchronised, or the package
+                rosbags is not installed.
+            TraceError: not a bag, or a damaged one.
+            DatabaseError: the file cannot be opened.
+        """
+        from msgflow.bag import join_bag
+
+        self.close()
+        return join_bag(self.path, Path(bag), run=run, memory_limit=self._memory_limit)
 
     def rename_run(self, run: str | int, name: str) -> Run:
         """Give a run another name, and return it as it was.
@@ -800,8 +826,7 @@ class Database:
         """
         connection = self.connection
         try:
-            query = guarded_query(connection, text, 'msgflow sql "SELECT * FROM run"')
-            return interruptible(connection, lambda: capped(connection.sql(query), limit))
+            return guarded_rows(connection, text, 'msgflow sql "SELECT * FROM run"', limit)
         except duckdb.Error as error:
             raise in_words(error, self.path) or sql_error(error) from error
 
@@ -1127,15 +1152,33 @@ def _path_and_others(path: str) -> UsageError:
     )
 
 
-def capped(relation: duckdb.DuckDBPyRelation, limit: int | None) -> QueryResult:
-    """Return the rows of a user's query, `limit` at most."""
-    if limit is None:
-        return QueryResult(relation.to_arrow_table())
-    table = relation.limit(limit + 1).to_arrow_table()
-    if table.num_rows <= limit:
+def guarded_rows(
+    connection: duckdb.DuckDBPyConnection, text: str, example: str, limit: int | None
+) -> QueryResult:
+    """Return the rows of a user's query, `limit` at most; see `guarded_query`.
+
+    Raises:
+        duckdb.Error: it is not SQL, or the database could not run it.
+    """
+    most = None if limit is None else limit + 1
+    query = guarded_query(connection, text, example, most)
+    try:
+        table = interruptible(connection, lambda: _rows(connection, query))
+    except duckdb.Error as error:
+        raise type(error)(in_own_lines(str(error))) from error
+    if limit is None or table.num_rows <= limit:
         return QueryResult(table)
     note = f"only the first {limit} rows are shown; --limit raises that"
     return QueryResult(table.slice(0, limit), notes=[note])
+
+
+def _rows(connection: duckdb.DuckDBPyConnection, query: str) -> pa.Table:
+    try:
+        return connection.sql(query).to_arrow_table()
+    except (duckdb.BinderException, duckdb.CatalogException):
+        # A relation does not say in which line. Such an error comes before anything runs.
+        connection.execute(query)
+        raise
 
 
 def sql_error(error: duckdb.Error, *more_memory: str) -> QueryError:

@@ -1,4 +1,4 @@
-"""Folders `schema/`, `migrations/` and `queries/`, installed or in a checkout."""
+"""Folders `schema/`, `migrations/`, `queries/` and `docs/`, installed or in a checkout."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from pathlib import Path
 
 
 def resource_directory(name: str) -> Path:
-    """Return the directory `name` ('schema', 'migrations' or 'queries').
+    """Return the directory `name` ('schema', 'migrations', 'queries', or 'docs' with the cookbook).
 
     In a wheel it lies in `msgflow/_data`; in a checkout beside the package, which counts
     only where pyproject.toml lies there too.

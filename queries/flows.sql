@@ -25,8 +25,11 @@
 --     'not_connected', 'cut_by_recording' or 'unknown'
 -- column: reason VARCHAR           Why it did not arrive
 -- column: path VARCHAR [path]  Nodes and topics
+-- column: size_bytes BIGINT [bytes]  Size of the message at the end; empty: no bag has it
+-- column: age_from_stamp_ns BIGINT [ns]  From header.stamp of the message at the end, which nodes
+--     pass on from the sensor's message, to the end; empty: no bag has it
 -- slowest: latency_ns
--- brief: path, root_ns, latency_ns, status, reason, take_id, sink_ns, root_kind, root_id
+-- brief: path, root_ns, latency_ns, age_from_stamp_ns, status, reason, take_id, sink_ns, root_id
 -- note: clocks
 SELECT
     f.run_id,
@@ -38,7 +41,9 @@ SELECT
     f.latency_ns,
     f.status,
     f.reason,
-    p.path
+    p.path,
+    m.size_bytes,
+    f.sink_ns - m.stamp_ns AS age_from_stamp_ns
 FROM main.end_to_end(
     $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns,
     max_depth := $max_depth, max_paths := $max_paths
@@ -46,6 +51,11 @@ FROM main.end_to_end(
 JOIN main.flow_path(
     $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths, only_paths := true
 ) AS p ON f.path_id = p.path_id
+LEFT JOIN (
+    SELECT l.take_id, b.size_bytes, b.stamp_ns
+    FROM main.link_transport AS l
+    JOIN main.bag_message AS b ON l.publication_id = b.publication_id
+) AS m ON f.take_id = m.take_id
 WHERE CASE $case
     WHEN 'first' THEN f.is_first
     WHEN 'last' THEN f.is_last

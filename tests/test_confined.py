@@ -8,13 +8,15 @@ import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from pathlib import Path
 
+import duckdb
 import pytest
 from processes import children_of, has_ended
 
 from msgflow.confined import ConfinedProcess, LateError
-from msgflow.confined_query import confined_query, confined_sql
+from msgflow.confined_query import WarmSql, confined_query, confined_sql
 from msgflow.errors import DatabaseError, QueryError, UsageError
 
 SLOW = "SELECT levenshtein(repeat('a', 400000), repeat('b', 400000))"
@@ -70,6 +72,35 @@ def test_a_late_call_is_killed_and_the_next_one_works(small_database: Path) -> N
             process.call("answer", asked | {"given": [SLOW]})
         assert time.monotonic() - begin < 60
         assert b"one" in process.call("answer", asked | {"given": ["SELECT 1 AS one"]})
+
+
+def test_one_child_answers_query_after_query(small_database: Path) -> None:
+    before = set(children_of(os.getpid()))
+    with closing(WarmSql(small_database, memory_limit=None, seconds=30)) as sql:
+        assert set(children_of(os.getpid())) == before
+        assert sql("SELECT 1 AS one", 10).table.to_pylist() == [{"one": 1}]
+        (child,) = set(children_of(os.getpid())) - before
+        with pytest.raises(QueryError, match="LINE 1"):
+            sql("SELECT nothing", 10)
+        assert len(sql("FROM range(11)", 10)) == 10
+        assert set(children_of(os.getpid())) - before == {child}
+        # It has nothing open.
+        duckdb.connect(str(small_database)).close()
+    assert has_ended(child)
+
+
+def test_another_thread_ends_a_query_and_the_next_one_works(small_database: Path) -> None:
+    with (
+        closing(WarmSql(small_database, memory_limit=None, seconds=100)) as sql,
+        ThreadPoolExecutor(1) as pool,
+    ):
+        sql("SELECT 1", 10)
+        slow = pool.submit(sql, SLOW, 10)
+        time.sleep(0.5)
+        sql.interrupt()
+        with pytest.raises(QueryError, match="has ended"):
+            slow.result(20)
+        assert len(sql("SELECT 1", 10)) == 1
 
 
 def test_a_child_killed_before_it_begins_fails_no_call(small_database: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from contextlib import closing
 from typing import Annotated
 
 import typer
@@ -42,7 +43,9 @@ def command(
     database, and write to it when no page has asked for some seconds.
     """
     from msgflow.cli.output import print_note, print_status
+    from msgflow.confined_query import WarmSql
     from msgflow.view.server import serve, serve_single
+    from msgflow.view.sql_page import MOST_SECONDS
 
     def started(address: str) -> None:
         print_status(f"{address}\nCtrl-C ends it")
@@ -51,7 +54,9 @@ def command(
 
     if lake is None:
         require_no_where(where)
-        serve(database, port=port, memory_limit=memory_limit, started=started)
+        sql = WarmSql(database, memory_limit=memory_limit, seconds=MOST_SECONDS)
+        with closing(sql):
+            serve(database, sql, port=port, memory_limit=memory_limit, started=started)
         return
     from msgflow.fleet.lake import Lake
     from msgflow.fleet.lake_page import lake_page

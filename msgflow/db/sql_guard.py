@@ -19,16 +19,21 @@ from msgflow.errors import QueryError, UsageError
 
 _CONDITION_HINT = "such as --where \"p99_ns > 80e6 AND node LIKE '%planner'\""
 _HINT = "SELECT, FROM, WITH, VALUES, DESCRIBE, SUMMARIZE, SHOW and EXPLAIN of such read"
+# Where DuckDB sees an error: the line, and below it a mark.
+_PLACE = re.compile(r"^LINE (?P<line>\d+): (?P<text>.*)\n(?P<mark> *\^*)", re.MULTILINE)
 _PARSED = "SELECT json_serialize_sql(?, skip_null := true, skip_empty := true)"
 
 
-def guarded_query(con: duckdb.DuckDBPyConnection, text: str, example: str) -> str:
+def guarded_query(
+    con: duckdb.DuckDBPyConnection, text: str, example: str, limit: int | None = None
+) -> str:
     """Return the SQL to run in place of the query in `text`, with the same rows.
 
     Args:
         con: any connection; it parses.
         text: one query, or EXPLAIN of one.
         example: a command with SQL.
+        limit: most rows of a query, all when None; EXPLAIN has few.
 
     Raises:
         UsageError: `text` is empty.
@@ -48,7 +53,8 @@ def guarded_query(con: duckdb.DuckDBPyConnection, text: str, example: str) -> st
     tokens = [at for at, token in duckdb.tokenize(statement) if token.name != "comment"]
     end = next((at for at in tokens if code.startswith(b";", at)), len(code))
     if kind == "SELECT":
-        return _as_subquery(code[:end])
+        most = "" if limit is None else f"\nLIMIT {limit}"
+        return f"{_as_subquery(code[:end])}{most}"
     start = _start_of_explained(con, code[:end], tokens) if kind == "EXPLAIN" else None
     if start is not None:
         return f"{code[:start].decode()} {_as_subquery(code[start:end])}"
@@ -58,6 +64,17 @@ def guarded_query(con: duckdb.DuckDBPyConnection, text: str, example: str) -> st
             "name them: PIVOT … ON column IN ('a', 'b') USING …",
         )
     raise _refused(kind.replace("_", " "))
+
+
+def in_own_lines(message: str) -> str:
+    """Return what DuckDB says of a guarded query, with lines as in the query that was given."""
+
+    def counted(found: re.Match[str]) -> str:
+        line = str(int(found["line"]) - 1)
+        shift = len(found["line"]) - len(line)
+        return f"LINE {line}: {found['text']}\n{found['mark'][shift:]}"
+
+    return _PLACE.sub(counted, message)
 
 
 def require_condition(
@@ -101,7 +118,7 @@ def _statements(con: duckdb.DuckDBPyConnection, text: str) -> list[tuple[str, st
 
 
 def _as_subquery(query: bytes) -> str:
-    # A comment at the end of the query ends with the line.
+    # A comment at the end of the query ends with the line. `in_own_lines` knows of the first line.
     return f"FROM (\n{query.decode()}\n)"
 
 

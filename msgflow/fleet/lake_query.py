@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import duckdb
 
-from msgflow.database import capped, sql_error
-from msgflow.db.sql_guard import guarded_query
+from msgflow.database import guarded_rows, sql_error
 from msgflow.errors import DatabaseError, QueryError, UsageError
 from msgflow.fleet.answers import answers
 from msgflow.fleet.lake_connection import (
@@ -193,9 +192,8 @@ def fleet_sql(
     try:
         with Reading(choice, _named_tables(text)) as reading:
             con = reading.connection
-            query = guarded_query(con, text, "msgflow fleet sql 'FROM run'")
             with lake_errors(lake, is_query=True):
-                return interruptible(con, lambda: capped(con.sql(query), limit))
+                return guarded_rows(con, text, "msgflow fleet sql 'FROM run'", limit)
     except duckdb.Error as error:
         raise sql_error(error, "ask about fewer runs with --where") from error
 

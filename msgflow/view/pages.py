@@ -23,6 +23,7 @@ from msgflow.view.critical_path import critical_path
 from msgflow.view.encoded import encoded_comparison, encoded_section
 from msgflow.view.page_query import page_query, run_page_query
 from msgflow.view.scratch import Scratch
+from msgflow.view.sql_page import examples, words
 from msgflow.view.summary import (
     MOST_PATHS,
     Part,
@@ -177,6 +178,12 @@ class Pages:
 
     def _run(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
         return encode(run_page_query(connection, "run", {}), units=_units("run"))
+
+    def _word(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
+        return encode(words(connection))
+
+    def _example(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
+        return encode(examples())
 
     def _query(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
         return self.named(connection, str(params.get("name")), params)[1]
@@ -395,6 +402,8 @@ class Pages:
 
 ANSWERS: dict[str, Callable[[Pages, duckdb.DuckDBPyConnection, Params], bytes]] = {
     "run": Pages._run,
+    "word": Pages._word,
+    "example": Pages._example,
     "query": Pages._query,
     "finding": Pages._finding,
     "summary": Pages._summary,
@@ -413,7 +422,7 @@ SUMMARY = ("paths", "blame", "drops", "threads")
 _PLAIN = (
     "row", "gap", "path", "executor_share", "executor_node", "neighbour", "rate", "callback",
     "callback_point", "callback_slowest", "topic_point", "topic_slowest", "service_point",
-    "service_slowest", "loss", "loss_point", "thread_name",
+    "service_slowest", "loss", "loss_point", "thread_name", "place",
 )  # fmt: skip
 # Named queries that list one by one what a page query counts.
 _LISTED_BY = {"loss": "topics-unmatched"}

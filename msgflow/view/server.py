@@ -13,7 +13,7 @@ import ipaddress
 import re
 import socket
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import anyio
 import anyio.to_thread
@@ -23,12 +23,13 @@ from starlette.applications import Starlette
 from starlette.responses import JSONResponse, PlainTextResponse, RedirectResponse, Response
 from starlette.routing import Route
 
-from msgflow.errors import MsgflowError, UsageError
+from msgflow.errors import MsgflowError, QueryError, UsageError
 from msgflow.sql.failure import first_line
 from msgflow.view import assets
 from msgflow.view.connection import Connection, timed
 from msgflow.view.kept_token import kept_token
 from msgflow.view.shared_database import ReplacedError, SharedDatabase, UnopenedError
+from msgflow.view.sql_page import Sql, encoded_error, encoded_rows, most_rows
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -36,6 +37,8 @@ if TYPE_CHECKING:
 
     from starlette.requests import Request
     from starlette.types import ASGIApp, Receive, Scope, Send
+
+    Started = Callable[["Interruptible"], None]
 
 HOST = "127.0.0.1"
 DEFAULT_PORT = 8642
@@ -60,14 +63,23 @@ _HEADERS = {
 _FILE = re.compile(r"[\w.-]+\.(?:js|css)")
 
 
-def application(shared: SharedDatabase, token: str) -> ASGIApp:
+class Interruptible(Protocol):
+    """Something that runs a question, and can be told to end it."""
+
+    def interrupt(self) -> None:
+        """End the question."""
+        ...
+
+
+def application(shared: SharedDatabase, token: str, sql: Sql) -> ASGIApp:
     """Return the application: pages and their data, for requests with the token.
 
     Args:
         shared: the database.
         token: of the printed address.
+        sql: runs the queries of the SQL page.
     """
-    limiter: list[anyio.CapacityLimiter] = []
+    limiters: dict[bool, anyio.CapacityLimiter] = {}
 
     async def page(request: Request) -> Response:
         generation = ""
@@ -82,7 +94,7 @@ def application(shared: SharedDatabase, token: str) -> ASGIApp:
         name = request.path_params["name"]
         if not _FILE.fullmatch(name):
             return PlainTextResponse("not found", status_code=404)
-        if name in (*assets.SCRIPTS, *assets.SHEETS):
+        if name in (*assets.SCRIPTS, *assets.SHEETS, *assets.IMPORTED):
             content = assets.vendored(name)
         elif name in assets.modules() or name == "style.css":
             content = assets.text(name)
@@ -90,11 +102,35 @@ def application(shared: SharedDatabase, token: str) -> ASGIApp:
             return PlainTextResponse("not found", status_code=404)
         return Response(content, media_type=_TYPES[name[name.rindex(".") :]])
 
-    async def data(request: Request) -> Response:
-        if not limiter:
-            limiter.append(anyio.CapacityLimiter(MOST_AT_ONCE))
+    def rows(params: dict[str, Any], generation: str | None, started: Started) -> bytes:
+        limit = most_rows(params)
+        shared.require(generation)
+        started(sql)
         try:
-            return await _answered(shared, request, limiter[0])
+            result = sql(params.get("text", ""), limit)
+        except (QueryError, UsageError) as error:
+            return encoded_error(error.message, error.hint)
+        shared.require(generation)
+        return encoded_rows(result)
+
+    async def data(request: Request) -> Response:
+        name = request.path_params["name"]
+        params: dict[str, Any] = dict(request.query_params)
+        generation = request.headers.get("X-Generation")
+        is_sql = name == "sql"
+        if is_sql not in limiters:
+            # SQL has one process, and keeps no page waiting.
+            limiters[is_sql] = anyio.CapacityLimiter(1 if is_sql else MOST_AT_ONCE)
+        try:
+            return await _answered(
+                request,
+                limiters[is_sql],
+                lambda started: (
+                    rows(params, generation, started)
+                    if is_sql
+                    else shared.answer(name, params, generation, started)
+                ),
+            )
         except ReplacedError as error:
             return _failure(error, 409, "replaced")
         except UnopenedError as error:
@@ -163,13 +199,10 @@ def serve_single(
 
 
 async def _answered(
-    shared: SharedDatabase, request: Request, limiter: anyio.CapacityLimiter
+    request: Request, limiter: anyio.CapacityLimiter, ask: Callable[[Started], bytes]
 ) -> Response:
-    """Return the answer; interrupt the query when the browser no longer waits for it."""
-    name = request.path_params["name"]
-    params: dict[str, Any] = dict(request.query_params)
-    generation = request.headers.get("X-Generation")
-    asked: list[duckdb.DuckDBPyConnection] = []
+    """Return the answer; interrupt the question when the browser no longer waits for it."""
+    asked: list[Interruptible] = []
     content: list[bytes] = []
 
     async def watch() -> None:
@@ -177,23 +210,26 @@ async def _answered(
             await anyio.sleep(_SECONDS_BETWEEN_LOOKS)
         # Repeatedly, since between two statements there is nothing to interrupt.
         while True:
-            for cursor in asked:
+            for one in asked:
                 with suppress(duckdb.Error):  # it has just ended
-                    cursor.interrupt()
+                    one.interrupt()
             await anyio.sleep(_SECONDS_BETWEEN_LOOKS)
 
     try:
         async with anyio.create_task_group() as group:
             group.start_soon(watch)
             content.append(
-                await anyio.to_thread.run_sync(
-                    lambda: shared.answer(name, params, generation, asked.append), limiter=limiter
-                )
+                await anyio.to_thread.run_sync(lambda: ask(asked.append), limiter=limiter)
             )
             group.cancel_scope.cancel()
     except BaseExceptionGroup as errors:
         # A group of one: what the query raised.
         raise errors.exceptions[0] from None
+    except anyio.get_cancelled_exc_class():
+        # The server ends, and does not wait for the question.
+        for one in asked:
+            one.interrupt()
+        return PlainTextResponse("error: the server has ended\n", status_code=503)
     return Response(content[0], media_type="application/octet-stream")
 
 
@@ -326,6 +362,7 @@ def listen(port: int | None) -> socket.socket:
 
 def serve(
     path: Path,
+    sql: Sql,
     *,
     port: int | None = None,
     memory_limit: str | None = None,
@@ -335,6 +372,7 @@ def serve(
 
     Args:
         path: the database.
+        sql: runs the queries of the SQL page.
         port: of 127.0.0.1; 0 takes any that is free, None the usual one or else any.
         memory_limit: most memory that DuckDB takes, such as '1GB'; when None a quarter of that of
             the machine, at least 500 MB and at most 4 GB.
@@ -344,20 +382,20 @@ def serve(
         DatabaseError: the file is missing, locked, foreign, or of another schema revision.
         UsageError: the port is in use.
     """
-    with running(path, port=port, memory_limit=memory_limit) as (server, listener, address):
+    with running(path, sql, port=port, memory_limit=memory_limit) as (server, listener, address):
         started(address)
         server.run(sockets=[listener])
 
 
 @contextmanager
 def running(
-    path: Path, *, port: int | None, memory_limit: str | None
+    path: Path, sql: Sql, *, port: int | None, memory_limit: str | None
 ) -> Iterator[tuple[uvicorn.Server, socket.socket, str]]:
     """Prepare a server; see `serve`."""
     shared = SharedDatabase(path, memory_limit)
     try:
         place = str(path.resolve())
-        with listening(place, port, lambda token: application(shared, token)) as server:
+        with listening(place, port, lambda token: application(shared, token, sql)) as server:
             yield server
     finally:
         shared.close()

@@ -138,6 +138,22 @@ class SharedDatabase:
         with self._changed:
             return self._current().answers.generation
 
+    def require(self, generation: str | None) -> None:
+        """Raise unless the database is still that of a page.
+
+        Args:
+            generation: that of the page; any when None.
+
+        Raises:
+            ReplacedError: the file was changed since the page was made, or is gone.
+        """
+        try:
+            is_same = generation is None or generation == generation_of(self.path)
+        except (OSError, DatabaseError):
+            is_same = False
+        if not is_same:
+            raise self._replaced()
+
     def answer(
         self,
         name: str,

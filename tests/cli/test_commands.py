@@ -150,7 +150,13 @@ def test_sql_says_when_rows_are_cut(msgflow: Msgflow, small_database: Path) -> N
 def test_sql_that_fails_has_code_1(msgflow: Msgflow, small_database: Path) -> None:
     result = msgflow("sql", "SELECT * FROM publishr", "--db", small_database)
     assert result.exit_code == 1
-    assert result.stderr.startswith("error: Table with name publishr does not exist\n\nhint: ")
+    said, _, hint = result.stderr.partition("\n\n")
+    assert said.splitlines() == [
+        "error: Table with name publishr does not exist",
+        "LINE 1: SELECT * FROM publishr",
+        "                      ^^^^^^^^",
+    ]
+    assert hint.startswith("hint: ")
 
 
 def test_sql_shows_addresses_as_numbers(msgflow: Msgflow, small_database: Path) -> None:

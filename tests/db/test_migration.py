@@ -169,6 +169,7 @@ def older(path: Path) -> dict[int, str]:
         con.execute("ALTER TABLE store.publisher DROP COLUMN is_topic_declared")
         con.execute("ALTER TABLE store.subscription DROP COLUMN is_topic_declared")
         con.execute("DROP TABLE store.user_event")
+        con.execute("DROP TABLE store.bag_message")
         con.execute("DROP TABLE store.link_call")
         con.execute("DROP TABLE store.other_thread")
         con.execute("DROP TABLE store.thread_state")

@@ -87,7 +87,7 @@ def test_times_of_a_clock_are_corrected_and_nothing_else(
 
 
 def test_what_is_corrected() -> None:
-    """All moments but the stamps of the middleware, and those of clocks themselves."""
+    """All moments but stamps of the clock of ROS, and those of clocks themselves."""
     as_recorded = {
         (table.name, column.name)
         for table in STORE.tables.values()
@@ -100,6 +100,8 @@ def test_what_is_corrected() -> None:
         ("take", "source_timestamp_ns"),
         ("clock", "reference_ns"),
         ("clock_uncertainty", "at_ns"),
+        ("bag_message", "received_ns"),
+        ("bag_message", "stamp_ns"),
     }
 
 

@@ -31,6 +31,7 @@ def test_a_wheel_can_be_made_of_it(tmp_path: Path) -> None:
             ignored = shutil.ignore_patterns("__pycache__")
             shutil.copytree(source, tmp_path / name, ignore=ignored)
         else:
+            (tmp_path / name).parent.mkdir(exist_ok=True)
             shutil.copy(source, tmp_path / name)
     with (tmp_path / "pyproject.toml").open("rb") as stream:
         included = tomllib.load(stream)["tool"]["hatch"]["build"]["targets"]["wheel"]

@@ -65,7 +65,11 @@ def test_sql_errors_keep_what_helps(small_database: Path) -> None:
     with msgflow.open_db(small_database) as database:
         with pytest.raises(QueryError) as raised:
             database.sql("SELECT * FROM publishr")
-        assert raised.value.message == "Table with name publishr does not exist"
+        assert raised.value.message == (
+            "Table with name publishr does not exist\n"
+            "LINE 1: SELECT * FROM publishr\n"
+            "                      ^^^^^^^^"
+        )
         assert "publisher" in str(raised.value.hint)
         with pytest.raises(QueryError, match="LINE 1: selec 1"):
             database.sql("selec 1")
@@ -73,6 +77,19 @@ def test_sql_errors_keep_what_helps(small_database: Path) -> None:
             database.sql("SELECT CAST(full_name AS BIGINT) FROM node")
         with pytest.raises(UsageError, match="no SQL to run"):
             database.sql(" ; ")
+
+
+@pytest.mark.parametrize("explained", ["", "EXPLAIN "])
+@pytest.mark.parametrize("lines", [0, 1, 9])
+def test_an_error_is_in_the_line_that_its_author_counts(
+    small_database: Path, explained: str, lines: int
+) -> None:
+    text = explained + "SELECT" + lines * "\n" + " nothing FROM run"
+    with msgflow.open_db(small_database) as database, pytest.raises(QueryError) as raised:
+        database.sql(text)
+    _, line, mark = raised.value.message.splitlines()
+    assert line.startswith(f"LINE {lines + 1}: ")
+    assert line[mark.index("^") : mark.index("^") + 7] == "nothing"
 
 
 def test_a_query_can_use_more_than_memory(small_database: Path) -> None:

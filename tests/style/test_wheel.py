@@ -16,9 +16,11 @@ from msgflow.resources import resource_directory
 from msgflow.query.catalogue import load_queries
 import msgflow
 print(msgflow.__file__)
-for name in ("schema", "migrations", "queries"):
+for name in ("schema", "migrations", "queries", "docs"):
     print(resource_directory(name))
 assert load_queries()
+from msgflow.view.sql_page import examples
+assert examples().num_rows
 from pathlib import Path
 from msgflow.db.migration import create
 create(Path(sys.argv[1]))

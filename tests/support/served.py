@@ -12,6 +12,7 @@ from urllib.parse import urlsplit
 
 import duckdb
 
+from msgflow.confined_query import WarmSql
 from msgflow.view.server import running
 
 _UNITS = ((10**9, "s"), (10**6, "ms"), (10**3, "µs"), (1, "ns"))
@@ -20,8 +21,9 @@ _UNITS = ((10**9, "s"), (10**6, "ms"), (10**3, "µs"), (1, "ns"))
 class Served:
     """A server in a thread of this process."""
 
-    def __init__(self, path: Path) -> None:
-        self._running = running(path, port=0, memory_limit=None)
+    def __init__(self, path: Path, seconds: float = 30) -> None:
+        self._sql = WarmSql(path, memory_limit="1GB", seconds=seconds)
+        self._running = running(path, self._sql, port=0, memory_limit=None)
         self.server, listener, self.address = self._running.__enter__()
         self._thread = threading.Thread(
             target=lambda: self.server.run(sockets=[listener]), daemon=True
@@ -52,6 +54,7 @@ class Served:
         self.server.should_exit = True
         self._thread.join(20)
         self._running.__exit__(None, None, None)
+        self._sql.close()
 
 
 @dataclass

@@ -6,12 +6,14 @@ import hashlib
 import json
 import re
 from collections import Counter
+from pathlib import Path
 
 from msgflow.view import assets
 
 _DECLARED = re.compile(
     r"^(?:export )?(?:async )?(?:function\*?|class|const|let) (?:(\w+)|\[)", re.MULTILINE
 )
+ROOT = Path(__file__).resolve().parents[2]
 _ADDRESS = re.compile(r"https?://[\w./-]+")
 # The name of a name space of XML looks like an address; browsers do not ask for it.
 _NAME_SPACES = {"http://www.w3.org/2000/svg"}
@@ -31,11 +33,21 @@ def test_libraries_are_those_that_are_listed() -> None:
         assert "Permission is hereby granted" in licence
         assert library["licence"] == "MIT"
         assert re.fullmatch(r"\d+\.\d+\.\d+", str(library["version"]))
-        assert str(library["package_integrity"]).startswith("sha512-")
+        packages: dict[str, dict[str, str]] = library["packages"]  # type: ignore[assignment]
+        for package in packages.values():
+            assert re.fullmatch(r"\d+\.\d+\.\d+", package["version"])
+            assert package["integrity"].startswith("sha512-")
     assert files.keys() | {"libraries.json"} == {path.name for path in assets.VENDOR.iterdir()}
     for name, digest in files.items():
         assert hashlib.sha256((assets.VENDOR / name).read_bytes()).hexdigest() == digest, name
-    assert {*assets.SCRIPTS, *assets.SHEETS} <= files.keys()
+    assert {*assets.SCRIPTS, *assets.SHEETS, *assets.IMPORTED} <= files.keys()
+
+
+def test_the_bundle_is_made_of_what_is_listed() -> None:
+    made = json.loads((ROOT / "packaging" / "codemirror" / "package.json").read_text())
+    (listed,) = (one["packages"] for one in libraries() if one["name"] == "CodeMirror")
+    packages: dict[str, dict[str, str]] = listed  # type: ignore[assignment]
+    assert made["dependencies"] == {name: one["version"] for name, one in packages.items()}
 
 
 def test_every_module_is_used() -> None:

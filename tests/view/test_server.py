@@ -23,6 +23,7 @@ import pytest
 from served import Served
 from tables import decoded
 
+from msgflow.confined_query import WarmSql
 from msgflow.errors import QueryError, UsageError
 from msgflow.view import pages
 from msgflow.view.connection import timed
@@ -283,7 +284,7 @@ def test_a_port_in_use_is_said(demo: Path, tmp_path: Path) -> None:
         taken.listen()
         port = taken.getsockname()[1]
         with pytest.raises(UsageError, match="cannot listen on the port"):
-            serve(path, port=port)
+            serve(path, WarmSql(path, memory_limit=None, seconds=1), port=port)
     with listen(None) as first, listen(None) as second:
         assert first.getsockname() != second.getsockname()
         assert first.getsockname()[0] == "127.0.0.1"

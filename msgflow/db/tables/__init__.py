@@ -12,6 +12,7 @@ foreign keys would forbid replacing a run in one transaction. `relation_check.py
 """
 
 from msgflow.db.tables import (
+    bag,
     call,
     callback,
     clock,
@@ -28,6 +29,7 @@ from msgflow.db.tables.column import STORE
 
 __all__ = [
     "STORE",
+    "bag",
     "call",
     "callback",
     "clock",

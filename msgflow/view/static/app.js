@@ -17,6 +17,7 @@ import { LossesPage } from "./losses.js";
 import { Bar } from "./bar.js";
 import { ComparePage } from "./compare.js";
 import { LakePage } from "./lake.js";
+import { SqlPage } from "./sql.js";
 import { failed, waiting } from "./notice.js";
 
 const PAGES = {
@@ -31,10 +32,12 @@ const PAGES = {
   losses: ["Losses", LossesPage],
   executors: ["Executors", ExecutorsPage],
   compare: ["Compare", ComparePage],
+  sql: ["SQL", SqlPage],
   lake: ["Lake", LakePage],
 };
-// Of a lake, which is no database.
+// Of a lake, which is no database; and what only a server answers.
 const OTHER_PAGES = ["lake"];
+const SERVED_PAGES = ["sql"];
 
 // What the server said in place of an answer.
 class SourceError extends Error {
@@ -55,15 +58,19 @@ class ServedSource {
   }
 
   async fetch(name, params = {}, signal = undefined) {
-    const query = new URLSearchParams();
-    for (const [key, value] of Object.entries(params)) {
-      if (value !== null && value !== undefined) query.set(key, value);
-    }
-    const address = `api/${name}?${query}`;
-    if (this.kept.has(address)) return this.kept.get(address);
+    const place = placeOf(name, params);
+    if (this.kept.has(place)) return this.kept.get(place);
+    const table = await this.ask(name, params, signal);
+    this.kept.set(place, table);
+    if (this.kept.size > 60) this.kept.delete(this.kept.keys().next().value);
+    return table;
+  }
+
+  // Asks the server, whatever it has said before.
+  async ask(name, params, signal) {
     let answer;
     try {
-      answer = await fetch(address, { signal, headers: { "X-Generation": this.generation } });
+      answer = await fetch(placeOf(name, params), { signal, headers: { "X-Generation": this.generation } });
     } catch (error) {
       if (error.name === "AbortError") throw error;
       throw new SourceError("the server does not answer", "is msgflow ui still running?", "gone");
@@ -72,11 +79,16 @@ class ServedSource {
       const said = await answer.json().catch(() => ({}));
       throw new SourceError(said.error ?? answer.statusText, said.hint, said.code);
     }
-    const table = decode(new Uint8Array(await answer.arrayBuffer()));
-    this.kept.set(address, table);
-    if (this.kept.size > 60) this.kept.delete(this.kept.keys().next().value);
-    return table;
+    return decode(new Uint8Array(await answer.arrayBuffer()));
   }
+}
+
+function placeOf(name, params) {
+  const query = new URLSearchParams();
+  for (const [key, value] of Object.entries(params)) {
+    if (value !== null && value !== undefined) query.set(key, value);
+  }
+  return `api/${name}?${query}`;
 }
 
 class App {
@@ -88,7 +100,7 @@ class App {
   async start() {
     const runs = await this.source.fetch("run");
     this.runs = records(runs);
-    this.pages = Object.fromEntries(Object.entries(PAGES).filter(([page]) => (this.source.pages ? this.source.pages.includes(page) : !OTHER_PAGES.includes(page) && !this.source.absent?.includes(page))));
+    this.pages = Object.fromEntries(Object.entries(PAGES).filter(([page]) => (this.source.pages ? this.source.pages.includes(page) : !OTHER_PAGES.includes(page) && (this.source.isServed || !SERVED_PAGES.includes(page)) && !this.source.absent?.includes(page))));
     if (!location.hash && this.source.address) history.replaceState(null, "", this.source.address);
     this.main = document.querySelector("main");
     this.nav = document.querySelector("nav");

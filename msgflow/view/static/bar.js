@@ -7,8 +7,8 @@ import { duration, momentOf, secondsText } from "./labels.js";
 // A shorter drag on the curve is a click.
 const LEAST_DRAG = 4;
 const MOST_FOUND = 8;
-// Pages whose numbers are of whole runs.
-const WITHOUT_WINDOW = ["compare"];
+// Pages whose numbers are of whole runs, or of what a query says.
+const WITHOUT_WINDOW = ["compare", "sql"];
 const FOUND_ON = { node: ["nodes", "q"], namespace: ["nodes", "q"], topic: ["topics", "topic"], service: ["services", "q"] };
 
 export class Bar {

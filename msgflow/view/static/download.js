@@ -50,7 +50,7 @@ function painted(title, canvases) {
   return result;
 }
 
-function saveFile(blob, name) {
+export function saveFile(blob, name) {
   const link = h("a", { href: URL.createObjectURL(blob), download: name });
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);

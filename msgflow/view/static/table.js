@@ -7,6 +7,7 @@ import { doubt } from "./notice.js";
 const SHOWN = 100;
 const HIDDEN = new Set(["run_id"]);
 
+// A column of the table may have a label in place of its name, and shown(row): the text of a cell.
 // Options: columns (names, in order), onPick(row), picked (row), sort, label, shown, order (compares
 // two rows before any column is chosen), once (a column that is left empty below an equal value),
 // doubted (row): its durations are between clocks that are not synchronised, state (an object that
@@ -31,7 +32,7 @@ export function dataTable(table, options = {}) {
       h("button", { type: "button", on: { click: () => {
         sort = state.sort = { name: column.name, down: sort?.name === column.name ? !sort.down : isNumber };
         fill();
-      } } }, title(column.name)));
+      } } }, column.label ?? title(column.name)));
   });
 
   function fill() {
@@ -53,12 +54,12 @@ export function dataTable(table, options = {}) {
       const cells = columns.map((column, position) => {
         const isNumber = column.type === "integer" || column.type === "double";
         const isAgain = column.name === options.once && place && table[column.name][row] === table[column.name][order[place - 1]];
-        const text = isAgain ? "" : cell(table[column.name][row], column);
+        const text = isAgain ? "" : column.shown ? column.shown(row) : cell(table[column.name][row], column);
         const inside = position === 0 && options.onPick && !isAgain
           ? h("button", { type: "button", className: "pick" }, text ? (isNumber ? text : breakable(text)) : "–") : isNumber ? text : breakable(text);
         // On a phone a row is a card, where every value says what it is.
         const shape = isNumber ? "number" : `text${String(text).length > 60 ? " long" : String(text).length > 18 ? " name" : ""}`;
-        return h("td", { data: { title: title(column.name) }, className: text === "" ? `${shape} empty` : shape }, inside, text !== "" && column.unit === "ns" && options.doubted?.(row) && doubt());
+        return h("td", { data: { title: column.label ?? title(column.name) }, className: text === "" ? `${shape} empty` : shape }, inside, text !== "" && column.unit === "ns" && options.doubted?.(row) && doubt());
       });
       return h("tr", {
         className: options.onPick ? "can-pick" : "",

@@ -55,6 +55,12 @@ WHERE coalesce(l.publication_id NOT BETWEEN b.first_id AND b.last_id, true)
     OR coalesce(l.take_id NOT BETWEEN t.first_id AND t.last_id, l.take_id IS NOT NULL)
 GROUP BY l.run_id
 UNION ALL
+SELECT m.run_id, 'bag_message', count(*), 'links to a row of another run'
+FROM store.bag_message AS m
+LEFT JOIN publication AS b ON m.run_id = b.run_id
+WHERE coalesce(m.publication_id NOT BETWEEN b.first_id AND b.last_id, true)
+GROUP BY m.run_id
+UNION ALL
 SELECT u.run_id, 'user_event', count(*), 'links to a row of another run'
 FROM store.user_event AS u
 LEFT JOIN callback_instance AS i ON u.run_id = i.run_id

@@ -1,0 +1,264 @@
+"""Messages of a bag find the publications that they are of, or none."""
+
+from __future__ import annotations
+
+import random
+import shutil
+from collections import Counter
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import duckdb
+import pytest
+
+from msgflow.database import open_db
+from msgflow.errors import TraceError, UsageError
+
+rosbag2 = pytest.importorskip("rosbags.rosbag2")
+typesys = pytest.importorskip("rosbags.typesys")
+
+STAMPED = "geometry_msgs/msg/PointStamped"
+PLAIN = "std_msgs/msg/String"
+SECOND = 1_000_000_000
+PUBLISHED = """
+SELECT b.publication_id, p.topic_name, coalesce(b.source_timestamp_ns, b.start_ns) AS sent_ns
+FROM publication AS b
+JOIN publisher AS p USING (publisher_id)
+WHERE NOT p.is_internal
+ORDER BY sent_ns, publication_id
+"""
+# Publication, topic, time of receipt; the number of the publication becomes the stamp.
+Message = tuple[int, str, int]
+
+
+def write_bag(path: Path, messages: Iterable[Message], *, plugin: str = "SQLITE3") -> Path:
+    """Write a bag whose stamps name the publications; topics that begin with /plain have none."""
+    store = typesys.get_typestore(typesys.Stores.LATEST)
+    header, time, stamped, point, text = (
+        store.types[name]
+        for name in (
+            "std_msgs/msg/Header", "builtin_interfaces/msg/Time", STAMPED,
+            "geometry_msgs/msg/Point", PLAIN,
+        )
+    )  # fmt: skip
+    with rosbag2.Writer(path, version=9, storage_plugin=rosbag2.StoragePlugin[plugin]) as writer:
+        connections: dict[str, Any] = {}
+        for publication, topic, received_ns in messages:
+            is_plain = topic.startswith("/plain")
+            kind = PLAIN if is_plain else STAMPED
+            if topic not in connections:
+                connections[topic] = writer.add_connection(topic, kind, typestore=store)
+            message = (
+                text(data="hello")
+                if is_plain
+                else stamped(
+                    header=header(
+                        stamp=time(sec=publication // SECOND, nanosec=publication % SECOND),
+                        frame_id=f"frame{publication}",
+                    ),
+                    point=point(x=0.0, y=0.0, z=0.0),
+                )
+            )
+            writer.write(connections[topic], received_ns, store.serialize_cdr(message, kind))
+    return path
+
+
+@pytest.fixture
+def database(simulated: Callable[..., Path], tmp_path: Path) -> Path:
+    return Path(shutil.copyfile(simulated("pipeline", 0.3), tmp_path / "run.duckdb"))
+
+
+def published(path: Path) -> list[Message]:
+    with duckdb.connect(str(path), read_only=True) as connection:
+        return connection.execute(PUBLISHED).fetchall()
+
+
+def stored(path: Path) -> list[dict[str, Any]]:
+    with open_db(path) as opened:
+        rows: list[dict[str, Any]] = (
+            opened.sql("FROM bag_message ORDER BY publication_id", limit=None)
+            .to_arrow()
+            .to_pylist()
+        )
+    return rows
+
+
+def join(path: Path, bag: Path) -> dict[str, Counter[str]]:
+    with open_db(path) as opened:
+        rows = opened.join_bag(bag).to_arrow().to_pylist()
+    for row in rows:
+        assert row["messages"] == sum(
+            row[name] for name in ("joined", "ambiguous", "no_publication", "topic_not_published")
+        )
+    return {row["topic_name"]: Counter(row) for row in rows}
+
+
+@pytest.mark.parametrize("plugin", ["SQLITE3", "MCAP"])
+def test_messages_find_their_publications(database: Path, tmp_path: Path, plugin: str) -> None:
+    jitter = random.Random(7)
+    sent = published(database)
+    received = [(one, topic, at + jitter.randrange(50_000)) for one, topic, at in sent]
+    found = join(database, write_bag(tmp_path / "bag", received, plugin=plugin))
+    assert sum(row["joined"] for row in found.values()) == len(sent)
+    rows = stored(database)
+    assert [row["publication_id"] for row in rows] == sorted(one for one, _, _ in sent)
+    assert all(row["stamp_ns"] == row["publication_id"] for row in rows)
+    assert all(row["frame_id"] == f"frame{row['publication_id']}" for row in rows)
+    assert {row["type_name"] for row in rows} == {STAMPED}
+    frame = len("frame1") + 1
+    assert min(row["size_bytes"] for row in rows) >= 4 + 8 + 4 + frame + 24
+
+
+def test_what_is_not_in_both_is_not_joined(database: Path, tmp_path: Path) -> None:
+    sent = published(database)
+    kept = [one for place, one in enumerate(sent) if place % 3]
+    with duckdb.connect(str(database)) as connection:
+        # The trace lost some of them, and the bag others.
+        lost = [number for number, _, _ in kept[::5]]
+        connection.execute(
+            "DELETE FROM store.publication WHERE list_contains(?::BIGINT[], publication_id)", [lost]
+        )
+    others = [(1, "/elsewhere", sent[0][2]), (2, "/plain/elsewhere", sent[0][2])]
+    received = [(number, topic, at + 20_000) for number, topic, at in kept]
+    found = join(database, write_bag(tmp_path / "bag", [*received, *others]))
+    assert found["/elsewhere"]["topic_not_published"] == 1
+    assert found["/plain/elsewhere"]["topic_not_published"] == 1
+    assert sum(row["no_publication"] for row in found.values()) == len(lost)
+    rows = stored(database)
+    assert len(rows) == len(kept) - len(lost)
+    assert all(row["stamp_ns"] == row["publication_id"] for row in rows)
+
+
+def test_what_may_be_several_is_not_joined(database: Path, tmp_path: Path) -> None:
+    sent = published(database)
+    (number, topic, at), *others = sent
+    received = [(one, name, when + 20_000) for one, name, when in others]
+    # Twice the same time, and a publication that has another one just before it.
+    twice = [(number, topic, at + 10_000), (number, topic, at + 10_000)]
+    near, near_topic, near_at = others[len(others) // 2]
+    with duckdb.connect(str(database)) as connection:
+        connection.execute(
+            "INSERT INTO store.publication SELECT * REPLACE ("
+            " (SELECT max(publication_id) + 1 FROM store.publication) AS publication_id,"
+            " source_timestamp_ns - 1000 AS source_timestamp_ns, start_ns - 1000 AS start_ns)"
+            " FROM store.publication WHERE publication_id = ?",
+            [near],
+        )
+    found = join(database, write_bag(tmp_path / "bag", [*twice, *received]))
+    assert sum(row["ambiguous"] for row in found.values()) == 3
+    assert found[topic]["ambiguous"] >= 2
+    rows = stored(database)
+    assert {row["publication_id"] for row in rows} == {one for one, _, _ in others} - {near}
+    assert all(row["stamp_ns"] == row["publication_id"] for row in rows)
+    assert near_topic in found
+    assert near_at
+
+
+def test_a_bag_of_another_time_joins_nothing_and_replaces(database: Path, tmp_path: Path) -> None:
+    sent = published(database)
+    good = [(one, topic, at + 10_000) for one, topic, at in sent]
+    join(database, write_bag(tmp_path / "good", good))
+    assert len(stored(database)) == len(sent)
+    later = [(one, topic, at + 3600 * SECOND) for one, topic, at in sent]
+    found = join(database, write_bag(tmp_path / "late", later))
+    assert sum(row["no_publication"] for row in found.values()) == len(sent)
+    assert stored(database) == []
+    assert join(database, write_bag(tmp_path / "empty", [])) == {}
+
+
+def test_flows_have_the_size_and_age_of_the_message_at_their_end(
+    database: Path, tmp_path: Path
+) -> None:
+    sent = published(database)
+    with open_db(database) as opened:
+        before = opened.query("flows").to_arrow().to_pylist()
+    assert {row["size_bytes"] for row in before} == {None}
+    join(database, write_bag(tmp_path / "bag", [(one, name, at + 9_000) for one, name, at in sent]))
+    with open_db(database) as opened:
+        flows = opened.query("flows", where="take_id IS NOT NULL").to_arrow().to_pylist()
+        links = dict(
+            opened.connection.execute(
+                "SELECT take_id, publication_id FROM link_transport"
+            ).fetchall()
+        )
+    assert flows
+    for row in flows:
+        assert row["age_from_stamp_ns"] == row["sink_ns"] - links[row["take_id"]]
+        assert row["size_bytes"] > 40
+    same = [{**row, "size_bytes": None, "age_from_stamp_ns": None} for row in flows]
+    assert same == [row for row in before if row["take_id"] is not None]
+
+
+def test_types_without_a_header_have_a_size(database: Path, tmp_path: Path) -> None:
+    number, _, at = published(database)[0]
+    with duckdb.connect(str(database)) as connection:
+        connection.execute("UPDATE store.publisher SET topic_name = '/plain' || topic_name")
+        connection.execute("UPDATE store.subscription SET topic_name = '/plain' || topic_name")
+    ((_, topic, _), *_) = published(database)
+    join(database, write_bag(tmp_path / "bag", [(number, topic, at + 9_000)]))
+    (row,) = stored(database)
+    assert (row["size_bytes"], row["stamp_ns"], row["frame_id"]) == (4 + 4 + 6, None, None)
+
+
+def damaged(path: Path, sent: list[Message], how: str, plugin: str) -> Path:
+    """Return a bag that something is wrong with."""
+    bag = write_bag(path, [(one, topic, at) for one, topic, at in sent], plugin=plugin)
+    (data,) = (file for file in bag.iterdir() if file.suffix in (".db3", ".mcap"))
+    content = data.read_bytes()
+    match how:
+        case "cut":
+            data.write_bytes(content[: len(content) // 2])
+        case "zeros":
+            middle = len(content) // 4
+            data.write_bytes(content[:middle] + bytes(middle) + content[2 * middle :])
+        case "empty":
+            data.write_bytes(b"")
+        case "no_data":
+            data.unlink()
+        case "no_metadata":
+            (bag / "metadata.yaml").write_text("rosbag2_bagfile_information: 7\n")
+    return bag
+
+
+@pytest.mark.parametrize("plugin", ["SQLITE3", "MCAP"])
+@pytest.mark.parametrize("how", ["cut", "zeros", "empty", "no_data", "no_metadata"])
+def test_a_damaged_bag_is_an_error_and_changes_nothing(
+    database: Path, tmp_path: Path, how: str, plugin: str
+) -> None:
+    sent = published(database)
+    join(
+        database, write_bag(tmp_path / "good", [(one, name, at + 9_000) for one, name, at in sent])
+    )
+    before = stored(database)
+    bag = damaged(tmp_path / "bad", sent, how, plugin)
+    with pytest.raises(TraceError, match="cannot read as a bag"):
+        join(database, bag)
+    assert stored(database) == before
+
+
+def test_what_is_no_bag(database: Path, tmp_path: Path) -> None:
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "file.mcap").write_text("no bag")
+    (tmp_path / "old.bag").write_text("no bag")
+    for name in ("folder", "file.mcap", "old.bag"):
+        with pytest.raises(TraceError, match=f"cannot read as a bag.*{name}"):
+            join(database, tmp_path / name)
+    with pytest.raises(TraceError, match="no such bag"):
+        join(database, tmp_path / "nowhere")
+
+
+def test_clocks_that_are_not_synchronised_are_refused(
+    simulated: Callable[..., Path], tmp_path: Path
+) -> None:
+    path = Path(shutil.copyfile(simulated("demo", 0.1), tmp_path / "run.duckdb"))
+    sent = published(path)
+    bag = write_bag(tmp_path / "bag", [(one, name, at + 9_000) for one, name, at in sent])
+    with pytest.raises(UsageError, match="not synchronised"):
+        join(path, bag)
+    with open_db(path) as opened:
+        opened.apply_clocks("messages")
+    found = join(path, bag)
+    rows = stored(path)
+    assert len(rows) == sum(row["joined"] for row in found.values()) > len(sent) / 2
+    assert all(row["stamp_ns"] == row["publication_id"] for row in rows)
