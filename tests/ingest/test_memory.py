@@ -13,8 +13,8 @@ from msgflow.db.tables import STORE
 from msgflow.ingest.memory import database_in_memory, ingest_again
 from msgflow.sim import simulate
 
-# When it was made, and ids of the source.
-_OF_THE_MOMENT = {"run", "source"}
+# It says when it was made.
+_OF_THE_MOMENT = {"run"}
 
 
 def ingested(con: duckdb.DuckDBPyConnection, path: Path) -> dict[str, list[Any]]:
