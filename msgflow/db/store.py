@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     import duckdb
     from sqlalchemy import Column, Table
 
+# What a database says of itself.
+_OF_NO_RUN = ("alembic_version", "definition")
+
 
 def store(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
     """Copy each staged table that has the name of a store table, inside the open transaction.
@@ -43,6 +46,23 @@ def delete(con: duckdb.DuckDBPyConnection, run_ids: Iterable[int]) -> None:
         for table in STORE.tables.values():
             if "run_id" in table.columns:
                 con.execute(f"DELETE FROM {table.fullname} WHERE run_id = ?", [run_id])
+
+
+def empty(con: duckdb.DuckDBPyConnection, *databases: str) -> None:
+    """Empty the tables of runs, or of staging, in attached databases.
+
+    New tables take the place of those with rows: DuckDB plans and scans an emptied one as if its
+    rows were there.
+    """
+    filled = con.execute(
+        "SELECT database_name, schema_name, sql FROM duckdb_tables() "
+        "WHERE list_contains(?, database_name) AND estimated_size > 0 "
+        "AND NOT list_contains(?, table_name)",
+        [list(databases), list(_OF_NO_RUN)],
+    ).fetchall()
+    for database, schema, sql in filled:
+        definition = sql.removeprefix("CREATE TABLE ").removeprefix(f"{schema}.")
+        con.execute(f"CREATE OR REPLACE TABLE {database}.{schema}.{definition}")
 
 
 def _bases(con: duckdb.DuckDBPyConnection) -> dict[str, int]:

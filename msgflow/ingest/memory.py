@@ -1,27 +1,25 @@
-"""Ingest into a database in memory, which lasts as long as a question needs it."""
+"""Ingest into a database in memory, run after run."""
 
 from __future__ import annotations
 
-import contextlib
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.clocks import set_clocks
 from msgflow.db import empty_database
-from msgflow.db.connection import attach
 from msgflow.db.derivation import derive
 from msgflow.db.sandbox import open_memory, shut_in
+from msgflow.db.store import empty
 from msgflow.db.transaction import transaction
 from msgflow.ingest import model, staging
 from msgflow.ingest.load import load_traces
 from msgflow.ingest.stored_run import store_run
 from msgflow.links import declare_links
 from msgflow.sql.interrupt import noted_interrupts
+from msgflow.sql.quoting import literal
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     import duckdb
 
     from msgflow.clocks import ClockSync
@@ -29,15 +27,44 @@ if TYPE_CHECKING:
     from msgflow.trace import TraceSet
 
 
-@contextlib.contextmanager
-def ingested_in_memory(
-    traces: TraceSet, name: str, *, links: LinksFile | None, clocks: ClockSync
-) -> Iterator[duckdb.DuckDBPyConnection]:
-    """Have a database with the traces as its only run, made by the SQL of every ingest.
+def database_in_memory() -> duckdb.DuckDBPyConnection:
+    """Make an empty database in memory, for `ingest_again`.
 
-    Nothing is written but an empty database to start from. Findings are not looked for.
+    It works with one thread: to share few rows costs more than it saves, and the system that is
+    watched needs the other CPUs.
+    """
+    con = open_memory()
+    with tempfile.TemporaryDirectory(prefix="msgflow-") as directory:
+        path = Path(directory) / "empty.duckdb"
+        empty_database.write_empty(path)
+        con.execute(f"ATTACH {literal(str(path))} AS empty (READ_ONLY)")
+        con.execute("ATTACH ':memory:' AS target")
+        con.execute("COPY FROM DATABASE empty TO target")
+        con.execute("DETACH empty")
+    con.execute("USE target")
+    staging.attach(con, None)
+    con.execute("SET threads = 1")
+    # It takes a tenth of the time of a large query, and would save little on few rows.
+    con.execute("SET disabled_optimizers = 'projection_pullup'")
+    shut_in(con, lock=False)
+    return con
+
+
+def ingest_again(
+    con: duckdb.DuckDBPyConnection,
+    traces: TraceSet,
+    name: str,
+    *,
+    links: LinksFile | None,
+    clocks: ClockSync,
+) -> None:
+    """Put the traces in place of all runs, made by the SQL of every ingest.
+
+    To make tables and views takes longer than to fill them with the rows of a few seconds. So those
+    of the run before stay, and tables that remain empty cost nothing. Findings are not looked for.
 
     Args:
+        con: from `database_in_memory`.
         traces: what to read.
         name: of the run.
         links: indirect links to declare.
@@ -47,35 +74,26 @@ def ingested_in_memory(
         UsageError: the links or clocks do not fit the traces.
         KeyboardInterrupt: Ctrl-C came.
     """
-    with (
-        noted_interrupts() as interrupts,
-        tempfile.TemporaryDirectory(prefix="msgflow-") as directory,
-        contextlib.closing(open_memory()) as con,
-    ):
-        target = Path(directory) / "target.duckdb"
-        empty_database.write_empty(target)
-        attach(con, target, is_new=True)
-        staging.attach(con, None)
-        # Closing must not write into the file what is of no use any more.
-        staging.leave(con)
-        con.execute("SET wal_autocheckpoint = '1TB'")
-        shut_in(con, lock=False)
-        loaded = load_traces(
-            con,
-            traces,
-            hostnames={},
-            ignore=(),
-            may_hold=False,
-            replace=False,
-            interrupts=interrupts,
-            progress=None,
-        )
-        model.build(con, findings=False)
-        with transaction(con):
-            run_id, _ = store_run(con, name, name, loaded)
-            if links is not None:
-                declare_links(con, run_id, links)
-            derive(con, run_id, synchronise=lambda: set_clocks(con, run_id, clocks), findings=False)
-        for catalog in ("raw", "staging"):
-            con.execute(f"DETACH {catalog}")
-        yield con
+    with noted_interrupts() as interrupts:
+        empty(con, "target")
+        try:
+            loaded = load_traces(
+                con,
+                traces,
+                hostnames={},
+                ignore=(),
+                may_hold=False,
+                replace=False,
+                interrupts=interrupts,
+                progress=None,
+            )
+            model.build(con, keep=True, findings=False)
+            with transaction(con):
+                run_id, _ = store_run(con, name, name, loaded)
+                if links is not None:
+                    declare_links(con, run_id, links)
+                derive(
+                    con, run_id, synchronise=lambda: set_clocks(con, run_id, clocks), findings=False
+                )
+        finally:
+            empty(con, "raw", "staging")

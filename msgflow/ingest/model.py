@@ -51,21 +51,30 @@ def create(con: duckdb.DuckDBPyConnection, header: Header, empty: set[str]) -> N
     Args:
         con: connection with `raw` and `staging` attached.
         header: the object.
-        empty: the tables without a row, as far as they are built; the object is added to them.
+        empty: the tables without a row, as far as they are there; it is kept up to date.
     """
     if header.kind == "macro":
         con.execute(header.body)
     elif header.kind == "inline":
-        con.execute(f"CREATE VIEW {header.name} AS\n{header.body}")
-    elif header.when and empty.issuperset(header.when):
-        columns = ", ".join(f"{column.name} {column.type}" for column in header.columns)
-        con.execute(f"CREATE TABLE {header.name} ({columns})")
-        empty.add(header.name)
-    else:
-        table = f"CREATE TABLE {header.name} AS\n{header.body}"
-        ((count,),) = con.execute(table).fetchall()
-        if not count:
+        con.execute(f"CREATE OR REPLACE VIEW {header.name} AS\n{header.body}")
+    elif _stays_empty(header, empty):
+        if header.name not in empty:
+            columns = ", ".join(f"{column.name} {column.type}" for column in header.columns)
+            con.execute(f"CREATE TABLE {header.name} ({columns})")
             empty.add(header.name)
+    else:
+        table = f"CREATE OR REPLACE TABLE {header.name} AS\n{header.body}"
+        ((count,),) = con.execute(table).fetchall()
+        if count:
+            empty.discard(header.name)
+        else:
+            empty.add(header.name)
+
+
+def _stays_empty(header: Header, empty: set[str]) -> bool:
+    """Tell whether a table needs no SQL: it has no row, and is there or declares its columns."""
+    is_known = header.name in empty or bool(header.columns)
+    return is_known and bool(header.when) and empty.issuperset(header.when)
 
 
 def _last_uses(headers: tuple[Header, ...]) -> dict[str, int]:

@@ -26,8 +26,10 @@ The header ends at the first line that is not a `--` comment. Two spaces end a p
   on which the others depend.
 - `slowest`: the column that `--slowest N` goes by.
 - `when`: tables, or macros of a run. If none of them has a row, this object has none either, and an
-  ingest leaves it empty without running its SQL. In `schema/model` such an object declares its
-  columns, from which the empty table is made. Only objects that take long to plan have it.
+  ingest leaves it empty without running its SQL. In `schema/model` such an object may declare its
+  columns, from which the empty table is made. One that does not is left out only where the table is
+  there already: `msgflow watch` ingests into one database again and again. Only objects that take
+  long to plan declare columns.
 
 - `variant`: a parameter whose values are queries of their own. The default is this file, and `age`
   stands in the file of the same name with `-age` behind it; a BOOLEAN `each`, in that with `-each`.

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import time
-from contextlib import ExitStack, contextmanager
 from dataclasses import replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError, UsageError
-from msgflow.ingest.memory import ingested_in_memory
+from msgflow.ingest.memory import database_in_memory, ingest_again
 from msgflow.run.window import Window
 from msgflow.trace import Continuation
 from msgflow.watch.history import History
@@ -16,7 +16,7 @@ from msgflow.watch.kept_chunk import read_chunk
 from msgflow.watch.window_report import report_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
     from pathlib import Path
 
     import duckdb
@@ -136,41 +136,37 @@ class Watcher:
             if self.on_passed is not None:
                 self.on_passed(path)
 
-    @contextmanager
-    def _database(self, traces: KeptTraces) -> Iterator[duckdb.DuckDBPyConnection]:
-        """Have a database of a window; links of nodes that are not there yet are left out."""
-        with ExitStack() as stack:
+    @cached_property
+    def _con(self) -> duckdb.DuckDBPyConnection:
+        return database_in_memory()
 
-            def opened(links: LinksFile | None) -> duckdb.DuckDBPyConnection:
-                made = ingested_in_memory(traces, _RUN, links=links, clocks=self._clocks)
-                return stack.enter_context(made)
-
-            try:
-                con = opened(self._links)
-            except UsageError as error:
-                if self._links is None:
-                    raise
-                if not self._lacks_links:
-                    self._note(f"the declared links are left out for now: {error.message}")
-                self._lacks_links = True
-                con = opened(None)
-            else:
-                self._lacks_links = False
-            yield con
+    def _ingest(self, traces: KeptTraces) -> None:
+        """Ingest what a window needs; links of nodes that are not there yet are left out."""
+        try:
+            ingest_again(self._con, traces, _RUN, links=self._links, clocks=self._clocks)
+        except UsageError as error:
+            if self._links is None:
+                raise
+            if not self._lacks_links:
+                self._note(f"the declared links are left out for now: {error.message}")
+            self._lacks_links = True
+            ingest_again(self._con, traces, _RUN, links=None, clocks=self._clocks)
+        else:
+            self._lacks_links = False
 
     def _report(self, window: Window, *, is_final: bool, is_live: bool) -> WindowReport:
         traces = self.history.traces(window)
-        with self._database(traces) as con:
-            report = report_of(con, window, is_final=is_final)
-            if self._alarm is not None:
-                # What came after the window counts, too: an alarm must be early.
-                whole = Window(window.start_ns, self.history.border_ns)
-                found = self._alarm.violations(con, whole, window.end_ns)
-                report = replace(report, violations=found)
-            if self._exporter is not None:
-                since_ns = self.history.final_ns
-                start_ns = window.start_ns if since_ns is None else since_ns
-                self._exporter.count(con, Window(start_ns, window.end_ns))
+        self._ingest(traces)
+        report = report_of(self._con, window, is_final=is_final)
+        if self._alarm is not None:
+            # What came after the window counts, too: an alarm must be early.
+            whole = Window(window.start_ns, self.history.border_ns)
+            found = self._alarm.violations(self._con, whole, window.end_ns)
+            report = replace(report, violations=found)
+        if self._exporter is not None:
+            since_ns = self.history.final_ns
+            start_ns = window.start_ns if since_ns is None else since_ns
+            self._exporter.count(self._con, Window(start_ns, window.end_ns))
         if report.violations:
             self._violated = (self.history.border_ns, traces, self.history.paths(window))
         self.history.note_longest(report.longest_ns)

@@ -2,6 +2,7 @@
 -- description: Which annotation each message_link event makes or repeats: those of a process with
 --     equal kind, inputs and outputs are one.
 -- grain: one row per message_link event
+-- when: staging.annotation_event
 WITH meant AS (
     SELECT
         e.event_id, e.process_id, e.kind,

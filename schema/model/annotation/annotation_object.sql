@@ -3,6 +3,7 @@
 --     initialised last before, else the one that was used but never seen to be initialised. A
 --     subscription without initialisation is known by the callback of its rclcpp object.
 -- grain: one row per message_link event, side and handle
+-- when: staging.annotation_event
 WITH input AS (
     SELECT DISTINCT event_id, process_id, unnest(inputs) AS handle FROM staging.annotation_event
 ),

@@ -1,6 +1,7 @@
 -- name: staging.annotation_output
 -- description: Publishers of annotations, as far as they are known.
 -- grain: one row per publisher of an annotation
+-- when: staging.annotation
 SELECT DISTINCT a.annotation_id, o.object_id AS publisher_id
 FROM staging.annotation AS a
 JOIN staging.annotation_object AS o ON a.event_id = o.event_id

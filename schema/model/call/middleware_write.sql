@@ -2,6 +2,7 @@
 -- description: What instrumented middleware says of one write: begin and end, in either order, or
 --     only one of them.
 -- grain: one row per write
+-- when: raw.dds_write, raw.dds_write_pre
 WITH write_begin AS (
     SELECT * FROM staging.call('dds_write_pre')
 ),

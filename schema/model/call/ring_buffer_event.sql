@@ -3,6 +3,8 @@
 --     call is the replay of a message that was kept for a subscription that joined late. A buffer
 --     that is made anew at an address is empty.
 -- grain: one row per enqueue, dequeue or clearing of a ring buffer
+-- when: raw.ros2_rclcpp_construct_ring_buffer, raw.ros2_rclcpp_ring_buffer_clear,
+--     raw.ros2_rclcpp_ring_buffer_dequeue, raw.ros2_rclcpp_ring_buffer_enqueue
 WITH enqueue AS (
     SELECT
         event_id, ts_ns, trace_index, process_id, thread_id, buffer, "index" AS slot, overwritten

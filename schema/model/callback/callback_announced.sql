@@ -3,6 +3,7 @@
 --     instances: the handle that it named (NULL if it named none), the timer or subscription of
 --     that handle if the trace has it, and which tracepoints were enabled meanwhile.
 -- grain: one row per such callback
+-- when: staging.callback_trigger
 WITH enabled AS (
     SELECT
         trace_index,

@@ -2,6 +2,7 @@
 -- description: How deep callback instances are nested on their thread, from 1. Where none can
 --     have others inside, none is nested.
 -- grain: one row per callback instance on a thread with one that others may be nested in
+-- when: staging.callback_outer
 WITH edge AS (
     SELECT thread_id, start_event_id AS event_id, 1 AS step FROM staging.callback_outer
     UNION ALL

@@ -4,6 +4,7 @@
 --     the latest begin left over (a callback that spins and is called again), repeated until
 --     nothing pairs. Nothing pairs across a gap.
 -- grain: one row per such begin or end; `partner_event_id` is NULL where there is none
+-- when: staging.callback_event
 WITH RECURSIVE left_over AS (
     SELECT
         0 AS pass, c.event_id, c.thread_id, c.trace_index, c.callback_handle, c.segment,

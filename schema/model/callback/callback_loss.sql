@@ -3,6 +3,7 @@
 --     after; or with one of other CPUs in their time, which the thread may have visited: two
 --     instances may look like one.
 -- grain: one row per such callback instance
+-- when: staging.beside_gap, staging.callback_gap
 WITH exposed AS (
     SELECT start_event_id, thread_id, end_event_id, effective_end_event_id
     FROM staging.callback_run

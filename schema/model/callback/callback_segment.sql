@@ -2,6 +2,7 @@
 -- description: How many gaps threads had seen at each begin and end of a callback, where they saw
 --     any at all.
 -- grain: one row per callback_start or callback_end behind the first gap of its thread
+-- when: staging.callback_gap
 WITH gap AS (
     SELECT event_id, thread_id, segment FROM staging.callback_gap WHERE is_between
 ),

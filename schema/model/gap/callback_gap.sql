@@ -2,6 +2,7 @@
 -- description: Gaps that threads have seen while they made calls, or that the CPUs had which they
 --     may have visited meanwhile. The former are numbered on each thread.
 -- grain: one row per event of a call behind a gap
+-- when: staging.near_gap
 SELECT
     g.event_id,
     c.thread_id,

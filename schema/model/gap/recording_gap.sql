@@ -3,6 +3,7 @@
 --     the last gap that starts before its end starts at or after its begin, or the one or another
 --     before it ends after its begin. CPU -1: all of them.
 -- grain: one row per gap in a recording
+-- when: staging.gap
 SELECT
     r.recording_index,
     coalesce(l.cpu, -1) AS cpu_id,

@@ -3,6 +3,7 @@
 --     loss on the CPU of that event or the one before, or a pause of the trace; or, where
 --     `is_elsewhere`, a loss on other CPUs only, which the thread may have visited meanwhile.
 -- grain: one row per event with a gap between itself and the one before on its thread
+-- when: staging.near_gap
 SELECT
     c.thread_id,
     g.event_id AS resumed_event_id,

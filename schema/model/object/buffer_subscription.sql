@@ -2,6 +2,7 @@
 -- description: Which subscription reads an intra-process ring buffer. The buffer that a
 --     transient-local publisher keeps belongs to none.
 -- grain: one row per ring buffer of a subscription
+-- when: raw.ros2_rclcpp_buffer_to_ipb
 SELECT
     b.event_id, b.process_id, b.buffer AS buffer_handle, o.subscription_event_id
 FROM staging.located('ros2_rclcpp_buffer_to_ipb') AS b

@@ -2,6 +2,7 @@
 -- description: Service clients. A handle that was used but never initialised in the trace gets a
 --     row without node, and the name of the service that it turned out to call.
 -- grain: one row per client
+-- when: staging.client_event, staging.client_known
 WITH learned AS (
     SELECT u.client_event_id, mode(s.service_name ORDER BY s.service_name) AS service_name
     FROM staging.service_use AS u

@@ -2,6 +2,7 @@
 -- description: The GID of each client. One whose initialisation was not traced learns it from the
 --     responses that it took: the number and stamp of a response tell which was sent to it.
 -- grain: one row per client with a GID
+-- when: staging.client_event, staging.client_known
 WITH inferred AS (
     SELECT client_event_id AS event_id, process_id, rmw_handle
     FROM staging.client_event

@@ -2,6 +2,7 @@
 -- description: Service clients whose initialisation was traced, with the GID by which servers know
 --     them (since Kilted).
 -- grain: one row per rcl_client_init
+-- when: raw.ros2_rcl_client_init
 SELECT
     c.event_id,
     c.process_id,

@@ -6,6 +6,7 @@
 --     callbacks, before the thread initialises another service. Where one of these is missing, the
 --     order tells nothing.
 -- grain: one row per rclcpp_service_callback_added of such a service
+-- when: raw.ros2_rcl_lifecycle_state_machine_init
 WITH initialised AS (
     SELECT event_id, thread_id, process_id, node_handle, service_handle
     FROM staging.located('ros2_rcl_service_init')

@@ -2,6 +2,7 @@
 -- description: Requests and the callback instance that sent them; NULL where the thread did so by
 --     itself.
 -- grain: one row per request that was seen to be sent
+-- when: staging.request_origin
 SELECT q.request_id, r.callback_instance_id
 FROM staging.request_origin AS q
 LEFT JOIN staging.sender_run AS r ON q.send_event_id = r.event_id

@@ -2,6 +2,7 @@
 -- description: Every request with what was traced of it, numbered in the order of sending: both
 --     ends, or only one, and the instance of the service callback.
 -- grain: one row per request and service that took it; one per request that no service took
+-- when: staging.client_event, staging.service_event
 WITH found AS (
     SELECT send_event_id, take_event_id FROM staging.request_pair
     UNION ALL

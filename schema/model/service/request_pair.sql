@@ -4,6 +4,7 @@
 --     the response tells which request it was, else the order, if as many were taken by a service
 --     as were sent.
 -- grain: one row per request whose two ends were traced, and service that took it
+-- when: staging.client_event
 WITH sent AS (
     SELECT e.event_id, g.gid, e.sequence_number
     FROM staging.client_event AS e

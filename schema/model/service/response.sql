@@ -1,6 +1,7 @@
 -- name: staging.response
 -- description: Responses; a side that was not traced is NULL.
 -- grain: one row per response
+-- when: staging.response_origin
 SELECT
     r.response_id,
     c.client_id,

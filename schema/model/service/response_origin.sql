@@ -2,6 +2,7 @@
 -- description: Every response with what was traced of it, numbered in the order of sending, and the
 --     request that it answers.
 -- grain: one row per response
+-- when: staging.client_event, staging.service_event
 WITH found AS (
     SELECT send_event_id, take_event_id FROM staging.response_pair
     UNION ALL

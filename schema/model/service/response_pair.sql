@@ -3,6 +3,7 @@
 --     request, and the stamp; without a stamp on one of the sides, where only one comes into
 --     question. Of equal ones the k-th sent is the k-th taken.
 -- grain: one row per response whose two ends were traced
+-- when: staging.client_event
 WITH sent AS (
     SELECT
         event_id, gid, sequence_number, source_timestamp_ns,

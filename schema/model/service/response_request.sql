@@ -2,6 +2,7 @@
 -- description: Which request each end of a response answers: at the service the request of the
 --     same client and number that it took last before, at the client the one that it sent.
 -- grain: one row per end of a response whose request was traced at the same end
+-- when: staging.client_event, staging.service_event
 WITH taken AS (
     SELECT service_event_id, gid, sequence_number, min(event_id) AS event_id, count(*) AS number
     FROM staging.service_event

@@ -2,6 +2,7 @@
 -- description: Callback instances that requests and responses were sent in: the innermost on the
 --     thread that had begun and was not over.
 -- grain: one row per request or response sent inside a callback instance
+-- when: staging.client_event, staging.service_event
 WITH send AS (
     SELECT event_id, thread_id FROM staging.client_event WHERE is_request
     UNION ALL

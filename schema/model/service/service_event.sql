@@ -2,6 +2,7 @@
 -- description: Requests that services took and responses that they sent, each with its service and
 --     the GID of the client.
 -- grain: one row per successful rmw_take_request or rmw_send_response
+-- when: raw.ros2_rmw_send_response, raw.ros2_rmw_take_request
 WITH event AS NOT MATERIALIZED (
     SELECT
         event_id, ts_ns, thread_index, true AS is_request, rmw_service_handle AS handle,

@@ -1,6 +1,7 @@
 -- name: staging.service_use
 -- description: Which clients called which services, as requests and responses show.
 -- grain: one row per client and service
+-- when: staging.client_event
 SELECT DISTINCT c.client_event_id, s.service_event_id
 FROM (
     SELECT send_event_id AS client_end, take_event_id AS service_end FROM staging.request_pair
