@@ -44,8 +44,6 @@ def database_in_memory() -> duckdb.DuckDBPyConnection:
     con.execute("USE target")
     staging.attach(con, None)
     con.execute("SET threads = 1")
-    # It takes a tenth of the time of a large query, and would save little on few rows.
-    con.execute("SET disabled_optimizers = 'projection_pullup'")
     shut_in(con, lock=False)
     return con
 
