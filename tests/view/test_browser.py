@@ -93,7 +93,8 @@ def require_critical_path_of_the_query(page: Page, database: Path, run: int) -> 
             opened.query(
                 "critical-path", run=run,
                 **{"from": options["--from"], "to": options["--to"],
-                   "take": int(options["--take"]), "detail": options["--detail"]},
+                   "take": int(options["--take"]), "case": options["--case"],
+                   "detail": options["--detail"]},
             )
             .to_arrow()
             .to_pylist()
