@@ -76,7 +76,7 @@ export const partTitle = (name) => PARTS[name] ?? name.replaceAll("_", " ");
 export const PALE = new Set(["wait", "faint"]);
 export const PART_COLORS = {
   callback: "subscription", cache: "indirect", take_to_callback: "faint", stored: "stored", network_or_idle: "transport", undecided: "wait",
-  until_arrival: "transport", run_queue: "wait", executor: "process", executor_busy: "process", all_threads_busy: "process", blocked: "process", unpublished: "faint", timer: "timer", service: "service", rclcpp: "publication",
+  until_arrival: "transport", run_queue: "runnable", executor: "process", executor_busy: "process", all_threads_busy: "process", blocked: "process", unpublished: "faint", timer: "timer", service: "service", rclcpp: "publication",
   rcl: "publication", rmw: "publication", dds: "publication", intra: "publication", publish: "publication", take: "take",
 };
 
