@@ -12,7 +12,9 @@
 --     message arrived either, so that time is three parts, with the bounds of waits:
 --     network_or_idle, executor_busy (with other callbacks), and undecided (one or the other).
 --     Executors were busy at least for executor_busy, at most for executor_busy and undecided
---     together. A part is negative if the next one began before it ended (overlaps), for example
+--     together. Where a kernel trace shows exactly when it arrived (main.arrival), the parts are
+--     until_arrival, run_queue (the thread was woken, and waited for a CPU) and executor instead.
+--     A part is negative if the next one began before it ended (overlaps), for example
 --     between hosts whose clocks are apart.
 -- grain: one row per path, hop, part, and callback that it belongs to
 -- param: from VARCHAR = NULL  Topics or nodes where flows start: globs, with commas between
@@ -30,7 +32,8 @@
 -- column: hop BIGINT               Number of the message on the path that it belongs or leads to
 -- column: part VARCHAR             'callback', 'cache', 'service', a layer of publishing
 --     ('intra', 'rclcpp', 'rcl', 'rmw', 'dds', or 'publish' where it is not known), 'stored',
---     'network_or_idle', 'undecided', 'executor_busy' or 'take_to_callback'
+--     'network_or_idle', 'undecided', 'executor_busy', or exactly 'until_arrival', 'run_queue',
+--     'executor'; 'take_to_callback'
 -- column: node VARCHAR [node]  Node that runs the callback, waits for it, or publishes
 -- column: what VARCHAR             The callback, or the topic of the message
 -- column: flows BIGINT             Flows with this part
@@ -69,22 +72,34 @@ FROM main.callback_instance AS i
 LEFT JOIN main.executor_wait AS w ON i.callback_instance_id = w.callback_instance_id
 WHERE list_contains($runs, i.run_id);
 
+CREATE OR REPLACE TEMP TABLE breakdown_arrival AS
+SELECT h.flow_id, h.hop, a.run_queue_ns, a.executor_ns
+FROM breakdown_trail AS h
+JOIN main.arrival AS a ON h.take_id = a.take_id
+WHERE a.is_exact AND a.executor_ns IS NOT NULL;
+
 -- Between clocks that are apart the time that they show may be shorter than the executor was busy.
 WITH piece AS (
     SELECT
-        path_id, flow_id, hop, rank, part, duration_ns, callback_id, is_turning,
-        least(coalesce(busy_min_ns, 0), greatest(duration_ns, 0)) AS busy_min_ns,
-        least(coalesce(busy_max_ns, duration_ns), greatest(duration_ns, 0)) AS busy_max_ns,
+        p.path_id, p.flow_id, p.hop, p.rank, p.part, p.duration_ns, p.callback_id, p.is_turning,
+        least(coalesce(p.busy_min_ns, 0), greatest(p.duration_ns, 0)) AS busy_min_ns,
+        least(coalesce(p.busy_max_ns, p.duration_ns), greatest(p.duration_ns, 0)) AS busy_max_ns,
+        a.run_queue_ns,
+        a.executor_ns,
         -- The time up to a take is three parts, all others are one.
         unnest(
-            CASE WHEN part IN ('publish_to_take', 'request_to_take')
-                THEN ['network_or_idle', 'undecided', 'executor_busy']
-            ELSE [part]
+            CASE
+                WHEN a.executor_ns IS NOT NULL THEN ['until_arrival', 'run_queue', 'executor']
+                WHEN p.part IN ('publish_to_take', 'request_to_take')
+                    THEN ['network_or_idle', 'undecided', 'executor_busy']
+                ELSE [p.part]
             END
         ) AS piece
     FROM main.end_to_end_piece_explained(
         'breakdown_flow', 'breakdown_trail', 'breakdown_callback', $runs
-    )
+    ) AS p
+    LEFT JOIN breakdown_arrival AS a
+        ON p.flow_id = a.flow_id AND p.hop = a.hop AND p.part = 'publish_to_take'
 ),
 part AS (
     SELECT
@@ -93,10 +108,15 @@ part AS (
             WHEN 'network_or_idle' THEN duration_ns - greatest(busy_max_ns, busy_min_ns)
             WHEN 'undecided' THEN greatest(busy_max_ns - busy_min_ns, 0)
             WHEN 'executor_busy' THEN busy_min_ns
+            WHEN 'until_arrival' THEN duration_ns - run_queue_ns - executor_ns
+            WHEN 'run_queue' THEN run_queue_ns
+            WHEN 'executor' THEN executor_ns
             ELSE duration_ns
         END AS duration_ns,
-        CASE WHEN piece <> 'network_or_idle' OR part = 'request_to_take' THEN callback_id END
-            AS callback_id
+        CASE
+            WHEN piece NOT IN ('network_or_idle', 'until_arrival') OR part = 'request_to_take'
+                THEN callback_id
+        END AS callback_id
     FROM piece
 ),
 measured AS (
@@ -153,5 +173,12 @@ LEFT JOIN main.node AS n ON b.node_id = n.node_id
 LEFT JOIN main.callback_label AS l ON m.callback_id = l.callback_id
 ORDER BY
     p.run_id, p.path, m.path_id, m.hop, m.rank,
-    list_position(['stored', 'network_or_idle', 'undecided', 'executor_busy'], m.part), m.part,
+    list_position(
+        [
+            'stored', 'until_arrival', 'run_queue', 'executor', 'network_or_idle', 'undecided',
+            'executor_busy'
+        ],
+        m.part
+    ),
+    m.part,
     m.callback_id

@@ -28,6 +28,9 @@ from msgflow.sql.interrupt import noted_interrupts
 if TYPE_CHECKING:
     from msgflow.ingest import IngestReport
 
+ARCHIVES_SHOWN = 3
+"""Most archives that a note names."""
+
 
 def command(
     traces: Annotated[
@@ -146,7 +149,23 @@ def command(
                 for warning in report.warnings:
                     print_note(warning)
             if not quiet:
+                _note_archives(traces, database)
                 _print_next(report, database)
+
+
+def _note_archives(traces: list[str], database: Path) -> None:
+    """Say which archives below the given directories were not read, and how to name them."""
+    from msgflow.cli.output import count, print_note
+    from msgflow.trace.discovery import archives_below
+
+    archives = [str(path) for path in archives_below(traces)]
+    if archives:
+        verb = "was" if len(archives) == 1 else "were"
+        words = ["msgflow", "ingest", *traces, *archives[:ARCHIVES_SHOWN], "--replace"]
+        print_note(
+            f"{count(len(archives), 'archive')} beside the traces {verb} not read; to read what is"
+            f" of the same recording: {shlex.join([*words, *_database_option(database)])}"
+        )
 
 
 def _require_no_word_for_one(count: int, name: str | None, keep_staging: Path | None) -> None:
@@ -183,10 +202,12 @@ def _print_next(report: IngestReport, database: Path) -> None:
     from msgflow.cli.output import print_status
     from msgflow.db.finding import next_command
 
-    words = next_command(report.findings).split()
-    if database != DEFAULT_DATABASE:
-        words += ["--db", str(database)]
+    words = [*next_command(report.findings).split(), *_database_option(database)]
     print_status(f"next: {shlex.join(words)}")
+
+
+def _database_option(database: Path) -> list[str]:
+    return [] if database == DEFAULT_DATABASE else ["--db", str(database)]
 
 
 def _hosts(texts: list[str]) -> dict[str, list[str]]:

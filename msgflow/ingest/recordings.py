@@ -1,9 +1,9 @@
 """Recordings among the traces below some paths: which of them become one run.
 
-Traces of one session belong together. So do sessions with a trace in common (the chunks of a
-rotation, snapshots), and sessions whose times overlap: their hosts may have sent each other
-messages. A session that records no initialisation belongs to the one before it that does (dual
-sessions).
+Traces of one session belong together, also those of an archive in its folder. So do sessions with a
+trace in common (the chunks of a rotation, snapshots), and sessions whose times overlap: their hosts
+may have sent each other messages. A session that records no initialisation belongs to the one
+before it that does (dual sessions).
 """
 
 from __future__ import annotations
@@ -79,13 +79,23 @@ def find_recordings(
         traces = opened.traces
     named = hostnames_of(traces, hosts)
     sessions: dict[Path, list[TraceInfo]] = {}
+    folders = {session_folder(trace.path) for trace in traces}
     for trace in traces:
-        above = (file for file in archives if trace.path.is_relative_to(file))
-        sessions.setdefault(next(above, session_folder(trace.path)), []).append(trace)
+        file = _archive_of(trace, archives)
+        folder = session_folder(file.parent if file else trace.path)
+        # An archive in the folder of a session is a part of it, and else a session of its own.
+        session = file if file and folder not in folders else folder
+        sessions.setdefault(session, []).append(trace)
     groups = _by_initialisation(_by_time(_by_trace(list(sessions.values()))))
     if len(groups) == 1:
         return whole
-    return [Recording(_paths(group, traces, roots), _hosts(group, named)) for group in groups]
+    return [
+        Recording(_paths(group, traces, roots, archives), _hosts(group, named)) for group in groups
+    ]
+
+
+def _archive_of(trace: TraceInfo, archives: Sequence[Path]) -> Path | None:
+    return next((file for file in archives if trace.path.is_relative_to(file)), None)
 
 
 def _by_trace(groups: Sequence[list[TraceInfo]]) -> list[list[TraceInfo]]:
@@ -108,7 +118,7 @@ def _by_time(groups: Sequence[list[TraceInfo]]) -> list[list[TraceInfo]]:
             joined[-1] += group
         else:
             joined.append(list(group))
-        latest = max(latest, *(trace.end_ns or 0 for trace in group))
+        latest = max(latest, *(trace.end_ns or 0 for trace in _timed(group)))
     return joined
 
 
@@ -138,14 +148,22 @@ def _records_initialisation(group: Sequence[TraceInfo]) -> bool:
 
 
 def _begin(group: Sequence[TraceInfo]) -> int:
-    begins = [trace.begin_ns for trace in group if trace.begin_ns is not None]
+    begins = [trace.begin_ns for trace in _timed(group) if trace.begin_ns is not None]
     return min(begins, default=0)
 
 
+def _timed(group: Sequence[TraceInfo]) -> Sequence[TraceInfo]:
+    """Return the traces whose times tell when a group was recorded: perf counts from the boot."""
+    return [trace for trace in group if trace.domain == "ust"] or group
+
+
 def _paths(
-    group: Sequence[TraceInfo], traces: Sequence[TraceInfo], roots: Collection[Path]
+    group: Sequence[TraceInfo],
+    traces: Sequence[TraceInfo],
+    roots: Collection[Path],
+    archives: Sequence[Path],
 ) -> tuple[Path, ...]:
-    """Return the highest folders below the given ones that hold no other group.
+    """Return the archives of a group, and the highest given folders that hold no other group.
 
     A link in a given folder may lead out of it: then there is no such folder but that of the trace.
     """
@@ -159,7 +177,9 @@ def _paths(
     def highest(folder: Path) -> Path:
         return next((above for above in reversed(folder.parents) if is_own(above)), folder)
 
-    return tuple(dict.fromkeys(highest(trace.path) for trace in group))
+    return tuple(
+        dict.fromkeys(_archive_of(trace, archives) or highest(trace.path) for trace in group)
+    )
 
 
 def _hosts(group: Sequence[TraceInfo], named: Mapping[int, str]) -> dict[str, list[Path]]:

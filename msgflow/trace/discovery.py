@@ -64,6 +64,26 @@ def discover(paths: Sequence[str | Path]) -> list[TraceLocation]:
     return locations
 
 
+def archives_below(paths: Sequence[str | Path]) -> list[Path]:
+    """List the archives below the directories among `paths` that are not given, sorted by path.
+
+    `discover` finds no trace in them: an archive is read only if it is named.
+
+    Raises:
+        TraceError: a directory cannot be read.
+    """
+    given = {Path(os.path.realpath(path)) for path in paths}
+    found = {
+        directory / name
+        for path in map(Path, paths)
+        if path.is_dir()
+        for directory, files in _directories(path)
+        for name in files
+        if is_archive(directory / name)
+    }
+    return sorted(found - given)
+
+
 def stream_files(directory: Path) -> list[Path]:
     """List the files of a trace directory that hold events, sorted by name."""
     return sorted(
@@ -110,6 +130,15 @@ def _check_exists(path: Path) -> None:
 
 def _directories_with_metadata(root: Path, strays: list[Path]) -> Iterator[Path]:
     """Yield the traces below a directory; add streams that have no metadata to `strays`."""
+    for directory, files in _directories(root):
+        if metadata_frame.FILE_NAME in files:
+            yield directory
+        else:
+            strays += _first_stream(directory, files)
+
+
+def _directories(root: Path) -> Iterator[tuple[Path, list[str]]]:
+    """Yield a directory and all below it, each once, with the names of their files."""
     visited: set[Path] = set()
 
     def fail(error: OSError) -> None:
@@ -125,10 +154,7 @@ def _directories_with_metadata(root: Path, strays: list[Path]) -> Iterator[Path]
             continue
         visited.add(resolved)
         names.sort()
-        if metadata_frame.FILE_NAME in files:
-            yield resolved
-        else:
-            strays += _first_stream(resolved, files)
+        yield resolved, files
 
 
 def _first_stream(directory: Path, names: Sequence[str]) -> list[Path]:

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 
 Row = dict[str, Any]
 QUERIES = (
-    "e2e-latency", "timers", "topics-rate", "topics-delivery", "service-latency", "action-latency",
+    "e2e-latency", "timers", "callback-schedule", "topics-rate", "topics-delivery",
+    "service-latency", "action-latency", "wakeup-latency",
 )  # fmt: skip
 # Of a good run nearly all messages are delivered.
 _DELIVERED_PERCENT = 99
@@ -43,9 +44,11 @@ def suggest_targets(run: Run, results: Mapping[str, Sequence[Row]], margin: floa
     entries = [
         *_paths(results["e2e-latency"], margin),
         *_timers(results["timers"], margin),
+        *_callbacks(results["callback-schedule"], margin),
         *_topics(results["topics-rate"]),
         *_calls(results["service-latency"], "service", "round_trip", "round_trip", margin),
         *_calls(results["action-latency"], "action", "goal", "result", margin),
+        *_processes(results["wakeup-latency"], margin),
     ]
     lines = [
         f"# What run {json.dumps(run.name)} met, and {100 * margin:.4g} % more: review it, keep"
@@ -113,6 +116,32 @@ def _timers(rows: Sequence[Row], margin: float) -> Iterator[Entry]:
             name = json.dumps(_literal(node), ensure_ascii=False)
             label = json.dumps(_literal(callback), ensure_ascii=False)
             yield "timer", f"{name}\n    callback: {label}", requirements
+
+
+def _callbacks(rows: Sequence[Row], margin: float) -> Iterator[Entry]:
+    """Yield a target of the CPU time per callback; there are none without a kernel trace."""
+    for (node, callback), group in _grouped(rows, "node", "callback"):
+        known = [row for row in group if row["total_ns"]]
+        if not node.startswith("/") or any(row["count"] < LEAST_VALUES for row in group):
+            continue
+        slow = max(row["running_p99_ns"] for row in group)
+        lost = max((row["preempted_ns"] / row["total_ns"] for row in known), default=0)
+        label = json.dumps(_literal(callback), ensure_ascii=False)
+        name = json.dumps(_literal(node), ensure_ascii=False)
+        requirements = {"cpu": f"p99 < {_time(slow, margin)}"}
+        most = math.floor(100 * lost * (1 + margin)) + 1
+        if most < 100:
+            requirements["preempted"] = f"< {most} %"
+        yield "callback", f"{label}\n    node: {name}", requirements
+
+
+def _processes(rows: Sequence[Row], margin: float) -> Iterator[Entry]:
+    """Yield a target per process, which all its threads have to meet: the wait for a CPU."""
+    for (process,), group in _grouped(rows, "process"):
+        if process and any(row["count"] >= LEAST_VALUES for row in group):
+            slow = max(row["p99_ns"] for row in group)
+            name = json.dumps(_literal(process), ensure_ascii=False)
+            yield "process", name, {"wakeup": f"p99 < {_time(slow, margin)}"}
 
 
 def _topics(rows: Sequence[Row]) -> Iterator[Entry]:

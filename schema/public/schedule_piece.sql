@@ -110,7 +110,9 @@ SELECT
     coalesce(t.wakers, 0) AS wakers,
     coalesce(t.thread_id, p.thread_id) AS thread_id,
     coalesce(
-        t.state, CASE WHEN p.thread_id IN (SELECT thread_id FROM state) THEN 'unknown' END
+        t.state,
+        -- Also of a thread whose states are all at other times.
+        CASE WHEN p.thread_id IN (SELECT thread_id FROM store.thread_state) THEN 'unknown' END
     ) AS state,
     t.priority,
     t.by_kind,

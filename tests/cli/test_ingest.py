@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import tarfile
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+from ctf_writer import Event, Packet, TraceContent, write_trace
 from thorough import thorough
 from typer.testing import Result
 
@@ -45,6 +47,36 @@ def test_two_commands_lead_to_the_answer_and_a_trace_is_ingested_once(
     runs = json.loads(msgflow("query", "info", "--run", "all", "--format", "json").stdout)
     assert [run["name"] for run in runs] == ["first"]
     assert "first" in msgflow("info").stdout
+
+
+def test_an_archive_beside_the_traces_is_named_and_read_as_the_note_says(
+    msgflow: Msgflow, tmp_path: Path
+) -> None:
+    session = simulate("pipeline", tmp_path / "robot", factor=0.03).directory / "alpha"
+    events = {"sched_switch": {"prev_tid": "i32"}}
+    packet = Packet([Event(1, "sched_switch", (7,))])
+    write_trace(
+        tmp_path / "kernel",
+        TraceContent(events, {0: [packet]}, environment={"hostname": "robot", "domain": "kernel"}),
+    )
+    archive = session / "kernel.tar.xz"
+    with tarfile.open(archive, "w:xz") as file:
+        file.add(tmp_path / "kernel", "kernel")
+    database = tmp_path / "x.duckdb"
+    note = msgflow("ingest", session, "--db", database).stderr.splitlines()[-2]
+    command = f"msgflow ingest {session} {archive} --replace --db {database}"
+    assert note == (
+        "note: 1 archive beside the traces was not read; to read what is of the same recording: "
+        + command
+    )
+    assert "archive" not in msgflow("ingest", session, "--replace", "--quiet").stderr
+    again = msgflow(*command.split()[1:])
+    assert again.exit_code == 0, again.stderr
+    query = ("SELECT domain FROM trace ORDER BY 1", "--format", "csv", "--db", database)
+    assert msgflow("sql", *query).stdout.split() == ['"domain"', '"kernel"', '"ust"']
+    assert "archive beside" not in again.stderr
+    # Its times are others, but it lies in the folder of the session.
+    assert "recordings" not in again.stderr
 
 
 def test_events_of_ones_own_are_loaded_on_request(msgflow: Msgflow, tmp_path: Path) -> None:

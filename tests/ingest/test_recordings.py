@@ -13,6 +13,7 @@ from msgflow.ingest.recordings import find_recordings
 
 _INIT = "ros2:rcl_node_init"
 _WORK = "ros2:callback_start"
+_OF_ROS = {_INIT, _WORK}
 
 
 def _record(
@@ -24,6 +25,7 @@ def _record(
         TraceContent(
             events={event: {"x": "u64"}},
             streams={0: [Packet([Event(time, event, (1,)) for time in (begin, end)])]},
+            environment={"hostname": "robot", "domain": "ust" if event in _OF_ROS else "kernel"},
             trace_uuid=uuid.UUID(int=trace) if trace else uuid.uuid4(),
             clock_uuid=uuid.UUID(int=clock),
         ),
@@ -103,6 +105,28 @@ def test_an_archive_is_a_session(tmp_path: Path) -> None:
             archive.add(tmp_path / name, name)
     assert _found(*files) == [[files[1]], [files[0]]]
     assert _found(files[0]) == [[files[0]]]
+
+
+def test_an_archive_in_the_folder_of_a_session_belongs_to_it(tmp_path: Path) -> None:
+    _record(tmp_path / "night/ust/uid/1000/64-bit", 500, 600)
+    _record(tmp_path / "day/ust/uid/1000/64-bit", 100, 200)
+    _record(tmp_path / "kernel", 10, 20, event="sched_switch", clock=2)
+    archive = tmp_path / "night/kernel.tar"
+    with tarfile.open(archive, "w") as file:
+        file.add(tmp_path / "kernel", "kernel")
+    assert _found(tmp_path / "night", archive) == [[tmp_path / "night", archive]]
+    # The folder alone does not have what is in the archive: both are named.
+    assert _found(tmp_path / "night", tmp_path / "day", archive) == [
+        [tmp_path / "day"],
+        [archive, tmp_path / "night"],
+    ]
+
+
+def test_times_of_kernel_traces_beside_those_of_ros_do_not_count(tmp_path: Path) -> None:
+    for name, begin in (("day", 100), ("night", 500)):
+        _record(tmp_path / name / "ust", begin, begin + 100)
+        _record(tmp_path / name / "kernel", 10, 900, event="sched_switch", clock=2)
+    assert _found(tmp_path) == [[tmp_path / "day"], [tmp_path / "night"]]
 
 
 def test_each_recording_has_its_hosts(tmp_path: Path) -> None:

@@ -36,13 +36,27 @@ def test_states_follow_from_switches_and_wakings(system: RosSystem, analyse: Ana
     assert model.rows("SELECT preemption_count, migration_count FROM callback_schedule") == [(1, 0)]
 
 
+def divided(model: Analysis, from_ns: int, to_ns: int) -> dict[str, int]:
+    return dict(
+        model.rows(
+            f"WITH part AS (SELECT 1 AS interval_id, 1 AS thread_id, {from_ns} AS from_ns, "
+            f"{to_ns} AS to_ns) SELECT state, sum(to_ns - from_ns) "
+            "FROM schedule_piece('part', [1], max_wakers := 0) GROUP BY state"
+        )
+    )
+
+
 def test_any_interval_of_a_thread_divides_as_callbacks_do(
     system: RosSystem, analyse: Analyse
 ) -> None:
     recorded(system)
     model = analyse(system)
-    assert model.rows("FROM thread_schedule(1, 1000, 2000)") == schedules(model)
-    assert model.rows("FROM thread_schedule(1, 0, 950)") == [(50, 0, 0, 0, 0, 900)]
+    assert divided(model, 1000, 2000) == {
+        "running": 500, "preempted": 200, "runnable": 100, "sleeping": 200,
+    }  # fmt: skip
+    assert schedules(model) == [(500, 200, 100, 200, 0, 0)]
+    assert divided(model, 0, 950) == {"running": 50, "unknown": 900}
+    assert divided(model, 0, 800) == {"unknown": 800}
 
 
 def test_who_took_the_cpu_and_who_woke(system: RosSystem, analyse: Analyse) -> None:

@@ -10,6 +10,7 @@ from ctf_writer import Event, Packet, TraceContent, write_trace
 import msgflow.trace
 from msgflow.errors import ExitCode, TraceError
 from msgflow.trace import discover
+from msgflow.trace.discovery import archives_below
 
 CONTENT = TraceContent(events={"ros2:x": {}}, streams={0: [Packet([Event(1, "ros2:x")])]})
 
@@ -185,6 +186,16 @@ def test_metadata_that_is_renamed(tmp_path: Path) -> None:
     assert damage.file == tmp_path / "a" / "channel_0"
     assert "`metadata`, which is missing or renamed" in damage.message
     fails([tmp_path / "a"], "a stream of a trace without its `metadata`", "^ls ")
+
+
+def test_archives_below_are_those_beside_traces_that_are_not_given(tmp_path: Path) -> None:
+    for name in ("a/ust", "b/ust"):
+        write_trace(tmp_path / name, CONTENT)
+    for name in ("a/kernel.tar.xz", "b/kernel.tgz", "b/truth.jsonl.gz"):
+        (tmp_path / name).touch()
+    assert archives_below([tmp_path]) == [tmp_path / "a/kernel.tar.xz", tmp_path / "b/kernel.tgz"]
+    assert archives_below([tmp_path / "a", tmp_path / "a/kernel.tar.xz"]) == []
+    assert archives_below([tmp_path / "a/kernel.tar.xz", tmp_path]) == [tmp_path / "b/kernel.tgz"]
 
 
 def test_directories_in_a_circle(tmp_path: Path) -> None:

@@ -258,6 +258,29 @@ def test_a_run_meets_what_is_suggested_from_it(name: str, tmp_path: Path) -> Non
     }[name] <= kinds  # fmt: skip
 
 
+def test_a_run_with_a_kernel_trace_meets_what_is_suggested_from_it(
+    traced: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    targets = tmp_path / "targets.yaml"
+    with Database(traced) as database:
+        assert "preempted" not in database.suggest_targets()  # Of so few values.
+        monkeypatch.setattr("msgflow.verify.suggestion.LEAST_VALUES", 1)
+        for margin in (0.2, 0):
+            targets.write_text(database.suggest_targets(margin=margin), encoding="utf-8")
+            found = rows(database.verify(targets))
+            assert {"cpu", "preempted", "wakeup"} <= {row["metric"] for row in found}
+            assert {row["verdict"] for row in found} == {"passed"}
+    assert (
+        '  - callback: "Timer(5 ms)"\n    node: "/planner"\n    cpu: "p99 < 190 ns"\n'
+        '    preempted: "< 24 %"\n'
+    ) in targets.read_text("utf-8")
+    with Database(traced) as database:
+        # Twice 60 % is no limit.
+        assert 'preempted: "< 61 %"' in database.suggest_targets(margin=0)
+        goal = database.suggest_targets(margin=1).split('"Subscription(/goal)"')[1]
+    assert "preempted" not in goal.split("  - ")[0]
+
+
 def test_a_negative_margin_is_refused(system: Path) -> None:
     with Database(system) as database, pytest.raises(UsageError, match="0 or more"):
         database.suggest_targets(margin=-0.1)

@@ -66,7 +66,8 @@ const TITLES = {
 // Parts of a latency, as path-breakdown names them.
 const PARTS = {
   network_or_idle: "network, or executor idle", executor_busy: "executor busy with others",
-  undecided: "undecided: network or busy executor", take_to_callback: "take to callback",
+  undecided: "undecided: network or busy executor", until_arrival: "until the message arrived", run_queue: "woken, waiting for a CPU",
+  take_to_callback: "take to callback",
   all_threads_busy: "all threads of the executor busy", blocked: "blocked by another callback", unpublished: "waiting for a message not published yet",
   timer: "waiting for the timer", cache: "in a cache", stored: "stored until the subscription existed",
 };
@@ -75,7 +76,7 @@ export const partTitle = (name) => PARTS[name] ?? name.replaceAll("_", " ");
 export const PALE = new Set(["wait", "faint"]);
 export const PART_COLORS = {
   callback: "subscription", cache: "indirect", take_to_callback: "faint", stored: "stored", network_or_idle: "transport", undecided: "wait",
-  executor_busy: "process", all_threads_busy: "process", blocked: "process", unpublished: "faint", timer: "timer", service: "service", rclcpp: "publication",
+  until_arrival: "transport", run_queue: "runnable", executor: "process", executor_busy: "process", all_threads_busy: "process", blocked: "process", unpublished: "faint", timer: "timer", service: "service", rclcpp: "publication",
   rcl: "publication", rmw: "publication", dds: "publication", intra: "publication", publish: "publication", take: "take",
 };
 

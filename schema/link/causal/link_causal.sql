@@ -3,7 +3,9 @@
 -- description: What led to each publication, by every kind of link. A link may be spoilt by lost
 --     events where a gap touches its callback instance, or its take, or its publication. In a
 --     process that is several with equal ids, the cause may be one of another process. What may be
---     no answer to the message before it has one candidate more: nothing. Files of links may
+--     no answer to the message before it has one candidate more: nothing. So has what a thread
+--     published after it slept since the take, where a kernel trace shows it: it probably waited
+--     for something else in between. Files of links may
 --     declare that a publisher answers a subscription (`direct`), or that it does not
 --     (`independent`): then there is no doubt, or no link.
 -- grain: one row per callback instance, or take without one, and publication that it led to, and
@@ -20,9 +22,24 @@ WITH declared AS MATERIALIZED (
 adjacent AS MATERIALIZED (
     FROM derive.link_causal_take_adjacent(only_run)
 ),
+-- A thread that waits begins a new turn: the last sleep before the publication tells.
+slept AS (
+    SELECT a.publication_id
+    FROM adjacent AS a
+    ASOF JOIN (
+        SELECT thread_id, start_ns, end_ns
+        FROM store.thread_state
+        WHERE run_id = only_run AND state = 'sleeping'
+    ) AS s ON a.thread_id = s.thread_id AND a.start_ns >= s.end_ns
+    WHERE s.start_ns >= a.taken_ns
+),
 doubtful AS (
     SELECT l.publication_id
-    FROM derive.answer_doubtful(only_run, 'adjacent') AS l
+    FROM (
+        SELECT publication_id FROM derive.answer_doubtful(only_run, 'adjacent')
+        UNION
+        SELECT publication_id FROM slept
+    ) AS l
     JOIN adjacent AS a ON l.publication_id = a.publication_id
     ANTI JOIN (SELECT subscription_id, publisher_id FROM declared WHERE kind = 'direct') AS d
         ON a.subscription_id = d.subscription_id AND a.publisher_id = d.publisher_id
