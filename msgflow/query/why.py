@@ -31,7 +31,9 @@ _BY_NODE = {
     "service": ("service-latency",),
 }
 _BY_STATE = {"preempted": "preemption", "runnable": "wakeup-latency"}
-_BY_TOPIC = {"network_or_idle": ("topics", "--measure", "latency")}
+_BY_TOPIC = dict.fromkeys(("network_or_idle", "undecided"), ("topics", "--measure", "latency"))
+# Queries with rows of callbacks: none of what a node without traced callbacks did.
+_OF_CALLBACKS = ("callbacks", "waits")
 
 
 @dataclass(frozen=True)
@@ -213,7 +215,11 @@ def _steps(pieces: Sequence[dict[str, Any]], losses: QueryResult) -> Iterator[tu
     if of_state := _BY_STATE.get(longest["state"] or ""):
         yield ("query", of_state)
     # What the trace has no name for cannot be asked for.
-    elif longest["node"] is not None and (of_node := _BY_NODE.get(longest["activity"])):
+    elif (
+        longest["node"] is not None
+        and (of_node := _BY_NODE.get(longest["activity"]))
+        and (longest["callback_instance_id"] is not None or of_node[0] not in _OF_CALLBACKS)
+    ):
         yield ("query", *of_node, "--node", longest["node"])
     elif longest["what"] is not None and (of_topic := _BY_TOPIC.get(longest["activity"])):
         yield ("query", *of_topic, "--topic", longest["what"])
