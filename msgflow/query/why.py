@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
@@ -84,12 +86,7 @@ def explain(ask: Ask, run: Run, place: str | None) -> Explanation:
     flow = ask("critical-path", **ends)
     pieces = flow.table.to_pylist()
     if not pieces:
-        raise UsageError(
-            "no flow arrives at the end of a path"
-            if place is None
-            else f"no flow arrives — {place}",
-            "msgflow check says where flows break off",
-        )
+        raise _nothing(ask, place)
     path = pieces[0]["path"]
     places = path.split(" → ")
     paths = ask("e2e-latency", **ends)
@@ -119,6 +116,24 @@ def explain(ask: Ask, run: Run, place: str | None) -> Explanation:
             dict.fromkeys([*_preempted(pieces), *_unexplained(pieces), *paths.notes, *flow.notes])
         ),
     )
+
+
+def _nothing(ask: Ask, place: str | None) -> UsageError:
+    """Return what to say where no flow ends at a place: flows may begin there or pass."""
+    if place is None:
+        message = "no flow arrives at the end of a path"
+    elif any(
+        fnmatchcase(step.strip("()"), place)
+        for row in ask("e2e-latency").table.to_pylist()
+        for step in row["path"].split(" → ")
+    ):
+        return UsageError(
+            f"flows begin there or pass, none ends — {place}",
+            shlex.join(["msgflow", "query", "e2e-latency", "--via", place]),
+        )
+    else:
+        message = f"no flow arrives — {place}"
+    return UsageError(message, "msgflow check says where flows break off")
 
 
 def _preempted(pieces: Sequence[dict[str, Any]]) -> Iterator[str]:

@@ -164,6 +164,14 @@ def test_formats(msgflow: Msgflow, demo: Path) -> None:
     assert msgflow("why", "--format", "markdown").stdout.startswith("## Paths\n\n|")
 
 
+def test_a_place_where_flows_only_begin_or_pass(msgflow: Msgflow, untraced: Path) -> None:
+    refused = msgflow("why", "/sour*")
+    assert refused.exit_code == 2
+    assert "error: flows begin there or pass, none ends — /sour*\n" in refused.stderr
+    hint = refused.stderr.partition("hint: msgflow ")[2]
+    assert msgflow(*shlex.split(hint)).stdout.count("/source → /scan") == 1
+
+
 def test_a_place_where_no_flow_arrives(msgflow: Msgflow, small_database: Path) -> None:
     result = msgflow("why", "/chatter", "--db", small_database)
     assert result.exit_code == 2
