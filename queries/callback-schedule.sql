@@ -30,6 +30,7 @@
 -- column: is_internal BOOLEAN       Infrastructure of ROS
 -- brief: node, callback, count, median_ns, running_median_ns, running_p99_ns, preempted_ns,
 --     sleeping_ns, runnable_ns, preemptions, max_ns
+-- note: kernel
 WITH measured AS (
     SELECT
         i.run_id,

@@ -17,6 +17,7 @@
 -- column: cpus BIGINT               CPUs that it ran on
 -- column: thread_id BIGINT          Identity of the thread
 -- brief: process, thread, tid, share, running_ns, most_share, cpus, pid, host
+-- note: kernel
 WITH chosen AS (
     SELECT *
     FROM main.cpu_usage

@@ -96,7 +96,30 @@ FROM main.end_to_end_part(
         THEN (SELECT coalesce(list(path_id), []) FROM path) END
 );
 
-WITH piece AS (
+WITH untraced AS (
+    -- What a thread did without a traced callback led to the message that comes next, unless it
+    -- called a service.
+    SELECT
+        *,
+        CASE
+            WHEN part <> 'callback' OR callback_instance_id IS NOT NULL THEN publication_id
+            ELSE first_value(
+                CASE WHEN part <> 'callback' THEN coalesce(publication_id, -1) END IGNORE NULLS
+            ) OVER (
+                PARTITION BY flow_rank ORDER BY position
+                ROWS BETWEEN CURRENT ROW AND UNBOUNDED FOLLOWING
+            )
+        END AS message_id
+    FROM main.critical_piece('critical_part', $runs)
+),
+named AS (
+    SELECT path_id, path, subscriptions
+    FROM main.flow_path(
+        $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths, only_paths := true
+    )
+    WHERE path_id IN (SELECT path_id FROM critical_part)
+),
+piece AS (
     SELECT
         c.run_id,
         c.flow_rank,
@@ -109,8 +132,9 @@ WITH piece AS (
         c.activity,
         coalesce(l.node, main.node_label(n.full_name, r.name, r.pid), o.node) AS node,
         CASE
+            WHEN c.activity = 'callback' THEN coalesce(l.label, p.topic_name)
             WHEN c.activity IN (
-                'callback', 'cache', 'take_to_callback', 'service', 'executor_busy',
+                'cache', 'take_to_callback', 'service', 'executor_busy',
                 'all_threads_busy', 'blocked', 'timer'
             ) OR c.part = 'request_to_take' THEN l.label
             ELSE coalesce(p.topic_name, '?')
@@ -134,7 +158,8 @@ WITH piece AS (
         c.by_priority AS who_priority,
         $detail = 'short' AND c.activity IN ('intra', 'rclcpp', 'rcl', 'rmw', 'dds')
             AND c.part = c.activity AS is_layer
-    FROM main.critical_piece('critical_part', $runs) AS c
+    FROM untraced AS c
+    LEFT JOIN named AS w ON c.path_id = w.path_id
     LEFT JOIN main.thread AS t ON c.state_thread_id = t.thread_id
     -- Where no callback is traced, the only node of the process that did it.
     LEFT JOIN (
@@ -148,10 +173,14 @@ WITH piece AS (
     LEFT JOIN main.other_thread AS bo ON c.by_other_thread_id = bo.other_thread_id
     LEFT JOIN main.callback_instance AS i ON c.callback_instance_id = i.callback_instance_id
     LEFT JOIN main.callback_label AS l ON i.callback_id = l.callback_id
-    LEFT JOIN main.publication AS b ON c.publication_id = b.publication_id
+    LEFT JOIN main.publication AS b ON c.message_id = b.publication_id
     LEFT JOIN main.publisher AS p ON b.publisher_id = p.publisher_id
-    LEFT JOIN main.process AS r ON b.process_id = r.process_id
-    LEFT JOIN main.node AS n ON p.node_id = n.node_id
+    -- Who waits for a message is the node that takes it, with a traced callback or without.
+    LEFT JOIN main.subscription AS s
+        ON c.part = 'publish_to_take' AND w.subscriptions[c.hop] = s.subscription_id
+    LEFT JOIN main.process AS r ON coalesce(s.process_id, b.process_id) = r.process_id
+    LEFT JOIN main.node AS n ON CASE WHEN s.subscription_id IS NULL THEN p.node_id ELSE s.node_id
+        END = n.node_id
 ),
 -- The layers of one publication follow each other. States of a callback alternate.
 folded AS (
@@ -239,13 +268,6 @@ ordered AS (
                 row_key
         ) AS place
     FROM summed
-),
-named AS (
-    SELECT path_id, path
-    FROM main.flow_path(
-        $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths, only_paths := true
-    )
-    WHERE path_id IN (SELECT path_id FROM summed)
 )
 SELECT
     s.run_id,

@@ -34,7 +34,8 @@
 --     ('intra', 'rclcpp', 'rcl', 'rmw', 'dds', or 'publish' where it is not known), 'stored',
 --     'network_or_idle', 'undecided', 'executor_busy', or exactly 'until_arrival', 'run_queue',
 --     'executor'; 'take_to_callback'
--- column: node VARCHAR [node]  Node that runs the callback, waits for it, or publishes
+-- column: node VARCHAR [node]  Node that runs the callback, waits for it or for the
+--     message, or publishes
 -- column: what VARCHAR             The callback, or the topic of the message
 -- column: flows BIGINT             Flows with this part
 -- column: overlaps BIGINT          Flows in which it is negative
@@ -116,7 +117,11 @@ part AS (
         CASE
             WHEN piece NOT IN ('network_or_idle', 'until_arrival') OR part = 'request_to_take'
                 THEN callback_id
-        END AS callback_id
+        END AS callback_id,
+        -- Where no callback is traced, the node that took the message is known all the same.
+        callback_id IS NULL
+            AND part = 'publish_to_take'
+            AND piece NOT IN ('network_or_idle', 'until_arrival') AS is_of_reader
     FROM piece
 ),
 measured AS (
@@ -125,6 +130,7 @@ measured AS (
         hop,
         part,
         callback_id,
+        is_of_reader,
         min(rank) AS rank,
         -- DISTINCT would tell all flows apart, not only these: that takes most of the memory.
         count(*) FILTER (WHERE NOT is_turning)
@@ -135,14 +141,15 @@ measured AS (
         max(duration_ns) AS max_ns,
         sum(duration_ns)::BIGINT AS total_ns
     FROM part
-    GROUP BY path_id, hop, part, callback_id
+    GROUP BY path_id, hop, part, callback_id, is_of_reader
 ),
 message AS (
     SELECT
         p.run_id, p.path_id, p.path,
         unnest(range(1, len(p.topics) + 1)) AS hop,
         unnest(p.topics) AS topic_name,
-        unnest(p.publishers) AS publisher_id
+        unnest(p.publishers) AS publisher_id,
+        unnest(p.subscriptions) AS subscription_id
     FROM main.flow_path(
         $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths, only_paths := true
     ) AS p
@@ -168,8 +175,11 @@ FROM measured AS m
 JOIN message AS p ON m.path_id = p.path_id AND p.hop = 1
 LEFT JOIN message AS h ON m.path_id = h.path_id AND m.hop = h.hop
 LEFT JOIN main.publisher AS b ON h.publisher_id = b.publisher_id
-LEFT JOIN main.process AS r ON b.process_id = r.process_id
-LEFT JOIN main.node AS n ON b.node_id = n.node_id
+LEFT JOIN main.subscription AS s ON h.subscription_id = s.subscription_id
+LEFT JOIN main.process AS r
+    ON CASE WHEN m.is_of_reader THEN s.process_id ELSE b.process_id END = r.process_id
+LEFT JOIN main.node AS n
+    ON CASE WHEN m.is_of_reader THEN s.node_id ELSE b.node_id END = n.node_id
 LEFT JOIN main.callback_label AS l ON m.callback_id = l.callback_id
 ORDER BY
     p.run_id, p.path, m.path_id, m.hop, m.rank,

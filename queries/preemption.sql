@@ -22,6 +22,7 @@
 -- column: thread_id BIGINT          Identity of the thread that lost the CPU
 -- brief: process, thread, preempted_by, count, total_ns, max_ns, median_ns, priority,
 --     preempted_by_priority, tid, preempted_by_tid
+-- note: kernel
 WITH lost AS (
     SELECT
         run_id, thread_id, thread_priority AS priority,

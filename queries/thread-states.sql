@@ -23,6 +23,7 @@
 -- column: thread_id BIGINT          Identity of the thread
 -- brief: process, thread, tid, running_ns, preempted_ns, runnable_ns, sleeping_ns, preemptions,
 --     priority, uninterruptible_ns, pid, host
+-- note: kernel
 WITH state AS (
     SELECT
         run_id, thread_id, state, priority, is_loss_affected,

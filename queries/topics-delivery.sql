@@ -27,8 +27,8 @@
 -- column: orphan_reasons VARCHAR    Why publications are not known, with counts
 -- column: subscription_id BIGINT    Identity of the subscription
 -- column: is_internal BOOLEAN       ROS uses the topic for itself
--- brief: topic_name, subscriber, delivered, dropped, lost, reasons, unknown, delivered_percent,
---     lost_percent, published, not_connected, cut_by_recording, orphans, orphan_reasons
+-- brief: topic_name, subscriber, delivered, dropped, lost, reasons, not_connected, unknown,
+--     delivered_percent, lost_percent, published, cut_by_recording, orphans, orphan_reasons
 -- answer: delivered, dropped, lost, unknown
 WITH outcome AS (
     SELECT d.subscription_id, d.status, d.reason, count(*) AS number

@@ -19,6 +19,7 @@
 -- column: total_ns BIGINT [ns]      Sum of the waits
 -- column: thread_id BIGINT          Identity of the thread
 -- brief: process, thread, tid, count, median_ns, p99_ns, max_ns, priority, total_ns, host
+-- note: kernel
 WITH waited AS (
     SELECT
         run_id, thread_id, priority,

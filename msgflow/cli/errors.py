@@ -12,6 +12,8 @@ from msgflow.cli.output import discard_stdout, print_error
 from msgflow.errors import ExitCode, MsgflowError
 from msgflow.version import __version__
 
+# Results go to `-o FILE` everywhere. An ingest has none: it writes to the database.
+_OUTPUT = ("-o", "--output")
 _CANNOT_WRITE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)
 # What Python says of it, in a RuntimeError.
 _NO_THREAD = "can't start new thread"
@@ -65,6 +67,9 @@ def _usage(error: typer.TyperException) -> tuple[str, str | None]:
     hint = None if context is None else f"{context.command_path} --help"
     if suggestion:
         hint = f"did you mean {suggestion}"
+    is_output = getattr(error, "option_name", None) in _OUTPUT
+    if is_output and context is not None and context.command_path.endswith("msgflow ingest"):
+        hint = "--db FILE names the database"
     return message[:1].lower() + message[1:].rstrip("."), hint
 
 

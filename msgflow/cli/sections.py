@@ -74,8 +74,8 @@ def screen_sections(
         if position:
             yield ""
         yield section.upper()
-        # The line about columns stands in brackets.
-        shown = lay_out(result, width - 2)
+        # A line about columns that are not shown stands in brackets.
+        shown = lay_out(result, width if is_chosen else width - 2)
         yield from screen_lines(shown, width)
         said = () if shown.not_shown is None or is_chosen else (shown.not_shown,)
         notes = (*said, *shown.notes) if len(result) else ("none",)

@@ -177,9 +177,9 @@ def read_findings(
 
 
 def next_command(findings: Sequence[Finding]) -> str:
-    """Return the command that comes next: first for what is wrong, then for latencies."""
+    """Return the command that comes next: first for what is wrong, then for what is late."""
     is_sound = all(finding.severity == "info" for finding in findings)
-    return "msgflow query e2e-latency" if is_sound else "msgflow check"
+    return "msgflow why" if is_sound else "msgflow check"
 
 
 def broken_rules(con: duckdb.DuckDBPyConnection, run_id: int | None = None) -> list[Finding]:

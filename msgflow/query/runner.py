@@ -117,7 +117,14 @@ def run_query(
         notes += _beside(connection, runs, window)
     notes += missing
     narrowing = _narrowing(own, selection)
-    if runs and not has_rows and narrowing:
+    if (
+        runs
+        and not has_rows
+        and header.note == "kernel"
+        and not _kernel_was_traced(connection, runs)
+    ):
+        notes.append("the kernel was not traced: msgflow record --kernel, see docs/scheduling.md")
+    elif runs and not has_rows and narrowing:
         why = _missing_way(connection, runs, own) or "try with less"
         notes.append(f"nothing fits {' '.join(narrowing)}: {why}")
     if header.note == "clocks" and table.num_rows:
@@ -258,6 +265,14 @@ def _beside(
         return [nothing]
     ((first, last),) = seen
     return [f"{nothing}: it lasts {format_duration(last - first)}, from {format_epoch(first)}"]
+
+
+def _kernel_was_traced(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run]) -> bool:
+    ((known,),) = connection.execute(
+        "SELECT count(*) > 0 FROM main.thread_state WHERE list_contains($runs, run_id)",
+        {"runs": [run.run_id for run in runs]},
+    ).fetchall()
+    return bool(known)
 
 
 def _without_callbacks(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run]) -> list[str]:

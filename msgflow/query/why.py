@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
@@ -31,7 +33,9 @@ _BY_NODE = {
     "service": ("service-latency",),
 }
 _BY_STATE = {"preempted": "preemption", "runnable": "wakeup-latency"}
-_BY_TOPIC = {"network_or_idle": ("topics", "--measure", "latency")}
+_BY_TOPIC = dict.fromkeys(("network_or_idle", "undecided"), ("topics", "--measure", "latency"))
+# Queries with rows of callbacks: none of what a node without traced callbacks did.
+_OF_CALLBACKS = ("callbacks", "waits")
 
 
 @dataclass(frozen=True)
@@ -82,12 +86,7 @@ def explain(ask: Ask, run: Run, place: str | None) -> Explanation:
     flow = ask("critical-path", **ends)
     pieces = flow.table.to_pylist()
     if not pieces:
-        raise UsageError(
-            "no flow arrives at the end of a path"
-            if place is None
-            else f"no flow arrives — {place}",
-            "msgflow check says where flows break off",
-        )
+        raise _nothing(ask, place)
     path = pieces[0]["path"]
     places = path.split(" → ")
     paths = ask("e2e-latency", **ends)
@@ -117,6 +116,24 @@ def explain(ask: Ask, run: Run, place: str | None) -> Explanation:
             dict.fromkeys([*_preempted(pieces), *_unexplained(pieces), *paths.notes, *flow.notes])
         ),
     )
+
+
+def _nothing(ask: Ask, place: str | None) -> UsageError:
+    """Return what to say where no flow ends at a place: flows may begin there or pass."""
+    if place is None:
+        message = "no flow arrives at the end of a path"
+    elif any(
+        fnmatchcase(step.strip("()"), place)
+        for row in ask("e2e-latency").table.to_pylist()
+        for step in row["path"].split(" → ")
+    ):
+        return UsageError(
+            f"flows begin there or pass, none ends — {place}",
+            shlex.join(["msgflow", "query", "e2e-latency", "--via", place]),
+        )
+    else:
+        message = f"no flow arrives — {place}"
+    return UsageError(message, "msgflow check says where flows break off")
 
 
 def _preempted(pieces: Sequence[dict[str, Any]]) -> Iterator[str]:
@@ -213,7 +230,11 @@ def _steps(pieces: Sequence[dict[str, Any]], losses: QueryResult) -> Iterator[tu
     if of_state := _BY_STATE.get(longest["state"] or ""):
         yield ("query", of_state)
     # What the trace has no name for cannot be asked for.
-    elif longest["node"] is not None and (of_node := _BY_NODE.get(longest["activity"])):
+    elif (
+        longest["node"] is not None
+        and (of_node := _BY_NODE.get(longest["activity"]))
+        and (longest["callback_instance_id"] is not None or of_node[0] not in _OF_CALLBACKS)
+    ):
         yield ("query", *of_node, "--node", longest["node"])
     elif longest["what"] is not None and (of_topic := _BY_TOPIC.get(longest["activity"])):
         yield ("query", *of_topic, "--topic", longest["what"])

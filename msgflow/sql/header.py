@@ -20,6 +20,7 @@ The header ends at the first line that is not a `--` comment. Two spaces end a p
 
 - `note: clocks`: rows compare times of hosts, so the runner names clocks that differ.
 - `note: callbacks`: rows are made of callbacks, so the runner names processes that record none.
+- `note: kernel`: rows are made of the kernel's events, so the runner says where there are none.
 - `brief`: the columns that a narrow terminal shows, the most important first.
 - `answer`: columns that stay where they are 0 in all rows, since people ask for them.
 - `heading`: columns that stand above a table on a terminal, once for each value of the first one,
@@ -79,7 +80,7 @@ _SINGLE = (
     "brief", "answer", "heading", "slowest", "variant",
 )  # fmt: skip
 _KINDS = ("view", "inline", "macro")
-_NOTES = ("clocks", "callbacks")
+_NOTES = ("clocks", "callbacks", "kernel")
 
 
 class HeaderError(ValueError):
@@ -156,8 +157,8 @@ class Header:
         severity: severity of a finding, else None.
         cause: cause of a finding, else None.
         cure: remedy for a finding, else None.
-        note: 'clocks' where rows compare times of several hosts, 'callbacks' where they are made of
-            callbacks, else None.
+        note: 'clocks' where rows compare times of several hosts, 'callbacks' or 'kernel' where they
+            are made of callbacks or of the kernel's events, else None.
         body: the SQL below the header; of a query in steps, the statement that returns its rows.
         path: the file.
         brief: columns for where not all have a place, the most important first.

@@ -34,7 +34,8 @@ def test_two_commands_lead_to_the_answer_and_a_trace_is_ingested_once(
     assert ingested.exit_code == 0, ingested.stderr
     assert ingested.stdout == ""
     assert "read into msgflow.duckdb as run robot (1)" in ingested.stderr
-    answer = msgflow("query", "e2e-latency")
+    assert "next: msgflow why\n" in ingested.stderr
+    answer = msgflow("why")
     assert answer.exit_code == 0, answer.stderr
     assert "/topic_a" in answer.stdout
     assert "run: robot (1)" in answer.stderr
@@ -77,6 +78,19 @@ def test_an_archive_beside_the_traces_is_named_and_read_as_the_note_says(
     assert "archive beside" not in again.stderr
     # Its times are others, but it lies in the folder of the session.
     assert "recordings" not in again.stderr
+
+
+@pytest.mark.parametrize("option", ["-o", "--output"])
+def test_the_option_of_other_commands_for_a_file_names_that_for_the_database(
+    msgflow: Msgflow, option: str
+) -> None:
+    refused = msgflow("ingest", "trace", option, "robot.duckdb")
+    assert refused.exit_code == 2
+    assert f"error: no such option: {option}\n" in refused.stderr
+    assert "hint: --db FILE names the database\n" in refused.stderr
+    # Other mistakes are explained as anywhere else.
+    assert "ingest --help" in msgflow("ingest", "trace", "--outline").stderr
+    assert "fleet ingest --help" in msgflow("fleet", "ingest", "trace", option, "lake").stderr
 
 
 def test_events_of_ones_own_are_loaded_on_request(msgflow: Msgflow, tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 
 import duckdb
 import pytest
+from golden import SYSTEMS, fill_case
 from rich.cells import cell_len
 from typer.testing import Result
 
@@ -123,6 +124,36 @@ def test_it_fits_and_its_next_steps_run(
             assert again.stdout
 
 
+@pytest.fixture
+def untraced(empty_database: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A line of nodes two of which have no callbacks in the trace."""
+    path = tmp_path / "untraced.duckdb"
+    shutil.copyfile(empty_database, path)
+    with duckdb.connect(str(path)) as connection:
+        fill_case(connection, SYSTEMS / "untraced_callbacks.case")
+    monkeypatch.setenv("MSGFLOW_DB", str(path))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("taken_ns", "steps"),
+    [
+        # The message took longest, or what the node did: nothing says more of that.
+        (1450, ["query topics --measure latency --topic /scan", "flow --take 2 --why"]),
+        (1200, ["flow --take 2 --why"]),
+    ],
+)
+def test_callbacks_that_were_not_traced_are_not_asked_for(
+    msgflow: Msgflow, untraced: Path, taken_ns: int, steps: list[str]
+) -> None:
+    with duckdb.connect(str(untraced)) as connection:
+        connection.execute("UPDATE store.take SET taken_ns = ? WHERE take_id = 1", [taken_ns])
+    result = msgflow("why")
+    next_steps = [line for line in result.stderr.splitlines() if line.startswith("next:")]
+    assert next_steps == [f"next: msgflow {step} --db {untraced}" for step in steps]
+    assert "/source" not in result.stdout.partition("ITS SLOWEST FLOW")[2]
+
+
 def test_formats(msgflow: Msgflow, demo: Path) -> None:
     result = msgflow("why", "-o", "why.json")
     assert result.stdout == ""
@@ -131,6 +162,14 @@ def test_formats(msgflow: Msgflow, demo: Path) -> None:
     assert "median_ns" in found["paths"][0]
     assert "sink_event" in msgflow("why", "--wide").stdout
     assert msgflow("why", "--format", "markdown").stdout.startswith("## Paths\n\n|")
+
+
+def test_a_place_where_flows_only_begin_or_pass(msgflow: Msgflow, untraced: Path) -> None:
+    refused = msgflow("why", "/sour*")
+    assert refused.exit_code == 2
+    assert "error: flows begin there or pass, none ends — /sour*\n" in refused.stderr
+    hint = refused.stderr.partition("hint: msgflow ")[2]
+    assert msgflow(*shlex.split(hint)).stdout.count("/source → /scan") == 1
 
 
 def test_a_place_where_no_flow_arrives(msgflow: Msgflow, small_database: Path) -> None:

@@ -361,6 +361,21 @@ def test_processes_that_record_no_callbacks_are_named(
     assert not run_query(connection, header(QUERY), {}, Slice(run="first")).notes[1:]
 
 
+def test_an_empty_answer_about_the_kernel_says_whether_it_was_traced(
+    connection: duckdb.DuckDBPyConnection,
+) -> None:
+    connection.execute("CREATE TABLE thread_state AS SELECT 2 AS run_id")
+    noted = header(QUERY.replace("-- param", "-- note: kernel\n-- param"))
+
+    def notes(run: str, channel: str) -> list[str]:
+        return run_query(connection, noted, {"channel": channel}, Slice(run=run)).notes
+
+    missing = "the kernel was not traced: msgflow record --kernel, see docs/scheduling.md"
+    assert notes("first", "/nowhere") == [missing]
+    assert notes("second", "/nowhere") == []
+    assert missing not in notes("first", "/a")
+
+
 @pytest.mark.parametrize(
     ("uncertainty_ns", "bounds", "wrong_by"),
     [
