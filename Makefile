@@ -47,7 +47,7 @@ demo: $(VENV)/.installed
 	@echo '  msgflow query critical-path --to /filtered       what the slowest message waited for'
 	@echo '  msgflow flow /scan --at 2.5s                     one message: its causes and effects'
 	@echo '  msgflow query callbacks                          how long callbacks run, how often'
-	@echo '  msgflow sql "FROM callback_run LIMIT 10"         anything else'
+	@echo '  msgflow sql "FROM callback_run WHERE NOT is_internal LIMIT 10"         anything else'
 	@echo 'see it: $(BIN)/msgflow ui --db $(DEMO)/msgflow.duckdb'
 	@echo 'two hosts, simulated: $(BIN)/msgflow simulate demo -o $(DEMO)/two_hosts'
 
