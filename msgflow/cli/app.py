@@ -43,7 +43,7 @@ COMMANDS = {
     "links": "Declare indirect links: how nodes use messages they keep; without a command: list.",
     "suggest": "Write links, paths or requirements that a run shows, as a file to review.",
     "clocks": "Synchronise the clocks of several hosts; without a command: show.",
-    "bag": "Join the messages of a bag of the same run to their publications: size and stamp.",
+    "bag": "Join the messages of a bag to their publications: size, header.stamp, frame_id.",
     "export": "Write the content of a database to files.",
     "db": "Upgrade and describe a database file.",
     "fleet": "Many recordings, on one machine or many, into one lake of Parquet files.",

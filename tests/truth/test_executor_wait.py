@@ -27,7 +27,7 @@ JOIN take AS t ON i.take_id = t.take_id
 JOIN subscription AS s ON t.subscription_id = s.subscription_id
 JOIN process AS p ON i.process_id = p.process_id
 JOIN host AS h ON p.host_id = h.host_id
-JOIN arrival AS a
+JOIN true_arrival AS a
     ON h.hostname = a.hostname
     AND p.pid = a.pid
     AND s.rmw_handle = a.handle
@@ -61,7 +61,7 @@ WITH part AS (
     JOIN process AS p ON i.process_id = p.process_id
     JOIN host AS h ON p.host_id = h.host_id
     JOIN executor_thread AS x ON i.thread_id = x.thread_id
-    LEFT JOIN arrival AS a
+    LEFT JOIN true_arrival AS a
         ON h.hostname = a.hostname
         AND p.pid = a.pid
         AND s.rmw_handle = a.handle
@@ -126,14 +126,14 @@ def test_inputs_arrive_within_their_bounds(
     ingested = ingest_one(simulation.directory, tmp_path / "run.duckdb")
     connection = ingested.connection
     connection.execute(
-        "CREATE TEMP TABLE arrival "
+        "CREATE TEMP TABLE true_arrival "
         "(hostname VARCHAR, pid INTEGER, handle UBIGINT, stamp_ns BIGINT, arrived_ns BIGINT)"
     )
     connection.execute(
         "CREATE TEMP TABLE due "
         "(hostname VARCHAR, pid INTEGER, callback UBIGINT, called_ns BIGINT, due_ns BIGINT)"
     )
-    connection.executemany("INSERT INTO arrival VALUES (?, ?, ?, ?, ?)", witness.arrivals)
+    connection.executemany("INSERT INTO true_arrival VALUES (?, ?, ?, ?, ?)", witness.arrivals)
     connection.executemany("INSERT INTO due VALUES (?, ?, ?, ?, ?)", witness.calls)
     arrived, due = ingested.rows(_ARRIVED), ingested.rows(_DUE)
     connection.close()
@@ -156,10 +156,10 @@ def test_the_breakdown_bounds_how_long_executors_were_busy(
     simulation = simulate(name, tmp_path / name, factor=_LENGTH)
     connection = ingest_one(simulation.directory, tmp_path / "run.duckdb").connection
     connection.execute(
-        "CREATE TEMP TABLE arrival "
+        "CREATE TEMP TABLE true_arrival "
         "(hostname VARCHAR, pid INTEGER, handle UBIGINT, stamp_ns BIGINT, arrived_ns BIGINT)"
     )
-    connection.executemany("INSERT INTO arrival VALUES (?, ?, ?, ?, ?)", witness.arrivals)
+    connection.executemany("INSERT INTO true_arrival VALUES (?, ?, ?, ?, ?)", witness.arrivals)
     true = connection.execute(_BUSY).fetchall()
     parts: dict[tuple[int, int, str], int] = defaultdict(int)
     for row in run_query(connection, load_query("path-breakdown"), {}).to_arrow().to_pylist():
