@@ -318,6 +318,20 @@ def test_the_bar_holds_a_window_on_all_pages(
     page.page.wait_for_function("() => !location.hash.includes('start=')")
 
 
+def test_a_page_that_is_ready_late_keeps_what_is_typed(
+    demo: Path, serve: Serve, page: Page
+) -> None:
+    page.open(serve(demo).address)
+    page.go("#/topics?start=500000000")
+    end = page.page.get_by_label("to [s]")
+    end.fill("1.25")
+    page.page.evaluate("msgflow.bar.update()")
+    assert end.input_value() == "1.25"
+    assert page.page.get_by_label("from [s]").input_value() == "0.5"
+    end.press("Enter")
+    page.page.wait_for_url("**end=1250000000*")
+
+
 def test_the_bar_finds_names_and_moments(demo: Path, serve: Serve, page: Page) -> None:
     page.open(serve(demo).address)
     search = page.page.get_by_label("find a node, topic")

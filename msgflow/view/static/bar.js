@@ -68,8 +68,8 @@ export class Bar {
     this.internal.checked = app.internal;
     if (!app.source.isServed || !app.run?.start_text) return;
     const { start, end } = app.window;
-    this.from.value = start === undefined ? "" : secondsText(start);
-    this.to.value = end === undefined ? "" : secondsText(end);
+    this.write(this.from, start);
+    this.write(this.to, end);
     if (this.isInternal !== app.internal) {
       this.isInternal = app.internal;
       this.places = null;
@@ -96,6 +96,11 @@ export class Bar {
     const ends = [this.from, this.to].map((input) => (input.value.trim() === "" ? null : momentOf(input.value)));
     if (ends.includes(undefined)) { clear(this.said, "a time is written as 3.25 or 400 ms"); return; }
     this.choose(...ends);
+  }
+
+  // A page that is ready late must not replace what somebody types meanwhile.
+  write(input, moment) {
+    if (input !== document.activeElement) input.value = moment === undefined ? "" : secondsText(moment);
   }
 
   async skipWarmUp() {
