@@ -119,6 +119,14 @@ named AS (
     )
     WHERE path_id IN (SELECT path_id FROM critical_part)
 ),
+-- A row per message: the list of a long path in each of its pieces would take much memory.
+reader AS (
+    SELECT
+        path_id,
+        unnest(range(1, len(subscriptions) + 1)) AS hop,
+        unnest(subscriptions) AS subscription_id
+    FROM named
+),
 piece AS (
     SELECT
         c.run_id,
@@ -159,7 +167,6 @@ piece AS (
         $detail = 'short' AND c.activity IN ('intra', 'rclcpp', 'rcl', 'rmw', 'dds')
             AND c.part = c.activity AS is_layer
     FROM untraced AS c
-    LEFT JOIN named AS w ON c.path_id = w.path_id
     LEFT JOIN main.thread AS t ON c.state_thread_id = t.thread_id
     -- Where no callback is traced, the only node of the process that did it.
     LEFT JOIN (
@@ -176,8 +183,9 @@ piece AS (
     LEFT JOIN main.publication AS b ON c.message_id = b.publication_id
     LEFT JOIN main.publisher AS p ON b.publisher_id = p.publisher_id
     -- Who waits for a message is the node that takes it, with a traced callback or without.
-    LEFT JOIN main.subscription AS s
-        ON c.part = 'publish_to_take' AND w.subscriptions[c.hop] = s.subscription_id
+    LEFT JOIN reader AS w
+        ON c.part = 'publish_to_take' AND c.path_id = w.path_id AND c.hop = w.hop
+    LEFT JOIN main.subscription AS s ON w.subscription_id = s.subscription_id
     LEFT JOIN main.process AS r ON coalesce(s.process_id, b.process_id) = r.process_id
     LEFT JOIN main.node AS n ON CASE WHEN s.subscription_id IS NULL THEN p.node_id ELSE s.node_id
         END = n.node_id
