@@ -1,7 +1,7 @@
 """Bags: messages of a rosbag2 of the same run, joined to their publications.
 
 A trace has neither the size nor the content of a message. A bag has both, and says when the
-recorder received the message, but not of which publication. `schema/internal/bag` joins the two.
+recorder received each message. It does not name the publication: `schema/internal/bag` finds it.
 """
 
 from __future__ import annotations

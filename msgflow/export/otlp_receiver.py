@@ -113,7 +113,7 @@ class Receiver:
 
 
 def _parts(address: str) -> SplitResult | None:
-    """Return the parts of an address; None if it is none of HTTP."""
+    """Return the parts of an HTTP address; None for any other text."""
     try:
         parts = urlsplit(address)
         port = parts.port

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import fcntl
+import importlib.util
 import json
 import os
-import pty
-import struct
-import subprocess
+import shlex
 import sys
-import termios
 from pathlib import Path
 
 import pytest
 
 from msgflow.ingest import ingest
 
-RECORDING = Path(__file__).resolve().parents[2] / "examples" / "pipeline.tar.xz"
+ROOT = Path(__file__).resolve().parents[2]
+RECORDING = ROOT / "examples" / "pipeline.tar.xz"
 SCREENS = Path(__file__).parent / "screens"
 COMMANDS = (
     "why /filtered",
@@ -68,26 +66,14 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def printed(commands: tuple[str, ...], columns: int, directory: Path) -> str:
     """Run commands in a terminal of so many columns; return what a person would see there."""
-    controller, terminal = pty.openpty()
-    fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", 50, columns, 0, 0))
-    environment = {**os.environ, "TERM": "xterm-256color", "NO_COLOR": "1", "LC_ALL": "C.UTF-8"}
-    environment.pop("COLUMNS", None)
-    with subprocess.Popen(
-        [sys.executable, "-c", PROGRAM, json.dumps(commands)],
-        cwd=directory, env=environment, stdin=subprocess.DEVNULL, stdout=terminal, stderr=terminal,
-        start_new_session=True,
-    ):  # fmt: skip
-        os.close(terminal)
-        said = bytearray()
-        # Linux reports an error once no process holds the other end.
-        try:
-            while read := os.read(controller, 65536):
-                said += read
-        except OSError:
-            pass
-    os.close(controller)
-    lines = said.decode("utf-8").replace("\r\n", "\n").splitlines()
-    return "".join(f"{line.rstrip()}\n" for line in lines)
+    spec = importlib.util.spec_from_file_location("examples", ROOT / "docs" / "examples.py")
+    assert spec is not None
+    assert spec.loader is not None
+    examples = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(examples)
+    line = shlex.join([sys.executable, "-c", PROGRAM, json.dumps(commands)])
+    shown: str = examples.run(line, directory, columns)
+    return shown
 
 
 @pytest.mark.parametrize("columns", [80, 100])

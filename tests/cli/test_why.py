@@ -126,7 +126,7 @@ def test_it_fits_and_its_next_steps_run(
 
 @pytest.fixture
 def untraced(empty_database: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A line of nodes two of which have no callbacks in the trace."""
+    """A line of nodes; the trace has no callbacks of two."""
     path = tmp_path / "untraced.duckdb"
     shutil.copyfile(empty_database, path)
     with duckdb.connect(str(path)) as connection:

@@ -70,7 +70,7 @@ def planned(lossy: Path) -> dict[str, Any]:
     return built(lossy)
 
 
-# Systems of which, together, each object with a `when` has rows, but for schedules: with the
+# Between them they fill each object that has a `when`, except schedules. Each is a system, its
 # layout, and what is wrong with the recording.
 SYSTEMS = (
     # Services answer later, of a release that records no end of them.

@@ -251,7 +251,7 @@ def test_without_a_kernel_trace_there_is_nothing(system: RosSystem, analyse: Ana
 def test_a_thread_that_ended_does_not_sleep(
     system: RosSystem, analyse: Analyse, state: int
 ) -> None:
-    """Another one gets its number, of which no event of ROS is known yet."""
+    """Its number goes to another thread, which has no event of ROS yet."""
     kernel = Kernel(system)
     kernel.switch(900, 0, 41)
     kernel.switch(1200, 41, 0, state)

@@ -8,7 +8,7 @@
 -- column: joined BIGINT  Those whose publication is known
 -- column: ambiguous BIGINT  Those that may be of several publications, or whose publication may
 --     have another message
--- column: no_publication BIGINT  Those of which no publication was recorded in that time
+-- column: no_publication BIGINT  Those whose publication the trace does not have
 -- column: topic_not_published BIGINT  Those of topics without a publication in the run
 -- column: bound_ns BIGINT [ns]  How long after it was sent a message may be received
 SELECT
