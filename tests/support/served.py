@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import http.client
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from decimal import ROUND_HALF_UP, Decimal
 from pathlib import Path
@@ -72,9 +74,16 @@ class Page:
 
     def go(self, place: str) -> None:
         """Go to a place of the page, such as '#/paths', and wait until it stands."""
-        before = int(self.page.locator("html").get_attribute("data-ready") or 0)
-        self.page.evaluate("place => { location.hash = place; }", place)
-        self.page.wait_for_selector(f"html[data-ready='{before + 1}']", timeout=30_000)
+        with self.anew():
+            self.page.evaluate("place => { location.hash = place; }", place)
+
+    @contextmanager
+    def anew(self) -> Iterator[None]:
+        """Wait until the page stands anew, after what is done inside led to another address."""
+        ready = "Number(document.documentElement.dataset.ready ?? 0)"
+        before = self.page.evaluate(ready)
+        yield
+        self.page.wait_for_function(f"before => {ready} > before", arg=before)
 
     def flow(self) -> set[tuple[str, int]]:
         """Return (kind, identity) of everything that the page says the picked flow has."""

@@ -231,9 +231,8 @@ def test_keys_and_boxes_move_and_hide(demo: Path, report: Report, page: Page) ->
     assert "/rosout" in page.page.evaluate(lanes)
     page.page.get_by_label("publishers").uncheck()
     assert "/rosout" not in page.page.evaluate(lanes)
-    page.page.wait_for_timeout(200)
+    page.page.wait_for_url("**kind%3Apublisher*")
     assert "internal=1" in page.page.url
-    assert "kind%3Apublisher" in page.page.url
     picked = page.page.evaluate("msgflow.page.rows.row_key.length")
     assert picked > len(every)
 
