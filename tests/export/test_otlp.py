@@ -169,7 +169,8 @@ def test_parents_and_links_are_the_causes(database: Database, tmp_path: Path) ->
         if {(from_kind, from_id), (to_kind, to_id)} <= written
     }
     for span in spans.values():
-        assert span["end"] >= span["start"]
+        # Jaeger calls a span without a duration a damaged one.
+        assert span["end"] > span["start"]
         if span["parent"]:
             assert spans[span["parent"]]["trace"] == span["trace"]
 
@@ -202,7 +203,7 @@ def test_spans_say_what_they_are_in_the_words_of_opentelemetry(
     )
     # Some messages are taken before the call that publishes them returns.
     for take, span in takes.items():
-        assert span["end"] - span["start"] == max(latencies[take], 0)
+        assert span["end"] - span["start"] == max(latencies[take], 1)
     assert len(takes) > 5
 
 

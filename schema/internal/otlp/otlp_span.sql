@@ -21,7 +21,8 @@
 -- column: name VARCHAR  What OpenTelemetry calls it: operation and topic
 -- column: span_kind INTEGER  1 internal, 2 server, 3 client, 4 producer, 5 consumer
 -- column: from_ns BIGINT [epoch ns]  Begin; of a take the end of the publication
--- column: to_ns BIGINT [epoch ns]  End, never before the begin
+-- column: to_ns BIGINT [epoch ns]  End, at least 1 ns after the begin: Jaeger calls a span without a
+--     duration a damaged one
 -- column: latency_ns BIGINT [ns]  Of a take: from the publication; negative where clocks are apart
 -- column: node VARCHAR [node]  Its node
 -- column: host VARCHAR [host]  Host of its process
@@ -191,7 +192,7 @@ SELECT
     END::INTEGER AS span_kind,
     CASE WHEN s.kind = 'take' THEN least(coalesce(u.end_ns, s.start_ns), s.start_ns)
         ELSE s.start_ns END AS from_ns,
-    s.end_ns AS to_ns,
+    greatest(s.end_ns, from_ns + 1) AS to_ns,
     CASE WHEN s.kind = 'take' THEN s.start_ns - u.end_ns END AS latency_ns,
     s.node,
     h.hostname AS host,
