@@ -7,25 +7,15 @@
 -- grain: one row per publication inside a callback instance, and subscription it took from before
 -- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.link_causal_polled(only_run) AS TABLE
-WITH RECURSIVE handled AS (
-    SELECT take_id
-    FROM store.callback_instance
-    WHERE run_id = only_run AND take_id IS NOT NULL
-),
-buffered AS (
+WITH RECURSIVE buffered AS (
     SELECT DISTINCT c.subscription_id
     FROM store.callback_instance AS i
     JOIN store.callback AS c ON i.callback_id = c.callback_id
     WHERE i.run_id = only_run AND i.is_intra_process AND c.subscription_id IS NOT NULL
 ),
 by_hand AS MATERIALIZED (
-    SELECT
-        t.take_id, t.subscription_id, t.trace_id, t.thread_id, t.taken_ns, t.start_event_id,
-        t.is_loss_affected
-    FROM store.take AS t
-    ANTI JOIN handled AS h ON t.take_id = h.take_id
+    FROM derive.take_by_hand(only_run) AS t
     ANTI JOIN buffered AS b ON t.subscription_id = b.subscription_id
-    WHERE t.run_id = only_run
 ),
 run AS MATERIALIZED (
     SELECT
