@@ -11,7 +11,7 @@ WITH RECURSIVE buffered AS (
     SELECT DISTINCT c.subscription_id
     FROM store.callback_instance AS i
     JOIN store.callback AS c ON i.callback_id = c.callback_id
-    WHERE i.run_id = only_run AND i.is_intra_process AND c.subscription_id IS NOT NULL
+    WHERE i.run_id = only_run AND i.is_intra_process
 ),
 by_hand AS MATERIALIZED (
     FROM derive.take_by_hand(only_run) AS t
@@ -25,7 +25,8 @@ run AS MATERIALIZED (
     SEMI JOIN by_hand AS t ON i.thread_id = t.thread_id
     WHERE i.run_id = only_run
 ),
--- Nested instances that were over by then, and what they were nested in.
+-- The instance that began last, and those around it, each if the one inside was over by then. What
+-- an instance published that was over came before the take, and gets no link.
 around (take_id, event_id, callback_instance_id, parent_id, effective_end_event_id) AS (
     SELECT
         t.take_id, t.start_event_id, i.callback_instance_id, i.parent_id, i.effective_end_event_id
@@ -44,7 +45,6 @@ polled AS MATERIALIZED (
         t.is_loss_affected
     FROM around AS a
     JOIN by_hand AS t ON a.take_id = t.take_id
-    WHERE a.event_id < a.effective_end_event_id
 ),
 published AS (
     SELECT

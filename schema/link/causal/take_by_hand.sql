@@ -8,7 +8,6 @@ SELECT
     t.run_id, t.take_id, t.subscription_id, t.trace_id, t.thread_id, t.taken_ns, t.start_event_id,
     t.is_loss_affected
 FROM store.take AS t
-ANTI JOIN (
-    SELECT take_id FROM store.callback_instance WHERE run_id = only_run AND take_id IS NOT NULL
-) AS h ON t.take_id = h.take_id
+ANTI JOIN (SELECT take_id FROM store.callback_instance WHERE run_id = only_run) AS i
+    ON t.take_id = i.take_id
 WHERE t.run_id = only_run
