@@ -46,15 +46,18 @@ polled AS MATERIALIZED (
     FROM around AS a
     JOIN by_hand AS t ON a.take_id = t.take_id
 ),
+-- Most threads poll nothing: what they publish is not looked at.
 published AS (
     SELECT
-        d.publication_id, b.publisher_id, b.trace_id, b.start_ns, b.start_event_id,
+        b.publication_id, b.publisher_id, b.trace_id, b.start_ns, b.start_event_id,
         d.is_loss_affected, p.callback_instance_id, p.subscription_id
-    FROM derive.link_causal_direct(only_run) AS d
+    FROM (
+        FROM store.publication
+        WHERE run_id = only_run AND thread_id IN (SELECT thread_id FROM by_hand)
+    ) AS b
+    JOIN derive.link_causal_direct(only_run) AS d ON b.publication_id = d.publication_id
     JOIN (SELECT DISTINCT callback_instance_id, subscription_id FROM polled) AS p
         ON d.callback_instance_id = p.callback_instance_id
-    JOIN store.publication AS b ON d.publication_id = b.publication_id
-    WHERE b.run_id = only_run
 ),
 linked AS MATERIALIZED (
     SELECT
