@@ -31,7 +31,7 @@ help:
 	@echo 'make truth   precision and recall on systems with known truth, minutes'
 	@echo 'make real    the same on real ROS 2: nodes of rclpy, recorded with LTTng'
 	@echo 'make fuzz    damaged traces, archives, databases and files through all of msgflow'
-	@echo 'make mutants changes numbers and comparisons of SQL rules, and says what no test notices'
+	@echo 'make mutants changes SQL rules one place at a time, and says what no test notices; hours'
 	@echo 'make docs    the documentation as a site, in .site; fails at a dead link'
 	@echo 'make clean   remove what these made'
 

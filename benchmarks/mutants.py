@@ -1,14 +1,15 @@
-"""Which changes of the numbers and comparisons of SQL files no test notices.
+"""Which changes of SQL files no test notices.
 
     python benchmarks/mutants.py [FILE… --tests SELECTION…] [--line N]… [--replace OLD NEW]…
         [--timeout 300]
 
-For each number of the files (doubled, halved) and each comparison (turned round), or each place of
-OLD, runs the tests in a child that reads the file with that one change.
+For each change, or each place of OLD, runs the tests in a child that reads the file with that one
+change. A number is doubled and halved; a comparison, a function, a join and a truth value become
+their opposite; a condition, a branch of a CASE and a part of a UNION are left out.
 Without files: the rules of `RULES`, each with the tests that are about it (`make mutants`).
 No file is written. Prints a line for each change: the test that failed first, or `SURVIVED`.
-Numbers 0 and 1 and those in comments and quotes are left alone. The exit code is 1 if a change
-survived.
+Numbers 0 and 1, what comments and quotes hold, and conditions that only choose the run are left
+alone. The exit code is 1 if a change survived.
 """
 
 from __future__ import annotations
@@ -32,11 +33,26 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).parents[1]
 # Comments and quotes come first, so that nothing within them counts.
 TOKEN = re.compile(
-    r"--[^\n]*|'(?:[^']|'')*'|(?P<number>(?<![\w.])\d[\d_]*(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.]))"
-    r"|(?P<comparison><=|>=|<>|(?<![<>!:=-])[<>](?![<>=]))"
+    r"(?P<skipped>--[^\n]*)|'(?:[^']|'')*'"
+    r"|(?P<number>(?<![\w.])\d[\d_]*(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.]))"
+    r"|\$?[A-Za-z_]\w*|->|=>|[<>!:]=|<>|[^\s]"
 )
-TURNED = {"<=": ">", ">=": "<", "<": ">=", ">": "<=", "<>": "="}
+# Numbers that change nothing where they count rows, and everything where they name a column.
 TRIVIAL = {"0", "1"}
+PAIRS = (
+    ("<=", ">"), ("<", ">="), ("=", "<>"), ("min", "max"), ("least", "greatest"),
+    ("lag", "lead"), ("bool_and", "bool_or"), ("arg_min", "arg_max"),
+    ("arg_min_null", "arg_max_null"), ("SEMI", "ANTI"), ("true", "false"),
+)  # fmt: skip
+OPPOSITE = dict(PAIRS) | {new: old for old, new in PAIRS}
+# A condition with `=` is left out instead: its opposite is further off, and noticed sooner.
+DROPPED_ALONE = {"="}
+BEFORE_CONDITION = {"WHERE", "ON", "HAVING", "QUALIFY", "WHEN", "AND", "OR"}
+BEHIND_CONDITION = {
+    "AND", "OR", "THEN", "GROUP", "HAVING", "QUALIFY", "WINDOW", "ORDER", "LIMIT", "UNION",
+    "JOIN", "LEFT", "ASOF", "SEMI", "ANTI", "CROSS", "WHERE", "AS", "ELSE", "END", ",",
+}  # fmt: skip
+ONLY_RUN = re.compile(r"(\w+\.)?run_id = (only_run|\w+\.run_id)")
 # Findings with numbers of their own: their golden cases have to notice when one changes.
 FINDINGS = (
     "busy_waiting",
@@ -64,6 +80,13 @@ RULES = (
         ("schema/cases/derive.link_transport_nearest",),
     ),
     ("link/causal/answer_doubtful.sql", ("schema/test_answer_doubtful.py",)),
+    ("link/causal/timed_publisher.sql", ("schema/test_answer_doubtful.py",)),
+    ("link/causal/link_causal_polled.sql", ("model/test_polled_links.py",)),
+    (
+        "link/causal/link_causal_take_adjacent.sql",
+        ("schema/cases/derive.link_causal_take_adjacent", "model/test_take_adjacent_links.py"),
+    ),
+    ("link/causal/link_call.sql", ("schema/cases/derive.link_call", "model/test_call_links.py")),
     ("link/causal/approximate_set.sql", ("schema/cases/derive.link_causal_indirect",)),
     (
         "delivery/delivery_limit.sql",
@@ -78,6 +101,11 @@ RULES = (
     ("clock/clock_sync.sql", ("schema/test_clock_chain.py", "schema/test_clock_pair.py")),
     ("model/gap/pause_limit.sql", ("model/test_loss.py",)),
     ("model/gap/silence.sql", ("model/test_loss.py",)),
+    ("model/gap/pause.sql", ("model/test_loss.py",)),
+    ("public/goal.sql", ("schema/cases/main.goal",)),
+    ("public/action_client.sql", ("schema/cases/main.action_client",)),
+    ("public/action_server.sql", ("schema/cases/main.action_server",)),
+    ("stat/action", ("schema/cases/main.goal", "schema/cases/main.action_server")),
     *((f"health/recording/{each}.sql", (f"schema/cases/finding.{each}",)) for each in FINDINGS),
 )
 
@@ -98,31 +126,83 @@ class Mutant:
         return f"{self.file}:{self.line}: {self.old} → {self.new}"
 
 
+@dataclass(frozen=True)
+class Token:
+    """A word or sign of a file, and how many parentheses are open around it."""
+
+    text: str
+    begin: int
+    end: int
+    depth: int
+    is_number: bool
+
+
 def mutants(file: Path, replaced: Sequence[Sequence[str]]) -> Iterator[Mutant]:
     """Return every change of a file, given from the root of the checkout."""
     text = (ROOT / file).read_text()
     found = [
-        (place.start(), old, new)
+        (place.start(), place.end(), new)
         for old, new in replaced
         for place in re.finditer(re.escape(old), text)
     ]
-    if not replaced:
-        found = [
-            (match.start(), match[0], new) for match in TOKEN.finditer(text) for new in _new(match)
-        ]
-    for begin, old, new in found:
-        yield Mutant(file, begin, begin + len(old), old, new, text.count("\n", 0, begin) + 1)
+    for begin, end, new in found if replaced else sorted(set(changes(text))):
+        yield Mutant(file, begin, end, text[begin:end], new, text.count("\n", 0, begin) + 1)
 
 
-def _new(match: re.Match[str]) -> list[str]:
-    old = match[0]
-    if match["comparison"]:
-        return [TURNED[old]]
-    if not match["number"] or old in TRIVIAL:
+def changes(text: str) -> Iterator[tuple[int, int, str]]:
+    """Return begin, end and new text of every change of an SQL file."""
+    tokens = list(_tokens(text))
+    for position, token in enumerate(tokens):
+        for new in _instead(token):
+            yield token.begin, token.end, new
+        behind = tokens[position + 1 :]
+        if token.text == "LEFT" and behind[0].text == "JOIN":
+            yield token.begin, behind[0].begin, ""
+        if token.text == "NOT" and behind[0].text not in {"NULL", "MATERIALIZED", "DISTINCT"}:
+            yield token.begin, behind[0].begin, ""
+        if token.text == "UNION":
+            yield token.begin, _end(token, behind, {"UNION"}), ""
+        if token.text in BEFORE_CONDITION and behind[0].text != "REPLACE":
+            end = _end(token, behind, BEHIND_CONDITION)
+            if not ONLY_RUN.fullmatch(text[token.end : end].strip()):
+                yield token.end, end, " false " if token.text in {"OR", "WHEN"} else " true "
+
+
+def _tokens(text: str) -> Iterator[Token]:
+    depth = 0
+    between = set()  # depths at which a BETWEEN waits for its AND
+    for match in TOKEN.finditer(text):
+        if match["skipped"]:
+            continue
+        word = match[0]
+        depth -= word in {")", "]", "}"}
+        if word == "BETWEEN":
+            between.add(depth)
+        elif word == "AND" and depth in between:
+            between.remove(depth)
+            word = "and"  # joins no conditions
+        yield Token(word, match.start(), match.end(), depth, bool(match["number"]))
+        depth += word in {"(", "[", "{"}
+
+
+def _instead(token: Token) -> list[str]:
+    if token.text in OPPOSITE and token.text not in DROPPED_ALONE:
+        return [OPPOSITE[token.text]]
+    if not token.is_number or token.text in TRIVIAL:
         return []
-    value = float(old)
-    whole = value.is_integer() and "." not in old and "e" not in old
+    value = float(token.text)
+    whole = value.is_integer() and "." not in token.text and "e" not in token.text
     return [str(round(each)) if whole else repr(each) for each in (value * 2, value / 2)]
+
+
+def _end(token: Token, behind: Sequence[Token], words: set[str]) -> int:
+    """Return where what follows a token ends: before such a word, or what closes around both."""
+    end = token.end
+    for other in behind:
+        if other.depth < token.depth or (other.depth == token.depth and other.text in words):
+            break
+        end = other.end
+    return end
 
 
 class FirstFailure:

@@ -184,13 +184,16 @@ class Creator:
             "rcl_subscription_init", handle, node.handle, rmw_handle, topic, description.depth
         )
         code = self._code(node, description, executor)
+        publishes = description.publishes or any(
+            isinstance(action, entity.Publish) for action in description.does
+        )
         created = SubscriptionObject(
             next(self.thread.scheduler.subscription_ids),
             self._process, executor, group, description,
             node.description.full_name, handle, rmw_handle, callback, memory.allocate(), code,
             self._process.is_rclcpp and description.kind != "serialized",
             topic in INTERNAL_TOPICS,
-            not code.publishers and not (code.links and code.links.inputs), begin,
+            not publishes and not (code.links and code.links.inputs), begin,
         )  # fmt: skip
         if description.intra_process:
             created.intra = self._buffer(created, symbol)

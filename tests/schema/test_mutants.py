@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from mutants import RULES
+from mutants import RULES, changes
 from thorough import thorough
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -22,6 +22,30 @@ def numbers_of(file: str, text: str) -> list[str]:
     lines = (ROOT / file).read_text().splitlines()
     (number,) = (number for number, line in enumerate(lines, start=1) if text in line)
     return ["--line", str(number)]
+
+
+RULE = """-- 5 < 6
+SELECT min(a) FROM t LEFT JOIN u ON t.id = u.id AND t.run_id = u.run_id
+WHERE NOT b AND c BETWEEN 2 AND d OR e <> 'x > 3'
+UNION ALL SELECT 1"""
+CHANGES = {
+    "min → max",
+    "LEFT  → ",
+    " t.id = u.id →  true ",
+    "NOT  → ",
+    " NOT b →  true ",
+    " c BETWEEN 2 AND d →  true ",
+    "2 → 4",
+    "2 → 1",
+    " e <> 'x > 3' →  false ",
+    "<> → =",
+    "UNION ALL SELECT 1 → ",
+}
+
+
+def test_what_is_changed() -> None:
+    """Neither comments nor quotes, nor what only chooses the run."""
+    assert {f"{RULE[begin:end]} → {new}" for begin, end, new in changes(RULE)} == CHANGES
 
 
 # A rule stands on tables that a test makes up; a finding is part of a whole database.

@@ -9,6 +9,8 @@ from msgflow.sim.symbols import PARAMETER_SERVICES
 
 # Where objects get the addresses of others that were destroyed.
 _REUSING = ("losses", "restarts", "container_restarts")
+# Layouts whose events have gids without what lies behind them in memory.
+_SHORT_GIDS = ("kilted", "rolling")
 _CREATION = {
     "rcl_init",
     "rcl_node_init",
@@ -137,10 +139,13 @@ def test_discovery_is_published_without_rcl_and_taken_without_stamp(recording):
             for before, e in pairwise(events)
             if _short(e) == "rmw_publish" and e.fields["rmw_publisher_handle"] == discovery
         ]
-        assert len(published) > 10
+        # Of each object of a node; ten of them every node has.
+        assert len(published) >= 10
         assert all(_short(before) != "rcl_publish" for before in published)
-    # Those threads of a process that execute nothing.
-    executing = {(e.pid, e.tid) for e in recording.events if _short(e) == "callback_start"}
+    # Those threads of a process that execute nothing: rclpy shows no callbacks, but its takes.
+    executing = {
+        (e.pid, e.tid) for e in recording.events if _short(e) in {"callback_start", "rcl_take"}
+    }
     listeners = {
         e.tid
         for e in recording.events
@@ -161,7 +166,8 @@ def test_gids_are_unique_in_their_first_sixteen_bytes(recording):
         for e in recording.events
         if _short(e) in {"rmw_publisher_init", "rmw_subscription_init"}
     ]
-    assert {len(gid) for gid in gids} == {16 if recording.meta["layout"] == "rolling" else 24}
+    is_short = recording.meta["layout"] in _SHORT_GIDS
+    assert {len(gid) for gid in gids} == {16 if is_short else 24}
     assert len({gid[:16] for gid in gids}) == len(gids)
     assert {gid[:2] for gid in gids} == {b"\x01\x0f"}
 

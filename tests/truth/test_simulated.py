@@ -90,11 +90,11 @@ CASES = {
         SELECT p.hostname, p.pid, p.tid, l.kind, i.start_ns, t.taken_ns, u.topic_name, b.rcl_ns,
             b.rmw_ns
         FROM link_causal AS l
-        JOIN callback_instance AS i USING (callback_instance_id)
-        JOIN place AS p USING (thread_id)
         JOIN publication AS b USING (publication_id)
-        JOIN publisher AS u USING (publisher_id)
-        LEFT JOIN take AS t ON i.take_id = t.take_id AND t.method = 'rmw'
+        LEFT JOIN callback_instance AS i USING (callback_instance_id)
+        JOIN place AS p ON coalesce(i.thread_id, b.thread_id) = p.thread_id
+        JOIN publisher AS u ON b.publisher_id = u.publisher_id
+        LEFT JOIN take AS t ON l.take_id = t.take_id AND t.method = 'rmw'
         WHERE l.kind <> 'take_adjacent'
         """,
     ),

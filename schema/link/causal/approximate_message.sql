@@ -12,20 +12,24 @@
 CREATE OR REPLACE MACRO derive.approximate_message(only_run) AS TABLE
 WITH RECURSIVE input AS MATERIALIZED (
     SELECT
-        a.annotation_id, r.subscription_id, r.callback_instance_id, r.start_ns, r.start_event_id,
-        c.take_id
+        a.run_id, a.annotation_id, r.subscription_id, r.callback_instance_id, r.start_ns,
+        r.start_event_id, c.take_id
     FROM store.annotation AS a
     JOIN store.annotation_input AS i ON a.annotation_id = i.annotation_id
     JOIN derive.annotated_run(only_run) AS r ON i.subscription_id = r.subscription_id
     JOIN store.callback_instance AS c ON r.callback_instance_id = c.callback_instance_id
     WHERE a.run_id = only_run AND a.kind = 'approximate_sync' AND c.run_id = only_run
 ),
--- Takes that no callback was called with.
+-- Few recordings have such an annotation: those that have none are not looked through.
 by_hand AS MATERIALIZED (
-    SELECT t.thread_id, t.taken_ns
-    FROM store.take AS t
-    ANTI JOIN store.callback_instance AS i ON t.take_id = i.take_id
-    WHERE t.run_id = only_run AND EXISTS (SELECT annotation_id FROM input)
+    SELECT thread_id, taken_ns
+    FROM derive.take_by_hand(only_run)
+    WHERE run_id IN (SELECT run_id FROM input)
+),
+instance AS (
+    SELECT callback_instance_id, take_id, start_ns
+    FROM store.callback_instance
+    WHERE run_id IN (SELECT run_id FROM input)
 ),
 taking AS MATERIALIZED (
     SELECT DISTINCT i.callback_instance_id
@@ -48,14 +52,12 @@ sent AS MATERIALIZED (
     JOIN store.link_transport AS l ON t.take_id = l.take_id
     JOIN store.publication AS b ON l.publication_id = b.publication_id
     LEFT JOIN derive.link_causal_direct(only_run) AS d ON b.publication_id = d.publication_id
-    LEFT JOIN store.callback_instance AS i
-        ON d.callback_instance_id = i.callback_instance_id AND i.run_id = only_run
+    LEFT JOIN instance AS i ON d.callback_instance_id = i.callback_instance_id
     LEFT JOIN (SELECT DISTINCT publisher_id FROM store.annotation_output) AS o
         ON b.publisher_id = o.publisher_id
     LEFT JOIN (SELECT DISTINCT thread_id FROM by_hand) AS h ON b.thread_id = h.thread_id
     LEFT JOIN taking AS g ON i.callback_instance_id = g.callback_instance_id
-    WHERE t.run_id = only_run AND l.run_id = only_run AND b.run_id = only_run
-        AND EXISTS (SELECT annotation_id FROM input)
+    WHERE t.run_id IN (SELECT run_id FROM input) AND l.run_id = only_run AND b.run_id = only_run
 ),
 origin (take_id, cause_id, publisher_ids, made_ns) AS (
     SELECT s.take_id, s.cause_id, [s.publisher_id], s.stamp_ns - s.working_ns

@@ -7,25 +7,15 @@
 -- grain: one row per publication inside a callback instance, and subscription it took from before
 -- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.link_causal_polled(only_run) AS TABLE
-WITH RECURSIVE handled AS (
-    SELECT take_id
-    FROM store.callback_instance
-    WHERE run_id = only_run AND take_id IS NOT NULL
-),
-buffered AS (
+WITH RECURSIVE buffered AS (
     SELECT DISTINCT c.subscription_id
     FROM store.callback_instance AS i
     JOIN store.callback AS c ON i.callback_id = c.callback_id
-    WHERE i.run_id = only_run AND i.is_intra_process AND c.subscription_id IS NOT NULL
+    WHERE i.run_id = only_run AND i.is_intra_process
 ),
 by_hand AS MATERIALIZED (
-    SELECT
-        t.take_id, t.subscription_id, t.trace_id, t.thread_id, t.taken_ns, t.start_event_id,
-        t.is_loss_affected
-    FROM store.take AS t
-    ANTI JOIN handled AS h ON t.take_id = h.take_id
+    FROM derive.take_by_hand(only_run) AS t
     ANTI JOIN buffered AS b ON t.subscription_id = b.subscription_id
-    WHERE t.run_id = only_run
 ),
 run AS MATERIALIZED (
     SELECT
@@ -35,7 +25,8 @@ run AS MATERIALIZED (
     SEMI JOIN by_hand AS t ON i.thread_id = t.thread_id
     WHERE i.run_id = only_run
 ),
--- Nested instances that were over by then, and what they were nested in.
+-- The instance that began last, and those around it, each if the one inside was over by then. What
+-- an instance published that was over came before the take, and gets no link.
 around (take_id, event_id, callback_instance_id, parent_id, effective_end_event_id) AS (
     SELECT
         t.take_id, t.start_event_id, i.callback_instance_id, i.parent_id, i.effective_end_event_id
@@ -54,17 +45,19 @@ polled AS MATERIALIZED (
         t.is_loss_affected
     FROM around AS a
     JOIN by_hand AS t ON a.take_id = t.take_id
-    WHERE a.event_id < a.effective_end_event_id
 ),
+-- Most threads poll nothing: what they publish is not looked at.
 published AS (
     SELECT
-        d.publication_id, b.publisher_id, b.trace_id, b.start_ns, b.start_event_id,
+        b.publication_id, b.publisher_id, b.trace_id, b.start_ns, b.start_event_id,
         d.is_loss_affected, p.callback_instance_id, p.subscription_id
-    FROM derive.link_causal_direct(only_run) AS d
+    FROM (
+        FROM store.publication
+        WHERE run_id = only_run AND thread_id IN (SELECT thread_id FROM by_hand)
+    ) AS b
+    JOIN derive.link_causal_direct(only_run) AS d ON b.publication_id = d.publication_id
     JOIN (SELECT DISTINCT callback_instance_id, subscription_id FROM polled) AS p
         ON d.callback_instance_id = p.callback_instance_id
-    JOIN store.publication AS b ON d.publication_id = b.publication_id
-    WHERE b.run_id = only_run
 ),
 linked AS MATERIALIZED (
     SELECT

@@ -9,18 +9,9 @@
 -- grain: one row per publication made after a take without a callback
 -- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.link_causal_take_adjacent(only_run) AS TABLE
-WITH handled AS (
-    SELECT take_id
-    FROM store.callback_instance
-    WHERE run_id = only_run AND take_id IS NOT NULL
-),
-by_hand AS (
-    SELECT
-        t.run_id, t.thread_id, t.start_event_id AS event_id, t.take_id, t.subscription_id,
-        t.taken_ns
-    FROM store.take AS t
-    ANTI JOIN handled AS h ON t.take_id = h.take_id
-    WHERE t.run_id = only_run
+WITH by_hand AS (
+    SELECT run_id, thread_id, start_event_id AS event_id, take_id, subscription_id, taken_ns
+    FROM derive.take_by_hand(only_run)
 ),
 busy AS (
     SELECT DISTINCT run_id, thread_id FROM by_hand

@@ -15,16 +15,15 @@ WITH unstamped_process AS (
     HAVING count(source_timestamp_ns) = 0
 ),
 unfinished AS (
-    SELECT publication_id, publisher_id, is_loss_affected
+    SELECT
+        run_id, publication_id, publisher_id, process_id, thread_id, next_event_ns, rcl_ns,
+        is_loss_affected
     FROM store.publication
     WHERE run_id = only_run
         AND rcl_ns IS NOT NULL
-        AND coalesce(rmw_ns, dds_ns, source_timestamp_ns) IS NULL
-),
-channelled AS (
-    SELECT publication_id
-    FROM unfinished
-    WHERE publisher_id IN (SELECT publisher_id FROM unfinished WHERE NOT is_loss_affected)
+        AND rmw_ns IS NULL
+        AND dds_ns IS NULL
+        AND source_timestamp_ns IS NULL
 )
 SELECT
     run_id, publication_id, publisher_id, process_id, thread_id, next_event_ns,
@@ -33,6 +32,10 @@ SELECT
 FROM store.publication
 WHERE run_id = only_run
     AND coalesce(rmw_ns, rcl_ns) IS NOT NULL
-    AND (
-        process_id IN (FROM unstamped_process) OR publication_id IN (FROM channelled)
-    )
+    AND process_id IN (FROM unstamped_process)
+UNION ALL
+SELECT
+    run_id, publication_id, publisher_id, process_id, thread_id, next_event_ns, rcl_ns, true
+FROM unfinished
+WHERE publisher_id IN (SELECT publisher_id FROM unfinished WHERE NOT is_loss_affected)
+    AND process_id NOT IN (FROM unstamped_process)
