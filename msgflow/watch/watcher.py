@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from msgflow.watch.flight_recorder import FlightRecorder
     from msgflow.watch.kept_traces import KeptTraces
     from msgflow.watch.prometheus import Exporter
+    from msgflow.watch.window_database import WindowDatabase
     from msgflow.watch.window_report import WindowReport
 
 _RUN = "watch"
@@ -54,6 +55,7 @@ class Watcher:
         alarm: Alarm | None = None,
         recorder: FlightRecorder | None = None,
         exporter: Exporter | None = None,
+        database: WindowDatabase | None = None,
     ) -> None:
         """Start before the first chunk.
 
@@ -66,6 +68,7 @@ class Watcher:
             alarm: the targets of each window.
             recorder: keeps the chunks around a violation.
             exporter: counts each moment once.
+            database: gets each window, for pages.
         """
         self.history = History(window_ns, step_ns)
         self._links = links
@@ -74,6 +77,7 @@ class Watcher:
         self._alarm = alarm
         self._recorder = recorder
         self._exporter = exporter
+        self._database = database
         self.on_passed: Callable[[Path], None] | None = None
         self._lacks_links = False
         self._violated: tuple[int, KeptTraces, list[Path]] | None = None
@@ -167,6 +171,8 @@ class Watcher:
             since_ns = self.history.final_ns
             start_ns = window.start_ns if since_ns is None else since_ns
             self._exporter.count(self._con, Window(start_ns, window.end_ns))
+        if self._database is not None:
+            self._database.offer(window.end_ns, traces)
         if report.violations:
             self._violated = (self.history.border_ns, traces, self.history.paths(window))
         self.history.note_longest(report.longest_ns)
