@@ -202,7 +202,7 @@ def command(
     if alarm is not None and alarm.count(Verdict.FAILED):
         raise typer.Exit(ExitCode.FAILED)
     # Without a window, nothing was measured.
-    if alarm is not None and (alarm.count(Verdict.NOT_MEASURED) or not alarm.count(Verdict.PASSED)):
+    if alarm is not None and not alarm.is_measured:
         raise typer.Exit(ExitCode.NOT_MEASURED)
 
 
@@ -233,6 +233,7 @@ def _pages(
 
 def _alarm(targets: Path, paths: Path) -> Alarm:
     """Return the alarm of a file of targets."""
+    from msgflow.cli.output import print_note
     from msgflow.paths import read_paths
     from msgflow.verify import read_targets
     from msgflow.watch import Alarm
@@ -247,7 +248,7 @@ def _alarm(targets: Path, paths: Path) -> Alarm:
         places[name.value] = {
             word: [text.value for text in texts] for word, texts in path.places.items()
         }
-    return Alarm(file, places)
+    return Alarm(file, places, print_note)
 
 
 def _record(

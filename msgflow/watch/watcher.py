@@ -165,8 +165,8 @@ class Watcher:
         if self._alarm is not None:
             # What came after the window counts, too: an alarm must be early.
             whole = Window(window.start_ns, self.history.border_ns)
-            found = self._alarm.violations(self._con, whole, window.end_ns)
-            report = replace(report, violations=found)
+            found, verdicts = self._alarm.judge(self._con, whole, window.end_ns)
+            report = replace(report, violations=found, verdicts=verdicts)
         if self._exporter is not None:
             since_ns = self.history.final_ns
             start_ns = window.start_ns if since_ns is None else since_ns

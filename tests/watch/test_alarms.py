@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from contextlib import chdir
 from pathlib import Path
 
 import pytest
@@ -75,6 +76,21 @@ def test_the_exit_code_is_that_of_verify(watched, condition: str, exit_code: int
 def test_what_was_never_measured(watched) -> None:
     text = TARGETS.replace("/scan", "/no_such_topic")
     assert watched(text, "--window", "8s", "--step", "8s").exit_code == 5
+
+
+def test_a_target_that_falls_silent_is_said_once(tmp_path: Path) -> None:
+    """The relay ends after one second, and begins again after 1.2 s."""
+    rotations = tuple(SECOND // 20 * number for number in range(1, 30))
+    simulate("restarts", tmp_path / "trace", recording=Recording(rotations=rotations))
+    (tmp_path / "targets.yaml").write_text("targets: [{topic: /result, rate: '> 1 Hz'}]")
+    words = ("watch", "trace", "--once", "--window", "50ms", "--step", "50ms", "--json")
+    with chdir(tmp_path):
+        result = CliRunner().invoke(app, [*words, "--targets", "targets.yaml"])
+    windows = [json.loads(line)["verdicts"] for line in result.stdout.splitlines()]
+    counted = [set(verdicts) for verdicts in windows]
+    assert {"no data"} in counted[counted.index({"passed"}) :]
+    assert result.stderr.count("no data of /relay → /result: rate > 1 Hz") == 1
+    assert result.exit_code == 0
 
 
 def test_what_was_kept_before_stays(watched, tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
+from msgflow.cli.show.window_line import verdict_words
 from msgflow.run.window import format_epoch
 from msgflow.text.values import NULL, format_duration, printable
 from msgflow.watch import violation_line
@@ -93,6 +94,8 @@ def _heading(report: WindowReport) -> Text:
     text.append(f"   {len(report.paths)} paths", style="not bold")
     if report.lag_s is not None:
         text.append(f"   lag {report.lag_s:.1f} s", style="not bold")
+    if report.verdicts:
+        text.append(f"   targets: {verdict_words(report)}", style="not bold")
     lost = report.discarded_events
     text.append(f"   {lost:,} events lost by the tracer", style="red" if lost else "not bold dim")
     return text
