@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -13,6 +14,8 @@ from pathlib import Path
 
 import pytest
 from lttng_program import lttng
+
+from msgflow.database import Database
 
 
 @dataclass
@@ -54,8 +57,9 @@ def record(tmp_path: Path) -> Record:
 
 
 def test_from_a_robot_to_an_answer(record: Record, robot: list[str], tmp_path: Path) -> None:
+    (tmp_path / "clocks.yaml").write_text(f"{socket.gethostname()}: -12500")
     ended = record(
-        *("--duration", "6", "--name", "drive", "-o", "trace"),
+        *("--duration", "6", "--name", "drive", "-o", "trace", "--clock-sync", "clocks.yaml"),
         *("--", *robot, "0.05"),
     )
     assert ended.exit_code == 0, ended.err
@@ -66,6 +70,19 @@ def test_from_a_robot_to_an_answer(record: Record, robot: list[str], tmp_path: P
     assert " 0 discarded" in ended.err
     # Only what LTTng wrote.
     assert [path.name for path in (tmp_path / "trace").iterdir()] == ["ust"]
+    with Database(tmp_path / "msgflow.duckdb") as database:
+        (clock,) = database.query("clocks").to_arrow().to_pylist()
+    assert clock["offset_ns"] == -12_500
+
+
+@pytest.mark.parametrize("option", ["--links", "--clock-sync"])
+def test_a_file_that_is_missing_is_said_before_anything_starts(
+    record: Record, option: str, tmp_path: Path
+) -> None:
+    ended = record(option, "no-such.yaml", "--", "touch", "started")
+    assert ended.exit_code == 2
+    assert "no-such.yaml" in ended.err
+    assert not list(tmp_path.iterdir())
 
 
 def test_discarded_events_are_said_at_once(record: Record, robot: list[str]) -> None:
