@@ -17,6 +17,7 @@ MS = 1_000_000
 
 def path(name: str, max_ms: float, lost: int = 0) -> dict[str, Any]:
     others = ("roots", "superseded", "dropped", "no_output", "not_connected", "unknown")
+    others += ("cut_by_recording",)
     return dict.fromkeys(others, 0) | {
         "path": name,
         "reached": 100,
