@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import closing, contextmanager
+from contextlib import AbstractContextManager, ExitStack, closing, contextmanager, nullcontext
 from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING, Annotated
@@ -147,7 +147,7 @@ def command(
     if prometheus is not None:
         exporter = Exporter()
         exporter.serve(prometheus)
-    with _pages(ui, links, clock_sync) as database:
+    with _pages(ui, links, clock_sync) as database, ExitStack() as stack:
         watcher = Watcher(
             window_ns=window_ns,
             step_ns=step_ns,
@@ -159,6 +159,7 @@ def command(
             exporter=exporter,
             database=database,
         )
+        stack.callback(watcher.close)
 
         def show(reports: Iterator[WindowReport]) -> None:
             if as_json:
@@ -182,11 +183,7 @@ def command(
             show(watch_finished(place, watcher))
         elif len(words) == 1 and (source := _source(words[0], place)) is not None:
             found, session = source
-            if session is not None:
-                from msgflow.live import rotate
-
-                rotate(session, step_ns)
-            with _until_interrupted() as interrupts:
+            with _rotated(session, step_ns), _until_interrupted() as interrupts:
                 is_over = _session_is_over(session)
 
                 def ends() -> bool:
@@ -289,6 +286,13 @@ def _record(
         watching.result()
     if recorded.exit_code:
         print_note(f"{words[0]} ended with exit code {recorded.exit_code}")
+
+
+def _rotated(session: str | None, step_ns: int) -> AbstractContextManager[None]:
+    """Let a session rotate during a block, if there is one."""
+    from msgflow.live import rotated
+
+    return nullcontext() if session is None else rotated(session, step_ns)
 
 
 @contextmanager

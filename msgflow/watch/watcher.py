@@ -135,6 +135,12 @@ class Watcher:
             self._recorder.keep(*self._violated)
         self._violated = None
 
+    def close(self) -> None:
+        """Free the memory of the database."""
+        # Before the first window there is none.
+        if "_con" in self.__dict__:
+            self._con.close()
+
     def _forget(self, window: Window) -> None:
         for path in self.history.forget(window):
             if self.on_passed is not None:
