@@ -62,8 +62,7 @@ static void sleep_until(int64_t at) {
 
 static const char *named(const char *name, int path) {
     static char text[64];
-    snprintf(text, sizeof text, "%s_%d", name, path);
-    return text;
+    return snprintf(text, sizeof text, "%s_%d", name, path), text;
 }
 
 static void make_node(struct node *n, const char *name, int path) {
@@ -136,18 +135,16 @@ static void run(int path, int64_t period, int64_t first, int64_t end, int64_t sl
 }
 
 int main(int count, char **words) {
-    if (count != 4 && count != 6) return 2;
+    if (count < 4) return 2;
     int paths = atoi(words[1]);
     int64_t period = paths * EVENTS_OF_FLOW * SECOND / atoll(words[2]);
     int64_t first = now(CLOCK_MONOTONIC) + SECOND, end = first + atoll(words[3]) * SECOND;
-    int64_t slow = count == 6 ? atoll(words[4]) * SECOND : 0;
-    int64_t every = count == 6 ? atoll(words[5]) * SECOND : 0;
+    int64_t slow = count > 5 ? atoll(words[4]) * SECOND : 0, every = slow ? atoll(words[5]) * SECOND : 0;
     for (int path = 0; path < paths; path++) {
-        if (fork() == 0) {
-            prctl(PR_SET_NAME, named("path", path));
-            run(path, period, first + path * period / paths, end, slow, every);
-            return 0;
-        }
+        if (fork()) continue;
+        prctl(PR_SET_NAME, named("path", path));
+        run(path, period, first + path * period / paths, end, slow, every);
+        return 0;
     }
     while (wait(NULL) > 0) continue;
     return 0;
