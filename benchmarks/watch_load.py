@@ -62,7 +62,7 @@ def build_program(directory: Path) -> Path:
     build_tracetools(directory)
     program = directory / "load"
     source = Path(__file__).parent / "recording" / "load.c"
-    command = ["gcc", "-O2", "-o", program, source, f"-L{directory}", "-ltracetools"]
+    command = ["gcc", "-O2", "-o", str(program), str(source), f"-L{directory}", "-ltracetools"]
     subprocess.run(command, check=True)
     return program
 
