@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from msgflow.errors import MsgflowError
 from msgflow.ingest import ingest
+from msgflow.watch.learned_answers import write_learned
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -54,13 +55,16 @@ class FlightRecorder:
         self._note = note
         self._until_ns = 0
 
-    def keep(self, end_ns: int, traces: KeptTraces, chunks: Sequence[Path]) -> None:
+    def keep(
+        self, end_ns: int, traces: KeptTraces, chunks: Sequence[Path], learned: str | None
+    ) -> None:
         """Keep the last chunks, unless a violation in the same window has kept them.
 
         Args:
             end_ns: until when they were recorded.
             traces: their events, with the names of all objects.
             chunks: their directories; of those that are gone only the events are kept.
+            learned: a file of links that earlier windows have shown, if any are needed.
         """
         if end_ns < self._until_ns:
             return
@@ -80,7 +84,7 @@ class FlightRecorder:
                 [target],
                 target / _DATABASE,
                 name=target.name,
-                links=self._links,
+                links=write_learned(target, self._links, learned),
                 clock_sync=self._clock_sync,
                 traces=traces,
             )

@@ -8,11 +8,12 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError, UsageError
-from msgflow.ingest.memory import database_in_memory, ingest_again
+from msgflow.ingest.memory import database_in_memory, ingest_again, link_again
 from msgflow.run.window import Window
 from msgflow.trace import Continuation
 from msgflow.watch.history import History
 from msgflow.watch.kept_chunk import read_chunk
+from msgflow.watch.learned_answers import LearnedAnswers, with_learned
 from msgflow.watch.window_report import report_of
 
 if TYPE_CHECKING:
@@ -80,7 +81,8 @@ class Watcher:
         self._database = database
         self.on_passed: Callable[[Path], None] | None = None
         self._lacks_links = False
-        self._violated: tuple[int, KeptTraces, list[Path]] | None = None
+        self._answers = LearnedAnswers()
+        self._violated: tuple[int, KeptTraces, list[Path], str | None] | None = None
         self._after = Continuation()
         self.numbers: dict[Path, int] = {}
 
@@ -150,8 +152,12 @@ class Watcher:
     def _con(self) -> duckdb.DuckDBPyConnection:
         return database_in_memory()
 
-    def _ingest(self, traces: KeptTraces) -> None:
-        """Ingest what a window needs; links of nodes that are not there yet are left out."""
+    def _ingest(self, traces: KeptTraces) -> str | None:
+        """Ingest what a window needs; links of nodes that are not there yet are left out.
+
+        Returns:
+            A file of links that were learned from earlier windows; None if none are needed.
+        """
         try:
             ingest_again(self._con, traces, _RUN, links=self._links, clocks=self._clocks)
         except UsageError as error:
@@ -163,10 +169,15 @@ class Watcher:
             ingest_again(self._con, traces, _RUN, links=None, clocks=self._clocks)
         else:
             self._lacks_links = False
+        learned = self._answers.doubted(self._con)
+        if learned is not None:
+            declared = None if self._lacks_links else self._links
+            link_again(self._con, links=with_learned(declared, learned), clocks=self._clocks)
+        return learned
 
     def _report(self, window: Window, *, is_final: bool, is_live: bool) -> WindowReport:
         traces = self.history.traces(window)
-        self._ingest(traces)
+        learned = self._ingest(traces)
         report = report_of(self._con, window, is_final=is_final)
         if self._alarm is not None:
             # What came after the window counts, too: an alarm must be early.
@@ -178,9 +189,10 @@ class Watcher:
             start_ns = window.start_ns if since_ns is None else since_ns
             self._exporter.count(self._con, Window(start_ns, window.end_ns))
         if self._database is not None:
-            self._database.offer(window.end_ns, traces)
+            self._database.offer(window.end_ns, traces, learned)
         if report.violations:
-            self._violated = (self.history.border_ns, traces, self.history.paths(window))
+            paths = self.history.paths(window)
+            self._violated = (self.history.border_ns, traces, paths, learned)
         self.history.note_longest(report.longest_ns)
         if is_live:
             lag_s = (time.time_ns() - self.history.last_event_ns) / _SECOND_NS

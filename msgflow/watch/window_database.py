@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from msgflow.db import empty_database
 from msgflow.ingest import ingest
+from msgflow.watch.learned_answers import write_learned
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -35,21 +36,22 @@ class WindowDatabase:
         self._prepared = path.with_name(f"next-{path.name}")
         self._links = links
         self._clock_sync = clock_sync
-        # Of the last window that is not prepared yet: when it ended, and its events.
-        self._last: tuple[int, KeptTraces] | None = None
+        # Of the last window that is not prepared yet: when it ended, its events, learned links.
+        self._last: tuple[int, KeptTraces, str | None] | None = None
         # The watcher has another thread than the pages.
         self._lock = Lock()
         empty_database.write_empty(path)
 
-    def offer(self, end_ns: int, traces: KeptTraces) -> None:
+    def offer(self, end_ns: int, traces: KeptTraces, learned: str | None) -> None:
         """Take over a further window.
 
         Args:
             end_ns: when it ended.
             traces: its events, with those around it.
+            learned: a file of links that earlier windows have shown, if any are needed.
         """
         with self._lock:
-            self._last = (end_ns, traces)
+            self._last = (end_ns, traces, learned)
 
     def prepare(self) -> None:
         """Write the last window beside the database, unless that was done before.
@@ -61,11 +63,12 @@ class WindowDatabase:
             last, self._last = self._last, None
         if last is None:
             return
-        end_ns, traces = last
+        end_ns, traces, learned = last
         name = time.strftime("window-%Y%m%d-%H%M%S", time.gmtime(end_ns // 1_000_000_000))
         self._prepared.unlink(missing_ok=True)
+        links = write_learned(self.path.parent, self._links, learned)
         ingest(
-            [name], self._prepared, name=name, links=self._links, clock_sync=self._clock_sync,
+            [name], self._prepared, name=name, links=links, clock_sync=self._clock_sync,
             traces=traces,
         )  # fmt: skip
 

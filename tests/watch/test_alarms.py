@@ -121,7 +121,7 @@ def test_sessions_of_one_name_on_two_hosts_are_kept(tmp_path: Path) -> None:
         note=notes.append,
     )  # fmt: skip
     traces = KeptTraces([], [chunk for chunk in read if chunk is not None])
-    recorder.keep(SECOND, traces, [chunk.path for chunk in chunks])
+    recorder.keep(SECOND, traces, [chunk.path for chunk in chunks], None)
     assert notes[0].startswith("kept: ")
     assert len(list((tmp_path / "kept").glob("*/archives/*/drive/chunk-0"))) == 2
 
