@@ -91,9 +91,21 @@ class FlightRecorder:
         except (OSError, MsgflowError) as error:
             # A disk that is full must not end the view.
             shutil.rmtree(target, ignore_errors=True)
-            self._note(f"the violation is not kept: {error}")
+            self._note(
+                f"the violation is not kept in {target}: {_reason(error)}; remove files, or name"
+                " another directory with --keep-on-violation"
+            )
             return
         others = sorted(set(self._directory.glob("violation-*")) - {target})
         for oldest in others[: max(len(others) + 1 - self._most, 0)]:
             shutil.rmtree(oldest, ignore_errors=True)
         self._note(f"kept: msgflow why --db {target / _DATABASE}")
+
+
+def _reason(error: OSError | MsgflowError) -> str:
+    if isinstance(error, MsgflowError):
+        return error.message
+    if isinstance(error, shutil.Error):
+        # Of the first file that was not copied: its source, its target, and the reason.
+        return str(error.args[0][0][2])
+    return (error.strerror or str(error)).lower()

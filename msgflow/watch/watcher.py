@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 
 _RUN = "watch"
 _SECOND_NS = 1_000_000_000
+# Clocks are kept in step by less.
+_LEAST_STEP_NS = 500_000_000
 
 
 class Watcher:
@@ -81,6 +83,8 @@ class Watcher:
         self._database = database
         self.on_passed: Callable[[Path], None] | None = None
         self._lacks_links = False
+        self._clock_offset_ns = _clock_offset_ns()
+        self._clock_step_ns = 0
         self._answers = LearnedAnswers()
         self._violated: tuple[int, KeptTraces, list[Path], str | None] | None = None
         self._after = Continuation()
@@ -175,6 +179,18 @@ class Watcher:
             link_again(self._con, links=with_learned(declared, learned), clocks=self._clocks)
         return learned
 
+    def _lag_s(self) -> float:
+        """Return how old the last event is; the tracer knows nothing of a clock that was set."""
+        step_ns = _clock_offset_ns() - self._clock_offset_ns
+        if abs(step_ns - self._clock_step_ns) > _LEAST_STEP_NS:
+            self._clock_step_ns = step_ns
+            self._note(
+                f"the clock of this machine was set, by {step_ns / _SECOND_NS:+.1f} s since the"
+                " begin: times of the tracer go on as before"
+            )
+        now_ns = time.time_ns() - self._clock_step_ns
+        return (now_ns - self.history.last_event_ns) / _SECOND_NS
+
     def _report(self, window: Window, *, is_final: bool, is_live: bool) -> WindowReport:
         traces = self.history.traces(window)
         learned = self._ingest(traces)
@@ -195,8 +211,12 @@ class Watcher:
             self._violated = (self.history.border_ns, traces, paths, learned)
         self.history.note_longest(report.longest_ns)
         if is_live:
-            lag_s = (time.time_ns() - self.history.last_event_ns) / _SECOND_NS
-            report = replace(report, lag_s=lag_s)
+            report = replace(report, lag_s=self._lag_s())
         if self._exporter is not None:
             self._exporter.show(report)
         return report
+
+
+def _clock_offset_ns() -> int:
+    """Return how far the clock is ahead of the one that nobody sets."""
+    return time.time_ns() - time.monotonic_ns()

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
+import subprocess
 from contextlib import chdir
 from pathlib import Path
 
@@ -101,6 +103,30 @@ def test_what_was_kept_before_stays(watched, tmp_path: Path) -> None:
         kept = list((tmp_path / "kept").iterdir())
         assert len(kept) == count
         assert all((directory / "msgflow.duckdb").exists() for directory in kept)
+
+
+@pytest.mark.parametrize("kilobytes", [100, 2_000])
+def test_a_full_disk_ends_no_view(watched, tmp_path: Path, kilobytes: int) -> None:
+    """There is room for nothing, or for the chunks but not for the database."""
+    kept = tmp_path / "kept"
+    kept.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", f"size={kilobytes}k", "tmpfs", str(kept)]
+    if os.geteuid() or subprocess.run(mount, capture_output=True).returncode:
+        pytest.skip("file systems can be mounted by root only")
+    try:
+        options = ("--window", "3s", "--step", "3s", "--keep-on-violation", kept)
+        result = watched(TARGETS, *options)
+        assert list(kept.iterdir()) == []
+    finally:
+        subprocess.run(["umount", str(kept)], check=True)
+    assert result.exit_code == 1
+    assert len([line for line in result.stdout.splitlines() if " paths, " in line]) > 1
+    said = " ".join(result.stderr.split())
+    assert f"the violation is not kept in {kept}/violation-" in said
+    assert "no space left on" in said.lower()
+    assert "another directory with --keep-on-violation" in said
+    # Of many files, one is enough to say.
+    assert said.lower().count("no space left on") == 1
 
 
 def test_sessions_of_one_name_on_two_hosts_are_kept(tmp_path: Path) -> None:
