@@ -6,6 +6,7 @@
  * sink hears it. In the last SLOW_SECONDS of each SLOW_EVERY seconds the filter of path 0 takes
  * 100 ms. It calls the functions of libtracetools.so, as ROS 2 does, and needs nothing else of it.
  */
+#include <signal.h>
 #include <stdbool.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -143,6 +144,7 @@ int main(int count, char **words) {
     for (int path = 0; path < paths; path++) {
         if (fork()) continue;
         prctl(PR_SET_NAME, named("path", path));
+        prctl(PR_SET_PDEATHSIG, SIGKILL);
         run(path, period, first + path * period / paths, end, slow, every);
         return 0;
     }
