@@ -51,6 +51,8 @@ export class Follower {
   async step() {
     const { source } = this.app;
     await source.get("prepare");
+    // What the page still asks is of the window that it shows.
+    await this.app.page?.complete;
     // Preparing takes so long that somebody may have clicked.
     if (!this.isDue()) return;
     const generation = await (await source.get("show")).text();
