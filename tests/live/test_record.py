@@ -16,6 +16,7 @@ import pytest
 from lttng_program import lttng
 
 from msgflow.database import Database
+from msgflow.live.lttng import losses
 
 
 @dataclass
@@ -206,3 +207,17 @@ def test_a_daemon_that_cannot_start_says_why(record: Record, tmp_path: Path) -> 
     ended = record("--duration", "1", env=os.environ | {"PATH": path})
     assert ended.exit_code == 1
     assert "the session daemon of LTTng does not start: no room for buffers" in ended.err
+
+
+def test_the_highest_bit_of_a_number_of_losses_means_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two events are lost, and LTTng says 9,223,372,036,854,775,810."""
+    program = tmp_path / "lttng"
+    program.write_text(
+        '#!/bin/sh\necho \'<command xmlns="x"><discarded_events>9223372036854775810'
+        "</discarded_events><discarded_events>3</discarded_events></command>'\n"
+    )
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
+    assert losses("drive") == 5
