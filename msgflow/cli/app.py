@@ -32,7 +32,7 @@ COMMANDS = {
     "compare": (
         "Compare run B with run A: medians, means, percentiles, and whether it may be chance."
     ),
-    "verify": "Check a run against the requirements of a file: passed, failed, or not measured.",
+    "verify": "Check a run against a file of requirements: passed, failed, not measured, no data.",
     "sql": "Run SQL on the public views, read-only and without access to other files.",
     "info": (
         "Print what a database holds: runs, hosts, processes, nodes, topics, counts, data quality."

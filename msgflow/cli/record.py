@@ -9,7 +9,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from msgflow.cli.options import DatabaseOption, LinksOption, OwnEventsOption, output_option
+from msgflow.cli.options import (
+    ClockSyncOption,
+    DatabaseOption,
+    LinksOption,
+    OwnEventsOption,
+    output_option,
+)
 from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import ExitCode
 
@@ -73,6 +79,7 @@ def command(
         int, typer.Option("--num-subbuf", min=2, help="Number of sub-buffers, per CPU")
     ] = 4,
     links: LinksOption = None,
+    clock_sync: ClockSyncOption = "none",
     ingest: Annotated[
         bool, typer.Option("--ingest/--no-ingest", help="Read the recording into the database")
     ] = True,
@@ -84,11 +91,17 @@ def command(
     ends the recording, then COMMAND.
     """
     from msgflow.cli.output import print_note, print_status
+    from msgflow.clocks import read_clock_sync
+    from msgflow.links import read_links
     from msgflow.live import Channel, record
     from msgflow.run.choice import require_run_name
 
     name = name or time.strftime("recording-%Y%m%d-%H%M%S")
     require_run_name(name)
+    # What is wrong with the files is said now, and not when all is recorded.
+    if links is not None:
+        read_links(links)
+    read_clock_sync(clock_sync)
     target = directory or Path(name)
     with _status_line() as show:
         recorded = record(
@@ -105,7 +118,7 @@ def command(
     print_status(f"recorded into {target}: {_words(recorded.last)}")
     if program and recorded.exit_code:
         print_note(f"{program[0]} ended with exit code {recorded.exit_code}")
-    is_sound = not ingest or _answer(target, name, events or [], links, database)
+    is_sound = not ingest or _answer(target, name, events or [], links, clock_sync, database)
     if recorded.exit_code or not is_sound:
         raise typer.Exit(ExitCode.FAILED)
 
@@ -139,7 +152,12 @@ def _words(status: Status) -> str:
 
 
 def _answer(
-    directory: Path, name: str, events: list[str], links: Path | None, database: Path
+    directory: Path,
+    name: str,
+    events: list[str],
+    links: Path | None,
+    clock_sync: str,
+    database: Path,
 ) -> bool:
     """Read the recording into the database, and print what a user wants to know first.
 
@@ -157,6 +175,7 @@ def _answer(
         together=True,
         events=events,
         links=links,
+        clock_sync=clock_sync,
         quiet=True,
         database=database,
     )

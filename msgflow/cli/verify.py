@@ -46,7 +46,7 @@ def command(
         bool,
         typer.Option(
             "--allow-not-measured",
-            help="Exit with 0 if nothing failed, even if something was not measured",
+            help="Exit with 0 if nothing failed, even if something has no value",
         ),
     ] = False,
     form: Annotated[
@@ -57,14 +57,15 @@ def command(
     wide: WideOption = False,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
-    """Check a run against the requirements of a file: passed, failed, or not measured.
+    """Check a run against a file of requirements: passed, failed, not measured, no data.
 
-    Exit code: 0 if all passed, 1 if one failed, 5 if none failed but one was not measured.
+    Exit code: 0 if all passed, 1 if one failed, 5 if none failed but one has no value.
     `msgflow suggest targets` writes such a file from a good run.
     """
     from msgflow.cli.output import print_result, print_runs, print_status, print_text
     from msgflow.database import Database
     from msgflow.export.formats import Format
+    from msgflow.verify import Verdict
 
     with Database(database) as opened:
         verification = opened.verify(targets, paths=paths, case=case, **asdict(part))
@@ -80,11 +81,9 @@ def command(
     if form is VerifyFormat.JUNIT or output is not None:
         for line in verification.unmet():
             print_status(line)
-    numbers = {
-        verdict: verification.count(verdict) for verdict in ("passed", "failed", "not measured")
-    }
+    numbers = {verdict: verification.count(verdict) for verdict in Verdict}
     print_status(", ".join(f"{number} {verdict}" for verdict, number in numbers.items()))
-    if numbers["failed"]:
+    if numbers[Verdict.FAILED]:
         raise typer.Exit(ExitCode.FAILED)
-    if numbers["not measured"] and not allow_not_measured:
+    if numbers[Verdict.NOT_MEASURED] + numbers[Verdict.NO_DATA] and not allow_not_measured:
         raise typer.Exit(ExitCode.NOT_MEASURED)

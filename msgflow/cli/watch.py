@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, ExitStack, closing, contextmanager, nullcontext
 from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING, Annotated
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from msgflow.live import Status
     from msgflow.sql.interrupt import Interrupts
-    from msgflow.watch import Alarm, WindowReport
+    from msgflow.watch import Alarm, WindowDatabase, WindowReport
 
 # Seconds between two looks whether a session is still there.
 _BETWEEN_LOOKS = 1.0
@@ -81,6 +81,17 @@ def command(
             "--prometheus",
             metavar="[ADDRESS:]PORT",
             help="Serve metrics for Prometheus, on 127.0.0.1 without an address",
+        ),
+    ] = None,
+    ui: Annotated[
+        int | None,
+        typer.Option(
+            "--ui",
+            metavar="PORT",
+            min=0,
+            max=65535,
+            help="Show the window in the browser, like `msgflow ui`, at this port of 127.0.0.1; 0"
+            " takes any that is free",
         ),
     ] = None,
     as_json: Annotated[
@@ -136,64 +147,90 @@ def command(
     if prometheus is not None:
         exporter = Exporter()
         exporter.serve(prometheus)
-    watcher = Watcher(
-        window_ns=window_ns,
-        step_ns=step_ns,
-        links=None if links is None else read_links(links),
-        clocks=read_clock_sync(clock_sync),
-        note=print_note,
-        alarm=alarm,
-        recorder=recorder,
-        exporter=exporter,
-    )
+    with _pages(ui, links, clock_sync) as database, ExitStack() as stack:
+        watcher = Watcher(
+            window_ns=window_ns,
+            step_ns=step_ns,
+            links=None if links is None else read_links(links),
+            clocks=read_clock_sync(clock_sync),
+            note=print_note,
+            alarm=alarm,
+            recorder=recorder,
+            exporter=exporter,
+            database=database,
+        )
+        stack.callback(watcher.close)
 
-    def show(reports: Iterator[WindowReport]) -> None:
-        if as_json:
-            for report in reports:
-                print_lines([report.to_json()])
-        elif is_screen():
-            show_screen(reports)
+        def show(reports: Iterator[WindowReport]) -> None:
+            if as_json:
+                for report in reports:
+                    print_lines([report.to_json()])
+            elif is_screen():
+                show_screen(reports)
+            else:
+                for report in reports:
+                    violated = [
+                        f"violation: {printable(violation_line(each))}"
+                        for each in report.violations
+                    ]
+                    print_lines([window_line(report), *violated])
+
+        def live(place: Path, is_over: Callable[[], bool]) -> None:
+            show(watch_live(place, watcher, step_ns=step_ns, is_over=is_over, note=print_note))
+
+        place = path_of(words[0]).absolute()
+        if once:
+            show(watch_finished(place, watcher))
+        elif len(words) == 1 and (source := _source(words[0], place)) is not None:
+            found, session = source
+            with _rotated(session, step_ns), _until_interrupted() as interrupts:
+                is_over = _session_is_over(session)
+
+                def ends() -> bool:
+                    interrupts.check()
+                    return is_over()
+
+                live(found, ends)
         else:
-            for report in reports:
-                violated = [
-                    f"violation: {printable(violation_line(each))}" for each in report.violations
-                ]
-                print_lines([window_line(report), *violated])
-
-    def live(place: Path, is_over: Callable[[], bool]) -> None:
-        show(watch_live(place, watcher, step_ns=step_ns, is_over=is_over, note=print_note))
-
-    place = path_of(words[0]).absolute()
-    if once:
-        show(watch_finished(place, watcher))
-    elif len(words) == 1 and (source := _source(words[0], place)) is not None:
-        found, session = source
-        if session is not None:
-            from msgflow.live import rotate
-
-            rotate(session, step_ns)
-        with _until_interrupted() as interrupts:
-            is_over = _session_is_over(session)
-
-            def ends() -> bool:
-                interrupts.check()
-                return is_over()
-
-            live(found, ends)
-    else:
-        if directory is None:
-            # The recording is ours alone: it need not grow.
-            watcher.on_passed = remove_chunk
-        _record(words, directory, step_ns, live)
+            if directory is None:
+                # The recording is ours alone: it need not grow.
+                watcher.on_passed = remove_chunk
+            _record(words, directory, step_ns, live)
     if alarm is not None and alarm.count(Verdict.FAILED):
         raise typer.Exit(ExitCode.FAILED)
     # Without a window, nothing was measured.
-    if alarm is not None and (alarm.count(Verdict.NOT_MEASURED) or not alarm.count(Verdict.PASSED)):
+    if alarm is not None and not alarm.is_measured:
         raise typer.Exit(ExitCode.NOT_MEASURED)
+
+
+@contextmanager
+def _pages(
+    port: int | None, links: Path | None, clock_sync: str
+) -> Iterator[WindowDatabase | None]:
+    """Serve pages of the last window during the block, unless there is no port for them."""
+    from msgflow.cli.output import print_status
+    from msgflow.confined_query import WarmSql
+    from msgflow.view.server import serving
+    from msgflow.view.sql_page import MOST_SECONDS
+    from msgflow.watch import WindowDatabase
+
+    if port is None:
+        yield None
+        return
+    with tempfile.TemporaryDirectory(prefix="msgflow-window-") as directory:
+        path = Path(directory) / "window.duckdb"
+        database = WindowDatabase(path, links=links, clock_sync=clock_sync)
+        with (
+            closing(WarmSql(path, memory_limit=None, seconds=MOST_SECONDS)) as sql,
+            serving(path, sql, database, place="msgflow watch", port=port) as address,
+        ):
+            print_status(address)
+            yield database
 
 
 def _alarm(targets: Path, paths: Path) -> Alarm:
     """Return the alarm of a file of targets."""
+    from msgflow.cli.output import print_note
     from msgflow.paths import read_paths
     from msgflow.verify import read_targets
     from msgflow.watch import Alarm
@@ -208,7 +245,7 @@ def _alarm(targets: Path, paths: Path) -> Alarm:
         places[name.value] = {
             word: [text.value for text in texts] for word, texts in path.places.items()
         }
-    return Alarm(file, places)
+    return Alarm(file, places, print_note)
 
 
 def _record(
@@ -249,6 +286,13 @@ def _record(
         watching.result()
     if recorded.exit_code:
         print_note(f"{words[0]} ended with exit code {recorded.exit_code}")
+
+
+def _rotated(session: str | None, step_ns: int) -> AbstractContextManager[None]:
+    """Let a session rotate during a block, if there is one."""
+    from msgflow.live import rotated
+
+    return nullcontext() if session is None else rotated(session, step_ns)
 
 
 @contextmanager

@@ -88,10 +88,30 @@ def ingest_again(
             model.build(con, keep=True, findings=False)
             with transaction(con):
                 run_id, _ = store_run(con, name, name, loaded)
-                if links is not None:
-                    declare_links(con, run_id, links)
-                derive(
-                    con, run_id, synchronise=lambda: set_clocks(con, run_id, clocks), findings=False
-                )
+                _derive(con, run_id, links, clocks)
         finally:
             empty(con, "raw", "staging")
+
+
+def link_again(con: duckdb.DuckDBPyConnection, *, links: LinksFile, clocks: ClockSync) -> None:
+    """Derive the links of the run anew, with other declared ones.
+
+    Args:
+        con: from `database_in_memory`, with a run.
+        links: indirect links to declare, in place of those before.
+        clocks: how clocks of several hosts are brought together.
+
+    Raises:
+        UsageError: the links do not fit the run.
+    """
+    with transaction(con):
+        ((run_id,),) = con.execute("SELECT run_id FROM store.run").fetchall()
+        _derive(con, run_id, links, clocks)
+
+
+def _derive(
+    con: duckdb.DuckDBPyConnection, run_id: int, links: LinksFile | None, clocks: ClockSync
+) -> None:
+    if links is not None:
+        declare_links(con, run_id, links)
+    derive(con, run_id, synchronise=lambda: set_clocks(con, run_id, clocks), findings=False)

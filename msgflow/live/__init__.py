@@ -4,6 +4,6 @@ from __future__ import annotations
 
 from msgflow.live.lttng import sessions
 from msgflow.live.recording import BYTES_OF_EVENT, Recorded, Status, record
-from msgflow.live.session import Channel, rotate
+from msgflow.live.session import Channel, rotated
 
-__all__ = ["BYTES_OF_EVENT", "Channel", "Recorded", "Status", "record", "rotate", "sessions"]
+__all__ = ["BYTES_OF_EVENT", "Channel", "Recorded", "Status", "record", "rotated", "sessions"]

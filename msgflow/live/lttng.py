@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 _NO_DAEMON = "No session daemon is available"
 # Seconds.
 _LONGEST = 60.0
+_HIGHEST_BIT = 2**63
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +127,10 @@ def providers() -> list[Provider]:
 
 def losses(session: str) -> int:
     """Return how many events the channels of a session have discarded so far."""
-    return sum(_numbers(lttng("list", session), "discarded_events"))
+    # LTTng 2.13 now and then sets the highest bit, too.
+    return sum(
+        number % _HIGHEST_BIT for number in _numbers(lttng("list", session), "discarded_events")
+    )
 
 
 def _numbers(element: ElementTree.Element, name: str) -> Iterator[int]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shlex
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -74,7 +74,7 @@ def recording_session(
         if with_kernel:
             _set_up_kernel(name, channel)
         if channel.rotation_ns is not None:
-            rotate(name, channel.rotation_ns)
+            _rotate(name, channel.rotation_ns)
         lttng("start", name)
         yield
     finally:
@@ -84,17 +84,26 @@ def recording_session(
         owner.unlink()
 
 
-def rotate(name: str, length_ns: int) -> None:
-    """Let a session cut its recording into chunks from now on; one that does so already goes on.
+@contextmanager
+def rotated(name: str, length_ns: int) -> Iterator[None]:
+    """Let a session cut its recording into chunks during the block; one that does so goes on.
 
     Raises:
         RecordingError: it cannot, as one with a live connection or a snapshot session.
     """
     try:
-        lttng("enable-rotation", f"--session={name}", f"--timer={length_ns // 1000}us")
+        _rotate(name, length_ns)
     except RecordingError as error:
         if "already set" not in error.message:
             raise
+        yield
+        return
+    try:
+        yield
+    finally:
+        # It may have ended.
+        with suppress(RecordingError):
+            lttng("disable-rotation", f"--session={name}", "--timer")
 
 
 def record_snapshot(name: str, directory: Path) -> None:
@@ -157,6 +166,10 @@ def _set_up_kernel(name: str, channel: Channel) -> None:
     _enable_channel("--kernel", name, channel)
     lttng("enable-event", *to_channel, ",".join(KERNEL_EVENTS))
     lttng("add-context", *to_channel, *(f"--type={context}" for context in KERNEL_CONTEXTS))
+
+
+def _rotate(name: str, length_ns: int) -> None:
+    lttng("enable-rotation", f"--session={name}", f"--timer={length_ns // 1000}us")
 
 
 def _enable_channel(domain: str, name: str, channel: Channel) -> None:

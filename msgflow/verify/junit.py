@@ -21,13 +21,13 @@ def junit_xml(result: QueryResult, run: Run, *, allow_not_measured: bool) -> str
     Args:
         result: the verdicts.
         run: their run.
-        allow_not_measured: requirements that were not measured are skipped tests, else errors.
+        allow_not_measured: requirements without a value are skipped tests, else errors.
     """
     rows: list[dict[str, Any]] = result.to_arrow().to_pylist()
     missing = "skipped" if allow_not_measured else "errors"
     counts = {"tests": len(rows), "failures": 0, "errors": 0, "skipped": 0}
     counts["failures"] = sum(row["verdict"] == "failed" for row in rows)
-    counts[missing] = sum(row["verdict"] == "not measured" for row in rows)
+    counts[missing] = sum(row["value"] is None for row in rows)
     numbers = {name: str(number) for name, number in counts.items()}
     root = ElementTree.Element("testsuites", {"name": "msgflow verify", **numbers})
     name = printable(run.name)
@@ -47,11 +47,11 @@ def junit_xml(result: QueryResult, run: Run, *, allow_not_measured: bool) -> str
                 case, "failure", {"type": "failed", "message": f"measured {row['measured']}"}
             )
             failure.text = printable(_worst(row))
-        elif row["verdict"] == "not measured":
+        elif row["value"] is None:
             tag = "skipped" if allow_not_measured else "error"
             attributes = {"message": printable(row["reason"])}
             if tag == "error":
-                attributes["type"] = "not measured"
+                attributes["type"] = row["verdict"]
             ElementTree.SubElement(case, tag, attributes)
     ElementTree.indent(root)
     text = ElementTree.tostring(root, encoding="unicode")

@@ -21,7 +21,8 @@ class Metric:
         statistics: those of the query; empty if there is one value only.
         samples: SQL over its columns: the number of values behind it.
         worst: the worst case that explains a value that is too large, a key of `worst_case.KEYS`.
-        missing: why there may be no value.
+        missing: why there may be no value, though the recording could have one.
+        lacking: what a recording may lack to have a value at all; None: nothing.
     """
 
     query: str
@@ -31,6 +32,7 @@ class Metric:
     samples: str = "count"
     worst: str | None = None
     missing: str = "too few values in the time window"
+    lacking: str | None = None
 
 
 @dataclass(frozen=True)
@@ -118,10 +120,10 @@ SUBJECTS: dict[str, Subject] = {
             "jitter": Metric("timers", "jitter_{}_ns", Dimension.TIME, _HIGH, worst="late_call"),
             "lateness": Metric(
                 "timers", "lateness_{}_ns", Dimension.TIME, _HIGH,
-                "count - unknown - loss_affected", "late_call", _NOT_DUE,
+                "count - unknown - loss_affected", "late_call", lacking=_NOT_DUE,
             ),
             "missed": Metric(
-                "timers", "missed", Dimension.COUNT, worst="late_call", missing=_NOT_DUE
+                "timers", "missed", Dimension.COUNT, worst="late_call", lacking=_NOT_DUE
             ),
             "bunched": Metric("timers", "bunched", Dimension.COUNT, worst="late_call"),
         },
@@ -142,11 +144,11 @@ SUBJECTS: dict[str, Subject] = {
             "wait": Metric("waits", "wait_{}_ns", Dimension.TIME, ("median", "max")),
             "cpu": Metric(
                 "callback-schedule", "running_{}_ns", Dimension.TIME, ("median", "p99", "max"),
-                missing=_NOT_TRACED,
+                lacking=_NOT_TRACED,
             ),
             "preempted": Metric(
                 "callback-schedule", "preempted_ns / nullif(total_ns, 0)", Dimension.SHARE,
-                worst="preemption", missing=_NOT_TRACED,
+                worst="preemption", lacking=_NOT_TRACED,
             ),
         },
         dict.fromkeys(("callbacks", "waits", "callback-schedule"), "node || ' ' || callback"),
@@ -245,7 +247,7 @@ SUBJECTS: dict[str, Subject] = {
             ),
             "wakeup": Metric(
                 "wakeup-latency", "{}_ns", Dimension.TIME, ("median", "p99", "max"),
-                missing=_NOT_TRACED,
+                lacking=_NOT_TRACED,
             ),
         },
         dict.fromkeys(

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from msgflow.run.window import Window
     from msgflow.sql.value import Value
     from msgflow.verify.file import Requirement, Target, TargetsFile
+    from msgflow.verify.metrics import Metric
     from msgflow.yaml_file import Text
 
 
@@ -39,11 +40,12 @@ class Verdict(StrEnum):
     PASSED = "passed"
     FAILED = "failed"
     NOT_MEASURED = "not measured"
+    NO_DATA = "no data"
 
 
-_ORDER = (Verdict.FAILED, Verdict.NOT_MEASURED, Verdict.PASSED)
+_ORDER = (Verdict.FAILED, Verdict.NOT_MEASURED, Verdict.NO_DATA, Verdict.PASSED)
 _COLUMNS = (
-    Column("verdict", "VARCHAR", None, "'passed', 'failed' or 'not measured'"),
+    Column("verdict", "VARCHAR", None, "'passed', 'failed', 'not measured' or 'no data'"),
     Column("target", "VARCHAR", None, "What the file calls it"),
     Column("subject", "VARCHAR", None, "What of the run it is; NULL: nothing there"),
     Column("metric", "VARCHAR", None, "What is required"),
@@ -52,7 +54,7 @@ _COLUMNS = (
     Column("value", "DOUBLE", None, "What was measured, in `unit`"),
     Column("unit", "VARCHAR", None, "'ns', 'Hz', 'share' (0 to 1) or 'count'"),
     Column("samples", "BIGINT", None, "How many values it is from"),
-    Column("reason", "VARCHAR", None, "Why it was not measured"),
+    Column("reason", "VARCHAR", None, "Why there is no value"),
     Column("worst_ns", "BIGINT", "ns", "The worst case of what is too long or lost"),
     Column("worst_at_ns", "BIGINT", "epoch ns", "When that began"),
     Column("see", "VARCHAR", None, "The command that shows it"),
@@ -93,12 +95,16 @@ class Verification:
         return self.result._repr_html_()
 
     def count(self, verdict: str) -> int:
-        """Return how many requirements have a verdict: 'passed', 'failed' or 'not measured'."""
+        """Return how many requirements have a verdict.
+
+        Args:
+            verdict: 'passed', 'failed', 'not measured' or 'no data'.
+        """
         verdicts: list[str] = self.result.table["verdict"].to_pylist()
         return verdicts.count(Verdict(verdict))
 
     def unmet(self) -> list[str]:
-        """Return a line for each requirement that failed or was not measured, with the reason."""
+        """Return a line for each requirement that is not met, or has no value, with the reason."""
         return [
             f"{row['verdict']}: {row['subject'] or row['target']}: {row['metric']}"
             f" {row['condition']}: {row['measured'] or row['reason']}"
@@ -107,7 +113,7 @@ class Verification:
         ]
 
     def to_junit(self, *, allow_not_measured: bool = False) -> str:
-        """Return the verdicts as JUnit XML: 'not measured' is an error, or skipped."""
+        """Return the verdicts as JUnit XML: one without a value is an error, or skipped."""
         from msgflow.verify.junit import junit_xml
 
         return junit_xml(self.result, self.run, allow_not_measured=allow_not_measured)
@@ -276,7 +282,7 @@ class _Work:
         metric = SUBJECTS[target.kind].metrics[requirement.metric]
         condition = requirement.condition
         value = row[f"value_{place}"]
-        verdict = Verdict.NOT_MEASURED
+        verdict = _without_value(metric)
         worst: WorstCase | None = None
         if value is not None:
             verdict = Verdict.PASSED if condition.holds(value) else Verdict.FAILED
@@ -289,7 +295,7 @@ class _Work:
             "measured": None if value is None else format_value(value, metric.dimension),
             "value": value,
             "samples": row[f"samples_{place}"],
-            "reason": metric.missing if value is None else None,
+            "reason": (metric.lacking or metric.missing) if value is None else None,
             "worst_ns": worst.duration_ns if worst else None,
             "worst_at_ns": worst.at_ns if worst else None,
             "see": worst.command if worst else None,
@@ -302,15 +308,17 @@ class _Work:
                 reason = "no message led from the start of this path to its end"
         else:
             reason = f"nothing of this {target.kind} was measured in the time window"
+        metric = SUBJECTS[target.kind].metrics[requirement.metric]
         return self._verdict(target, requirement) | {
-            "verdict": Verdict.NOT_MEASURED,
-            "reason": reason,
+            "verdict": _without_value(metric),
+            "reason": metric.lacking or reason,
         }
 
     def missing(self, target: Target, reason: str) -> Iterator[dict[str, Any]]:
         """Yield 'not measured' for each requirement on something that the run does not have."""
         for requirement in target.requirements:
-            yield self._missing(target, requirement) | {"reason": reason}
+            row = {"verdict": Verdict.NOT_MEASURED, "reason": reason}
+            yield self._missing(target, requirement) | row
 
     @staticmethod
     def _verdict(target: Target, requirement: Requirement) -> dict[str, Any]:
@@ -327,6 +335,11 @@ class _Work:
             return find_worst_case(self._connection, kind, key, self._window)
         rows = self._ask("flows", FLOWS[kind], target, {"subject": subject})
         return worst_case_of(list(rows[0].values())) if rows else None
+
+
+def _without_value(metric: Metric) -> Verdict:
+    """Return the verdict on a requirement without a value; its name is known in the run."""
+    return Verdict.NO_DATA if metric.lacking is None else Verdict.NOT_MEASURED
 
 
 def _vanished(connection: duckdb.DuckDBPyConnection, file: TargetsFile, run: Run) -> dict[int, str]:

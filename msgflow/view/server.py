@@ -12,6 +12,7 @@ import html
 import ipaddress
 import re
 import socket
+import threading
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -63,6 +64,18 @@ _HEADERS = {
 _FILE = re.compile(r"[\w.-]+\.(?:js|css)")
 
 
+class Following(Protocol):
+    """What moves a database on when a page asks for it."""
+
+    def prepare(self) -> None:
+        """Write its next state beside the database; this may take long."""
+        ...
+
+    def show(self) -> None:
+        """Put what was prepared in place of the database."""
+        ...
+
+
 class Interruptible(Protocol):
     """Something that runs a question, and can be told to end it."""
 
@@ -71,22 +84,26 @@ class Interruptible(Protocol):
         ...
 
 
-def application(shared: SharedDatabase, token: str, sql: Sql) -> ASGIApp:
+def application(
+    shared: SharedDatabase, token: str, sql: Sql, following: Following | None = None
+) -> ASGIApp:
     """Return the application: pages and their data, for requests with the token.
 
     Args:
         shared: the database.
         token: of the printed address.
         sql: runs the queries of the SQL page.
+        following: moves the database on; None if it stays as it is.
     """
-    limiters: dict[bool, anyio.CapacityLimiter] = {}
+    limiters: dict[str, anyio.CapacityLimiter] = {}
+    follows = "" if following is None else " data-follows"
 
     async def page(request: Request) -> Response:
         generation = ""
         with suppress(MsgflowError):  # the page asks too, and shows the error
             generation = await anyio.to_thread.run_sync(shared.generation)
         content = assets.page(
-            head=_head(), attributes=f' data-generation="{html.escape(generation)}"'
+            head=_head(), attributes=f' data-generation="{html.escape(generation)}"{follows}'
         )
         return Response(content, media_type="text/html")
 
@@ -113,23 +130,34 @@ def application(shared: SharedDatabase, token: str, sql: Sql) -> ASGIApp:
         shared.require(generation)
         return encoded_rows(result)
 
+    def prepare() -> bytes:
+        assert following is not None
+        following.prepare()
+        return b""
+
+    def show() -> bytes:
+        assert following is not None
+        following.show()
+        return shared.generation().encode()
+
     async def data(request: Request) -> Response:
         name = request.path_params["name"]
         params: dict[str, Any] = dict(request.query_params)
         generation = request.headers.get("X-Generation")
-        is_sql = name == "sql"
-        if is_sql not in limiters:
-            # SQL has one process, and keeps no page waiting.
-            limiters[is_sql] = anyio.CapacityLimiter(1 if is_sql else MOST_AT_ONCE)
+        # SQL has one process, and keeps no page waiting; nor does the next state.
+        alone: dict[str, Callable[[Started], bytes]] = {
+            "sql": lambda started: rows(params, generation, started)
+        }
+        if following is not None:
+            alone |= {"prepare": lambda _: prepare(), "show": lambda _: show()}
+        kind = name if name in alone else ""
+        if kind not in limiters:
+            limiters[kind] = anyio.CapacityLimiter(1 if kind else MOST_AT_ONCE)
         try:
             return await _answered(
                 request,
-                limiters[is_sql],
-                lambda started: (
-                    rows(params, generation, started)
-                    if is_sql
-                    else shared.answer(name, params, generation, started)
-                ),
+                limiters[kind],
+                alone.get(name, lambda started: shared.answer(name, params, generation, started)),
             )
         except ReplacedError as error:
             return _failure(error, 409, "replaced")
@@ -355,7 +383,7 @@ def listen(port: int | None) -> socket.socket:
         reason = (error.strerror or str(error)).lower()
         raise UsageError(
             f"cannot listen on the port: {reason} — {wanted}",
-            "give another --port, or none: then a free one is taken",
+            "give another port, or 0: then a free one is taken",
         ) from error
     return listener
 
@@ -388,14 +416,52 @@ def serve(
 
 
 @contextmanager
+def serving(path: Path, sql: Sql, following: Following, *, place: str, port: int) -> Iterator[str]:
+    """Serve the pages of a database that moves on, in a thread, during the block.
+
+    Args:
+        path: the database.
+        sql: runs the queries of the SQL page.
+        following: moves it on.
+        place: what its token is kept for.
+        port: of 127.0.0.1; 0 takes any that is free.
+
+    Yields:
+        The address, which has the token.
+
+    Raises:
+        UsageError: the port is in use.
+    """
+    with running(
+        path, sql, port=port, memory_limit=None, following=following, place=place
+    ) as (server, listener, address):  # fmt: skip
+        thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
+        thread.start()
+        try:
+            yield address
+        finally:
+            server.should_exit = True
+            thread.join()
+
+
+@contextmanager
 def running(
-    path: Path, sql: Sql, *, port: int | None, memory_limit: str | None
+    path: Path,
+    sql: Sql,
+    *,
+    port: int | None,
+    memory_limit: str | None,
+    following: Following | None = None,
+    place: str | None = None,
 ) -> Iterator[tuple[uvicorn.Server, socket.socket, str]]:
-    """Prepare a server; see `serve`."""
+    """Prepare a server; see `serve` and `serving`."""
     shared = SharedDatabase(path, memory_limit)
     try:
-        place = str(path.resolve())
-        with listening(place, port, lambda token: application(shared, token, sql)) as server:
+        with listening(
+            place or str(path.resolve()),
+            port,
+            lambda token: application(shared, token, sql, following),
+        ) as server:
             yield server
     finally:
         shared.close()

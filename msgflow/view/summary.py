@@ -231,7 +231,7 @@ def verdict_section(verification: Verification, part: Part) -> Section:
     """Return the verdicts on requirements for a run and window, those that are not met first."""
     numbers = [
         f"{verification.count(verdict)} {verdict}"
-        for verdict in ("failed", "not measured", "passed")
+        for verdict in ("failed", "not measured", "no data", "passed")
     ]
     words = ["msgflow", "verify", verification.file, *part.options]
     if verification.paths != DEFAULT_PATHS:

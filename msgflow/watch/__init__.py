@@ -8,6 +8,7 @@ from msgflow.watch.flight_recorder import FlightRecorder
 from msgflow.watch.follow import watch_finished, watch_live
 from msgflow.watch.prometheus import Exporter
 from msgflow.watch.watcher import Watcher
+from msgflow.watch.window_database import WindowDatabase
 from msgflow.watch.window_report import WindowReport
 
 __all__ = [
@@ -15,6 +16,7 @@ __all__ = [
     "Exporter",
     "FlightRecorder",
     "Watcher",
+    "WindowDatabase",
     "WindowReport",
     "finished_chunks",
     "remove_chunk",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 from msgflow.query.catalogue import load_query
@@ -11,7 +12,7 @@ from msgflow.text.values import format_duration
 from msgflow.verify import Verdict, take_of, verify
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     import duckdb
 
@@ -40,6 +41,8 @@ _BLAME_OF_STATE = {
     "uninterruptible": "{node} waited {time} for a page or a disk",
 }
 _OTHER = "{node} spent {time} on {activity}"
+# A requirement has the first of these that a window gave it.
+_STRONGEST = (Verdict.FAILED, Verdict.PASSED, Verdict.NO_DATA, Verdict.NOT_MEASURED)
 # A piece that took a smaller part of the latency is not to blame.
 _LEAST_SHARE = 0.2
 _MOST_PIECES = 2
@@ -49,33 +52,48 @@ class Alarm:
     """The targets, and which of them were met since the begin."""
 
     def __init__(
-        self, targets: TargetsFile, paths: Mapping[str, Mapping[str, Sequence[str]]]
+        self,
+        targets: TargetsFile,
+        paths: Mapping[str, Mapping[str, Sequence[str]]],
+        note: Callable[[str], None],
     ) -> None:
         """Start without a verdict.
 
         Args:
             targets: the requirements.
             paths: places of the named paths of the requirements, as `verify` takes them.
+            note: gets a sentence about each requirement that had data and has none any more.
         """
         self._targets = targets
         self._paths = paths
+        self._say = note
         # By (target, metric, condition).
         self._verdicts: dict[tuple[str, str, str], Verdict] = {}
         self._failing: set[tuple[Any, ...]] = set()
+        self._silent: set[tuple[str, str, str]] = set()
 
     def count(self, verdict: Verdict) -> int:
         """Return how many requirements have a verdict: one that failed once has failed."""
         return list(self._verdicts.values()).count(verdict)
 
-    def violations(
+    @property
+    def is_measured(self) -> bool:
+        """Whether a window had a value for each requirement; without a window there is none."""
+        found = set(self._verdicts.values())
+        return bool(found) and found <= {Verdict.FAILED, Verdict.PASSED}
+
+    def judge(
         self, con: duckdb.DuckDBPyConnection, window: Window, final_ns: int
-    ) -> list[Row]:
-        """Verify a window, and return what is violated there and was not before.
+    ) -> tuple[list[Row], Counter[str]]:
+        """Verify a window.
 
         Args:
             con: to a database with one run.
             window: the window, with the part of it that is not final yet.
             final_ns: where this part begins.
+
+        Returns:
+            What is violated there and was not before, and how many verdicts there are of each kind.
         """
         part = Slice(start=window.start_ns, end=window.end_ns)
         rows = verify(con, self._targets, part, paths=self._paths).result.table.to_pylist()
@@ -92,14 +110,24 @@ class Alarm:
             if key not in self._failing:
                 found.append(self._violation(con, row, part, final_ns))
         self._failing = failing
-        return found
+        self._note_silence(rows)
+        return found, Counter(row["verdict"] for row in rows)
 
     def _note(self, row: Row) -> None:
-        key = (row["target"], row["metric"], row["condition"])
-        before = self._verdicts.get(key)
-        verdict = Verdict(row["verdict"])
-        if before is None or verdict is Verdict.FAILED or before is Verdict.NOT_MEASURED:
-            self._verdicts[key] = verdict
+        key, verdict = _key(row), Verdict(row["verdict"])
+        before = self._verdicts.get(key, verdict)
+        self._verdicts[key] = min(before, verdict, key=_STRONGEST.index)
+
+    def _note_silence(self, rows: Sequence[Row]) -> None:
+        """Say what had data before and has none in this window, once for each silence."""
+        measured = {_key(row) for row in rows if row["value"] is not None}
+        silent = {_key(row) for row in rows} - measured
+        for row in rows:
+            had_data = self._verdicts[_key(row)] in (Verdict.FAILED, Verdict.PASSED)
+            if had_data and _key(row) in silent - self._silent:
+                name = row["subject"] or row["target"]
+                self._say(f"no data of {name}: {row['metric']} {row['condition']}: {row['reason']}")
+        self._silent = silent
 
     @staticmethod
     def _violation(con: duckdb.DuckDBPyConnection, row: Row, part: Slice, final_ns: int) -> Row:
@@ -120,6 +148,10 @@ class Alarm:
             "is_final": at_ns is None or at_ns < final_ns,
             "culprit": ", ".join(blamed(pieces, row["path"])) or None,
         }
+
+
+def _key(row: Row) -> tuple[str, str, str]:
+    return row["target"], row["metric"], row["condition"]
 
 
 def violation_line(violation: Row) -> str:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from msgflow.errors import MsgflowError
 from msgflow.ingest import ingest
+from msgflow.watch.learned_answers import write_learned
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -54,13 +55,16 @@ class FlightRecorder:
         self._note = note
         self._until_ns = 0
 
-    def keep(self, end_ns: int, traces: KeptTraces, chunks: Sequence[Path]) -> None:
+    def keep(
+        self, end_ns: int, traces: KeptTraces, chunks: Sequence[Path], learned: str | None
+    ) -> None:
         """Keep the last chunks, unless a violation in the same window has kept them.
 
         Args:
             end_ns: until when they were recorded.
             traces: their events, with the names of all objects.
             chunks: their directories; of those that are gone only the events are kept.
+            learned: a file of links that earlier windows have shown, if any are needed.
         """
         if end_ns < self._until_ns:
             return
@@ -80,16 +84,28 @@ class FlightRecorder:
                 [target],
                 target / _DATABASE,
                 name=target.name,
-                links=self._links,
+                links=write_learned(target, self._links, learned),
                 clock_sync=self._clock_sync,
                 traces=traces,
             )
         except (OSError, MsgflowError) as error:
             # A disk that is full must not end the view.
             shutil.rmtree(target, ignore_errors=True)
-            self._note(f"the violation is not kept: {error}")
+            self._note(
+                f"the violation is not kept in {target}: {_reason(error)}; remove files, or name"
+                " another directory with --keep-on-violation"
+            )
             return
         others = sorted(set(self._directory.glob("violation-*")) - {target})
         for oldest in others[: max(len(others) + 1 - self._most, 0)]:
             shutil.rmtree(oldest, ignore_errors=True)
         self._note(f"kept: msgflow why --db {target / _DATABASE}")
+
+
+def _reason(error: OSError | MsgflowError) -> str:
+    if isinstance(error, MsgflowError):
+        return error.message
+    if isinstance(error, shutil.Error):
+        # Of the first file that was not copied: its source, its target, and the reason.
+        return str(error.args[0][0][2])
+    return (error.strerror or str(error)).lower()

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 
 from msgflow import trace as trace_package
 from msgflow.ingest.catalogue import load
@@ -91,6 +92,9 @@ def read_chunk(chunk: Chunk, after: Continuation) -> KeptChunk | None:
         ends = [trace.end_ns for trace in traces.traces if trace.end_ns is not None]
         if not begins or not ends:
             return None
+        end_ns = max(ends)
+        if packets:
+            packets.append(_last_packets(packets, end_ns))
         return KeptChunk(
             source=chunk.source,
             path=chunk.path,
@@ -99,9 +103,40 @@ def read_chunk(chunk: Chunk, after: Continuation) -> KeptChunk | None:
             event_counts=dict(traces.event_counts),
             damages=tuple(traces.damages),
             begin_ns=min(begins),
-            end_ns=max(ends),
+            end_ns=end_ns,
             **_renumbered({name: joined(batches) for name, batches in events.items()}),
         )
+
+
+def _last_packets(packets: list[pa.RecordBatch], end_ns: int) -> pa.RecordBatch:
+    """Return an empty packet to the end of the chunk for each stream that ends before.
+
+    Stopping writes one into every stream, but a rotation does not where nothing happened: the
+    stream of a CPU that was idle would seem to be lost.
+    """
+    streams = (
+        pa.Table.from_batches(packets)
+        .group_by(
+            ["trace_index", "stream_index", "stream_class_id", "stream_instance_id", "cpu_id"]
+        )
+        .aggregate([("position", "max"), ("end_ns", "max"), ("is_numbered", "all")])
+    )
+    early = streams.filter(pc.field("end_ns_max") < end_ns)
+    count = early.num_rows
+    columns = {
+        **{name: early[name] for name in early.column_names},
+        "position": pc.add(early["position_max"], 1),
+        "begin_ns": early["end_ns_max"],
+        "end_ns": pa.repeat(end_ns, count),
+        "last_event_ns": pa.nulls(count),
+        "event_count": pa.repeat(0, count),
+        "discarded_event_count": pa.repeat(0, count),
+        "lost_packet_count": pa.repeat(0, count),
+        "is_numbered": early["is_numbered_all"],
+    }
+    schema = packets[0].schema
+    table = pa.table([columns[name] for name in schema.names], names=schema.names).cast(schema)
+    return table.combine_chunks().to_batches()[0] if count else packets[0].slice(0, 0)
 
 
 def joined(batches: list[pa.RecordBatch]) -> pa.RecordBatch:

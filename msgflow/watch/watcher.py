@@ -8,11 +8,12 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError, UsageError
-from msgflow.ingest.memory import database_in_memory, ingest_again
+from msgflow.ingest.memory import database_in_memory, ingest_again, link_again
 from msgflow.run.window import Window
 from msgflow.trace import Continuation
 from msgflow.watch.history import History
 from msgflow.watch.kept_chunk import read_chunk
+from msgflow.watch.learned_answers import LearnedAnswers, with_learned
 from msgflow.watch.window_report import report_of
 
 if TYPE_CHECKING:
@@ -28,10 +29,13 @@ if TYPE_CHECKING:
     from msgflow.watch.flight_recorder import FlightRecorder
     from msgflow.watch.kept_traces import KeptTraces
     from msgflow.watch.prometheus import Exporter
+    from msgflow.watch.window_database import WindowDatabase
     from msgflow.watch.window_report import WindowReport
 
 _RUN = "watch"
 _SECOND_NS = 1_000_000_000
+# Clocks are kept in step by less.
+_LEAST_STEP_NS = 500_000_000
 
 
 class Watcher:
@@ -54,6 +58,7 @@ class Watcher:
         alarm: Alarm | None = None,
         recorder: FlightRecorder | None = None,
         exporter: Exporter | None = None,
+        database: WindowDatabase | None = None,
     ) -> None:
         """Start before the first chunk.
 
@@ -66,6 +71,7 @@ class Watcher:
             alarm: the targets of each window.
             recorder: keeps the chunks around a violation.
             exporter: counts each moment once.
+            database: gets each window, for pages.
         """
         self.history = History(window_ns, step_ns)
         self._links = links
@@ -74,9 +80,13 @@ class Watcher:
         self._alarm = alarm
         self._recorder = recorder
         self._exporter = exporter
+        self._database = database
         self.on_passed: Callable[[Path], None] | None = None
         self._lacks_links = False
-        self._violated: tuple[int, KeptTraces, list[Path]] | None = None
+        self._clock_offset_ns = _clock_offset_ns()
+        self._clock_step_ns = 0
+        self._answers = LearnedAnswers()
+        self._violated: tuple[int, KeptTraces, list[Path], str | None] | None = None
         self._after = Continuation()
         self.numbers: dict[Path, int] = {}
 
@@ -131,6 +141,12 @@ class Watcher:
             self._recorder.keep(*self._violated)
         self._violated = None
 
+    def close(self) -> None:
+        """Free the memory of the database."""
+        # Before the first window there is none.
+        if "_con" in self.__dict__:
+            self._con.close()
+
     def _forget(self, window: Window) -> None:
         for path in self.history.forget(window):
             if self.on_passed is not None:
@@ -140,8 +156,12 @@ class Watcher:
     def _con(self) -> duckdb.DuckDBPyConnection:
         return database_in_memory()
 
-    def _ingest(self, traces: KeptTraces) -> None:
-        """Ingest what a window needs; links of nodes that are not there yet are left out."""
+    def _ingest(self, traces: KeptTraces) -> str | None:
+        """Ingest what a window needs; links of nodes that are not there yet are left out.
+
+        Returns:
+            A file of links that were learned from earlier windows; None if none are needed.
+        """
         try:
             ingest_again(self._con, traces, _RUN, links=self._links, clocks=self._clocks)
         except UsageError as error:
@@ -153,26 +173,50 @@ class Watcher:
             ingest_again(self._con, traces, _RUN, links=None, clocks=self._clocks)
         else:
             self._lacks_links = False
+        learned = self._answers.doubted(self._con)
+        if learned is not None:
+            declared = None if self._lacks_links else self._links
+            link_again(self._con, links=with_learned(declared, learned), clocks=self._clocks)
+        return learned
+
+    def _lag_s(self) -> float:
+        """Return how old the last event is; the tracer knows nothing of a clock that was set."""
+        step_ns = _clock_offset_ns() - self._clock_offset_ns
+        if abs(step_ns - self._clock_step_ns) > _LEAST_STEP_NS:
+            self._clock_step_ns = step_ns
+            self._note(
+                f"the clock of this machine was set, by {step_ns / _SECOND_NS:+.1f} s since the"
+                " begin: times of the tracer go on as before"
+            )
+        now_ns = time.time_ns() - self._clock_step_ns
+        return (now_ns - self.history.last_event_ns) / _SECOND_NS
 
     def _report(self, window: Window, *, is_final: bool, is_live: bool) -> WindowReport:
         traces = self.history.traces(window)
-        self._ingest(traces)
+        learned = self._ingest(traces)
         report = report_of(self._con, window, is_final=is_final)
         if self._alarm is not None:
             # What came after the window counts, too: an alarm must be early.
             whole = Window(window.start_ns, self.history.border_ns)
-            found = self._alarm.violations(self._con, whole, window.end_ns)
-            report = replace(report, violations=found)
+            found, verdicts = self._alarm.judge(self._con, whole, window.end_ns)
+            report = replace(report, violations=found, verdicts=verdicts)
         if self._exporter is not None:
             since_ns = self.history.final_ns
             start_ns = window.start_ns if since_ns is None else since_ns
             self._exporter.count(self._con, Window(start_ns, window.end_ns))
+        if self._database is not None:
+            self._database.offer(window.end_ns, traces, learned)
         if report.violations:
-            self._violated = (self.history.border_ns, traces, self.history.paths(window))
+            paths = self.history.paths(window)
+            self._violated = (self.history.border_ns, traces, paths, learned)
         self.history.note_longest(report.longest_ns)
         if is_live:
-            lag_s = (time.time_ns() - self.history.last_event_ns) / _SECOND_NS
-            report = replace(report, lag_s=lag_s)
+            report = replace(report, lag_s=self._lag_s())
         if self._exporter is not None:
             self._exporter.show(report)
         return report
+
+
+def _clock_offset_ns() -> int:
+    """Return how far the clock is ahead of the one that nobody sets."""
+    return time.time_ns() - time.monotonic_ns()

@@ -12,7 +12,7 @@ from msgflow.run.slice import Slice
 from msgflow.text.json_value import json_value
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     import duckdb
 
@@ -56,6 +56,7 @@ class WindowReport:
         losses: rows of `topics --measure delivery` with messages that were dropped or lost.
         discarded_events: events that the tracer lost.
         violations: what is not as the targets demand.
+        verdicts: how many verdicts on the targets there are of each kind, as `verify` names them.
         longest_ns: how long a message or data that a node kept was on the way at most.
     """
 
@@ -67,6 +68,7 @@ class WindowReport:
     discarded_events: int
     longest_ns: int
     violations: Sequence[Row] = field(default=())
+    verdicts: Mapping[str, int] = field(default_factory=dict)
     lag_s: float | None = None
 
     def to_json(self) -> str:
@@ -80,6 +82,7 @@ class WindowReport:
             "losses": self.losses,
             "discarded_events": self.discarded_events,
             "violations": self.violations,
+            "verdicts": self.verdicts,
         }
         return json.dumps(shown, ensure_ascii=False, default=json_value)
 

@@ -29,7 +29,7 @@ def test_from_a_suggestion_to_verdicts(demo: Msgflow, tmp_path: Path) -> None:
     result = demo("verify", file, "--run", "trace", "--format", "json")
     assert result.exit_code == 0
     assert result.stderr.splitlines()[0] == "run: trace (1)"
-    assert result.stderr.splitlines()[-1].endswith(" passed, 0 failed, 0 not measured")
+    assert result.stderr.splitlines()[-1].endswith(" passed, 0 failed, 0 not measured, 0 no data")
     assert {row["verdict"] for row in json.loads(result.stdout)} == {"passed"}
 
 
@@ -79,7 +79,7 @@ def test_with_a_file_it_says_what_failed(demo: Msgflow, tmp_path: Path, name: st
     *_, failed, summary = result.stderr.splitlines()
     assert failed.startswith("failed: /imu/driver → /imu/data: rate 1 Hz ± 5 %: ")
     assert failed.endswith(" Hz")
-    assert summary == "1 passed, 1 failed, 0 not measured"
+    assert summary == "1 passed, 1 failed, 0 not measured, 0 no data"
 
 
 def test_several_runs_are_refused(demo: Msgflow, tmp_path: Path) -> None:

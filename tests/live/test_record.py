@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -13,6 +14,9 @@ from pathlib import Path
 
 import pytest
 from lttng_program import lttng
+
+from msgflow.database import Database
+from msgflow.live.lttng import losses
 
 
 @dataclass
@@ -54,8 +58,9 @@ def record(tmp_path: Path) -> Record:
 
 
 def test_from_a_robot_to_an_answer(record: Record, robot: list[str], tmp_path: Path) -> None:
+    (tmp_path / "clocks.yaml").write_text(f"{socket.gethostname()}: -12500")
     ended = record(
-        *("--duration", "6", "--name", "drive", "-o", "trace"),
+        *("--duration", "6", "--name", "drive", "-o", "trace", "--clock-sync", "clocks.yaml"),
         *("--", *robot, "0.05"),
     )
     assert ended.exit_code == 0, ended.err
@@ -66,6 +71,19 @@ def test_from_a_robot_to_an_answer(record: Record, robot: list[str], tmp_path: P
     assert " 0 discarded" in ended.err
     # Only what LTTng wrote.
     assert [path.name for path in (tmp_path / "trace").iterdir()] == ["ust"]
+    with Database(tmp_path / "msgflow.duckdb") as database:
+        (clock,) = database.query("clocks").to_arrow().to_pylist()
+    assert clock["offset_ns"] == -12_500
+
+
+@pytest.mark.parametrize("option", ["--links", "--clock-sync"])
+def test_a_file_that_is_missing_is_said_before_anything_starts(
+    record: Record, option: str, tmp_path: Path
+) -> None:
+    ended = record(option, "no-such.yaml", "--", "touch", "started")
+    assert ended.exit_code == 2
+    assert "no-such.yaml" in ended.err
+    assert not list(tmp_path.iterdir())
 
 
 def test_discarded_events_are_said_at_once(record: Record, robot: list[str]) -> None:
@@ -189,3 +207,17 @@ def test_a_daemon_that_cannot_start_says_why(record: Record, tmp_path: Path) -> 
     ended = record("--duration", "1", env=os.environ | {"PATH": path})
     assert ended.exit_code == 1
     assert "the session daemon of LTTng does not start: no room for buffers" in ended.err
+
+
+def test_the_highest_bit_of_a_number_of_losses_means_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two events are lost, and LTTng says 9,223,372,036,854,775,810."""
+    program = tmp_path / "lttng"
+    program.write_text(
+        '#!/bin/sh\necho \'<command xmlns="x"><discarded_events>9223372036854775810'
+        "</discarded_events><discarded_events>3</discarded_events></command>'\n"
+    )
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
+    assert losses("drive") == 5

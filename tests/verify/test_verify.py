@@ -132,13 +132,13 @@ targets:
         assert str(database.flow(request_id=int(failed["see"].split()[-1])))
 
 
-def test_what_was_not_measured_says_why(check: Check) -> None:
+def test_what_has_no_data_says_why(check: Check) -> None:
     verification = check(
         "targets:\n  - path: [/b, /c]\n    latency: p99 < 1 s\n"
         "  - topic: /c\n    node: /source\n    rate: < 1 Hz\n"
     )
     first, second = rows(verification)
-    assert (first["verdict"], second["verdict"]) == ("not measured", "not measured")
+    assert (first["verdict"], second["verdict"]) == ("no data", "no data")
     assert "along this path" in first["reason"]
     assert "in the time window" in second["reason"]
 
@@ -154,7 +154,7 @@ def test_patterns_mean_what_they_match(check: Check) -> None:
 
 def test_a_path_passes_every_topic_that_is_named(check: Check) -> None:
     text = "targets:\n  - path: [/a, /c, /b]\n    latency: max < 1 s\n"
-    assert [row["verdict"] for row in rows(check(text))] == ["not measured"]
+    assert [row["verdict"] for row in rows(check(text))] == ["no data"]
 
 
 def test_every_metric_reads_columns_that_its_query_has(
@@ -365,7 +365,7 @@ def test_a_path_may_have_a_name_of_its_file(system: Path, tmp_path: Path, check:
     assert "/relay" in other["path"]
     assert "/slow" not in other["path"]
     (none,) = with_paths(system, tmp_path, "targets: [{path: nowhere, latency: max < 1 us}]")
-    assert none["verdict"] == "not measured"
+    assert none["verdict"] == "no data"
     assert "this path" in none["reason"]
 
 

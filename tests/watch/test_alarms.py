@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
+import subprocess
+from contextlib import chdir
 from pathlib import Path
 
 import pytest
@@ -77,6 +80,21 @@ def test_what_was_never_measured(watched) -> None:
     assert watched(text, "--window", "8s", "--step", "8s").exit_code == 5
 
 
+def test_a_target_that_falls_silent_is_said_once(tmp_path: Path) -> None:
+    """The relay ends after one second, and begins again after 1.2 s."""
+    rotations = tuple(SECOND // 20 * number for number in range(1, 30))
+    simulate("restarts", tmp_path / "trace", recording=Recording(rotations=rotations))
+    (tmp_path / "targets.yaml").write_text("targets: [{topic: /result, rate: '> 1 Hz'}]")
+    words = ("watch", "trace", "--once", "--window", "50ms", "--step", "50ms", "--json")
+    with chdir(tmp_path):
+        result = CliRunner().invoke(app, [*words, "--targets", "targets.yaml"])
+    windows = [json.loads(line)["verdicts"] for line in result.stdout.splitlines()]
+    counted = [set(verdicts) for verdicts in windows]
+    assert {"no data"} in counted[counted.index({"passed"}) :]
+    assert result.stderr.count("no data of /relay → /result: rate > 1 Hz") == 1
+    assert result.exit_code == 0
+
+
 def test_what_was_kept_before_stays(watched, tmp_path: Path) -> None:
     """The same recording is watched twice: the name of its violation is taken."""
     options = ("--window", "3s", "--step", "3s", "--keep-on-violation", tmp_path / "kept")
@@ -85,6 +103,30 @@ def test_what_was_kept_before_stays(watched, tmp_path: Path) -> None:
         kept = list((tmp_path / "kept").iterdir())
         assert len(kept) == count
         assert all((directory / "msgflow.duckdb").exists() for directory in kept)
+
+
+@pytest.mark.parametrize("kilobytes", [100, 2_000])
+def test_a_full_disk_ends_no_view(watched, tmp_path: Path, kilobytes: int) -> None:
+    """There is room for nothing, or for the chunks but not for the database."""
+    kept = tmp_path / "kept"
+    kept.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", f"size={kilobytes}k", "tmpfs", str(kept)]
+    if os.geteuid() or subprocess.run(mount, capture_output=True).returncode:
+        pytest.skip("file systems can be mounted by root only")
+    try:
+        options = ("--window", "3s", "--step", "3s", "--keep-on-violation", kept)
+        result = watched(TARGETS, *options)
+        assert list(kept.iterdir()) == []
+    finally:
+        subprocess.run(["umount", str(kept)], check=True)
+    assert result.exit_code == 1
+    assert len([line for line in result.stdout.splitlines() if " paths, " in line]) > 1
+    said = " ".join(result.stderr.split())
+    assert f"the violation is not kept in {kept}/violation-" in said
+    assert "no space left on" in said.lower()
+    assert "another directory with --keep-on-violation" in said
+    # Of many files, one is enough to say.
+    assert said.lower().count("no space left on") == 1
 
 
 def test_sessions_of_one_name_on_two_hosts_are_kept(tmp_path: Path) -> None:
@@ -105,7 +147,7 @@ def test_sessions_of_one_name_on_two_hosts_are_kept(tmp_path: Path) -> None:
         note=notes.append,
     )  # fmt: skip
     traces = KeptTraces([], [chunk for chunk in read if chunk is not None])
-    recorder.keep(SECOND, traces, [chunk.path for chunk in chunks])
+    recorder.keep(SECOND, traces, [chunk.path for chunk in chunks], None)
     assert notes[0].startswith("kept: ")
     assert len(list((tmp_path / "kept").glob("*/archives/*/drive/chunk-0"))) == 2
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import time
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ from msgflow.database import Database
 from msgflow.errors import TraceError
 from msgflow.links import read_links
 from msgflow.sim import Recording, simulate
-from msgflow.watch import Watcher, WindowReport, watch_finished
+from msgflow.watch import Watcher, WindowReport, finished_chunks, watch_finished
 
 SECOND = 1_000_000_000
 Row = dict[str, Any]
@@ -122,6 +123,33 @@ def test_a_damaged_and_a_missing_chunk_are_said(simulated: Path, tmp_path: Path)
     assert any("1 chunks are missing before number 3" in note for note in notes)
     assert any("a chunk cannot be read" in note for note in notes)
     assert sum(row["roots"] for report in found for row in report.paths) > 0
+
+
+def test_a_clock_that_is_set_is_said_and_is_no_lag(
+    simulated: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The tracer goes on with the clock that it began with."""
+    notes: list[str] = []
+    watcher = Watcher(
+        window_ns=SECOND // 2,
+        step_ns=SECOND // 2,
+        links=None,
+        clocks=read_clock_sync("none"),
+        note=notes.append,
+    )
+    before = time.time_ns
+    lags = []
+    for number, chunk in enumerate(finished_chunks(simulated)):
+        if number == 6:
+            monkeypatch.setattr(time, "time_ns", lambda: before() - 3600 * SECOND)
+        watcher.read(chunk)
+        watcher.go_on()
+        if (report := watcher.final_report(is_live=True)) is not None:
+            lags.append(report.lag_s)
+    watcher.close()
+    assert len(lags) > 1
+    assert max(lags) - min(lags) < 60
+    assert [note for note in notes if "the clock of this machine was set, by -3600.0 s" in note]
 
 
 def test_links_of_a_node_that_is_not_there_are_said(simulated: Path, tmp_path: Path) -> None:

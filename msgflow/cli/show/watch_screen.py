@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Group
@@ -10,12 +11,14 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
+from msgflow.cli.show.keys import noted_keys
+from msgflow.cli.show.window_line import verdict_words
 from msgflow.run.window import format_epoch
 from msgflow.text.values import NULL, format_duration, printable
 from msgflow.watch import violation_line
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
 
     from rich.console import RenderableType
 
@@ -30,6 +33,17 @@ _STEPS = 10
 _PATHS, _THREADS, _LOSSES, _VIOLATIONS = 12, 5, 5, 5
 _PATH_WIDTH, _NAME_WIDTH = 26, 40
 _MISSING = ("dropped", "lost", "no_output", "unknown")
+_FATES = ("reached", "superseded", *_MISSING, "not_connected", "cut_by_recording")
+# By the title of the column that they sort by; what is worst comes first.
+_ORDERS: dict[str, Callable[[Row], Any]] = {
+    "missing": lambda path: (-missing(path), -(path["max_ns"] or 0)),
+    "max": lambda path: -(path["max_ns"] or 0),
+    "p99": lambda path: -(path["p99_ns"] or 0),
+    "median": lambda path: -(path["median_ns"] or 0),
+    "/s": lambda path: path["reached"],
+    "path": lambda path: path["path"],
+}
+_KEYS = "s: sort by another column   ↑ ↓: pick a path   Ctrl-C: end"
 
 
 class WatchScreen:
@@ -39,28 +53,79 @@ class WatchScreen:
         """Start before the first window."""
         self._slowest: dict[str, deque[int]] = {}
         self._violations: deque[str] = deque(maxlen=_VIOLATIONS)
+        self._order = "missing"
+        self._picked: str | None = None
+        self._report: WindowReport | None = None
+        # Keys come from another thread than windows.
+        self._lock = Lock()
 
     def of(self, report: WindowReport) -> RenderableType:
         """Return the screen after a further window."""
+        with self._lock:
+            self._take_in(report)
+            return self._shown(report)
+
+    def after_key(self, key: str) -> RenderableType | None:
+        """Return the screen after a key; None if nothing changes.
+
+        Args:
+            key: 's' sorts by the next column; 'up' and 'down' pick a path, 'escape' none.
+        """
+        with self._lock:
+            if self._report is None:
+                return None
+            if key == "s":
+                orders = list(_ORDERS)
+                self._order = orders[(orders.index(self._order) + 1) % len(orders)]
+            elif key in ("up", "down"):
+                self._pick(1 if key == "down" else -1)
+            elif key == "escape":
+                self._picked = None
+            else:
+                return None
+            return self._shown(self._report)
+
+    def _pick(self, step: int) -> None:
+        assert self._report is not None
+        names = [path["path"] for path in self._sorted(self._report)]
+        if not names:
+            return
+        place = names.index(self._picked) + step if self._picked in names else 0
+        self._picked = names[min(max(place, 0), len(names) - 1)]
+
+    def _sorted(self, report: WindowReport) -> list[Row]:
+        return sorted(report.paths, key=_ORDERS[self._order])
+
+    def _take_in(self, report: WindowReport) -> None:
+        self._report = report
         for path in report.paths:
             steps = self._slowest.setdefault(path["path"], deque(maxlen=_STEPS))
             # Clocks that are apart make latencies negative.
             steps.append(max(path["max_ns"] or 0, 0))
         at = format_epoch(report.window.end_ns)[_TIME]
         self._violations += [f"{at} {violation_line(each)}" for each in report.violations]
-        parts: list[RenderableType] = [_heading(report), self._paths(report), _threads(report)]
+
+    def _shown(self, report: WindowReport) -> RenderableType:
+        parts: list[RenderableType] = [_heading(report), self._paths(report)]
+        parts += [_fates(path) for path in report.paths if path["path"] == self._picked]
+        parts.append(_threads(report))
         if report.losses:
             parts.append(_losses(report))
         if self._violations:
             parts.append(Text("violations", style="bold red"))
             parts += [Text(printable(line), style="red") for line in self._violations]
+        parts.append(Text(_KEYS, style="dim"))
         return Group(*parts)
 
     def _paths(self, report: WindowReport) -> Table:
         seconds = (report.window.end_ns - report.window.start_ns) / 1_000_000_000
-        table = _table("path", "/s", "median", "p99", "max", "missing", "steps")
-        worst = sorted(report.paths, key=lambda path: (-missing(path), -(path["max_ns"] or 0)))
-        for path in worst[:_PATHS]:
+        titles = ("path", "/s", "median", "p99", "max", "missing", "steps")
+        table = _table(*(f"{name}▾" if name == self._order else name for name in titles))
+        ordered = self._sorted(report)
+        places = [place for place, path in enumerate(ordered) if path["path"] == self._picked]
+        # The one that is picked is seen.
+        first = max([0, *(place - _PATHS + 1 for place in places)])
+        for path in ordered[first : first + _PATHS]:
             lost = missing(path)
             table.add_row(
                 _short(path["path"], _PATH_WIDTH),
@@ -68,8 +133,9 @@ class WatchScreen:
                 *(_duration(path[name]) for name in ("median_ns", "p99_ns", "max_ns")),
                 Text(str(lost), style="bold red" if lost else ""),
                 _sparkline(self._slowest[path["path"]]),
+                style="reverse" if path["path"] == self._picked else "",
             )
-        if (more := len(worst) - _PATHS) > 0:
+        if (more := len(ordered) - _PATHS) > 0:
             table.add_row(f"and {more} more")
         return table
 
@@ -78,8 +144,14 @@ def show_screen(reports: Iterable[WindowReport]) -> None:
     """Show window after window on the terminal; the last one stays."""
     screen = WatchScreen()
     with Live(Text("waiting for the first window"), auto_refresh=False) as live:
-        for report in reports:
-            live.update(screen.of(report), refresh=True)
+
+        def pressed(key: str) -> None:
+            if (shown := screen.after_key(key)) is not None:
+                live.update(shown, refresh=True)
+
+        with noted_keys(pressed):
+            for report in reports:
+                live.update(screen.of(report), refresh=True)
 
 
 def missing(path: Row) -> int:
@@ -93,8 +165,21 @@ def _heading(report: WindowReport) -> Text:
     text.append(f"   {len(report.paths)} paths", style="not bold")
     if report.lag_s is not None:
         text.append(f"   lag {report.lag_s:.1f} s", style="not bold")
+    if report.verdicts:
+        text.append(f"   targets: {verdict_words(report)}", style="not bold")
     lost = report.discarded_events
     text.append(f"   {lost:,} events lost by the tracer", style="red" if lost else "not bold dim")
+    return text
+
+
+def _fates(path: Row) -> Text:
+    """Return what became of the flows of a path that was picked."""
+    counts = ", ".join(f"{path[name]:,} {name.replace('_', ' ')}" for name in _FATES if path[name])
+    text = Text(printable(path["path"]), style="bold")
+    reasons = f" ({path['reasons']})" if path["reasons"] else ""
+    text.append(
+        "\n" + printable(f"{path['roots']:,} flows: {counts or 'none'}{reasons}"), style="not bold"
+    )
     return text
 
 

@@ -28,6 +28,13 @@ def window_line(report: WindowReport) -> str:
         words.append(f"{missing:,} messages dropped or lost")
     if report.discarded_events:
         words.append(f"{report.discarded_events:,} events lost by the tracer")
+    if report.verdicts:
+        words.append(f"targets: {verdict_words(report)}")
     if report.lag_s is not None:
         words.append(f"lag {report.lag_s:.1f} s")
     return f"{start} to {end}: {', '.join(words)}"
+
+
+def verdict_words(report: WindowReport) -> str:
+    """Return how many verdicts on targets there are of each kind."""
+    return ", ".join(f"{number} {verdict}" for verdict, number in sorted(report.verdicts.items()))

@@ -18,6 +18,7 @@ import { Bar } from "./bar.js";
 import { ComparePage } from "./compare.js";
 import { LakePage } from "./lake.js";
 import { SqlPage } from "./sql.js";
+import { Follower } from "./follower.js";
 import { failed, waiting } from "./notice.js";
 
 const PAGES = {
@@ -68,6 +69,10 @@ class ServedSource {
 
   // Asks the server, whatever it has said before.
   async ask(name, params, signal) {
+    return decode(new Uint8Array(await (await this.get(name, params, signal)).arrayBuffer()));
+  }
+
+  async get(name, params = {}, signal = undefined) {
     let answer;
     try {
       answer = await fetch(placeOf(name, params), { signal, headers: { "X-Generation": this.generation } });
@@ -79,7 +84,13 @@ class ServedSource {
       const said = await answer.json().catch(() => ({}));
       throw new SourceError(said.error ?? answer.statusText, said.hint, said.code);
     }
-    return decode(new Uint8Array(await answer.arrayBuffer()));
+    return answer;
+  }
+
+  // The database has moved on: from now on answers are of its new state.
+  moveOn(generation) {
+    this.generation = generation;
+    this.kept.clear();
   }
 }
 
@@ -106,7 +117,16 @@ class App {
     this.nav = document.querySelector("nav");
     this.header();
     onChange(() => this.show());
+    if ("follows" in document.documentElement.dataset) this.follower = new Follower(this, document.querySelector(".bar"));
     await this.show();
+  }
+
+  // Shows the same page of the state that the database has now; the old one stays until then.
+  async moveOn(generation) {
+    this.source.moveOn(generation);
+    this.runs = records(await this.source.fetch("run"));
+    this.runName.textContent = this.run?.name ?? "no run";
+    await this.show(true);
   }
 
   get run() {
@@ -146,10 +166,11 @@ class App {
   }
 
   header() {
+    this.runName = h("span", { className: "run-name" }, this.run?.name ?? "no run");
     const runs = this.runs.length > 1
       ? h("select", { "aria-label": "run", on: { change: (event) => { location.hash = pageAddress(current().page, { run: event.target.value, start: null, end: null }); } } },
         this.runs.map((run) => h("option", { value: String(run.run_id), selected: run === this.run }, run.name)))
-      : h("span", { className: "run-name" }, this.run?.name ?? "no run");
+      : this.runName;
     this.tabs = Object.entries(this.pages).map(([page, [title]]) => ({ page, link: h("a", {}, title) }));
     const theme = h("button", { type: "button", className: "theme", title: "light or dark", "aria-label": "light or dark", on: { click: () => this.theme() } }, "◐");
     clear(this.nav, h("span", { className: "brand" }, "msgflow"), runs, h("span", { className: "tabs" }, this.tabs.map(({ link }) => link)), theme);
@@ -178,16 +199,20 @@ class App {
     }
   }
 
-  async show() {
+  async show(isNext = false) {
     const asked = current();
     const [title, Page] = this.pages[asked.page] ?? [];
     if (!Page) { go({ page: Object.keys(this.pages)[0] }); return; }
     this.linksMoved();
     document.title = `${title} – ${this.run?.name ?? "msgflow"}`;
-    this.page?.leave?.();
-    clear(this.main, waiting());
+    const before = this.page;
+    if (!isNext) {
+      before?.leave?.();
+      clear(this.main, waiting());
+    }
     if (!this.run) {
-      clear(this.main, h("section", {}, h("h2", {}, "No run"), h("p", {}, "The database holds no run yet: msgflow ingest TRACE")));
+      const cure = this.follower ? "The first window comes when the nodes have sent something." : "The database holds no run yet: msgflow ingest TRACE";
+      clear(this.main, h("section", {}, h("h2", {}, "No run"), h("p", {}, cure)));
       this.done();
       return;
     }
@@ -197,13 +222,21 @@ class App {
       return;
     }
     // A page has a place of its own: one that was left may still come to its end.
-    const root = h("div", {}, waiting());
-    clear(this.main, root);
+    const root = h("div", { className: isNext ? "next" : "" }, waiting());
+    if (isNext) this.main.append(root); else clear(this.main, root);
+    const page = new Page(this, root);
+    this.page = page;
     try {
-      this.page = new Page(this, root);
-      await this.page.ready;
+      await page.ready;
+      if (isNext) await page.complete;
     } catch (error) {
       if (error.name !== "AbortError") clear(root, failed(error));
+    }
+    // Meanwhile somebody may have gone to another page.
+    if (isNext && this.page === page) {
+      before?.leave?.();
+      root.className = "";
+      this.main.replaceChildren(root);
     }
     this.done();
   }

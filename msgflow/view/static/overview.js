@@ -104,7 +104,7 @@ export class OverviewPage {
       }),
     ];
     // The page stands without what takes longest.
-    fill(nodes, async () => blame(await app.inWindow("summary", { part: "blame" })));
+    this.complete = fill(nodes, async () => blame(await app.inWindow("summary", { part: "blame" })));
     await Promise.all([hosts, findings, paths, ...others]);
   }
 

@@ -55,7 +55,7 @@ export class TimelinePage {
     this.listen();
     const chosen = this.app.window;
     this.setView(number(asked.from, chosen.start ?? 0), number(asked.to, chosen.end ?? this.length), false);
-    this.isOpening = !asked.from && !asked.to && !asked.flow && chosen.start === undefined && chosen.end === undefined;
+    this.isOpening = !this.app.follower?.isFollowing && !asked.from && !asked.to && !asked.flow && chosen.start === undefined && chosen.end === undefined;
     this.state.query = asked.q ?? "";
     this.search.value = this.state.query;
     this.state.internal = asked.internal === "1";

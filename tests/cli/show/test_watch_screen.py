@@ -17,6 +17,7 @@ MS = 1_000_000
 
 def path(name: str, max_ms: float, lost: int = 0) -> dict[str, Any]:
     others = ("roots", "superseded", "dropped", "no_output", "not_connected", "unknown")
+    others += ("cut_by_recording",)
     return dict.fromkeys(others, 0) | {
         "path": name,
         "reached": 100,
@@ -79,3 +80,39 @@ def test_a_violation_stays_on_the_screen() -> None:
     text = " ".join(lines(screen, report()))
     assert "22:13:30 /cmd: latency 182.000 ms, required max < 80 ms: /detector ran" in text
     assert "(provisional)" in text
+
+
+def after(screen: WatchScreen, *keys: str) -> list[str]:
+    """Return the lines of the screen after the last of these keys."""
+    console = Console(width=80, file=None, force_terminal=False)
+    for key in keys:
+        shown = screen.after_key(key)
+    assert shown is not None
+    with console.capture() as capture:
+        console.print(shown)
+    return [line.rstrip() for line in capture.get().splitlines()]
+
+
+def test_keys_choose_the_order() -> None:
+    screen = WatchScreen()
+    assert screen.after_key("s") is None  # nothing is shown yet
+    lines(screen, report(path("/a", 80), path("/c", 5, lost=3)))
+    found = after(screen, "s")
+    assert "max▾" in found[1]
+    assert [line.split()[0] for line in found if line.startswith("/")] == ["/a", "/c"]
+    # After the last column the first one follows.
+    assert "missing▾" in after(screen, "s", "s", "s", "s", "s")[1]
+    assert screen.after_key("x") is None
+
+
+def test_a_path_that_is_picked_is_seen_with_its_fates() -> None:
+    """It stays the same if another becomes worse, also below the first twelve."""
+    screen = WatchScreen()
+    paths = [path(f"/p{number:02}", 100 - number) for number in range(20)]
+    lines(screen, report(*paths))
+    found = after(screen, *["down"] * 14, "up")
+    assert "/p12" in [line.split()[0] for line in found[2:14]]
+    assert "0 flows: 100 reached" in found
+    found = lines(screen, report(*paths, path("/worse", 200, lost=1)))
+    assert found[found.index("0 flows: 100 reached") - 1] == "/p12"
+    assert "0 flows: 100 reached" not in after(screen, "escape")

@@ -1,0 +1,68 @@
+"""Keys that somebody presses while a screen is shown."""
+
+from __future__ import annotations
+
+import os
+import select
+import sys
+from contextlib import contextmanager
+from threading import Thread
+from typing import TYPE_CHECKING
+
+try:
+    import termios
+except ImportError:  # Windows has no such terminals
+    termios = None  # type: ignore[assignment]
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+# What terminals send.
+_NAMES = {b"\x1b[A": "up", b"\x1b[B": "down", b"\x1bOA": "up", b"\x1bOB": "down", b"\x1b": "escape"}
+_MOST_BYTES = 64
+
+
+@contextmanager
+def noted_keys(pressed: Callable[[str], None]) -> Iterator[None]:
+    """Call a function with each key during the block, from a thread; Ctrl-C stays what it is.
+
+    Without a terminal, and in the background, there are no keys.
+
+    Args:
+        pressed: gets a character, 'up', 'down' or 'escape'.
+    """
+    if not _has_keys():
+        yield
+        return
+    terminal = sys.stdin.fileno()
+    before = termios.tcgetattr(terminal)
+    as_pressed = termios.tcgetattr(terminal)
+    # At once, and not shown.
+    as_pressed[3] &= ~(termios.ICANON | termios.ECHO)
+    ended, end = os.pipe()
+    thread = Thread(target=_read, args=(terminal, ended, pressed))
+    try:
+        termios.tcsetattr(terminal, termios.TCSADRAIN, as_pressed)
+        thread.start()
+        yield
+    finally:
+        os.close(end)
+        if thread.is_alive():
+            thread.join()
+        os.close(ended)
+        termios.tcsetattr(terminal, termios.TCSADRAIN, before)
+
+
+def _has_keys() -> bool:
+    if termios is None or sys.stdin is None or not sys.stdin.isatty():
+        return False
+    # Another program has the terminal if this one was started with &.
+    return os.tcgetpgrp(sys.stdin.fileno()) == os.getpgrp()
+
+
+def _read(terminal: int, ended: int, pressed: Callable[[str], None]) -> None:
+    while True:
+        ready, _, _ = select.select([terminal, ended], [], [])
+        if ended in ready or not (sent := os.read(terminal, _MOST_BYTES)):
+            return
+        pressed(_NAMES.get(sent) or sent.decode(errors="replace")[0])

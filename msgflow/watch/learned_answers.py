@@ -1,0 +1,105 @@
+"""What windows have shown of nodes without traced callbacks: which topics they answer."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from msgflow.links import LinksFile, read_links
+from msgflow.yaml_file import quoted
+
+if TYPE_CHECKING:
+    import duckdb
+
+_FILE = "links.yaml"
+_PAIRS = """
+SELECT
+    n.full_name, o.pid, h.hostname, s.topic_name, p.topic_name,
+    2 * count(*) FILTER (l.candidate_count = 1) >= count(*)
+FROM store.link_causal AS l
+JOIN store.publisher AS p ON l.publisher_id = p.publisher_id
+JOIN store.subscription AS s ON l.subscription_id = s.subscription_id
+JOIN store.node AS n ON p.node_id = n.node_id
+JOIN store.process AS o ON n.process_id = o.process_id
+JOIN store.host AS h ON o.host_id = h.host_id
+WHERE l.kind = 'take_adjacent' AND NOT p.is_internal AND NOT s.is_internal
+    AND n.full_name IS NOT NULL AND s.topic_name IS NOT NULL AND p.topic_name IS NOT NULL
+GROUP BY ALL
+"""
+
+
+@dataclass(frozen=True, order=True)
+class _Pair:
+    """A topic that a node hears, and one that it publishes."""
+
+    node: str
+    pid: int
+    host: str
+    heard: str
+    published: str
+
+    @property
+    def entry(self) -> str:
+        """The line that declares it in a file of links."""
+        return (
+            f"  - {{kind: direct, node: {quoted(self.node)}, process: {self.pid},"
+            f" host: {quoted(self.host)}, inputs: [{quoted(self.heard)}],"
+            f" outputs: [{quoted(self.published)}]}}"
+        )
+
+
+class LearnedAnswers:
+    """Which topics nodes of rclpy answer, by the windows so far.
+
+    A window has few messages. When a node becomes slow, its answers look like the work of a timer
+    for a while, and an alarm would come late. What it does with messages has not changed: if more
+    windows said that it answers than doubted it, it still does.
+    """
+
+    def __init__(self) -> None:
+        """Know nothing yet."""
+        self._scores: Counter[_Pair] = Counter()
+
+    def doubted(self, con: duckdb.DuckDBPyConnection) -> str | None:
+        """Learn from a window, and return what it doubts and earlier ones have shown.
+
+        Args:
+            con: to a database with the run of a window, without what is learned.
+
+        Returns:
+            A file of links; None if there is nothing to declare.
+        """
+        verdicts = {
+            _Pair(*names): is_answer for *names, is_answer in con.execute(_PAIRS).fetchall()
+        }
+        doubted = sorted(
+            pair for pair, is_answer in verdicts.items() if not is_answer and self._scores[pair] > 0
+        )
+        for pair, is_answer in verdicts.items():
+            self._scores[pair] += 1 if is_answer else -1
+        if not doubted:
+            return None
+        return "\n".join(["links:", *(pair.entry for pair in doubted), ""])
+
+
+def with_learned(links: LinksFile | None, learned: str) -> LinksFile:
+    """Return links that a user declared, if any, with those that were learned."""
+    file = read_links(Path(_FILE), learned)
+    return file if links is None else replace(links, links=(*links.links, *file.links))
+
+
+def write_learned(directory: Path, links: Path | None, learned: str | None) -> Path | None:
+    """Write a file of what was learned, and return it; a file of the user is enough.
+
+    Args:
+        directory: where to write.
+        links: the file that a user declared.
+        learned: what was learned, if anything.
+    """
+    if links is not None or learned is None:
+        return links
+    path = directory / _FILE
+    path.write_text(learned, encoding="utf-8")
+    return path

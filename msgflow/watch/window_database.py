@@ -1,0 +1,78 @@
+"""The last window as a database, for pages that follow a recording."""
+
+from __future__ import annotations
+
+import os
+import time
+from threading import Lock
+from typing import TYPE_CHECKING
+
+from msgflow.db import empty_database
+from msgflow.ingest import ingest
+from msgflow.watch.learned_answers import write_learned
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from msgflow.watch.kept_traces import KeptTraces
+
+
+class WindowDatabase:
+    """A database that has the last window once somebody asks for it; nothing is written before.
+
+    To prepare a window takes long, to show it no time. So a page can change its mind meanwhile, and
+    goes on with the window that it shows.
+    """
+
+    def __init__(self, path: Path, *, links: Path | None, clock_sync: str) -> None:
+        """Write a database without a run.
+
+        Args:
+            path: of the file, which does not exist yet.
+            links: file with indirect links to declare.
+            clock_sync: how clocks of several hosts are brought together, as `ingest` takes it.
+        """
+        self.path = path
+        self._prepared = path.with_name(f"next-{path.name}")
+        self._links = links
+        self._clock_sync = clock_sync
+        # Of the last window that is not prepared yet: when it ended, its events, learned links.
+        self._last: tuple[int, KeptTraces, str | None] | None = None
+        # The watcher has another thread than the pages.
+        self._lock = Lock()
+        empty_database.write_empty(path)
+
+    def offer(self, end_ns: int, traces: KeptTraces, learned: str | None) -> None:
+        """Take over a further window.
+
+        Args:
+            end_ns: when it ended.
+            traces: its events, with those around it.
+            learned: a file of links that earlier windows have shown, if any are needed.
+        """
+        with self._lock:
+            self._last = (end_ns, traces, learned)
+
+    def prepare(self) -> None:
+        """Write the last window beside the database, unless that was done before.
+
+        Raises:
+            MsgflowError: it cannot be written, or the links do not fit it.
+        """
+        with self._lock:
+            last, self._last = self._last, None
+        if last is None:
+            return
+        end_ns, traces, learned = last
+        name = time.strftime("window-%Y%m%d-%H%M%S", time.gmtime(end_ns // 1_000_000_000))
+        self._prepared.unlink(missing_ok=True)
+        links = write_learned(self.path.parent, self._links, learned)
+        ingest(
+            [name], self._prepared, name=name, links=links, clock_sync=self._clock_sync,
+            traces=traces,
+        )  # fmt: skip
+
+    def show(self) -> None:
+        """Put the window that was prepared last in place of the database."""
+        if self._prepared.exists():
+            os.replace(self._prepared, self.path)
