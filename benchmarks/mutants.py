@@ -102,6 +102,8 @@ RULES = (
     ("model/gap/pause_limit.sql", ("model/test_loss.py",)),
     ("model/gap/silence.sql", ("model/test_loss.py",)),
     ("model/gap/pause.sql", ("model/test_loss.py",)),
+    ("overlap/session_container.sql", ("schema/test_session_container.py",)),
+    ("overlap/session_pair.sql", ("schema/test_session_pair.py",)),
     ("public/goal.sql", ("schema/cases/main.goal",)),
     ("public/action_client.sql", ("schema/cases/main.action_client",)),
     ("public/action_server.sql", ("schema/cases/main.action_server",)),

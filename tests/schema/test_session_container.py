@@ -49,3 +49,8 @@ def test_sessions_of_the_first_container_that_a_third_one_joins() -> None:
 def test_the_later_container_is_the_other_one() -> None:
     """The one whose first session is later, whichever of its sessions was compared."""
     assert containers({(1, 4): SAME, (2, 4): OTHER, (2, 3): SAME}) == {2: 2, 3: 2}
+
+
+def test_sessions_that_nothing_compares_may_be_of_one_container() -> None:
+    """Those of two hosts, for one."""
+    assert containers({(1, 2): SAME, (3, 4): SAME}) == {}
