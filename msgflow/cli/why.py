@@ -40,12 +40,11 @@ _SHOWN = {
     ),
     "waits": (
         "what kept its callbacks waiting",
-        "node callback meanwhile_node meanwhile_callback worst_ns share",
+        "node callback meanwhile_node meanwhile_callback worst_ns",
     ),
     "losses": (
         "messages not delivered",
-        "topic_name subscriber published dropped lost not_connected cut_by_recording unknown "
-        "reasons",
+        "topic_name subscriber published dropped lost reasons",
     ),
 }
 

@@ -92,9 +92,10 @@ def explain(ask: Ask, run: Run, place: str | None) -> Explanation:
     paths = ask("e2e-latency", **ends)
     parts = _chosen(ask("path-breakdown", **ends), lambda row: row["path"] == path)
     callbacks = {(row["node"], row["what"]) for row in parts.table.to_pylist()}
-    waits = _chosen(
-        ask("waits-pair"), lambda row: (row["node"], row["callback"]) in callbacks, _WAITS
-    )
+    waits = _longest(
+        _chosen(ask("waits-pair"), lambda row: (row["node"], row["callback"]) in callbacks),
+        "worst_ns",
+    ).first(_WAITS)
     losses = _chosen(
         ask("topics-delivery"),
         lambda row: (
@@ -108,7 +109,7 @@ def explain(ask: Ask, run: Run, place: str | None) -> Explanation:
         place=place,
         paths=_slowest_first(paths, path),
         nodes=_by_node(parts),
-        slowest_flow=_longest(flow),
+        slowest_flow=_longest_pieces(flow),
         waits=waits,
         losses=losses,
         steps=tuple(_steps(pieces, losses)),
@@ -171,11 +172,15 @@ def _unexplained(pieces: Sequence[dict[str, Any]]) -> Iterator[str]:
         )
 
 
-def _chosen(
-    result: QueryResult, is_wanted: Callable[[dict[str, Any]], bool], most: int | None = None
-) -> QueryResult:
+def _chosen(result: QueryResult, is_wanted: Callable[[dict[str, Any]], bool]) -> QueryResult:
     rows = result.table.to_pylist()
-    return _taken(result, [place for place, row in enumerate(rows) if is_wanted(row)][:most])
+    return _taken(result, [place for place, row in enumerate(rows) if is_wanted(row)])
+
+
+def _longest(result: QueryResult, name: str) -> QueryResult:
+    """Return the rows, those with the longest duration in a column first."""
+    durations = result.table[name].to_pylist()
+    return _taken(result, sorted(range(len(durations)), key=lambda place: -durations[place]))
 
 
 def _taken(result: QueryResult, places: Sequence[int]) -> QueryResult:
@@ -218,7 +223,7 @@ def _by_node(parts: QueryResult) -> QueryResult:
     return replace(parts, table=pyarrow.Table.from_pylist(nodes, pyarrow.schema(fields)))
 
 
-def _longest(flow: QueryResult) -> QueryResult:
+def _longest_pieces(flow: QueryResult) -> QueryResult:
     rows = flow.table.to_pylist()
     longest = sorted(range(len(rows)), key=lambda place: -rows[place]["duration_ns"])[:_PIECES]
     return _taken(flow, sorted(longest))

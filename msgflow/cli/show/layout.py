@@ -37,14 +37,15 @@ _SYMBOLS = ("symbol", "symbols")
 # So many of the most important columns never yield. For so many, names may be broken.
 _ESSENTIAL = 5
 _WANTED = 6
-# The narrowest column of text, in cells, and the most lines of a cell. Plain SQL does not say what
-# is important: its cells may have more lines.
+# The narrowest column of text, in cells, and the most lines of a cell. Where all columns are to be
+# shown, as those of plain SQL, columns may be narrower and cells have more lines.
 _NARROW = 16
+_NARROW_OF_ALL = 12
 _WORD = 40
 # Shorter text is broken only to make room for the most important columns, as names are.
 _SHORT = 20
 _LINES = 4
-_LINES_OF_SQL = 10
+_LINES_OF_ALL = 10
 
 
 @dataclass(frozen=True)
@@ -102,6 +103,7 @@ def lay_out(
     *,
     most_rows: int | None = MOST_ROWS,
     is_chosen: bool = False,
+    is_whole: bool = False,
     remedy: str = "--wide shows all",
 ) -> Layout:
     """Return the layout of a result.
@@ -111,12 +113,14 @@ def lay_out(
         width: of the terminal, in cells.
         most_rows: how many rows are shown; all when None.
         is_chosen: the user asked for these columns: show all of them.
+        is_whole: show all columns with something in them.
         remedy: how to see the rest, for notes.
     """
     keeps_all = is_chosen or result.header is None
     kept, nothing = _that_say_something(result, keeps_all)
     first = result.table if most_rows is None else result.table.slice(0, most_rows)
-    columns = [_column(result, name, first[name]) for name in kept]
+    lines = _LINES_OF_ALL if is_whole or result.header is None else _LINES
+    columns = [_column(result, name, first[name], lines) for name in kept]
     columns, paths = _with_numbered_paths(columns)
     headings: tuple[str, ...] = ()
     if not keeps_all:
@@ -124,10 +128,10 @@ def lay_out(
     notes = []
     if first.num_rows < len(result):
         notes.append(f"the first {first.num_rows} of {len(result):,} rows: {remedy}")
-    if not keeps_all:
-        shown = _that_fit(result, columns, width)
-    else:
+    if keeps_all or is_whole:
         shown = columns if _least(columns) <= width else _broken(columns)
+    else:
+        shown = _that_fit(result, columns, width)
     names = {column.name for column in shown}
     left_out = [column for column in columns if column.name not in names]
     is_table = _least(shown) <= width and not (left_out and first.num_rows == 1)
@@ -186,7 +190,7 @@ def _title(result: QueryResult, name: str) -> str:
     return column_title(name, result.units.get(name), result.columns)
 
 
-def _column(result: QueryResult, name: str, values: pa.ChunkedArray) -> ShownColumn:
+def _column(result: QueryResult, name: str, values: pa.ChunkedArray, lines: int) -> ShownColumn:
     import pyarrow.types as types
 
     kind = values.type
@@ -208,7 +212,6 @@ def _column(result: QueryResult, name: str, values: pa.ChunkedArray) -> ShownCol
             else _since(value - begin)
             for value in listed
         ]
-    lines = _LINES_OF_SQL if result.header is None else _LINES
     return _measured(name, title, cells, is_number, lines)
 
 
@@ -221,9 +224,10 @@ def _measured(
         word = max((longest_word(cell) for cell in cells), default=0)
         most = max(map(cell_len, cells), default=0)
         piece = max(map(longest_piece, cells), default=0)
+        narrow = _NARROW if lines == _LINES else _NARROW_OF_ALL
         broken = min(
             width,
-            max(cell_len(title), min(piece, _WORD), _NARROW, -(-most * 5 // (4 * lines))),
+            max(cell_len(title), min(piece, _WORD), narrow, -(-most * 5 // (4 * lines))),
         )
         least = width if width <= _SHORT else min(width, max(broken, min(word, _WORD)))
     return ShownColumn(name, title, tuple(cells), is_number, width, least, broken)
