@@ -50,6 +50,7 @@
 -- column: path VARCHAR [path]  Nodes and topics
 -- brief: path, hop, part, node, median_ns, share, max_ns, p95_ns, what, mean_ns, total_ns, flows,
 --     overlaps
+-- zero: total_ns
 -- note: clocks
 CREATE OR REPLACE TEMP TABLE breakdown_flow AS
 SELECT
