@@ -69,7 +69,7 @@ def command(
         verdicts = opened.clock_verdicts(run=run, only_several=True)
     labels = {one.run_id: one.title for one in runs} if len(runs) > 1 else {}
     _report(findings, form, output, run_labels=labels, notes=verdicts, table=quality)
-    for step in commands_after(findings):
+    for step in commands_after(findings) if runs else ["msgflow ingest TRACE"]:
         print_next(step.split(), database, run)
     if any(finding.severity == "error" for finding in findings):
         raise typer.Exit(ExitCode.FAILED)

@@ -148,4 +148,5 @@ def targets(
     if output is None:
         print_next([*_SUGGEST, "targets", "-o", _TARGETS], database, part.run)
     else:
-        print_next(["msgflow", "verify", str(output)], database, part.run)
+        # Another run is what they are for.
+        print_next(["msgflow", "verify", str(output)], database)

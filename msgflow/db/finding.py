@@ -43,6 +43,7 @@ _NO_ROW = (
 # By the name of a finding: what shows more of it, or cures it.
 _AFTER = {
     "dead_end": "msgflow suggest links",
+    "topic_unnamed": "msgflow suggest links",
     "unmatched_take": "msgflow query topics --measure unmatched",
     "process_without_rclcpp": "msgflow query path-breakdown",
     "clock_not_synchronised": "msgflow query clocks",
@@ -193,7 +194,8 @@ def next_command(findings: Sequence[Finding]) -> str:
 def commands_after(findings: Sequence[Finding]) -> list[str]:
     """Return the commands that come next for whoever has read the findings, the last is `why`."""
     names = {finding.name for finding in findings}
-    return [*(command for name, command in _AFTER.items() if name in names), "msgflow why"]
+    after = dict.fromkeys(command for name, command in _AFTER.items() if name in names)
+    return [*after, "msgflow why"]
 
 
 def broken_rules(con: duckdb.DuckDBPyConnection, run_id: int | None = None) -> list[Finding]:
