@@ -78,7 +78,7 @@ def links(
             print_text(text, path)
             if apply:
                 print_status("no candidate is without a doubt: nothing is declared")
-            elif path is None:
+            elif path is None and found.certain:
                 print_next([*_SUGGEST, "links", "--apply"], database, run)
             return
         with replacing(path) as temporary:
