@@ -142,7 +142,8 @@ def _unpack(content: bytearray) -> QueryResult:
         table = reader.read_all()
     runs = tuple(Run(**{**run, "labels": tuple(run["labels"])}) for run in said["runs"])
     header = None if said["header"] is None else load_query(said["header"])
-    return QueryResult(table, header, runs, said["notes"], said["when_empty"])
+    names = ("notes", "when_empty", "path_numbers", "order")
+    return QueryResult(table, header, runs, **{name: said[name] for name in names})
 
 
 def _pack(result: QueryResult, write: Write) -> None:
@@ -155,6 +156,8 @@ def _pack(result: QueryResult, write: Write) -> None:
             "runs": [asdict(run) for run in result.runs],
             "notes": result.notes,
             "when_empty": result.when_empty,
+            "path_numbers": result.path_numbers,
+            "order": result.order,
         }
     ).encode()
     write(len(said).to_bytes(_SIZE) + said)

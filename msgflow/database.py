@@ -17,6 +17,7 @@ from msgflow.default_files import DEFAULT_PATHS
 from msgflow.errors import QueryError, UsageError
 from msgflow.name_suggestions import did_you_mean
 from msgflow.query.catalogue import choose_query, load_queries, query_names
+from msgflow.query.path_numbers import has_all_paths, with_path_numbers
 from msgflow.query.result import QueryResult
 from msgflow.query.runner import run_query
 from msgflow.query.selection import make_selection
@@ -414,14 +415,12 @@ class Database:
         def ask() -> QueryResult:
             if where is not None:
                 require_condition(connection, where)
-            return run_query(
-                connection,
-                header,
-                parameters,
-                part,
-                internal=internal,
-                selection=make_selection(selection),
+            chosen = make_selection(selection)
+            result = run_query(
+                connection, header, parameters, part, internal=internal, selection=chosen
             )
+            has_all = has_all_paths(header.name, parameters, chosen)
+            return with_path_numbers(connection, result, has_all=has_all)
 
         return self._ask(ask)
 
@@ -465,7 +464,12 @@ class Database:
         connection = self.connection
         one = self._ask(lambda: Slice(run).one_run(connection, "an explanation"))
         ask = partial(self.query, run=one.run_id, start=start, end=end, skip_first=skip_first)
-        return explain(ask, one, place)
+        dead_ends = [
+            (finding.subject, finding.detail)
+            for finding in self.findings(run=one.run_id)
+            if finding.name == "dead_end"
+        ]
+        return explain(ask, one, place, dead_ends)
 
     def flow(
         self,

@@ -28,7 +28,7 @@
 -- column: loss_affected BIGINT      Callback instances during which kernel events were lost
 -- column: callback_id BIGINT        Identity of the callback
 -- column: is_internal BOOLEAN       Infrastructure of ROS
--- brief: node, callback, count, median_ns, running_median_ns, running_p99_ns, preempted_ns,
+-- brief: node, callback, preempted_ns, median_ns, running_median_ns, running_p99_ns, count,
 --     sleeping_ns, runnable_ns, preemptions, max_ns
 -- note: kernel
 WITH measured AS (
@@ -83,4 +83,4 @@ SELECT
     l.is_internal
 FROM measured AS m
 JOIN main.callback_label AS l ON m.callback_id = l.callback_id
-ORDER BY m.run_id, m.preempted_ns + m.runnable_ns DESC, l.node, l.label, m.callback_id
+ORDER BY m.run_id, m.preempted_ns DESC, m.runnable_ns DESC, l.node, l.label, m.callback_id

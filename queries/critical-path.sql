@@ -42,7 +42,8 @@
 -- column: state VARCHAR            What the thread did, as in thread_state, where the kernel was
 --     traced
 -- column: who VARCHAR              What took the CPU, or ended the sleep: thread or interrupt
--- column: node VARCHAR [node]      Node that did it, or that waited
+-- column: node VARCHAR [node]      Node that did it, or that waited; 'between nodes' where neither
+--     worked: network_or_idle, unless its thread is known to have run or waited for a CPU
 -- column: what VARCHAR             The callback, or the topic of the message
 -- column: share DOUBLE [share]     Part of the latency, rounded to 4 places
 -- column: pieces BIGINT            Number of pieces in the row
@@ -138,7 +139,12 @@ piece AS (
         c.hop,
         c.part,
         c.activity,
-        coalesce(l.node, main.node_label(n.full_name, r.name, r.pid), o.node) AS node,
+        CASE
+            WHEN c.activity = 'network_or_idle'
+                AND coalesce(c.state, 'unknown') IN ('sleeping', 'unknown')
+                THEN 'between nodes'
+            ELSE coalesce(l.node, main.node_label(n.full_name, r.name, r.pid), o.node)
+        END AS node,
         CASE
             WHEN c.activity = 'callback' THEN coalesce(l.label, p.topic_name)
             WHEN c.activity IN (

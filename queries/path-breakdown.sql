@@ -35,7 +35,8 @@
 --     'network_or_idle', 'undecided', 'executor_busy', or exactly 'until_arrival', 'run_queue',
 --     'executor'; 'take_to_callback'
 -- column: node VARCHAR [node]  Node that runs the callback, waits for it or for the
---     message, or publishes
+--     message, or publishes; 'between nodes' where neither worked: network_or_idle and
+--     until_arrival
 -- column: what VARCHAR             The callback, or the topic of the message
 -- column: flows BIGINT             Flows with this part
 -- column: overlaps BIGINT          Flows in which it is negative
@@ -49,6 +50,7 @@
 -- column: path VARCHAR [path]  Nodes and topics
 -- brief: path, hop, part, node, median_ns, share, max_ns, p95_ns, what, mean_ns, total_ns, flows,
 --     overlaps
+-- zero: total_ns
 -- note: clocks
 CREATE OR REPLACE TEMP TABLE breakdown_flow AS
 SELECT
@@ -160,7 +162,10 @@ SELECT
     m.path_id,
     m.hop,
     m.part,
-    coalesce(l.node, main.node_label(n.full_name, r.name, r.pid)) AS node,
+    CASE
+        WHEN m.part IN ('network_or_idle', 'until_arrival') THEN 'between nodes'
+        ELSE coalesce(l.node, main.node_label(n.full_name, r.name, r.pid))
+    END AS node,
     coalesce(l.label, h.topic_name) AS what,
     m.flows,
     m.overlaps,

@@ -73,4 +73,4 @@ SELECT
 FROM measured AS m
 JOIN main.callback_label AS l ON m.callback_id = l.callback_id
 JOIN main.callback_label AS o ON m.meanwhile_callback_id = o.callback_id
-ORDER BY m.run_id, m.overlap_max_ns DESC, m.callback_id, m.meanwhile_callback_id
+ORDER BY m.run_id, m.worst_ns DESC, m.callback_id, m.meanwhile_callback_id

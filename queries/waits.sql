@@ -33,7 +33,7 @@
 -- column: loss_affected BIGINT      Of these, with a gap of the trace in their wait
 -- column: callback_id BIGINT        Identity of the callback
 -- column: is_internal BOOLEAN       Infrastructure of ROS
--- brief: node, callback, wait_median_ns, wait_max_ns, busy_worst_ns, meanwhile, count,
+-- brief: node, callback, busy_worst_ns, wait_median_ns, wait_max_ns, meanwhile, count,
 --     delayed_min, delayed_max, busy_total_min_ns, busy_total_max_ns
 -- note: clocks
 WITH waited AS MATERIALIZED (
@@ -122,4 +122,4 @@ SELECT
 FROM measured AS m
 JOIN main.callback_label AS l ON m.callback_id = l.callback_id
 LEFT JOIN meanwhile AS w ON m.callback_id = w.callback_id
-ORDER BY m.run_id, m.busy_total_max_ns DESC, l.node, l.label, m.callback_id
+ORDER BY m.run_id, m.busy_worst_ns DESC NULLS LAST, l.node, l.label, m.callback_id

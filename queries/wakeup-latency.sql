@@ -18,7 +18,7 @@
 -- column: max_ns BIGINT [ns]        Longest wait
 -- column: total_ns BIGINT [ns]      Sum of the waits
 -- column: thread_id BIGINT          Identity of the thread
--- brief: process, thread, tid, count, median_ns, p99_ns, max_ns, priority, total_ns, host
+-- brief: process, thread, tid, median_ns, max_ns, p99_ns, count, priority, total_ns, host
 -- note: kernel
 WITH waited AS (
     SELECT

@@ -53,7 +53,9 @@ def command(
     when the run was ingested is shown too. If a run has several clocks, the last
     line says how far their times can be compared.
     """
+    from msgflow.cli.output import print_next
     from msgflow.database import Database
+    from msgflow.db.finding import commands_after
     from msgflow.export.formats import Format
     from msgflow.run.choice import choose_runs
 
@@ -67,6 +69,10 @@ def command(
         verdicts = opened.clock_verdicts(run=run, only_several=True)
     labels = {one.run_id: one.title for one in runs} if len(runs) > 1 else {}
     _report(findings, form, output, run_labels=labels, notes=verdicts, table=quality)
+    for step in commands_after(findings) if runs else ["msgflow ingest TRACE"]:
+        print_next(step.split(), database, run)
+    if any(finding.severity == "error" for finding in findings):
+        raise typer.Exit(ExitCode.FAILED)
 
 
 def _report(
@@ -78,7 +84,7 @@ def _report(
     notes: Sequence[str],
     table: QueryResult | None,
 ) -> None:
-    """Print findings and their numbers, and end with exit code 1 on errors.
+    """Print findings and their numbers.
 
     Args:
         findings: errors first, those of one kind together.
@@ -112,8 +118,6 @@ def _report(
         for severity in ("error", "warning")
     ]
     print_status(", ".join(numbers) if findings else "nothing is wrong with the recording")
-    if any(finding.severity == "error" for finding in findings):
-        raise typer.Exit(ExitCode.FAILED)
 
 
 def _numbered(findings: Sequence[Finding]) -> Iterator[tuple[int, Finding]]:

@@ -32,6 +32,9 @@ if TYPE_CHECKING:
 
 app = typer.Typer()
 
+# What answers most questions without a join.
+_FIRST = {"callback_run", "message"}
+
 _DirectoryOption = Annotated[Path, output_option("DIR", "Directory, created if missing")]
 _ViewsArgument = Annotated[
     list[str] | None,
@@ -326,7 +329,14 @@ def series(
 
 
 def _report(exported: Sequence[ExportedView], directory: Path) -> None:
-    from msgflow.cli.output import count, print_status
+    from msgflow.cli.output import count, print_note, print_status
 
     rows = sum(view.row_count for view in exported)
     print_status(f"{count(len(exported), 'view')}, {count(rows, 'row')} written to {directory}")
+    names = {view.view for view in exported}
+    if names > _FIRST:
+        empty = sum(not view.row_count for view in exported)
+        print_note(
+            f"start with {', '.join(sorted(_FIRST))}: they have the names inside;"
+            f" {count(empty, 'view')} without rows; msgflow db schema says what each is"
+        )

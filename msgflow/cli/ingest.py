@@ -199,11 +199,10 @@ def _print_report(report: IngestReport, database: Path) -> None:
 
 
 def _print_next(report: IngestReport, database: Path) -> None:
-    from msgflow.cli.output import print_status
+    from msgflow.cli.output import print_next
     from msgflow.db.finding import next_command
 
-    words = [*next_command(report.findings).split(), *_database_option(database)]
-    print_status(f"next: {shlex.join(words)}")
+    print_next(next_command(report.findings).split(), database)
 
 
 def _database_option(database: Path) -> list[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import codecs
 import os
+import shlex
 import shutil
 import sys
 from pathlib import Path
@@ -13,6 +14,7 @@ import typer
 from rich.cells import cell_len
 
 from msgflow.cli.show.layout import MOST_ROWS, screen_width
+from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import UsageError
 from msgflow.export.formats import Format, format_of, write_result
 
@@ -43,6 +45,13 @@ def print_note(text: str) -> None:
 def print_status(text: str) -> None:
     """Print what was done."""
     typer.echo("\n".join(_fitting(_shown(text), "  ")), err=True)
+
+
+def print_next(words: Sequence[str], database: Path, run: str | int | None = None) -> None:
+    """Print a command that runs as it is printed."""
+    chosen = ["--run", str(run)] if run is not None else []
+    place = ["--db", str(database)] if database != DEFAULT_DATABASE else []
+    print_status(f"next: {shlex.join([*words, *chosen, *place])}")
 
 
 def is_asked() -> bool:

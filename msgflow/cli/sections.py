@@ -75,7 +75,7 @@ def screen_sections(
             yield ""
         yield section.upper()
         # A line about columns that are not shown stands in brackets.
-        shown = lay_out(result, width if is_chosen else width - 2)
+        shown = lay_out(result, width if is_chosen else width - 2, is_whole=is_chosen)
         yield from screen_lines(shown, width)
         said = () if shown.not_shown is None or is_chosen else (shown.not_shown,)
         notes = (*said, *shown.notes) if len(result) else ("none",)

@@ -6,7 +6,7 @@ import readline
 from typing import TYPE_CHECKING
 
 from msgflow.cli.errors import print_exception
-from msgflow.cli.output import print_status
+from msgflow.cli.output import print_result, print_status
 from msgflow.database import Database
 from msgflow.errors import MsgflowError
 
@@ -18,7 +18,11 @@ _WORDS = (
     "SELECT", "FROM", "JOIN", "LEFT JOIN", "USING", "ON", "WHERE", "GROUP BY", "ORDER BY", "LIMIT",
     "count(*)", "avg(", "min(", "max(", "quantile_disc(", "DESCRIBE",
 )  # fmt: skip
-_END = ("exit", "quit")
+_END = ("exit", "quit", ".exit", ".quit", ".q")
+_HELP = (
+    "a query ends with ; or an empty line; tab completes names; .tables lists the views,"
+    " .schema VIEW its columns; Ctrl-D ends"
+)
 
 
 def prompt(database: Path, ask: Callable[[str], None]) -> None:
@@ -37,7 +41,7 @@ def prompt(database: Path, ask: Callable[[str], None]) -> None:
     readline.set_completer(completer(words))
     readline.set_completer_delims(" \t\n,()=<>")
     readline.parse_and_bind("tab: complete")
-    print_status("a query ends with ; or an empty line; tab completes names; Ctrl-D ends")
+    print_status(_HELP)
     lines: list[str] = []
     while True:
         try:
@@ -47,6 +51,12 @@ def prompt(database: Path, ask: Callable[[str], None]) -> None:
             return
         if not lines and line.strip().rstrip("; ").lower() in _END:
             return
+        if not lines and line.lstrip().startswith("."):
+            try:
+                _answer(database, line.strip().rstrip("; "))
+            except MsgflowError as error:
+                print_exception(error)
+            continue
         if line.strip():
             lines.append(line)
         if lines and (not line.strip() or line.rstrip().endswith(";")):
@@ -56,6 +66,17 @@ def prompt(database: Path, ask: Callable[[str], None]) -> None:
                 ask(query)
             except MsgflowError as error:
                 print_exception(error)
+
+
+def _answer(database: Path, line: str) -> None:
+    """Answer what the prompts of DuckDB and SQLite have too."""
+    word, _, view = line.partition(" ")
+    if word not in (".tables", ".schema"):
+        print_status(_HELP)
+        return
+    with Database(database) as opened:
+        asked = word == ".schema" and view.strip()
+        print_result(opened.schema(asked) if asked else opened.views(), None, None, most_rows=None)
 
 
 def completer(words: Iterable[str]) -> Callable[[str, int], str | None]:

@@ -9,11 +9,14 @@ import typer
 
 from msgflow.cli.options import DatabaseOption, OutputOption, RunOption
 from msgflow.cli.slice_options import with_slice
-from msgflow.default_files import DEFAULT_DATABASE, DEFAULT_LINKS
+from msgflow.default_files import DEFAULT_DATABASE, DEFAULT_LINKS, DEFAULT_PATHS
 from msgflow.errors import UsageError
 from msgflow.run.slice import LATEST, Slice
 
 app = typer.Typer()
+
+_SUGGEST = ("msgflow", "suggest")
+_TARGETS = "targets.yaml"
 
 
 @app.command("links")
@@ -37,7 +40,14 @@ def links(
     """
     from msgflow.atomic import replacing
     from msgflow.cli.links import print_applied
-    from msgflow.cli.output import count, print_note, print_runs, print_status, print_text
+    from msgflow.cli.output import (
+        count,
+        print_next,
+        print_note,
+        print_runs,
+        print_status,
+        print_text,
+    )
     from msgflow.database import Database
 
     if run == "all":
@@ -68,6 +78,8 @@ def links(
             print_text(text, path)
             if apply:
                 print_status("no candidate is without a doubt: nothing is declared")
+            elif path is None and found.certain:
+                print_next([*_SUGGEST, "links", "--apply"], database, run)
             return
         with replacing(path) as temporary:
             temporary.write_text(f"{text}\n", encoding="utf-8")
@@ -89,7 +101,7 @@ def paths(
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
     """Print the paths of a run as a file with names, to choose from: paths.yaml."""
-    from msgflow.cli.output import print_note, print_runs, print_text
+    from msgflow.cli.output import print_next, print_note, print_runs, print_text
     from msgflow.database import Database
     from msgflow.paths import suggest_paths
 
@@ -101,6 +113,8 @@ def paths(
         if "cut off" in note:
             print_note(note)
     print_text(text, output)
+    if output is None:
+        print_next([*_SUGGEST, "paths", "-o", str(DEFAULT_PATHS)], database, run)
 
 
 @app.command("targets")
@@ -116,12 +130,13 @@ def targets(
     output: OutputOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
-    """Write requirements that a good run meets, as a file to review.
+    """Print requirements that a good run meets, as a file to review: -o targets.yaml.
 
+    `msgflow verify targets.yaml` applies them to a run.
     It covers paths, timers, topics, services and actions with at least 20 values. A note and a
     comment in the file name topics that delivered less than 99 % of their messages.
     """
-    from msgflow.cli.output import print_note, print_text
+    from msgflow.cli.output import print_next, print_note, print_text
     from msgflow.database import Database
 
     with Database(database) as opened:
@@ -130,3 +145,8 @@ def targets(
     for line in text.splitlines()[1:]:
         if line.startswith("# "):
             print_note(line.removeprefix("# "))
+    if output is None:
+        print_next([*_SUGGEST, "targets", "-o", _TARGETS], database, part.run)
+    else:
+        # Another run is what they are for.
+        print_next(["msgflow", "verify", str(output)], database)

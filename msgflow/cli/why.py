@@ -33,19 +33,18 @@ _PATHS = 3
 # Titles, and the columns that answer the question.
 _SHOWN = {
     "paths": ("paths", "path reached roots median_ns p95_ns max_ns reasons"),
-    "nodes": ("time by node, on path 1", "node share part what median_ns max_ns"),
+    "nodes": ("time by node, on {}", "node share part what median_ns max_ns"),
     "slowest_flow": (
         "its slowest flow",
         "rank latency_ns take_id at_ns duration_ns share activity state who node what",
     ),
     "waits": (
         "what kept its callbacks waiting",
-        "node callback meanwhile_node meanwhile_callback worst_ns share",
+        "node callback meanwhile_node meanwhile_callback worst_ns",
     ),
     "losses": (
         "messages not delivered",
-        "topic_name subscriber published dropped lost not_connected cut_by_recording unknown "
-        "reasons",
+        "topic_name subscriber published dropped lost reasons",
     ),
 }
 
@@ -70,7 +69,7 @@ def command(
 ) -> None:
     """Explain why a topic is late: its slowest path, where the time goes, what to ask next.
 
-    Path 1 is the path of the slowest flow: all other sections are about it. Each
+    The first path is that of the slowest flow: all other sections are about it. Each
     section is part of a named query, with the same numbers: e2e-latency,
     path-breakdown, critical-path, waits --by pair, and topics --measure delivery.
     """
@@ -96,9 +95,13 @@ def command(
 
 
 def _shown(found: Explanation) -> dict[str, QueryResult]:
+    path = found.paths.table["path"][0].as_py()
+    number = found.paths.path_numbers.get(path)
+    place = "the path" if number is None else f"path {number}"
     shown = {}
     for name, result in found.sections.items():
         title, columns = _SHOWN[name]
+        title = title.format(place)
         rows = result.first(_PATHS) if name == "paths" else result
         shown[title] = rows.with_columns(columns.split())
     return shown

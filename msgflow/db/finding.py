@@ -40,6 +40,15 @@ _NO_ROW = (
     "NULL::BIGINT AS count, NULL::VARCHAR AS detail WHERE false"
 )
 
+# By the name of a finding: what shows more of it, or cures it.
+_AFTER = {
+    "dead_end": "msgflow suggest links",
+    "topic_unnamed": "msgflow suggest links",
+    "unmatched_take": "msgflow query topics --measure unmatched",
+    "process_without_rclcpp": "msgflow query path-breakdown",
+    "clock_not_synchronised": "msgflow query clocks",
+}
+
 
 @dataclass(frozen=True)
 class Finding:
@@ -180,6 +189,13 @@ def next_command(findings: Sequence[Finding]) -> str:
     """Return the command that comes next: first for what is wrong, then for what is late."""
     is_sound = all(finding.severity == "info" for finding in findings)
     return "msgflow why" if is_sound else "msgflow check"
+
+
+def commands_after(findings: Sequence[Finding]) -> list[str]:
+    """Return the commands that come next for whoever has read the findings, the last is `why`."""
+    names = {finding.name for finding in findings}
+    after = dict.fromkeys(command for name, command in _AFTER.items() if name in names)
+    return [*after, "msgflow why"]
 
 
 def broken_rules(con: duckdb.DuckDBPyConnection, run_id: int | None = None) -> list[Finding]:

@@ -33,8 +33,8 @@ GROUP BY views.view_name
 ORDER BY views.view_name
 """
 # The time of a row is the first of these columns that the view has …
-_TIMES = ("start_ns", "sent_ns", "taken_ns", "at_ns", "from_ns")
-# (for a request or response whose sending was not seen: when it was taken)
+_TIMES = ("start_ns", "sent_ns", "published_ns", "taken_ns", "at_ns", "from_ns")
+# (for what was taken and not seen to be sent: when it was taken)
 _SENT = "coalesce(sent_ns, taken_ns)"
 # … else the time of the first of these things: for a link, of its cause.
 _THINGS = (
@@ -99,7 +99,8 @@ class Selection:
             return None
         for name in _TIMES:
             if name in columns:
-                time = _SENT if name == "sent_ns" and "taken_ns" in columns else name
+                is_sent = name in ("sent_ns", "published_ns") and "taken_ns" in columns
+                time = f"coalesce({name}, taken_ns)" if is_sent else name
                 return f"{time} >= $start_ns AND {time} < $end_ns"
         for thing, name in _THINGS:
             if f"{thing}_id" in columns:

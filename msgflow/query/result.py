@@ -33,6 +33,8 @@ class QueryResult:
         runs: the runs that were read; empty for plain SQL.
         notes: what the rows do not say (hidden rows, rows that are cut), a sentence each.
         when_empty: what to say when there are no rows.
+        path_numbers: numbers of paths, if there are several; those of all paths of the runs.
+        order: columns that the user sorted by.
     """
 
     table: pa.Table
@@ -40,6 +42,8 @@ class QueryResult:
     runs: tuple[Run, ...] = ()
     notes: list[str] = field(default_factory=list)
     when_empty: str = "no rows"
+    path_numbers: dict[str, int] = field(default_factory=dict)
+    order: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return int(self.table.num_rows)

@@ -22,6 +22,7 @@ from msgflow.query.selection import (
     PLACE,
     Selection,
     selected,
+    sorted_by,
 )
 from msgflow.run.slice import LATEST, Slice
 from msgflow.run.window import format_epoch
@@ -131,7 +132,7 @@ def run_query(
         notes += clock_notes(connection, runs)
     if header.note == "callbacks":
         notes += _without_callbacks(connection, runs)
-    return QueryResult(table, header, runs, notes)
+    return QueryResult(table, header, runs, notes, order=sorted_by(header, selection))
 
 
 @contextlib.contextmanager

@@ -192,6 +192,12 @@ def _order(header: Header, selection: Selection) -> list[str]:
     return [_sorted(header, text) for text in selection.sort]
 
 
+def sorted_by(header: Header, selection: Selection) -> tuple[str, ...]:
+    """Return the columns that rows were asked to be sorted by."""
+    names = [column.name for column in header.columns]
+    return tuple(column_named(text.partition(":")[0], names) for text in selection.sort)
+
+
 def _sorted(header: Header, text: str) -> str:
     name, _, direction = text.partition(":")
     if direction not in ("", "asc", "desc"):

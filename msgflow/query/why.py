@@ -34,6 +34,7 @@ _BY_NODE = {
 }
 _BY_STATE = {"preempted": "preemption", "runnable": "wakeup-latency"}
 _BY_TOPIC = dict.fromkeys(("network_or_idle", "undecided"), ("topics", "--measure", "latency"))
+_LINKS = ("suggest", "links")
 # Queries with rows of callbacks: none of what a node without traced callbacks did.
 _OF_CALLBACKS = ("callbacks", "waits")
 
@@ -71,13 +72,16 @@ class Explanation:
         return {name: getattr(self, name) for name in names}
 
 
-def explain(ask: Ask, run: Run, place: str | None) -> Explanation:
+def explain(
+    ask: Ask, run: Run, place: str | None, dead_ends: Sequence[tuple[str, str]]
+) -> Explanation:
     """Return why flows are late that end at a topic or node.
 
     Args:
         ask: runs a named query in the run and the times that are wanted.
         run: that run.
         place: a topic or node, or a glob; the path with the slowest flow of all when None.
+        dead_ends: nodes that publish and at which messages end, with what is said of it.
 
     Raises:
         UsageError: there is no such place, or no flow arrives there.
@@ -92,9 +96,12 @@ def explain(ask: Ask, run: Run, place: str | None) -> Explanation:
     paths = ask("e2e-latency", **ends)
     parts = _chosen(ask("path-breakdown", **ends), lambda row: row["path"] == path)
     callbacks = {(row["node"], row["what"]) for row in parts.table.to_pylist()}
-    waits = _chosen(
-        ask("waits-pair"), lambda row: (row["node"], row["callback"]) in callbacks, _WAITS
-    )
+    shown = [path] if place is None else paths.table["path"].to_pylist()
+    ends_here = list(dict.fromkeys(_ending(dead_ends, shown)))
+    waits = _longest(
+        _chosen(ask("waits-pair"), lambda row: (row["node"], row["callback"]) in callbacks),
+        "worst_ns",
+    ).first(_WAITS)
     losses = _chosen(
         ask("topics-delivery"),
         lambda row: (
@@ -108,12 +115,20 @@ def explain(ask: Ask, run: Run, place: str | None) -> Explanation:
         place=place,
         paths=_slowest_first(paths, path),
         nodes=_by_node(parts),
-        slowest_flow=_longest(flow),
+        slowest_flow=_longest_pieces(flow),
         waits=waits,
         losses=losses,
-        steps=tuple(_steps(pieces, losses)),
+        steps=(*(_LINKS for _ in ends_here[:1]), *_steps(pieces, losses)),
         notes=tuple(
-            dict.fromkeys([*_preempted(pieces), *_unexplained(pieces), *paths.notes, *flow.notes])
+            dict.fromkeys(
+                [
+                    *ends_here,
+                    *_preempted(pieces),
+                    *_unexplained(pieces),
+                    *paths.notes,
+                    *flow.notes,
+                ]
+            )
         ),
     )
 
@@ -134,6 +149,14 @@ def _nothing(ask: Ask, place: str | None) -> UsageError:
     else:
         message = f"no flow arrives — {place}"
     return UsageError(message, "msgflow check says where flows break off")
+
+
+def _ending(dead_ends: Sequence[tuple[str, str]], paths: Sequence[str]) -> Iterator[str]:
+    """Yield what is said of paths that end at a node which publishes."""
+    ends = [path.split(" → ")[-2:] for path in paths]
+    for node, detail in dead_ends:
+        if any(node == last and f" on {topic} " in detail for topic, last in ends):
+            yield detail
 
 
 def _preempted(pieces: Sequence[dict[str, Any]]) -> Iterator[str]:
@@ -171,11 +194,15 @@ def _unexplained(pieces: Sequence[dict[str, Any]]) -> Iterator[str]:
         )
 
 
-def _chosen(
-    result: QueryResult, is_wanted: Callable[[dict[str, Any]], bool], most: int | None = None
-) -> QueryResult:
+def _chosen(result: QueryResult, is_wanted: Callable[[dict[str, Any]], bool]) -> QueryResult:
     rows = result.table.to_pylist()
-    return _taken(result, [place for place, row in enumerate(rows) if is_wanted(row)][:most])
+    return _taken(result, [place for place, row in enumerate(rows) if is_wanted(row)])
+
+
+def _longest(result: QueryResult, name: str) -> QueryResult:
+    """Return the rows, those with the longest duration in a column first."""
+    durations = result.table[name].to_pylist()
+    return _taken(result, sorted(range(len(durations)), key=lambda place: -durations[place]))
 
 
 def _taken(result: QueryResult, places: Sequence[int]) -> QueryResult:
@@ -218,7 +245,7 @@ def _by_node(parts: QueryResult) -> QueryResult:
     return replace(parts, table=pyarrow.Table.from_pylist(nodes, pyarrow.schema(fields)))
 
 
-def _longest(flow: QueryResult) -> QueryResult:
+def _longest_pieces(flow: QueryResult) -> QueryResult:
     rows = flow.table.to_pylist()
     longest = sorted(range(len(rows)), key=lambda place: -rows[place]["duration_ns"])[:_PIECES]
     return _taken(flow, sorted(longest))

@@ -26,6 +26,7 @@ The header ends at the first line that is not a `--` comment. Two spaces end a p
 - `heading`: columns that stand above a table on a terminal, once for each value of the first one,
   on which the others depend.
 - `slowest`: the column that `--slowest N` goes by.
+- `zero`: the column that is 0 in rows that a terminal leaves out.
 - `when`: tables, or macros of a run. If none of them has a row, this object has none either, and an
   ingest leaves it empty without running its SQL. In `schema/model` such an object may declare its
   columns, from which the empty table is made. One that does not is left out only where the table is
@@ -77,7 +78,7 @@ _MINIMUM = re.compile(r"(-?\d+)\.\.")
 _REPEATABLE = ("param", "column")
 _SINGLE = (
     "name", "title", "description", "cause", "cure", "grain", "kind", "severity", "note", "when",
-    "brief", "answer", "heading", "slowest", "variant",
+    "brief", "answer", "heading", "slowest", "zero", "variant",
 )  # fmt: skip
 _KINDS = ("view", "inline", "macro")
 _NOTES = ("clocks", "callbacks", "kernel")
@@ -165,6 +166,7 @@ class Header:
         answer: columns that are shown also where they are 0 or empty throughout.
         heading: columns that stand once above their rows: the first says which rows these are.
         slowest: column by which rows are the slowest, else None.
+        zero: column that is 0 in rows that a terminal leaves out, else None.
         steps: what a query makes before, in order.
         when: tables and macros of a run; if none of them has a row, this has none.
         variant: parameter that chooses between this query and others; its default is this one.
@@ -188,6 +190,7 @@ class Header:
     answer: tuple[str, ...] = ()
     heading: tuple[str, ...] = ()
     slowest: str | None = None
+    zero: str | None = None
     steps: tuple[Step, ...] = ()
     when: tuple[str, ...] = ()
     variant: Param | None = None
@@ -268,7 +271,7 @@ def parse(text: str, path: Path) -> Header:
     columns = tuple(_column(field, path) for field in fields if field.key == "column")
     _check_names(params, path)
     _check_names(columns, path)
-    for key in ("brief", "answer", "heading", "slowest"):
+    for key in ("brief", "answer", "heading", "slowest", "zero"):
         for name in _names(single.get(key, "")):
             if name not in [column.name for column in columns]:
                 raise _error(path, 1, f"{key} names a column that there is not: {name!r}")
@@ -290,6 +293,7 @@ def parse(text: str, path: Path) -> Header:
         answer=_names(single.get("answer", "")),
         heading=_names(single.get("heading", "")),
         slowest=single.get("slowest"),
+        zero=single.get("zero"),
         steps=steps,
         when=_names(single.get("when", "")),
         variant=variants[0] if variants else None,

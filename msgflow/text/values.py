@@ -93,8 +93,6 @@ def _number(value: float, unit: str | None, is_handle: bool) -> str:
         if unit == MOMENT:
             return format_epoch(value)
         return f"0x{value:x}" if is_handle else str(value)
-    if unit == SHARE and 0 < value < 0.0005:
-        return "<0.001"
     if value == 0 or abs(value) >= 0.001 or unit == SHARE:
         return f"{value:.3f}"
     return f"{value:.3g}"

@@ -24,7 +24,7 @@ Row = dict[str, Any]
 # By the activity of a piece of a flow, see the query critical-path.
 _BLAME = {
     "callback": "{node} ran {time}",
-    "network_or_idle": "{what} took {time} to {node}",
+    "network_or_idle": "{what} was on its way for {time}",
     "executor_busy": "kept waiting {time} by {node}, which ran {what}",
     "all_threads_busy": "kept waiting {time} for a thread, one ran {what} of {node}",
     "blocked": "kept waiting {time} by {what} of {node}, which excludes it",

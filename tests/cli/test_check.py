@@ -66,7 +66,9 @@ def test_nothing_is_wrong(msgflow: Msgflow, database: Path) -> None:
     result = msgflow("check", "--db", database)
     assert result.exit_code == 0
     assert result.stdout == ""
-    assert result.stderr == "nothing is wrong with the recording\n"
+    said, next_steps = result.stderr.split("next: ", maxsplit=1)
+    assert said == "nothing is wrong with the recording\n"
+    assert next_steps.startswith("msgflow ")
 
 
 def test_warnings_leave_the_exit_code_at_0(msgflow: Msgflow, database: Path) -> None:
@@ -81,7 +83,9 @@ def test_warnings_leave_the_exit_code_at_0(msgflow: Msgflow, database: Path) -> 
         "cause",
         "cure",
     ]
-    assert result.stderr == "0 errors, 1 warning\n"
+    said, next_steps = result.stderr.split("next: ", maxsplit=1)
+    assert said == "0 errors, 1 warning\n"
+    assert next_steps.startswith("msgflow ")
 
 
 def test_errors_make_it_1_and_come_first(msgflow: Msgflow, database: Path) -> None:
@@ -95,7 +99,9 @@ def test_errors_make_it_1_and_come_first(msgflow: Msgflow, database: Path) -> No
         "2. warning: Tracing was paused (tracing_paused)",
     ]
     assert "--subbuf-size=128K" in result.stdout
-    assert result.stderr == "1 error, 1 warning\n"
+    said, next_steps = result.stderr.split("next: ", maxsplit=1)
+    assert said == "1 error, 1 warning\n"
+    assert next_steps.startswith("msgflow ")
 
 
 def test_json_has_every_place_under_the_number_of_its_finding(
@@ -141,7 +147,9 @@ def test_runs_of_a_label_are_several_runs(msgflow: Msgflow, database: Path) -> N
 def test_a_database_without_runs(msgflow: Msgflow, fresh_database: Path) -> None:
     result = msgflow("check", "--db", fresh_database)
     assert result.exit_code == 0
-    assert result.stderr == "nothing is wrong with the recording\n"
+    said, next_steps = result.stderr.split("next: ", maxsplit=1)
+    assert said == "nothing is wrong with the recording\n"
+    assert next_steps.startswith("msgflow ")
 
 
 def test_broken_rules_of_the_database_are_shown_alike(
@@ -157,7 +165,9 @@ def test_broken_rules_of_the_database_are_shown_alike(
     assert lines[0] == "1. error: A row refers to one that does not exist (relation_is_kept)"
     assert lines[1] == "   gap.trace_id — identities that are no row of trace"
     assert "2. error: A word is not of the vocabulary (vocabulary_is_closed)" in lines
-    assert result.stderr == "2 errors, 1 warning\n"
+    said, next_steps = result.stderr.split("next: ", maxsplit=1)
+    assert said == "2 errors, 1 warning\n"
+    assert next_steps.startswith("msgflow ")
     rows = json.loads(
         msgflow("check", "--detail", "--format", "json", "--db", fresh_database).stdout
     )

@@ -48,11 +48,25 @@ def test_the_prompt_goes_on_after_a_mistake(
     assert "error: not SQL" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("word", ["exit", "QUIT;", "exit ;"])
+@pytest.mark.parametrize("word", ["exit", "QUIT;", "exit ;", ".quit", ".exit"])
 def test_words_end_the_prompt(
     monkeypatch: pytest.MonkeyPatch, small_database: Path, word: str
 ) -> None:
     assert asked(monkeypatch, small_database, "SELECT 1;", word, "SELECT 2;") == ["SELECT 1;"]
+
+
+def test_questions_of_other_prompts(
+    monkeypatch: pytest.MonkeyPatch, small_database: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lines = (".tables", ".schema take", ".help", ".mode csv", ".schema tak", "SELECT 1;")
+    assert asked(monkeypatch, small_database, *lines) == ["SELECT 1;"]
+    said = capsys.readouterr()
+    views, _, columns = said.out.partition("column ")
+    assert "callback_run" in views
+    assert "taken_ns" in columns
+    assert "callback_run" not in columns
+    assert said.err.count(".schema VIEW its columns") == 3
+    assert "no such view — tak" in said.err
 
 
 def test_tab_completes_in_any_case() -> None:

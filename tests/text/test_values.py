@@ -49,7 +49,7 @@ def test_a_printed_duration_is_right_to_the_last_digit(duration_ns: int) -> None
         (199.98765, "Hz", "199.988"),
         (0.0, None, "0.000"),
         (0.0000123456, None, "1.23e-05"),
-        (0.0000123456, "share", "<0.001"),
+        (0.0000123456, "share", "0.000"),
         (0.0005, "share", "0.001"),
         (0.0, "share", "0.000"),
         (0.84567, "share", "0.846"),

@@ -448,6 +448,15 @@ def test_a_table_that_is_wider_says_so_and_is_cards_on_a_phone(
     assert said == '"median "'
 
 
+def test_no_tab_is_out_of_sight_on_a_phone(demo: Path, report: Report, page: Page) -> None:
+    page.page.set_viewport_size({"width": 390, "height": 844})
+    page.open(report(demo))
+    tabs = page.page.locator("nav .tabs a")
+    boxes = [tab.bounding_box() for tab in tabs.all()]
+    assert len(boxes) > 6
+    assert all(box and box["x"] >= 0 and box["x"] + box["width"] <= 390 for box in boxes)
+
+
 def test_a_screenshot_is_no_blank_page(demo: Path, read: Read, report: Report, page: Page) -> None:
     number = a_publication(read(demo), 1)
     for width, height, scheme in ((1280, 800, "light"), (390, 844, "dark")):

@@ -374,6 +374,8 @@ def test_rows_of_ros_itself_are_shown_where_the_bar_says_so(
     page.open(serve(demo).address)
     page.go("#/topics")
     assert "/rosout" not in [row["topic"] for row in cells(page, "topics")]
+    hidden = page.page.locator(".notes").get_by_text("hidden").first.inner_text()
+    assert "“what ROS does for itself” shows them" in hidden
     with page.anew():
         page.page.locator(".bar").get_by_label("what ROS does for itself").check()
     assert page.page.get_by_text("--internal").count()
@@ -396,6 +398,36 @@ def test_charts_are_downloaded(place: str, demo: Path, serve: Serve, page: Page)
     assert all(float(line[0]) >= 0 for line in lines[1:])
     with page.page.expect_download() as download:
         frame.get_by_role("button", name="as PNG").click()
+    assert Path(download.value.path()).read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("place", "titles"),
+    [
+        ("timeline", ["begin_ns", "what", "row", "node", "duration_ns", "identity"]),
+        ("graph", ["from", "to", "kind", "indirect", "count", "median_ns"]),
+    ],
+)
+def test_the_timeline_and_the_graph_are_downloaded(
+    place: str, titles: list[str], demo: Path, serve: Serve, page: Page
+) -> None:
+    page.open(serve(demo).address)
+    page.go(f"#/{place}")
+    tools = page.page.locator("main .tools").first
+    tools.get_by_role("button", name="as CSV").wait_for()
+    if place == "timeline":
+        page.page.get_by_text("the window as a table").click()
+        page.page.locator("main table tbody tr").first.wait_for()
+    else:
+        page.page.locator("svg .vertex").first.wait_for()
+    with page.page.expect_download() as download:
+        tools.get_by_role("button", name="as CSV").click()
+    lines = list(csv.reader(io.StringIO(Path(download.value.path()).read_text())))
+    assert lines[0] == titles
+    assert len(lines) > 10
+    assert all(len(line) == len(titles) and line[0] and line[2] for line in lines)
+    with page.page.expect_download() as download:
+        tools.get_by_role("button", name="as PNG").click()
     assert Path(download.value.path()).read_bytes().startswith(b"\x89PNG")
 
 

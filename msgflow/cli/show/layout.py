@@ -21,7 +21,7 @@ from msgflow.text.values import MOMENT, NULL, column_title, format_cell, short_s
 from msgflow.text.wrapping import ARROW, longest_piece, longest_word, wrap
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     import pyarrow as pa
 
@@ -37,14 +37,15 @@ _SYMBOLS = ("symbol", "symbols")
 # So many of the most important columns never yield. For so many, names may be broken.
 _ESSENTIAL = 5
 _WANTED = 6
-# The narrowest column of text, in cells, and the most lines of a cell. Plain SQL does not say what
-# is important: its cells may have more lines.
+# The narrowest column of text, in cells, and the most lines of a cell. Where all columns are to be
+# shown, as those of plain SQL, columns may be narrower and cells have more lines.
 _NARROW = 16
+_NARROW_OF_ALL = 12
 _WORD = 40
 # Shorter text is broken only to make room for the most important columns, as names are.
 _SHORT = 20
 _LINES = 4
-_LINES_OF_SQL = 10
+_LINES_OF_ALL = 10
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ class Layout:
         headings: lines above the rows.
         columns: in the order of the result, after the number of the path.
         widths: of the columns, in cells; None if each row is a record.
-        paths: the paths with the numbers 1, 2, …
+        paths: the paths, by their numbers.
         notes: what is left out, a sentence each.
         not_shown: which columns are left out, in one line; None if none are.
     """
@@ -86,7 +87,7 @@ class Layout:
     headings: tuple[str, ...]
     columns: tuple[ShownColumn, ...]
     widths: tuple[int, ...] | None
-    paths: tuple[str, ...]
+    paths: dict[int, str]
     notes: tuple[str, ...]
     not_shown: str | None
 
@@ -102,6 +103,7 @@ def lay_out(
     *,
     most_rows: int | None = MOST_ROWS,
     is_chosen: bool = False,
+    is_whole: bool = False,
     remedy: str = "--wide shows all",
 ) -> Layout:
     """Return the layout of a result.
@@ -111,35 +113,52 @@ def lay_out(
         width: of the terminal, in cells.
         most_rows: how many rows are shown; all when None.
         is_chosen: the user asked for these columns: show all of them.
+        is_whole: show all columns with something in them.
         remedy: how to see the rest, for notes.
     """
     keeps_all = is_chosen or result.header is None
+    zero_rows = 0
+    if not keeps_all:
+        result, zero_rows = _without_zero_rows(result)
     kept, nothing = _that_say_something(result, keeps_all)
     first = result.table if most_rows is None else result.table.slice(0, most_rows)
-    columns = [_column(result, name, first[name]) for name in kept]
-    columns, paths = _with_numbered_paths(columns)
+    lines = _LINES_OF_ALL if is_whole or result.header is None else _LINES
+    columns = [_column(result, name, first[name], lines) for name in kept]
+    columns, paths = _with_numbered_paths(columns, result.path_numbers)
     headings: tuple[str, ...] = ()
     if not keeps_all:
         columns, headings = _with_headings(result, columns)
     notes = []
     if first.num_rows < len(result):
         notes.append(f"the first {first.num_rows} of {len(result):,} rows: {remedy}")
-    if not keeps_all:
-        shown = _that_fit(result, columns, width)
-    else:
+    if keeps_all or is_whole:
         shown = columns if _least(columns) <= width else _broken(columns)
+    else:
+        shown = _that_fit(result, columns, width)
     names = {column.name for column in shown}
     left_out = [column for column in columns if column.name not in names]
     is_table = _least(shown) <= width and not (left_out and first.num_rows == 1)
     if not keeps_all:
-        brief = () if result.header is None else result.header.brief[:_ESSENTIAL]
+        brief = () if result.header is None else (*result.order, *result.header.brief)[:_ESSENTIAL]
         important = [column for column in columns if column.name in brief]
         is_table = is_table and all(column.name in names for column in important)
     if not is_table:
         shown, left_out = columns, []
     widths = tuple(_widths(shown, width)) if is_table else None
-    not_shown = _not_shown(left_out, nothing, width, remedy) if first.num_rows else None
+    not_shown = _not_shown(left_out, nothing, zero_rows, width, remedy) if first.num_rows else None
     return Layout(headings, tuple(shown), widths, paths, tuple(notes), not_shown)
+
+
+def _without_zero_rows(result: QueryResult) -> tuple[QueryResult, int]:
+    """Return the rows that are not 0 throughout, and how many are; all if each of them is."""
+    from pyarrow import compute
+
+    name = None if result.header is None else result.header.zero
+    if name is None or name not in result.columns:
+        return result, 0
+    table = result.table.filter(compute.not_equal(result.table[name], 0))
+    count = len(result) - table.num_rows
+    return (replace(result, table=table), count) if table.num_rows else (result, 0)
 
 
 def _free(columns: Sequence[ShownColumn]) -> int:
@@ -186,7 +205,7 @@ def _title(result: QueryResult, name: str) -> str:
     return column_title(name, result.units.get(name), result.columns)
 
 
-def _column(result: QueryResult, name: str, values: pa.ChunkedArray) -> ShownColumn:
+def _column(result: QueryResult, name: str, values: pa.ChunkedArray, lines: int) -> ShownColumn:
     import pyarrow.types as types
 
     kind = values.type
@@ -208,7 +227,6 @@ def _column(result: QueryResult, name: str, values: pa.ChunkedArray) -> ShownCol
             else _since(value - begin)
             for value in listed
         ]
-    lines = _LINES_OF_SQL if result.header is None else _LINES
     return _measured(name, title, cells, is_number, lines)
 
 
@@ -221,9 +239,10 @@ def _measured(
         word = max((longest_word(cell) for cell in cells), default=0)
         most = max(map(cell_len, cells), default=0)
         piece = max(map(longest_piece, cells), default=0)
+        narrow = _NARROW if lines == _LINES else _NARROW_OF_ALL
         broken = min(
             width,
-            max(cell_len(title), min(piece, _WORD), _NARROW, -(-most * 5 // (4 * lines))),
+            max(cell_len(title), min(piece, _WORD), narrow, -(-most * 5 // (4 * lines))),
         )
         least = width if width <= _SHORT else min(width, max(broken, min(word, _WORD)))
     return ShownColumn(name, title, tuple(cells), is_number, width, least, broken)
@@ -253,17 +272,20 @@ def _since(duration_ns: int) -> str:
 
 
 def _with_numbered_paths(
-    columns: list[ShownColumn],
-) -> tuple[list[ShownColumn], tuple[str, ...]]:
-    """Return the columns with numbers in place of paths, and the paths."""
+    columns: list[ShownColumn], known: Mapping[str, int]
+) -> tuple[list[ShownColumn], dict[int, str]]:
+    """Return the columns with numbers in place of paths, and the paths by number."""
     texts = next((column.cells for column in columns if column.name == PATH), ())
     if not any(ARROW in text for text in texts):
-        return columns, ()
+        return columns, {}
     paths = tuple(dict.fromkeys(text for text in texts if ARROW in text))
-    numbers = {text: str(number) for number, text in enumerate(paths, start=1)}
-    column = _measured(PATH, PATH, [numbers.get(text, text) for text in texts], True)
+    own = {text: place for place, text in enumerate(paths, start=1)}
+    # Those of names with control characters are not known.
+    numbers = {text: known[text] for text in paths} if known.keys() >= own.keys() else own
+    column = _measured(PATH, PATH, [str(numbers.get(text, text)) for text in texts], True)
     others = [other for other in columns if other.name != PATH]
-    return ([column] if len(paths) > 1 else []) + others, paths
+    listed = {number: text for text, number in sorted(numbers.items(), key=lambda item: item[1])}
+    return ([column] if len(paths) > 1 else []) + others, listed
 
 
 def _with_headings(
@@ -302,7 +324,8 @@ def _by_importance(result: QueryResult, columns: list[ShownColumn]) -> list[Show
     brief = () if header is None else header.brief
     others = [name for name in brief if name not in (PATH, RUN)]
     # Rows whose order nothing explains look like a mistake.
-    order = () if header is None or header.slowest is None else (header.slowest,)
+    slowest = () if header is None or header.slowest is None else (header.slowest,)
+    order = (*result.order, *slowest)
     kept = {PATH, RUN, *order, *others[:_WANTED], *(() if header is None else header.answer)}
     places = {name: place for place, name in enumerate(dict.fromkeys((PATH, RUN, *order, *brief)))}
     return sorted(
@@ -400,18 +423,25 @@ def _is_alike(column: ShownColumn) -> bool:
 
 
 def _not_shown(
-    columns: Sequence[ShownColumn], nothing: Sequence[str], width: int, remedy: str
+    columns: Sequence[ShownColumn],
+    nothing: Sequence[str],
+    zero_rows: int,
+    width: int,
+    remedy: str,
 ) -> str | None:
     """Return one line that names columns, with the value of those alike in all rows.
 
     Args:
         columns: that have no room.
         nothing: titles of those that are 0 or empty in all rows.
+        zero_rows: how many rows are left out since they are 0 throughout.
         width: of the line. What it has no room for is counted.
         remedy: how to see them.
     """
     alike = [column for column in columns if _is_alike(column)]
-    words = [column.title for column in columns if column not in alike]
+    rows = "1 row" if zero_rows == 1 else f"{zero_rows} rows"
+    words = [f"{rows} of 0"] if zero_rows else []
+    words += [column.title for column in columns if column not in alike]
     words += [f"{column.title} ({column.cells[0]} in all rows)" for column in alike]
     words += [f"{title} (empty)" for title in nothing]
     if not words:

@@ -10,7 +10,7 @@ from msgflow.cli.show.layout import GAP
 from msgflow.text.wrapping import ARROW, wrap, wrap_path
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from msgflow.cli.show.layout import Layout, ShownColumn
 
@@ -65,19 +65,19 @@ def _records(columns: Sequence[ShownColumn], width: int) -> Iterator[str]:
                 yield " " * (label + GAP) + line
 
 
-def _paths(paths: Sequence[str], width: int) -> Iterator[str]:
-    labels = ["path"] if len(paths) == 1 else [f"path {n + 1}" for n in range(len(paths))]
+def _paths(paths: Mapping[int, str], width: int) -> Iterator[str]:
+    labels = ["path"] if len(paths) == 1 else [f"path {number}" for number in paths]
     indent = max(map(len, labels)) + GAP
-    before: list[list[str]] = []
-    for label, path in zip(labels, paths, strict=True):
+    before: dict[int, list[str]] = {}
+    for label, (number, path) in zip(labels, paths.items(), strict=True):
         steps = path.split(ARROW)
         text = _shortened(steps, before)
         for place, line in enumerate(wrap_path(text, max(20, width - indent))):
             yield f"{'' if place else label:<{indent}}{line}"
-        before.append(steps)
+        before[number] = steps
 
 
-def _shortened(steps: list[str], before: Sequence[list[str]]) -> str:
+def _shortened(steps: list[str], before: Mapping[int, list[str]]) -> str:
     """Return a path without the begin and the end that it shares with earlier paths."""
     head, first = _most_shared(steps, before)
     tail, last = _most_shared(steps[head:], before, is_end=True)
@@ -90,14 +90,14 @@ def _shortened(steps: list[str], before: Sequence[list[str]]) -> str:
 
 
 def _most_shared(
-    steps: list[str], before: Sequence[list[str]], *, is_end: bool = False
+    steps: list[str], before: Mapping[int, list[str]], *, is_end: bool = False
 ) -> tuple[int, int]:
     """Return the most steps that an earlier path has in common at its begin or end, and its number.
 
     The steps are 0 if cutting them saves too little.
     """
     most, of = 0, 0
-    for number, other in enumerate(before, start=1):
+    for number, other in before.items():
         one, two = (steps[::-1], other[::-1]) if is_end else (steps, other)
         count = _shared(one, two)
         # A topic may have the name of its node: the cut is clear only behind both.

@@ -3,6 +3,7 @@
 import { h, clear, color, breakable } from "./dom.js";
 import { current, go, pageAddress } from "./address.js";
 import { duration, momentOf, secondsText } from "./labels.js";
+import { INTERNAL } from "./notice.js";
 
 // A shorter drag on the curve is a click.
 const LEAST_DRAG = 4;
@@ -24,14 +25,14 @@ export class Bar {
     this.search = h("input", { type: "search", placeholder: "find a node, topic, 3.25 s …", "aria-label": "find a node, topic, namespace, service or moment", autocomplete: "off",
       on: { input: () => { this.finding = this.find(); }, focus: () => { this.finding = this.find(); }, keydown: (event) => this.keyDown(event) } });
     this.found = h("div", { className: "found", hidden: true });
-    this.internal = h("input", { type: "checkbox", on: { change: () => go({ internal: this.internal.checked ? "1" : null }) } });
+    this.internal = h("input", { type: "checkbox", className: "internal", on: { change: () => go({ internal: this.internal.checked ? "1" : null }) } });
     this.copy = h("button", { type: "button", title: "copy a link to what is shown", on: { click: () => this.copyLink() } }, "copy link");
     this.time = h("div", { className: "bar-time" }, this.canvas,
       h("div", { className: "group" }, this.from, "–", this.to, this.wholeRun, this.warmUp), this.said);
     const search = h("div", { className: "bar-search" }, this.search, this.found);
     search.addEventListener("focusout", (event) => { if (!search.contains(event.relatedTarget)) this.found.hidden = true; });
     clear(root, app.source.isServed && this.time, search,
-      app.source.isServed && h("label", {}, this.internal, "what ROS does for itself"), this.copy);
+      app.source.isServed && h("label", {}, this.internal, INTERNAL), this.copy);
     if (app.source.isServed) this.listen();
   }
 

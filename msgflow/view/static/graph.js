@@ -6,6 +6,7 @@ import { count, duration, percent } from "./labels.js";
 import { dataTable, besides } from "./table.js";
 import { command, failed, notes, waiting } from "./notice.js";
 import { markSlowest, model } from "./graph_model.js";
+import { csvText, saveFile } from "./download.js";
 import { savePng, saveSvg } from "./picture_file.js";
 import { Zoom } from "./zoom.js";
 
@@ -50,7 +51,7 @@ export class GraphPage {
     clear(this.root,
       h("div", { className: "tools" }, this.search, h("button", { type: "button", on: { click: () => this.filter("") } }, "all"), h("label", {}, group, "group by executor"),
         h("span", { className: "group" }, act("Zoom in", "+", () => this.zoom.in()), act("Zoom out", "−", () => this.zoom.out()), act("Show all of it", "fit", () => this.zoom.all())),
-        h("span", { className: "group" }, act("Save as SVG", "SVG", () => saveSvg(this.drawing, "graph")), act("Save as PNG", "PNG", () => this.save()))),
+        h("span", { className: "group" }, act("Save as SVG", "SVG", () => saveSvg(this.drawing, "graph")), act("Save as PNG", "PNG", () => this.save()), act("Save as CSV", "CSV", () => this.saveNumbers()))),
       this.said, h("div", { className: "stage" }, this.picture, this.side),
       h("div", { className: "legend" },
         item("box", "node"), item("pill", "topic, with its rate"), item("diamond", "service, with its round trip"), actions.rows > 0 && item("action", "action, with the time from a goal to its result"),
@@ -85,6 +86,13 @@ export class GraphPage {
     } catch (error) {
       clear(this.said, failed(error));
     }
+  }
+
+  saveNumbers() {
+    const { edges, vertices } = this.model;
+    const columns = { from: (edge) => vertices.get(edge.from).label, to: (edge) => vertices.get(edge.to).label, kind: (edge) => edge.kind,
+      indirect: (edge) => edge.indirect, count: (edge) => edge.count, median_ns: (edge) => edge.median };
+    saveFile(new Blob([csvText(Object.entries(columns).map(([title, value]) => [title, edges.map(value)]))], { type: "text/csv" }), "graph.csv");
   }
 
   // What goes in and out of a vertex; the graph stays as it is.

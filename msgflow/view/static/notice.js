@@ -14,9 +14,13 @@ export function failed(error) {
     reload && h("button", { type: "button", on: { click: () => location.reload() } }, "reload the page"));
 }
 
+// What a page calls the option of commands that shows ROS's own rows.
+export const INTERNAL = "what ROS does for itself";
+
 export function notes(list) {
   if (!list?.length) return null;
-  return h("ul", { className: "notes" }, list.map((text) => h("li", {}, text)));
+  const named = document.querySelector("input.internal") ? (text) => text.replace("--internal", `“${INTERNAL}”`) : (text) => text;
+  return h("ul", { className: "notes" }, list.map((text) => h("li", {}, named(text))));
 }
 
 export function command(text) {

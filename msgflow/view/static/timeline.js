@@ -12,7 +12,8 @@ import { Renderer, AXIS } from "./renderer.js";
 import { KERNEL_KINDS, ROW_KINDS, indexBars, layout } from "./timeline_rows.js";
 import { buildFlow, extent, markCritical } from "./flow.js";
 import { besides, scrolls } from "./table.js";
-import { command, failed, notes, waiting } from "./notice.js";
+import { downloads } from "./download.js";
+import { command, failed, INTERNAL, notes, waiting } from "./notice.js";
 
 const LEAST_SPAN = 20;
 const MARGIN = 0.5;
@@ -20,6 +21,7 @@ const MARGIN = 0.5;
 const READABLE = 400;
 // Events of one callback instance that the list of a flow names.
 const MOST_EVENTS = 5;
+const MOST_LISTED = 300;
 
 export class TimelinePage {
   constructor(app, root) {
@@ -109,6 +111,10 @@ export class TimelinePage {
     this.worst = h("select", { "aria-label": "go to the slowest flow of a path", on: { change: () => this.goWorst() } },
       h("option", { value: "" }, "slowest flow of …"));
     this.unhide = h("button", { type: "button", hidden: true, on: { click: () => { this.state.hidden.clear(); this.remember(); this.relayout(); this.redraw(); } } });
+    this.files = downloads({ name: "timeline", canvases: () => [this.canvas], columns: () => {
+      const bars = this.shown();
+      return ["begin_ns", "what", "row", "node", "duration_ns", "identity"].map((title, place) => [title, bars.map((bar) => bar[place])]);
+    } });
     this.bar = h("div", { className: "tools" },
       this.search,
       h("span", { className: "group" },
@@ -118,10 +124,10 @@ export class TimelinePage {
       h("span", { className: "group" },
         button("Previous bar of this row (P)", "‹ previous", () => this.step(-1)),
         button("Next bar of this row (N)", "next ›", () => this.step(1))),
-      this.measuring, this.worst, button("Help (?)", "?", () => this.help.showModal()),
+      this.files, this.measuring, this.worst, button("Help (?)", "?", () => this.help.showModal()),
       h("details", { className: "menu" }, h("summary", {}, "rows"),
         h("div", { className: "menu-body" }, this.kindBoxes.map(({ label }) => label),
-          h("label", {}, this.internal, "what ROS does for itself"), this.unhide)));
+          h("label", {}, this.internal, INTERNAL), this.unhide)));
   }
 
   legend() {
@@ -771,27 +777,33 @@ export class TimelinePage {
     this.worst.selectedIndex = 0;
   }
 
-  tables() {
-    const { table } = this.renderer.bars;
+  // The bars in the window: each a row of values.
+  shown() {
+    const { table, ranges } = this.renderer.bars;
     const { from, to } = this.renderer.view;
+    const found = [];
+    for (const lane of this.renderer.lanes) {
+      const [first, last] = ranges.get(lane.key) ?? [0, 0];
+      for (let at = first; at < last; at++) {
+        if (table.start_at[at] > to || table.start_at[at] + table.length[at] < from) continue;
+        found.push([table.start_at[at], KINDS[table.kind[at]], lane.label, this.rows.node[lane.row] ?? this.rows.process[lane.row],
+          table.length[at], table.count?.[at] > 1 ? `${table.count[at]} together` : table.id[at] >= 0 ? table.id[at] : ""]);
+      }
+    }
+    return found;
+  }
+
+  tables() {
     const list = h("div");
     const fill = () => {
-      const rows = [];
-      let more = 0;
-      for (const lane of this.renderer.lanes) {
-        const range = this.renderer.bars.ranges.get(lane.key);
-        if (!range) continue;
-        for (let at = range[0]; at < range[1]; at++) {
-          if (table.start_at[at] > to || table.start_at[at] + table.length[at] < from) continue;
-          if (rows.length >= 300) { more++; continue; }
-          rows.push(h("tr", {}, h("td", { className: "number" }, moment(table.start_at[at])), h("td", {}, KINDS[table.kind[at]]),
-            h("td", {}, lane.label), h("td", {}, this.rows.node[lane.row] ?? this.rows.process[lane.row]),
-            h("td", { className: "number" }, duration(table.length[at])), h("td", { className: "number" }, table.count?.[at] > 1 ? `${table.count[at]} together` : table.id[at] >= 0 ? table.id[at] : "")));
-        }
-      }
+      const bars = this.shown();
+      const more = bars.length - MOST_LISTED;
+      const rows = bars.slice(0, MOST_LISTED).map(([begin, kind, label, node, length, identity]) => h("tr", {},
+        h("td", { className: "number" }, moment(begin)), h("td", {}, kind), h("td", {}, label), h("td", {}, node),
+        h("td", { className: "number" }, duration(length)), h("td", { className: "number" }, identity)));
       clear(list, scrolls("bars in the window", h("table", {},
         h("thead", {}, h("tr", {}, ["begin", "what", "row", "node", "duration", "identity"].map((text) => h("th", { scope: "col" }, text)))), h("tbody", {}, rows))),
-      more ? h("p", { className: "soft" }, `${count(more, "further bar")} in the window: zoom in.`) : null);
+      more > 0 ? h("p", { className: "soft" }, `${count(more, "further bar")} in the window: zoom in.`) : null);
     };
     const details = besides("the window as a table", list);
     details.addEventListener("toggle", () => { if (details.open) fill(); });
