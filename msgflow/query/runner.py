@@ -115,7 +115,7 @@ def run_query(
     table, missing, has_rows = shown_rows(table, internal=internal, on_hidden=_on_hidden)
     notes = [] if runs else ["the database holds no run yet"]
     if part.has_window:
-        notes += _beside(connection, runs, window)
+        notes += _beside(runs, window)
     notes += missing
     narrowing = _narrowing(own, selection)
     if (
@@ -248,15 +248,13 @@ def _fit(command: str, param: Param, value: Value) -> Value:
     return value
 
 
-def _beside(
-    connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], window: Window
-) -> list[str]:
+def _beside(runs: Sequence[Run], window: Window) -> list[str]:
     """Return a note if the runs have nothing in the time window."""
-    rows = connection.execute(
-        "SELECT start_ns, end_ns FROM main.run WHERE list_contains($runs, run_id)",
-        {"runs": [run.run_id for run in runs]},
-    ).fetchall()
-    seen = [(first, last) for first, last in rows if first is not None and last is not None]
+    seen = [
+        (run.start_ns, run.end_ns)
+        for run in runs
+        if run.start_ns is not None and run.end_ns is not None
+    ]
     if any(first < window.end_ns and last >= window.start_ns for first, last in seen):
         return []
     if len(runs) > 1:

@@ -27,12 +27,14 @@ class Run:
         name: its name.
         start_ns: time of its first event, epoch ns; None for a run without events.
         labels: KEY=VALUE each.
+        end_ns: time of its last event, epoch ns; None for a run without events.
     """
 
     run_id: int
     name: str
     start_ns: int | None
     labels: tuple[str, ...] = ()
+    end_ns: int | None = None
 
     @property
     def title(self) -> str:
@@ -43,10 +45,11 @@ class Run:
 def read_runs(connection: duckdb.DuckDBPyConnection) -> tuple[Run, ...]:
     """Return all runs of the database, oldest first."""
     rows = connection.execute(
-        "SELECT run_id, name, start_ns, coalesce(labels, []) FROM main.run ORDER BY run_id"
+        "SELECT run_id, name, start_ns, coalesce(labels, []), end_ns FROM main.run ORDER BY run_id"
     ).fetchall()
     return tuple(
-        Run(run_id, name, start_ns, tuple(labels)) for run_id, name, start_ns, labels in rows
+        Run(run_id, name, start_ns, tuple(labels), end_ns)
+        for run_id, name, start_ns, labels, end_ns in rows
     )
 
 

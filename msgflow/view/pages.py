@@ -140,12 +140,9 @@ class Pages:
     def extent(self, connection: duckdb.DuckDBPyConnection, params: Params) -> Extent:
         """Return the run that the page is about."""
         run = Slice(params.get("run")).one_run(connection, "a page")
-        ((start_ns, end_ns),) = connection.execute(
-            "SELECT start_ns, end_ns FROM main.run WHERE run_id = ?", [run.run_id]
-        ).fetchall()
-        if start_ns is None:
+        if run.start_ns is None or run.end_ns is None:
             return Extent(run, 0, 0)
-        return Extent(run, start_ns, max(end_ns - start_ns, 0))
+        return Extent(run, run.start_ns, max(run.end_ns - run.start_ns, 0))
 
     def window(self, extent: Extent, params: Params) -> Window:
         """Return the window that the page asks for, within the times that pages show."""

@@ -7,6 +7,9 @@ from typing import Any
 
 import duckdb
 import pytest
+from network import Network, traffic
+from ros_system import RosSystem
+from staged_events import StagedEvents, Thread
 
 from msgflow import trace
 from msgflow.db import objects
@@ -18,6 +21,7 @@ from msgflow.sql.interrupt import Interrupts
 
 SOMETIMES_EMPTY = [header for header in objects.load("model") if header.when]
 S = 1_000_000_000
+ADDRESSES = {"alpha": "10.0.0.1", "beta": "10.0.0.2", "gamma": "10.0.0.3"}
 
 
 @pytest.fixture(scope="module")
@@ -29,23 +33,26 @@ def lossy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     ).directory
 
 
-def read(con: duckdb.DuckDBPyConnection, path: Path) -> None:
-    """Read a trace into `raw` and `staging`."""
+def read(con: duckdb.DuckDBPyConnection, source: Path | StagedEvents) -> None:
+    """Read a trace into `raw` and `staging`, or write events by hand there."""
     staging.attach(con, None)
-    with trace.open([path]) as traces:
+    if isinstance(source, StagedEvents):
+        source.write(con)
+        return
+    with trace.open([source]) as traces:
         load_traces(
             con, traces, hostnames={}, ignore=(), events=["my_pkg:*"], may_hold=False,
             replace=False, interrupts=Interrupts(), progress=None,
         )  # fmt: skip
 
 
-def built(path: Path, emptied: tuple[str, ...] = ()) -> dict[str, Any]:
+def built(source: Path | StagedEvents, emptied: tuple[str, ...] = ()) -> dict[str, Any]:
     """Build the whole model, nothing skipped, and return (columns, count) of each `when` object.
 
     Tables of `emptied` lose their rows before anything reads them.
     """
     with duckdb.connect() as con:
-        read(con, path)
+        read(con, source)
         staging.narrow(con, staging.empty_tables(con))
         for name in emptied:
             if name.startswith("raw."):
@@ -84,10 +91,45 @@ SYSTEMS = (
 )
 
 
+def network(directory: Path) -> Path:
+    """Write traces of two hosts that exchange packets."""
+    simulated = simulate("two_hosts", directory / "traces", factor=0.03)
+    carried = Network(simulated.directory, ADDRESSES)
+    traffic(carried, 1.0)
+    carried.write()
+    return simulated.directory
+
+
+def managed_node_in_a_callback_group() -> StagedEvents:
+    """What the simulator does not write: a node that changes its state, and what CARET records."""
+    system = RosSystem()
+    main, worker = Thread(100), Thread(100, 101)
+    system.node(main, 0x1, "node")
+    system.add("ros2:rcl_lifecycle_state_machine_init", main, node_handle=0x1, state_machine=0x5)
+    system.add(
+        "ros2:rcl_lifecycle_transition", main, state_machine=0x5, start_label="unconfigured",
+        goal_label="configuring",
+    )  # fmt: skip
+    system.timer(main, 0x2, 0xC2)
+    system.add(
+        "ros2_caret:callback_group_add_timer", main, callback_group_addr=0xA1, timer_handle=0x2
+    )
+    system.add(
+        "ros2_caret:construct_executor", main, executor_addr=0xE1, executor_type_name="single"
+    )
+    system.add(
+        "ros2_caret:add_callback_group", main, executor_addr=0xE1, callback_group_addr=0xA1,
+        group_type_name="reentrant",
+    )  # fmt: skip
+    system.start(worker, 0xC2)
+    system.end(worker, 0xC2)
+    return system
+
+
 @pytest.fixture(scope="module")
-def systems(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, ...]:
-    """Traces of all of `SYSTEMS`."""
-    return tuple(
+def systems(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path | StagedEvents, ...]:
+    """Traces of all of `SYSTEMS`, and two that the simulator does not write by itself."""
+    simulated = [
         simulate(
             system,
             tmp_path_factory.mktemp(system) / "trace",
@@ -96,12 +138,14 @@ def systems(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, ...]:
             recording=recording,
         ).directory
         for system, layout, recording in SYSTEMS
-    )
+    ]
+    of_packets = network(tmp_path_factory.mktemp("network"))
+    return (*simulated, of_packets, managed_node_in_a_callback_group())
 
 
 @pytest.mark.thorough
 def test_objects_have_no_row_without_the_tables_of_their_when(
-    lossy: Path, systems: tuple[Path, ...]
+    lossy: Path, systems: tuple[Path | StagedEvents, ...]
 ) -> None:
     headers = [header for header in SOMETIMES_EMPTY if header.columns and not of_schedules(header)]
     assert len(headers) >= 3
@@ -110,7 +154,7 @@ def test_objects_have_no_row_without_the_tables_of_their_when(
 
 @pytest.mark.thorough
 def test_objects_that_stay_empty_have_no_row_without_the_tables_of_their_when(
-    systems: tuple[Path, ...],
+    systems: tuple[Path | StagedEvents, ...],
 ) -> None:
     headers = [header for header in SOMETIMES_EMPTY if not header.columns]
     assert len(headers) >= 30
@@ -131,10 +175,12 @@ def test_schedules_have_no_row_without_the_tables_of_their_when(shared_kernel: P
     have_no_row_without_their_when(shown, (path,))
 
 
-def have_no_row_without_their_when(headers: list[Any], paths: tuple[Path, ...]) -> None:
-    found = {path: built(path) for path in paths}
+def have_no_row_without_their_when(
+    headers: list[Any], sources: tuple[Path | StagedEvents, ...]
+) -> None:
+    found = {source: built(source) for source in sources}
     for header in headers:
-        shown = [path for path, rows in found.items() if rows[header.name][1]]
+        shown = [source for source, rows in found.items() if rows[header.name][1]]
         assert shown, header.name
         columns, _ = found[shown[0]][header.name]
         assert built(shown[0], header.when)[header.name] == (columns, 0)

@@ -9,14 +9,15 @@
 --     publication, or its callback, or its thread outside of callbacks, took messages itself.
 -- grain: one row per annotation and callback instance of one of its inputs
 -- param: only_run BIGINT  Run to look at
-CREATE OR REPLACE MACRO derive.approximate_message(only_run) AS TABLE
+-- param: runs VARCHAR  Name of the rows of derive.annotated_run
+CREATE OR REPLACE MACRO derive.approximate_message(only_run, runs) AS TABLE
 WITH RECURSIVE input AS MATERIALIZED (
     SELECT
         a.run_id, a.annotation_id, r.subscription_id, r.callback_instance_id, r.start_ns,
         r.start_event_id, c.take_id
     FROM store.annotation AS a
     JOIN store.annotation_input AS i ON a.annotation_id = i.annotation_id
-    JOIN derive.annotated_run(only_run) AS r ON i.subscription_id = r.subscription_id
+    JOIN query_table(runs) AS r ON i.subscription_id = r.subscription_id
     JOIN store.callback_instance AS c ON r.callback_instance_id = c.callback_instance_id
     WHERE a.run_id = only_run AND a.kind = 'approximate_sync' AND c.run_id = only_run
 ),

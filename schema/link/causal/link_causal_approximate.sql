@@ -11,9 +11,11 @@
 --     `since_ns`: from when on a message that is missing might have changed the choice.
 -- grain: one row per annotation, publication of a firing, and input
 -- param: only_run BIGINT  Run to look at
-CREATE OR REPLACE MACRO derive.link_causal_approximate(only_run) AS TABLE
+-- param: publications VARCHAR  Name of the rows of derive.annotated_publication
+-- param: runs VARCHAR  Name of the rows of derive.annotated_run
+CREATE OR REPLACE MACRO derive.link_causal_approximate(only_run, publications, runs) AS TABLE
 WITH filtered AS MATERIALIZED (
-    FROM derive.approximate_message(only_run)
+    FROM derive.approximate_message(only_run, runs)
 ),
 published AS MATERIALIZED (
     SELECT
@@ -22,7 +24,7 @@ published AS MATERIALIZED (
         count(*) OVER (
             PARTITION BY b.annotation_id, b.cut_event_id, p.publisher_id
         ) AS publication_count
-    FROM derive.annotated_publication(only_run) AS b
+    FROM query_table(publications) AS b
     JOIN store.annotation_input AS i
         ON b.annotation_id = i.annotation_id AND b.subscription_id = i.subscription_id
     JOIN store.publication AS p ON b.publication_id = p.publication_id

@@ -18,7 +18,13 @@
 -- grain: one row per annotation, publication by one of its outputs, and other input with a message
 -- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.link_causal_indirect(only_run) AS TABLE
-WITH RECURSIVE nesting AS (
+WITH RECURSIVE annotated AS MATERIALIZED (
+    FROM derive.annotated_publication(only_run)
+),
+input_run AS MATERIALIZED (
+    FROM derive.annotated_run(only_run)
+),
+nesting AS (
     SELECT DISTINCT parent_id
     FROM store.callback_instance
     WHERE run_id = only_run AND parent_id IS NOT NULL
@@ -28,7 +34,7 @@ firing AS MATERIALIZED (
     SELECT
         annotation_id, callback_instance_id, first_event_id, last_event_id, emptied_event_id,
         kept_event_id
-    FROM derive.partial_sync_firing(only_run)
+    FROM derive.partial_sync_firing('annotated')
 ),
 -- All publications of a firing use the same messages, except for those that come meanwhile, in
 -- callback instances nested in the firing.
@@ -44,7 +50,7 @@ demand AS MATERIALIZED (
         END AS read_event_id,
         coalesce(f.emptied_event_id, 0) AS emptied_event_id,
         coalesce(f.kept_event_id, 0) AS kept_event_id
-    FROM derive.annotated_publication(only_run) AS b
+    FROM annotated AS b
     JOIN store.annotation_input AS i ON b.annotation_id = i.annotation_id
     LEFT JOIN firing AS f
         ON b.annotation_id = f.annotation_id AND b.callback_instance_id = f.callback_instance_id
@@ -59,7 +65,7 @@ run AS MATERIALIZED (
         r.effective_end_event_id
     FROM store.annotation AS a
     JOIN store.annotation_input AS i ON a.annotation_id = i.annotation_id
-    JOIN derive.annotated_run(only_run) AS r ON i.subscription_id = r.subscription_id
+    JOIN input_run AS r ON i.subscription_id = r.subscription_id
     ANTI JOIN firing AS f
         ON a.annotation_id = f.annotation_id AND r.callback_instance_id = f.callback_instance_id
     WHERE a.run_id = only_run
@@ -70,9 +76,7 @@ around (callback_instance_id, outer_id) AS (
     FROM store.callback_instance
     WHERE run_id = only_run
         AND parent_id IS NOT NULL
-        AND callback_instance_id IN (
-            SELECT callback_instance_id FROM derive.annotated_run(only_run)
-        )
+        AND callback_instance_id IN (SELECT callback_instance_id FROM input_run)
     UNION ALL
     SELECT a.callback_instance_id, i.parent_id
     FROM around AS a
@@ -280,7 +284,7 @@ linked AS (
     SELECT
         run_id, annotation_id, kind, publication_id, callback_instance_id, candidate_count,
         trace_id, thread_id, start_ns, start_event_id, since_ns
-    FROM derive.link_causal_approximate(only_run)
+    FROM derive.link_causal_approximate(only_run, 'annotated', 'input_run')
 ),
 -- A message that is missing may have been the right one, since the first that was looked at.
 found AS MATERIALIZED (

@@ -8,15 +8,15 @@
 --     published when this one began; what came after it may have been kept. `last_event_id`: its
 --     own last publication.
 -- grain: one row per annotation and callback instance of one of its inputs that fires it
--- param: only_run BIGINT  Run to look at
-CREATE OR REPLACE MACRO derive.partial_sync_firing(only_run) AS TABLE
+-- param: publications VARCHAR  Name of the rows of derive.annotated_publication
+CREATE OR REPLACE MACRO derive.partial_sync_firing(publications) AS TABLE
 WITH published AS (
     SELECT
         b.annotation_id, b.callback_instance_id, b.cut_event_id, b.start_event_id,
         lag(b.start_event_id) OVER (
             PARTITION BY b.annotation_id ORDER BY b.start_event_id
         ) AS previous_event_id
-    FROM derive.annotated_publication(only_run) AS b
+    FROM query_table(publications) AS b
     JOIN store.annotation_input AS i
         ON b.annotation_id = i.annotation_id AND b.subscription_id = i.subscription_id
     WHERE b.kind = 'partial_sync'

@@ -4,6 +4,7 @@
 --     until the first event of their thread that cannot be inside: the next begin or end of a
 --     callback, executor event, or event behind a gap of any CPU.
 -- grain: one row per such callback instance
+-- when: staging.callback_event
 WITH closed_by AS (
     SELECT o.start_event_id, min(e.event_id) AS event_id
     FROM staging.callback_open AS o

@@ -1,6 +1,7 @@
 -- name: staging.callback_parent
 -- description: Callback instances that are nested in another one.
 -- grain: one row per such callback instance
+-- when: staging.callback_depth
 WITH outer_run AS (
     SELECT n.callback_instance_id, r.start_event_id, r.thread_id, r.depth
     FROM staging.callback_run AS r

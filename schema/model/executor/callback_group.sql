@@ -1,6 +1,7 @@
 -- name: staging.callback_group
 -- description: Callback groups (CARET), with the executors that they were added to.
 -- grain: one row per callback group and executor
+-- when: staging.callback_group_owner
 SELECT
     row_number() OVER (ORDER BY g.event_id) AS callback_group_id,
     g.process_id,

@@ -2,6 +2,7 @@
 -- description: Callbacks in callback groups (CARET). A group usually is filled before it is added
 --     to an executor; else it was added to it last.
 -- grain: one row per callback in a callback group
+-- when: staging.callback_group_owner
 WITH entry AS (
     SELECT event_id, process_id, callback_group_addr, 'timer' AS kind, timer_handle AS handle
     FROM staging.located('ros2_caret_callback_group_add_timer')

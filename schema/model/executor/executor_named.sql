@@ -2,6 +2,8 @@
 -- description: Executors that name themselves (CARET). Of some, only the address is known, since
 --     their construction was not traced.
 -- grain: one row per executor
+-- when: raw.ros2_caret_construct_executor, raw.ros2_caret_construct_static_executor,
+--     raw.ros2_caret_add_callback_group, raw.ros2_caret_executor_entity_collector_to_executor
 WITH constructed AS (
     SELECT event_id, process_id, executor_addr, executor_type_name AS kind
     FROM staging.located('ros2_caret_construct_executor')

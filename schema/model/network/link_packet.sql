@@ -4,6 +4,7 @@
 --     rarest keys, unless another difference does nearly as well; two ends of a key belong together
 --     where they are within one second of that.
 -- grain: one row per packet and clock that received it
+-- when: staging.single_packet
 WITH counted AS (
     SELECT clock_id, is_sent, key, count(*) AS number
     FROM staging.single_packet

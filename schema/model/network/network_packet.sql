@@ -8,6 +8,7 @@
 --     not received before all were sent. NULL: a later fragment, or nothing tells the packet from
 --     others; what stays on its host (127.0.0.0/8, ::1) does not tell of others.
 -- grain: one row per packet sent or received on a host
+-- when: raw.net_dev_queue, raw.net_if_receive_skb
 WITH recorded AS (
     SELECT *, true AS is_sent
     FROM raw.net_dev_queue

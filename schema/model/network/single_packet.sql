@@ -3,6 +3,7 @@
 --     within two seconds before and after: a retransmission, or a number that came round again,
 --     cannot be taken for them. What hosts of two clocks sent under one key counts for neither.
 -- grain: one row per such packet
+-- when: staging.network_packet
 WITH spaced AS (
     SELECT
         event_id, trace_id, clock_id, ts_ns, is_sent, key,

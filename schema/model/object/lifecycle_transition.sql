@@ -1,6 +1,7 @@
 -- name: staging.lifecycle_transition
 -- description: State changes of managed nodes, by the state machine that the node created last.
 -- grain: one row per rcl_lifecycle_transition
+-- when: raw.ros2_rcl_lifecycle_transition
 WITH machine AS (
     SELECT m.event_id, m.process_id, m.state_machine, n.node_id
     FROM staging.located('ros2_rcl_lifecycle_state_machine_init') AS m

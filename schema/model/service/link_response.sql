@@ -3,6 +3,7 @@
 --     called with the request, and, where the response was sent later in another instance, that
 --     one too.
 -- grain: one row per response and callback instance that it came from
+-- when: staging.response_origin
 SELECT r.response_id, i.callback_instance_id
 FROM staging.response_origin AS r
 JOIN staging.callback_number AS i ON r.callback_start_event_id = i.start_event_id
