@@ -132,6 +132,9 @@ static void run(int path, int64_t period, int64_t first, int64_t end, int64_t sl
         ros_trace_callback_end(&heard.callback);
         take(&shown, stamp);
         ros_trace_callback_end(&shown.callback);
+        /* As a timer of ROS does: what it missed meanwhile is left out. */
+        int64_t late = now(CLOCK_MONOTONIC) - due;
+        if (late > period) due += (late / period - 1) * period;
     }
 }
 
