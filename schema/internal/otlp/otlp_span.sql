@@ -21,8 +21,8 @@
 -- column: name VARCHAR  What OpenTelemetry calls it: operation and topic
 -- column: span_kind INTEGER  1 internal, 2 server, 3 client, 4 producer, 5 consumer
 -- column: from_ns BIGINT [epoch ns]  Begin; of a take the end of the publication
--- column: to_ns BIGINT [epoch ns]  End, at least 1 ns after the begin: Jaeger calls a span without a
---     duration a damaged one
+-- column: to_ns BIGINT [epoch ns]  End, at least 1 ns after the begin: Jaeger calls a span without
+--     a duration a damaged one
 -- column: latency_ns BIGINT [ns]  Of a take: from the publication; negative where clocks are apart
 -- column: node VARCHAR [node]  Its node
 -- column: host VARCHAR [host]  Host of its process
