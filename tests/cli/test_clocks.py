@@ -181,7 +181,8 @@ def test_containers_share_a_clock_and_have_equal_pids(msgflow: Msgflow, tmp_path
     assert (clock["hosts"], clock["method"]) == ("box-1, box-2", "none")
     shown = msgflow("clocks", "show", "--db", database).stderr
     assert "one clock (box-1, box-2): all times can be compared\n" in shown
-    assert "clock" not in msgflow("check", "--db", database).stderr
+    said = msgflow("check", "--db", database).stderr
+    assert "clock" not in said.replace(str(database), "")
     with open_db(database) as opened:
         processes = opened.sql(
             "SELECT count(*), count(DISTINCT pid), count(DISTINCT (host_id, pid)) FROM process"

@@ -56,7 +56,10 @@ def test_the_numbers_are_those_of_the_queries(demo: Path) -> None:
         assert (row["node"], row["callback"]) in nodes
 
 
-def test_it_names_what_took_the_cpu(demo: Path, tmp_path: Path, msgflow: Msgflow) -> None:
+def test_it_names_what_took_the_cpu(
+    demo: Path, tmp_path: Path, msgflow: Msgflow, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "120")
     path = tmp_path / "traced.duckdb"
     shutil.copyfile(demo, path)
     with Database(demo) as database:
