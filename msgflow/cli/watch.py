@@ -338,15 +338,19 @@ def _session_is_over(name: str | None) -> Callable[[], bool]:
     from msgflow.live import sessions
 
     last = time.monotonic()
+    absences = 0
 
     def is_over() -> bool:
-        nonlocal last
+        nonlocal last, absences
         if name is None or time.monotonic() - last < _BETWEEN_LOOKS:
             return False
         last = time.monotonic()
         try:
-            return all(each.name != name for each in sessions())
+            is_there = any(each.name == name for each in sessions())
         except RecordingError:
-            return True
+            is_there = False
+        absences = 0 if is_there else absences + 1
+        # The last chunk may come half a second after its session has gone.
+        return absences > 1
 
     return is_over

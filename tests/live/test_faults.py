@@ -146,7 +146,7 @@ def test_a_hundred_restarts_of_a_node(daemon: None, load: list[str], tmp_path: P
     with Database(tmp_path / "whole.duckdb") as whole:
         whole.ingest([directory])
         paths = whole.query("e2e-latency").to_arrow()
-    assert arrived == pytest.approx(sum(paths["reached"].to_pylist()), rel=0.01)
+    assert arrived == sum(paths["reached"].to_pylist())
     assert sum(count > 0 for count in paths["reached"].to_pylist()) == 100
     # On a busy machine the view may lag.
     assert all("the view lags" in line for line in watched.said.splitlines()), watched.said
