@@ -156,6 +156,19 @@ def shared_traces() -> Path:
 
 
 @pytest.fixture(scope="session")
+def real(shared_traces: Path, tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """Ingests a recording, once for all tests."""
+
+    def database(name: str) -> Path:
+        def make(path: Path) -> None:
+            ingest([shared_traces / name], path)
+
+        return made_once(tmp_path_factory, name, make)
+
+    return database
+
+
+@pytest.fixture(scope="session")
 def shared_kernel() -> Path:
     """Recordings with kernel traces, which lie beside the checkout where they are at hand."""
     path = ROOT.parent / "shared" / "kernel"

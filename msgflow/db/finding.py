@@ -192,7 +192,7 @@ def next_command(findings: Sequence[Finding]) -> str:
 
 
 def commands_after(findings: Sequence[Finding]) -> list[str]:
-    """Return the commands that come next for whoever has read the findings, the last is `why`."""
+    """Return the commands that a reader of the findings runs next; the last one is `why`."""
     names = {finding.name for finding in findings}
     after = dict.fromkeys(command for name, command in _AFTER.items() if name in names)
     return [*after, "msgflow why"]

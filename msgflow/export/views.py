@@ -34,7 +34,7 @@ ORDER BY views.view_name
 """
 # The time of a row is the first of these columns that the view has …
 _TIMES = ("start_ns", "sent_ns", "published_ns", "taken_ns", "at_ns", "from_ns")
-# (for what was taken and not seen to be sent: when it was taken)
+# (or the take, where the sending is not in the trace)
 _SENT = "coalesce(sent_ns, taken_ns)"
 # … else the time of the first of these things: for a link, of its cause.
 _THINGS = (

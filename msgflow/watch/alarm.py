@@ -78,7 +78,7 @@ class Alarm:
 
     @property
     def is_measured(self) -> bool:
-        """Whether a window had a value for each requirement; without a window there is none."""
+        """Each requirement had a value in some window. False before the first window."""
         found = set(self._verdicts.values())
         return bool(found) and found <= {Verdict.FAILED, Verdict.PASSED}
 

@@ -143,7 +143,7 @@ class Watcher:
 
     def close(self) -> None:
         """Free the memory of the database."""
-        # Before the first window there is none.
+        # The first window makes the database.
         if "_con" in self.__dict__:
             self._con.close()
 
@@ -218,5 +218,5 @@ class Watcher:
 
 
 def _clock_offset_ns() -> int:
-    """Return how far the clock is ahead of the one that nobody sets."""
+    """Return the time of the system clock less that of the monotonic clock."""
     return time.time_ns() - time.monotonic_ns()

@@ -11,28 +11,13 @@ from typing import Any
 
 import duckdb
 import pytest
-from ingested import made_once
 from typer.testing import Result
 
-from msgflow.ingest import ingest
 from msgflow.query.catalogue import load_queries
 from msgflow.sql.header import Header
 
 Msgflow = Callable[..., Result]
 Rows = list[dict[str, Any]]
-
-
-@pytest.fixture(scope="session")
-def real(shared_traces: Path, tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    """Ingests a recording, once for all tests."""
-
-    def database(name: str) -> Path:
-        def make(path: Path) -> None:
-            ingest([shared_traces / name], path)
-
-        return made_once(tmp_path_factory, name, make)
-
-    return database
 
 
 @pytest.fixture

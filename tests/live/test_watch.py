@@ -119,6 +119,6 @@ def test_ctrl_c_ends_the_view_and_not_the_session(watch: Watch, session: Path) -
     _, err = windows(process)
     assert "error" not in err
     assert "drive" in lttng("list").stdout
-    # It does not rotate any more: nobody reads its chunks.
+    # The watcher has switched off the rotation, as nobody reads the chunks now.
     assert "rotat" not in lttng("list", "drive").stdout
     assert os.path.isdir(session)

@@ -156,7 +156,7 @@ def test_end_to_end_follows_from_the_links(recording):
             SELECT l.callback_instance_id, l.take_id, l.topic_name, t.take_id AS next_take_id,
                 l.publication_id
             FROM causal l JOIN transport t USING (publication_id)
-            -- Of a filter, the sets lead on, whoever triggered it.
+            -- A filter passes on its sets. Which message triggered it does not matter.
             WHERE NOT l.is_internal AND NOT t.is_self_loop AND l.kind <> 'triggered'
         ),
         walk AS (

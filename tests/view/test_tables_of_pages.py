@@ -13,7 +13,6 @@ from typing import Any
 
 import duckdb
 import pytest
-from ingested import made_once
 from served import Page, Served, shown
 from tables import decoded
 from thorough import few
@@ -21,7 +20,6 @@ from typer.testing import CliRunner
 
 from msgflow.cli.app import app
 from msgflow.database import open_db
-from msgflow.ingest import ingest
 from msgflow.view.pages import Pages
 
 Read = Callable[[Path], duckdb.DuckDBPyConnection]
@@ -38,19 +36,6 @@ WINDOWS: tuple[dict[str, str], ...] = (
     {"start": "500000000"},
     {"start": "400000001", "end": "2100000000"},
 )
-
-
-@pytest.fixture(scope="session")
-def real(shared_traces: Path, tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    """Ingests a recording, once for all tests."""
-
-    def database(name: str) -> Path:
-        def make(path: Path) -> None:
-            ingest([shared_traces / name], path)
-
-        return made_once(tmp_path_factory, name, make)
-
-    return database
 
 
 def printed(database: Path, command: str) -> list[dict[str, Any]]:
