@@ -17,7 +17,7 @@ from msgflow.default_files import DEFAULT_PATHS
 from msgflow.errors import QueryError, UsageError
 from msgflow.name_suggestions import did_you_mean
 from msgflow.query.catalogue import choose_query, load_queries, query_names
-from msgflow.query.path_numbers import has_all_paths, with_path_numbers
+from msgflow.query.path_numbers import with_path_numbers
 from msgflow.query.result import QueryResult
 from msgflow.query.runner import run_query
 from msgflow.query.selection import make_selection
@@ -415,12 +415,15 @@ class Database:
         def ask() -> QueryResult:
             if where is not None:
                 require_condition(connection, where)
-            chosen = make_selection(selection)
             result = run_query(
-                connection, header, parameters, part, internal=internal, selection=chosen
+                connection,
+                header,
+                parameters,
+                part,
+                internal=internal,
+                selection=make_selection(selection),
             )
-            has_all = has_all_paths(header.name, parameters, chosen)
-            return with_path_numbers(connection, result, has_all=has_all)
+            return with_path_numbers(connection, result)
 
         return self._ask(ask)
 
