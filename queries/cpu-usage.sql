@@ -7,6 +7,8 @@
 -- grain: one row per host and thread
 -- column: run_id BIGINT             Run
 -- column: host VARCHAR [host]  Host
+-- column: nodes VARCHAR             Nodes of its process, without nodes its name and id; NULL: a
+--     process without ROS
 -- column: process VARCHAR           Process name; NULL: a process without ROS
 -- column: pid INTEGER               Process id
 -- column: thread VARCHAR            Thread name
@@ -16,7 +18,7 @@
 -- column: most_share DOUBLE [share]  The largest share of a CPU in one second
 -- column: cpus BIGINT               CPUs that it ran on
 -- column: thread_id BIGINT          Identity of the thread
--- brief: process, thread, tid, share, running_ns, most_share, cpus, pid, host
+-- brief: nodes, thread, tid, share, running_ns, most_share, cpus, process, pid, host
 -- note: kernel
 WITH chosen AS (
     SELECT *
@@ -49,6 +51,7 @@ measured AS (
 SELECT
     m.run_id,
     h.hostname AS host,
+    l.nodes,
     p.name AS process,
     p.pid,
     coalesce(t.name, m.name) AS thread,
@@ -63,4 +66,5 @@ JOIN traced AS c ON m.run_id = c.run_id AND m.host_id = c.host_id
 JOIN main.host AS h ON m.host_id = h.host_id
 LEFT JOIN main.thread AS t ON m.thread_id = t.thread_id
 LEFT JOIN main.process AS p ON t.process_id = p.process_id
+LEFT JOIN main.process_label AS l ON t.process_id = l.process_id
 ORDER BY m.run_id, m.running_ns DESC, m.host_id, tid, m.thread_id

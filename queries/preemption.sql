@@ -6,12 +6,14 @@
 --     first.
 -- grain: one row per thread, priority, and thread that took the CPU from it, with its priority
 -- column: run_id BIGINT             Run
+-- column: nodes VARCHAR             Nodes of its process; without nodes its name and id
 -- column: process VARCHAR           Process name
 -- column: thread VARCHAR            Thread that lost the CPU
 -- column: tid INTEGER               Its thread id
 -- column: priority INTEGER          Its priority, as the kernel has it: 0 to 99 real-time, 100 to
 --     139 nice -20 to 19
--- column: preempted_by VARCHAR      Thread that had the CPU
+-- column: preempted_by VARCHAR      Thread that had the CPU; of a ROS process its nodes, with the
+--     name of the thread where that is not the one of the process
 -- column: preempted_by_tid INTEGER  Its thread id; of a process without ROS the kernel's number
 -- column: preempted_by_priority INTEGER  Its priority
 -- column: is_ros BOOLEAN            It is of a ROS process
@@ -20,8 +22,8 @@
 -- column: max_ns BIGINT [ns]        Longest such time
 -- column: total_ns BIGINT [ns]      Sum of these times
 -- column: thread_id BIGINT          Identity of the thread that lost the CPU
--- brief: process, thread, preempted_by, count, total_ns, max_ns, median_ns, priority,
---     preempted_by_priority, tid, preempted_by_tid
+-- brief: nodes, thread, preempted_by, count, total_ns, max_ns, median_ns, priority,
+--     preempted_by_priority, tid, preempted_by_tid, process
 -- note: kernel
 WITH lost AS (
     SELECT
@@ -42,11 +44,12 @@ WITH lost AS (
 )
 SELECT
     l.run_id,
+    pl.nodes,
     p.name AS process,
     t.name AS thread,
     t.tid,
     l.priority,
-    coalesce(b.name, o.name) AS preempted_by,
+    coalesce(main.thread_label(bl.nodes, bp.name, b.name), o.name) AS preempted_by,
     coalesce(b.tid, o.tid) AS preempted_by_tid,
     l.preempted_by_priority,
     l.preempted_by_thread_id IS NOT NULL AS is_ros,
@@ -58,7 +61,10 @@ SELECT
 FROM lost AS l
 JOIN main.thread AS t ON l.thread_id = t.thread_id
 JOIN main.process AS p ON t.process_id = p.process_id
+JOIN main.process_label AS pl ON t.process_id = pl.process_id
 LEFT JOIN main.thread AS b ON l.preempted_by_thread_id = b.thread_id
+LEFT JOIN main.process AS bp ON b.process_id = bp.process_id
+LEFT JOIN main.process_label AS bl ON b.process_id = bl.process_id
 LEFT JOIN main.other_thread AS o ON l.preempted_by_other_thread_id = o.other_thread_id
 ORDER BY
     l.run_id, l.total_ns DESC, l.thread_id, l.priority, l.preempted_by_thread_id,

@@ -6,6 +6,7 @@
 -- grain: one row per thread with known states
 -- column: run_id BIGINT             Run
 -- column: host VARCHAR [host]  Host
+-- column: nodes VARCHAR             Nodes of its process; without nodes its name and id
 -- column: process VARCHAR           Process name
 -- column: pid INTEGER               Process id
 -- column: thread VARCHAR            Thread name
@@ -21,8 +22,8 @@
 --     to 99 real-time, 100 to 139 nice -20 to 19
 -- column: loss_affected BIGINT      States during which kernel events were lost
 -- column: thread_id BIGINT          Identity of the thread
--- brief: process, thread, tid, running_ns, preempted_ns, runnable_ns, sleeping_ns, preemptions,
---     priority, uninterruptible_ns, pid, host
+-- brief: nodes, thread, tid, running_ns, preempted_ns, runnable_ns, sleeping_ns, preemptions,
+--     priority, uninterruptible_ns, process, pid, host
 -- note: kernel
 WITH state AS (
     SELECT
@@ -56,6 +57,7 @@ measured AS (
 SELECT
     m.run_id,
     h.hostname AS host,
+    l.nodes,
     p.name AS process,
     p.pid,
     t.name AS thread,
@@ -73,5 +75,6 @@ SELECT
 FROM measured AS m
 JOIN main.thread AS t ON m.thread_id = t.thread_id
 JOIN main.process AS p ON t.process_id = p.process_id
+JOIN main.process_label AS l ON t.process_id = l.process_id
 JOIN main.host AS h ON p.host_id = h.host_id
 ORDER BY m.run_id, m.running_ns DESC, m.thread_id

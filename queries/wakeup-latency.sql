@@ -6,6 +6,7 @@
 -- grain: one row per thread and priority
 -- column: run_id BIGINT             Run
 -- column: host VARCHAR [host]  Host
+-- column: nodes VARCHAR             Nodes of its process; without nodes its name and id
 -- column: process VARCHAR           Process name
 -- column: thread VARCHAR            Thread name
 -- column: tid INTEGER               Thread id
@@ -18,7 +19,7 @@
 -- column: max_ns BIGINT [ns]        Longest wait
 -- column: total_ns BIGINT [ns]      Sum of the waits
 -- column: thread_id BIGINT          Identity of the thread
--- brief: process, thread, tid, median_ns, max_ns, p99_ns, count, priority, total_ns, host
+-- brief: nodes, thread, tid, median_ns, max_ns, p99_ns, count, priority, total_ns, process, host
 -- note: kernel
 WITH waited AS (
     SELECT
@@ -37,6 +38,7 @@ WITH waited AS (
 SELECT
     w.run_id,
     h.hostname AS host,
+    l.nodes,
     p.name AS process,
     t.name AS thread,
     t.tid,
@@ -51,5 +53,6 @@ SELECT
 FROM waited AS w
 JOIN main.thread AS t ON w.thread_id = t.thread_id
 JOIN main.process AS p ON t.process_id = p.process_id
+JOIN main.process_label AS l ON t.process_id = l.process_id
 JOIN main.host AS h ON p.host_id = h.host_id
 ORDER BY w.run_id, w.max_ns DESC, w.thread_id, w.priority

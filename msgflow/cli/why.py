@@ -36,7 +36,7 @@ _SHOWN = {
     "nodes": ("time by node, on {}", "node share part what median_ns max_ns"),
     "slowest_flow": (
         "its slowest flow",
-        "rank latency_ns take_id at_ns duration_ns share activity state who node what",
+        "rank latency_ns take_id duration_ns share activity state who node what",
     ),
     "waits": (
         "what kept its callbacks waiting",

@@ -3,7 +3,8 @@
 Traces of one session belong together, also those of an archive in its folder. So do sessions with a
 trace in common (the chunks of a rotation, snapshots), and sessions whose times overlap: their hosts
 may have sent each other messages. A session that records no initialisation belongs to the one
-before it that does (dual sessions).
+before it that does (dual sessions). A kernel trace belongs to the sessions of ROS that are nearest
+to its folder.
 """
 
 from __future__ import annotations
@@ -86,7 +87,10 @@ def find_recordings(
         # An archive in the folder of a session is a part of it, and else a session of its own.
         session = file if file and folder not in folders else folder
         sessions.setdefault(session, []).append(trace)
-    groups = _by_initialisation(_by_time(_by_trace(list(sessions.values()))))
+    apart = _by_trace(list(sessions.values()))
+    of_kernel = [group for group in apart if {trace.domain for trace in group} == {"kernel"}]
+    of_ros = [group for group in apart if group not in of_kernel]
+    groups = _with_kernel(_by_initialisation(_by_time(of_ros)), of_kernel)
     if len(groups) == 1:
         return whole
     return [
@@ -141,6 +145,39 @@ def _by_initialisation(groups: Sequence[list[TraceInfo]]) -> list[list[TraceInfo
         else:
             joined.append(list(group))
     return joined
+
+
+def _with_kernel(
+    groups: Sequence[list[TraceInfo]], of_kernel: Sequence[list[TraceInfo]]
+) -> list[list[TraceInfo]]:
+    """Join kernel traces with the nearest group; where there are several, with those of their time.
+
+    Times of perf count from the boot, so that they tell nothing where folders do.
+
+    Args:
+        groups: in order of time.
+        of_kernel: groups without other traces.
+    """
+    joined = list(groups)
+    for kernel in of_kernel:
+        near = _nearest(joined, session_folder(kernel[0].path))
+        if len(near) > 1:
+            near = [group for group in near if len(_by_time([group, kernel])) == 1]
+        place = min((joined.index(group) for group in near), default=len(joined))
+        joined = [group for group in joined if group not in near]
+        joined.insert(place, [*itertools.chain(*near), *kernel])
+    return joined
+
+
+def _nearest(groups: Sequence[list[TraceInfo]], folder: Path) -> list[list[TraceInfo]]:
+    """Return the groups with a trace below the lowest folder around this one that has any."""
+    for around in (folder, *folder.parents):
+        below = [
+            group for group in groups if any(trace.path.is_relative_to(around) for trace in group)
+        ]
+        if below:
+            return below
+    return []
 
 
 def _records_initialisation(group: Sequence[TraceInfo]) -> bool:

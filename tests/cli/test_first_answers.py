@@ -72,7 +72,7 @@ def test_why_keeps_its_columns(ask: Msgflow, columns: int) -> None:
         titles = shown.partition("TIME BY NODE, ON ")[2].splitlines()[1].split()
         assert titles == ["node", "share", "part", "what", "median", "max"]
         titles = section(shown, "ITS SLOWEST FLOW").splitlines()[1].split()
-        assert titles == ["at", "duration", "share", "activity", "node", "what"]
+        assert titles == ["duration", "share", "activity", "node", "what"]
         assert "── 1 ──" not in shown
 
 

@@ -129,6 +129,32 @@ def test_times_of_kernel_traces_beside_those_of_ros_do_not_count(tmp_path: Path)
     assert _found(tmp_path) == [[tmp_path / "day"], [tmp_path / "night"]]
 
 
+@pytest.mark.parametrize(
+    ("ros", "perf"), [("ust/uid/1000/64-bit", "perf"), ("ros", "perf"), ("perf/ros", "perf")]
+)
+def test_a_trace_of_perf_belongs_to_the_session_that_it_lies_in_beside_or_around(
+    tmp_path: Path, ros: str, perf: str
+) -> None:
+    for name, begin in (("day", 10_100), ("night", 10_500)):
+        # From the boot, which was anew between the two.
+        _record(tmp_path / name / perf, 10, 90, event="sched_switch", clock=2)
+        _record(tmp_path / name / ros, begin, begin + 100)
+    assert _found(tmp_path / "day") == [[tmp_path / "day"]]
+    assert _found(tmp_path) == [[tmp_path / "day"], [tmp_path / "night"]]
+
+
+def test_of_several_sessions_beside_it_a_kernel_trace_belongs_to_those_of_its_time(
+    tmp_path: Path,
+) -> None:
+    for name, begin in (("day", 100), ("evening", 300), ("night", 500)):
+        _record(tmp_path / name, begin, begin + 100)
+    _record(tmp_path / "kernel", 350, 560, event="sched_switch", clock=2)
+    assert _found(tmp_path) == [
+        [tmp_path / "day"],
+        [tmp_path / "evening", tmp_path / "night", tmp_path / "kernel"],
+    ]
+
+
 def test_each_recording_has_its_hosts(tmp_path: Path) -> None:
     first = _record(tmp_path / "a", 100, 200)
     second = _record(tmp_path / "b", 300, 400)

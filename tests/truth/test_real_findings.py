@@ -49,12 +49,12 @@ EXPECTED: dict[str, list[tuple[str, str | None, int]]] = {
     "real_lifecycle": [],
     "real_overload": [],
     "real_pipeline": [],
-    "real_py_mixed": [("process_without_rclcpp", "python3.11 20878 on vm", 137)],
+    "real_py_mixed": [("process_without_rclcpp", "/filter_image (python3.11 20878 on vm)", 137)],
     "real_py_timer": [
         ("doubtful_answer", "/filter_timer", 288),
-        ("process_without_rclcpp", "python3.11 19960 on vm", 25),
-        ("process_without_rclcpp", "python3.11 19963 on vm", 437),
-        ("process_without_rclcpp", "python3.11 19964 on vm", 142),
+        ("process_without_rclcpp", "/filter_timer (python3.11 19963 on vm)", 437),
+        ("process_without_rclcpp", "/sink2 (python3.11 19960 on vm)", 25),
+        ("process_without_rclcpp", "/source (python3.11 19964 on vm)", 142),
     ],
     "real_reference": [
         ("busy_waiting", "perception 18109 on vm", 38_747),

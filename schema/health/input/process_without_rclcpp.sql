@@ -25,6 +25,14 @@ sent AS (
 timed AS (
     SELECT process_id, count(*) AS number FROM staging.timer GROUP BY process_id
 ),
+-- One of rclcpp that was there before the recording may only have logged. Of rclpy all processes
+-- have one name, so that only their nodes tell them apart.
+named AS (
+    SELECT process_id, string_agg(full_name, ', ' ORDER BY node_id) AS nodes
+    FROM staging.node
+    WHERE NOT is_inferred
+    GROUP BY process_id
+),
 rclcpp AS (
     SELECT process_id FROM staging.callback
     UNION
@@ -33,13 +41,12 @@ rclcpp AS (
     SEMI JOIN staging.executor_first AS x ON t.thread_id = x.thread_id
 )
 SELECT
-    l.label AS subject,
+    printf('%s (%s)', n.nodes, l.label) AS subject,
     s.number AS count,
     printf('publications: %d, timers: %d, callbacks: none', s.number, coalesce(t.number, 0))
         AS detail
 FROM sent AS s
--- One of rclcpp that was there before the recording may only have logged.
-SEMI JOIN (FROM staging.node WHERE NOT is_inferred) AS n ON s.process_id = n.process_id
+JOIN named AS n ON s.process_id = n.process_id
 ANTI JOIN rclcpp AS r ON s.process_id = r.process_id
 LEFT JOIN timed AS t ON s.process_id = t.process_id
 JOIN process_label AS l ON s.process_id = l.process_id
