@@ -165,8 +165,7 @@ piece AS (
         printf('%s %d', coalesce(t.name, '?'), t.tid) AS thread,
         c.priority,
         CASE
-            WHEN bt.thread_id IS NOT NULL
-                THEN printf('%s %d', main.thread_label(bl.nodes, bp.name, bt.name), bt.tid)
+            WHEN bt.thread_id IS NOT NULL THEN printf('%s %d', bl.label, bt.tid)
             WHEN c.by_kind = 'thread' THEN bo.name
             ELSE c.by_kind
         END AS who,
@@ -184,8 +183,7 @@ piece AS (
     ) AS o
         ON t.process_id = o.process_id AND c.wakers = 0
     LEFT JOIN main.thread AS bt ON c.by_thread_id = bt.thread_id
-    LEFT JOIN main.process AS bp ON bt.process_id = bp.process_id
-    LEFT JOIN main.process_label AS bl ON bt.process_id = bl.process_id
+    LEFT JOIN main.thread_label AS bl ON c.by_thread_id = bl.thread_id
     LEFT JOIN main.other_thread AS bo ON c.by_other_thread_id = bo.other_thread_id
     LEFT JOIN main.callback_instance AS i ON c.callback_instance_id = i.callback_instance_id
     LEFT JOIN main.callback_label AS l ON i.callback_id = l.callback_id

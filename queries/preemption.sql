@@ -49,7 +49,7 @@ SELECT
     t.name AS thread,
     t.tid,
     l.priority,
-    coalesce(main.thread_label(bl.nodes, bp.name, b.name), o.name) AS preempted_by,
+    coalesce(bl.label, o.name) AS preempted_by,
     coalesce(b.tid, o.tid) AS preempted_by_tid,
     l.preempted_by_priority,
     l.preempted_by_thread_id IS NOT NULL AS is_ros,
@@ -63,8 +63,7 @@ JOIN main.thread AS t ON l.thread_id = t.thread_id
 JOIN main.process AS p ON t.process_id = p.process_id
 JOIN main.process_label AS pl ON t.process_id = pl.process_id
 LEFT JOIN main.thread AS b ON l.preempted_by_thread_id = b.thread_id
-LEFT JOIN main.process AS bp ON b.process_id = bp.process_id
-LEFT JOIN main.process_label AS bl ON b.process_id = bl.process_id
+LEFT JOIN main.thread_label AS bl ON l.preempted_by_thread_id = bl.thread_id
 LEFT JOIN main.other_thread AS o ON l.preempted_by_other_thread_id = o.other_thread_id
 ORDER BY
     l.run_id, l.total_ns DESC, l.thread_id, l.priority, l.preempted_by_thread_id,

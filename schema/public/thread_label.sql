@@ -1,9 +1,14 @@
 -- name: main.thread_label
--- kind: macro
--- description: The name of a thread: the nodes of its process, and its own name if that is not the
---     one of the process, as of threads of the middleware.
--- param: nodes VARCHAR  Nodes of its process, see main.process_label; NULL: then the result is NULL
--- param: process_name VARCHAR  Name of its process
--- param: thread_name VARCHAR  Its own name
-CREATE OR REPLACE MACRO main.thread_label(nodes, process_name, thread_name) AS
-nodes || coalesce(' ' || nullif(thread_name, process_name), '')
+-- description: What people call a thread: the nodes of its process, and its own name where that is
+--     not the one of the process, as of threads of the middleware.
+-- grain: one row per thread
+-- column: run_id BIGINT     Run that the row belongs to
+-- column: thread_id BIGINT  The thread
+-- column: label VARCHAR     Nodes of its process (main.process_label), and its name
+SELECT
+    t.run_id,
+    t.thread_id,
+    l.nodes || coalesce(' ' || nullif(t.name, p.name), '') AS label
+FROM main.thread AS t
+JOIN main.process AS p ON t.process_id = p.process_id
+JOIN main.process_label AS l ON t.process_id = l.process_id

@@ -19,14 +19,16 @@ WITH state AS MATERIALIZED (
     SELECT
         s.thread_id, s.state, s.start_ns, s.end_ns, s.cpu, s.priority, s.waker_kind, p.host_id,
         h.hostname,
-        printf('%s %d', coalesce(t.name, '?'), t.tid) AS thread,
-        printf('%s %d', coalesce(b.name, o.name, '?'), coalesce(b.tid, o.tid)) AS who
+        printf('%s %d', l.label, t.tid) AS thread,
+        printf('%s %d', coalesce(bl.label, o.name, '?'), coalesce(b.tid, o.tid)) AS who
     FROM main.thread_state AS s
     JOIN main.thread AS t ON s.thread_id = t.thread_id
     JOIN main.process AS p ON t.process_id = p.process_id
     JOIN main.host AS h ON p.host_id = h.host_id
+    JOIN main.thread_label AS l ON s.thread_id = l.thread_id
     LEFT JOIN main.thread AS b
         ON coalesce(s.preempted_by_thread_id, s.waker_thread_id) = b.thread_id
+    LEFT JOIN main.thread_label AS bl ON b.thread_id = bl.thread_id
     LEFT JOIN main.other_thread AS o
         ON coalesce(s.preempted_by_other_thread_id, s.waker_other_thread_id) = o.other_thread_id
     WHERE s.run_id = $run_id AND s.start_ns >= $start_ns AND s.start_ns < $end_ns
