@@ -85,7 +85,10 @@ JOIN main.callback AS c ON l.callback_id = c.callback_id
 WHERE l.run_id = $run_id AND c.kind = 'timer'
 """
 _CALLBACKS = "SELECT DISTINCT label FROM main.callback_label WHERE run_id = $run_id"
-_PROCESSES = "SELECT DISTINCT name FROM main.process WHERE run_id = $run_id"
+_PROCESSES = """
+SELECT name FROM main.process WHERE run_id = $run_id
+UNION SELECT nodes FROM main.process_label WHERE run_id = $run_id
+"""
 _NOT_TRACED = "the kernel was not traced, or not during it"
 _NOT_DUE = "when it was due is not known: one call only, or its creation was not recorded"
 # Roots and messages that could arrive, as far as the recording shows.
@@ -250,12 +253,13 @@ SUBJECTS: dict[str, Subject] = {
                 lacking=_NOT_TRACED,
             ),
         },
-        dict.fromkeys(
-            ("executor-usage", "wakeup-latency"), "printf('%s, thread %d', process, tid)"
-        ),
+        {
+            "executor-usage": "printf('%s, thread %d', process, tid)",
+            "wakeup-latency": "printf('%s, thread %d', nodes, tid)",
+        },
         {
             "process": Filter(
-                dict.fromkeys(("executor-usage", "wakeup-latency"), ("process",)),
+                {"executor-usage": ("process",), "wakeup-latency": ("process", "nodes")},
                 _PROCESSES, "process",
             ),
         },

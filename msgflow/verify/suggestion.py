@@ -137,10 +137,12 @@ def _callbacks(rows: Sequence[Row], margin: float) -> Iterator[Entry]:
 
 def _processes(rows: Sequence[Row], margin: float) -> Iterator[Entry]:
     """Yield a target per process, which all its threads have to meet: the wait for a CPU."""
-    for (process,), group in _grouped(rows, "process"):
-        if process and any(row["count"] >= LEAST_VALUES for row in group):
+    for (nodes, process), group in _grouped(rows, "nodes", "process"):
+        # Without nodes it has its id, which is another one in the next run.
+        called = nodes if nodes.startswith("/") else process
+        if called and any(row["count"] >= LEAST_VALUES for row in group):
             slow = max(row["p99_ns"] for row in group)
-            name = json.dumps(_literal(process), ensure_ascii=False)
+            name = json.dumps(_literal(called), ensure_ascii=False)
             yield "process", name, {"wakeup": f"p99 < {_time(slow, margin)}"}
 
 

@@ -276,9 +276,16 @@ def test_a_run_with_a_kernel_trace_meets_what_is_suggested_from_it(
     ) in targets.read_text("utf-8")
     with Database(traced) as database:
         # Twice 60 % is no limit.
-        assert 'preempted: "< 61 %"' in database.suggest_targets(margin=0)
+        text = database.suggest_targets(margin=0)
+        assert 'preempted: "< 61 %"' in text
+        assert '  - process: "/planner"\n    wakeup: ' in text
         goal = database.suggest_targets(margin=1).split('"Subscription(/goal)"')[1]
     assert "preempted" not in goal.split("  - ")[0]
+    with duckdb.connect(str(traced)) as connection:
+        connection.execute("UPDATE store.node SET full_name = NULL")
+    with Database(traced) as database:
+        # The id of a process is another one in the next run.
+        assert '  - process: "process"\n    wakeup: ' in database.suggest_targets()
 
 
 def test_a_negative_margin_is_refused(system: Path) -> None:
@@ -406,6 +413,8 @@ targets:
     preempted: < 50 %
   - process: process
     wakeup: p99 < 31 ns
+  - process: /planner
+    wakeup: p99 < 30 ns
 """
     found = {
         (row["subject"], row["condition"]): (row["verdict"], row["value"], row["see"])
@@ -418,7 +427,8 @@ targets:
         ("/planner Subscription(/goal)", "< 50 %"): (
             "failed", 0.6, "msgflow flow --callback-instance 5",
         ),
-        ("process, thread 1", "p99 < 31 ns"): ("passed", 30, None),
+        ("/planner, thread 1", "p99 < 31 ns"): ("passed", 30, None),
+        ("/planner, thread 1", "p99 < 30 ns"): ("failed", 30, None),
     }  # fmt: skip
     without = rows(check(text))
     assert {row["verdict"] for row in without} == {"not measured"}
