@@ -71,7 +71,7 @@ class KeptChunk:
 
 
 def read_chunk(chunk: Chunk, after: Continuation) -> KeptChunk | None:
-    """Read a chunk into memory; None if it has no packet at all.
+    """Read a chunk into memory; None if nothing was recorded in it.
 
     Args:
         chunk: which one.
@@ -80,6 +80,9 @@ def read_chunk(chunk: Chunk, after: Continuation) -> KeptChunk | None:
     Raises:
         TraceError: it cannot be read.
     """
+    # LTTng also cuts the time before the first program, into chunks without any file.
+    if not any(path.is_file() for path in chunk.path.rglob("*")):
+        return None
     events: dict[str, list[pa.RecordBatch]] = {}
     packets = []
     with trace_package.open([chunk.path], after=after) as traces:

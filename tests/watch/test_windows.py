@@ -125,6 +125,18 @@ def test_a_damaged_and_a_missing_chunk_are_said(simulated: Path, tmp_path: Path)
     assert sum(row["roots"] for report in found for row in report.paths) > 0
 
 
+def test_a_chunk_without_any_file_is_no_damage(simulated: Path, tmp_path: Path) -> None:
+    directory = tmp_path / "trace"
+    shutil.copytree(simulated, directory)
+    for host in directory.glob("*/archives"):
+        last = max(host.iterdir())
+        shutil.rmtree(last)
+        (last / "ust").mkdir(parents=True)
+    notes: list[str] = []
+    assert reports(directory, window=0.5, step=0.5, notes=notes)
+    assert notes == []
+
+
 def test_a_clock_that_is_set_is_said_and_is_no_lag(
     simulated: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
