@@ -96,8 +96,8 @@ class Watcher:
         self.numbers[chunk.source] = chunk.number
         if before is not None and chunk.number > before + 1:
             self._note(
-                f"{chunk.number - before - 1} chunks are missing before number {chunk.number}"
-                f" of {chunk.source}"
+                f"chunks are missing before number {chunk.number} of {chunk.source}:"
+                f" {chunk.number - before - 1}"
             )
         try:
             kept = read_chunk(chunk, self._after)

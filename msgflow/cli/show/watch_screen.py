@@ -11,6 +11,7 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
+from msgflow.cli.output import count
 from msgflow.cli.show.keys import noted_keys
 from msgflow.cli.show.window_line import verdict_words
 from msgflow.run.window import format_epoch
@@ -162,13 +163,14 @@ def missing(path: Row) -> int:
 def _heading(report: WindowReport) -> Text:
     start, end = (format_epoch(at)[_TIME] for at in report.window.bindings.values())
     text = Text(f"{start} to {end}", style="bold")
-    text.append(f"   {len(report.paths)} paths", style="not bold")
+    text.append(f"   {count(len(report.paths), 'path')}", style="not bold")
     if report.lag_s is not None:
         text.append(f"   lag {report.lag_s:.1f} s", style="not bold")
     if report.verdicts:
         text.append(f"   targets: {verdict_words(report)}", style="not bold")
     lost = report.discarded_events
-    text.append(f"   {lost:,} events lost by the tracer", style="red" if lost else "not bold dim")
+    said = f"{count(lost, 'event')} lost by the tracer"
+    text.append(f"   {said}", style="red" if lost else "not bold dim")
     return text
 
 

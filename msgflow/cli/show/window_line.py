@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from msgflow.cli.output import count
 from msgflow.run.window import format_epoch
 from msgflow.text.values import format_duration, printable
 
@@ -19,15 +20,15 @@ def window_line(report: WindowReport) -> str:
     start, end = (format_epoch(at)[_TIME] for at in report.window.bindings.values())
     roots = sum(path["roots"] for path in report.paths)
     reached = sum(path["reached"] for path in report.paths)
-    words = [f"{len(report.paths)} paths", f"{reached:,} of {roots:,} flows arrived"]
+    words = [count(len(report.paths), "path"), f"{reached:,} of {roots:,} flows arrived"]
     slow = max(report.paths, key=lambda path: path["max_ns"] or 0, default=None)
     if slow is not None and slow["max_ns"] is not None:
         words.append(f"slowest {format_duration(slow['max_ns'])} on {printable(slow['path'])}")
     missing = sum(loss["dropped"] + loss["lost"] for loss in report.losses)
     if missing:
-        words.append(f"{missing:,} messages dropped or lost")
+        words.append(f"{count(missing, 'message')} dropped or lost")
     if report.discarded_events:
-        words.append(f"{report.discarded_events:,} events lost by the tracer")
+        words.append(f"{count(report.discarded_events, 'event')} lost by the tracer")
     if report.verdicts:
         words.append(f"targets: {verdict_words(report)}")
     if report.lag_s is not None:
