@@ -96,10 +96,11 @@ def _report(
     """
     import pyarrow as pa
 
-    from msgflow.cli.output import count, print_lines, print_result, print_status
+    from msgflow.cli.output import print_lines, print_result, print_status
     from msgflow.db.finding import Finding
     from msgflow.export.formats import Format
     from msgflow.query.result import QueryResult
+    from msgflow.text.values import count
 
     if output is None and form in (None, Format.TABLE):
         print_lines(_text(findings, run_labels))

@@ -15,8 +15,9 @@ app = typer.Typer()
 @app.command("upgrade")
 def upgrade(database: DatabaseOption = DEFAULT_DATABASE) -> None:
     """Upgrade a database to the schema and views of this version of msgflow."""
-    from msgflow.cli.output import count, print_status
+    from msgflow.cli.output import print_status
     from msgflow.db.migration import upgrade as upgrade_database
+    from msgflow.text.values import count
 
     done = upgrade_database(database)
     if done.before == done.after and not done.views_changed and not done.rederived_runs:

@@ -95,9 +95,9 @@ def command(
     fields.
     """
     from msgflow import trace
-    from msgflow.cli.output import count as counted
     from msgflow.cli.output import print_note
     from msgflow.events.selection import Selection
+    from msgflow.text.values import count as counted
 
     with trace.open(traces, reader=reader.value, strict=strict) as opened:
         selection = Selection(opened, event or (), start, end)
@@ -122,10 +122,11 @@ def command(
 
 def _write(selection: Selection, form: EventFormat, output: Path | None) -> None:
     from msgflow.atomic import replacing
-    from msgflow.cli.output import count, data_stream, print_note, print_status, terminal
+    from msgflow.cli.output import data_stream, print_note, print_status, terminal
     from msgflow.cli.progress import reading_progress
     from msgflow.events.listing import write_events
     from msgflow.events.tables import write_event_tables
+    from msgflow.text.values import count
 
     if output is None:
         if form is EventFormat.PARQUET and sys.stdout.isatty():

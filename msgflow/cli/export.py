@@ -144,8 +144,9 @@ def perfetto(
 
     Needs the package perfetto: pip install perfetto, or in a checkout '.\\[perfetto]'.
     """
-    from msgflow.cli.output import count, print_runs, print_status
+    from msgflow.cli.output import print_runs, print_status
     from msgflow.database import Database
+    from msgflow.text.values import count
 
     with Database(database, memory_limit=memory_limit) as opened:
         trace = opened.export_perfetto(output, **asdict(part))
@@ -179,8 +180,9 @@ def mcap(
     Needs the package mcap-ros2-support: pip install mcap-ros2-support, or in a
     checkout '.\\[mcap]'.
     """
-    from msgflow.cli.output import count, print_runs, print_status
+    from msgflow.cli.output import print_runs, print_status
     from msgflow.database import Database
+    from msgflow.text.values import count
 
     with Database(database, memory_limit=memory_limit) as opened:
         written = opened.export_mcap(output, **asdict(part), targets=targets, paths=paths)
@@ -257,8 +259,9 @@ def otlp(
     --endpoint needs the package opentelemetry-proto: pip install
     opentelemetry-proto, or in a checkout '.\\[otlp]'.
     """
-    from msgflow.cli.output import count, print_runs, print_status
+    from msgflow.cli.output import print_runs, print_status
     from msgflow.database import Database
+    from msgflow.text.values import count
 
     if output is not None and endpoint is not None:
         raise UsageError("--endpoint and --output exclude each other", "give one of them")
@@ -329,7 +332,8 @@ def series(
 
 
 def _report(exported: Sequence[ExportedView], directory: Path) -> None:
-    from msgflow.cli.output import count, print_note, print_status
+    from msgflow.cli.output import print_note, print_status
+    from msgflow.text.values import count
 
     rows = sum(view.row_count for view in exported)
     print_status(f"{count(len(exported), 'view')}, {count(rows, 'row')} written to {directory}")

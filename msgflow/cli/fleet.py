@@ -154,7 +154,8 @@ def ingest(
 
 
 def _print_report(report: FleetProgress, lake: str, quiet: bool) -> None:
-    from msgflow.cli.output import count, print_note, print_status
+    from msgflow.cli.output import print_note, print_status
+    from msgflow.text.values import count
 
     if not quiet:
         kinds = {
@@ -224,8 +225,9 @@ def remove(
     lake: LakeOption,
 ) -> None:
     """Take runs out of a lake; their files go with the next `msgflow fleet compact`."""
-    from msgflow.cli.output import count, print_status
+    from msgflow.cli.output import print_status
     from msgflow.fleet.lake import Lake
+    from msgflow.text.values import count
 
     removed = Lake.open(lake).remove(keys)
     print_status(f"{count(removed, 'run')} removed from {lake}")
@@ -246,9 +248,10 @@ def compact(
 ) -> None:
     """Put the answers of many runs into few files, and delete those that nobody needs."""
     seconds = _time(older_than, "--older-than")
-    from msgflow.cli.output import count, print_status
+    from msgflow.cli.output import print_status
     from msgflow.fleet.compact import compact as compacted
     from msgflow.fleet.lake import Lake
+    from msgflow.text.values import count
 
     done = compacted(Lake.open(lake), older_than=seconds)
     print_status(

@@ -155,7 +155,8 @@ def command(
 
 def _note_archives(traces: list[str], database: Path) -> None:
     """Say which archives below the given directories were not read, and how to name them."""
-    from msgflow.cli.output import count, print_note
+    from msgflow.cli.output import print_note
+    from msgflow.text.values import count
     from msgflow.trace.discovery import archives_below
 
     archives = [str(path) for path in archives_below(traces)]
@@ -180,7 +181,8 @@ def _require_no_word_for_one(count: int, name: str | None, keep_staging: Path | 
 
 
 def _print_report(report: IngestReport, database: Path) -> None:
-    from msgflow.cli.output import count, print_note, print_status
+    from msgflow.cli.output import print_note, print_status
+    from msgflow.text.values import count
 
     print_status(
         f"{count(report.event_count, 'event')} read into {database} as run"

@@ -45,7 +45,8 @@ def apply(
 
 def print_applied(opened: Database, one: AppliedLinks) -> None:
     """Print what was declared, and what contradicts it."""
-    from msgflow.cli.output import count, print_note, print_status
+    from msgflow.cli.output import print_note, print_status
+    from msgflow.text.values import count
 
     known = f", {one.known_count} of them by the trace itself" if one.known_count else ""
     traced = f", and {one.traced_link_count} that the trace declares itself"

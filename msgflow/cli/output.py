@@ -87,6 +87,7 @@ def print_result(
         UsageError: Parquet on a terminal, a closed stdout, or a file that cannot be written.
     """
     from msgflow.atomic import replacing
+    from msgflow.text.values import count
 
     form = form or format_of(path)
     if columns is not None:
@@ -230,11 +231,6 @@ def print_list(rows: Sequence[tuple[str, str]], titles: tuple[str, str] | None =
         longest = max(cell_len(line) for _, texts in wrapped for line in texts)
         lines.insert(len(wrapped[0][1]), "─" * (width + 2 + longest))
     print_lines(lines)
-
-
-def count(number: int, thing: str) -> str:
-    """Return '1 row', '1,234 rows'."""
-    return f"{number:,} {thing}" if number == 1 else f"{number:,} {thing}s"
 
 
 def discard_stdout() -> None:

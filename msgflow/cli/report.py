@@ -75,8 +75,9 @@ def command(
     The first page is a summary. A file that ends with .md gets the summary alone, as Markdown.
     With --lake: a page of the paths of all its runs by label over time, outliers, failures.
     """
-    from msgflow.cli.output import count, print_note, print_runs, print_status
+    from msgflow.cli.output import print_note, print_runs, print_status
     from msgflow.database import Database
+    from msgflow.text.values import count
 
     is_page = output.suffix.lower() in (".html", ".htm")
     if not is_page and (lake is not None or output.suffix.lower() != ".md"):

@@ -159,8 +159,9 @@ def command(
     ] = None,
 ) -> None:
     """Write the trace of a simulated ROS 2 system, and the links that really happened."""
-    from msgflow.cli.output import count, print_status
+    from msgflow.cli.output import print_status
     from msgflow.sim import Buffers, Recording, simulate
+    from msgflow.text.values import count
 
     directory = output or Path(scenario)
     recording = Recording(

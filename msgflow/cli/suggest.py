@@ -41,7 +41,6 @@ def links(
     from msgflow.atomic import replacing
     from msgflow.cli.links import print_applied
     from msgflow.cli.output import (
-        count,
         print_next,
         print_note,
         print_runs,
@@ -49,6 +48,7 @@ def links(
         print_text,
     )
     from msgflow.database import Database
+    from msgflow.text.values import count
 
     if run == "all":
         raise UsageError(

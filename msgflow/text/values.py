@@ -98,6 +98,11 @@ def _number(value: float, unit: str | None, is_handle: bool) -> str:
     return f"{value:.3g}"
 
 
+def count(number: int, thing: str) -> str:
+    """Return '1 row', '1,234 rows'."""
+    return f"{number:,} {thing}" if number == 1 else f"{number:,} {thing}s"
+
+
 def printable(text: str, keep: str = "") -> str:
     """Return text with control characters escaped as in Python.
 

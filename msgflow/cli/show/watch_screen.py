@@ -11,11 +11,10 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from msgflow.cli.output import count
 from msgflow.cli.show.keys import noted_keys
 from msgflow.cli.show.window_line import verdict_words
 from msgflow.run.window import format_epoch
-from msgflow.text.values import NULL, format_duration, printable
+from msgflow.text.values import NULL, count, format_duration, printable
 from msgflow.watch import violation_line
 
 if TYPE_CHECKING:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from msgflow.cli.output import count
 from msgflow.run.window import format_epoch
-from msgflow.text.values import format_duration, printable
+from msgflow.text.values import count, format_duration, printable
 
 if TYPE_CHECKING:
     from msgflow.watch import WindowReport
