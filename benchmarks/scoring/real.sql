@@ -134,6 +134,13 @@ link AS (
     JOIN traced AS t ON s.pid = t.pid
     WHERE c.kind = 'client'
     UNION ALL
+    -- In rclpy, what clients do with a response shows as nothing.
+    SELECT 'link_call', 'request_taken', s.callback, 'publication', s.sent
+    FROM truth_sent AS s
+    JOIN truth_callback AS c ON s.callback = c.callback
+    ANTI JOIN traced AS t ON s.pid = t.pid
+    WHERE s.k = 'publication' AND c.kind = 'service'
+    UNION ALL
     SELECT
         CASE WHEN accepted THEN 'goal_accepted' ELSE 'goal_rejected' END, 'request_sent',
         name || ' ' || id, 'request_taken', callback

@@ -170,13 +170,9 @@ class _Painter:
     def _name(self, item: Item, link: Row | None) -> str:
         node = item.node
         label, place = _printable(node["label"]), _printable(node["node"])
-        if node["kind"] == "publication":
-            # Otherwise the line of the callback instance names the publisher.
-            is_alone = link is None or not item.causes
-            return f"{place}  publishes {label}" if is_alone else f"publishes {label}"
-        if node["kind"] == "request":
-            is_alone = link is None or not item.causes
-            return f"{place}  requests {label}" if is_alone else f"requests {label}"
+        if node["kind"] in ("publication", "request"):
+            what = f"{'publishes' if node['kind'] == 'publication' else 'requests'} {label}"
+            return f"{place}  {what}" if link is None or _is_alone(item) else what
         if node["kind"] == "response":
             return f"{place}  Client({label})"
         if node["kind"] == "callback_instance":
@@ -214,7 +210,7 @@ class _Painter:
             if vertex is not None and vertex["missing"] in _NOT_SEEN.get(vertex["kind"], {}):
                 why = f", {_reason(vertex)}" if vertex["missing"] == "publication" else ""
                 details.append(f"NA: {_NOT_SEEN[vertex['kind']][vertex['missing']]}{why}")
-        if node["kind"] not in ("publication", "request") or not item.causes:
+        if node["kind"] not in ("publication", "request") or _is_alone(item):
             host = f" on {_printable(node['host'])}" if self.has_hosts else ""
             details.append(f"thread {_printable(node['thread'])}{host}")
         if node["symbol"]:
@@ -223,6 +219,11 @@ class _Painter:
         if number:
             details.append(f"… {number} more")
         return details
+
+
+def _is_alone(item: Item) -> bool:
+    """Return whether no line before it has the node that sends: of a request it has the client."""
+    return all(cause.node["kind"] == "request" for cause, _ in item.causes)
 
 
 def _bound(detail: str, room: int) -> str:

@@ -164,6 +164,29 @@ def test_branches_are_indented_and_nothing_is_drawn_twice(robot: Database) -> No
     ]
 
 
+def test_what_follows_from_a_request_without_a_callback_names_its_node(
+    empty_database: Path, tmp_path: Path
+) -> None:
+    with database_of("services_forward", empty_database, tmp_path) as database:
+        path = database.path
+    with duckdb.connect(str(path)) as connection:
+        connection.execute(
+            "INSERT INTO store.publication BY NAME SELECT * REPLACE "
+            "(90 AS publication_id, 665 AS start_ns, 666 AS end_ns, NULL AS callback_event_id) "
+            "FROM store.publication ORDER BY publication_id DESC LIMIT 1"
+        )
+        connection.execute(
+            "INSERT INTO store.link_call BY NAME SELECT run_id, 2 AS taken_request_id, "
+            "publication_id, publisher_id, 1 AS candidate_count "
+            "FROM store.publication WHERE publication_id = 90"
+        )
+    with Database(path) as database:
+        lines = str(database.flow(publication_id=90)).splitlines()
+    assert lines[2] == " +10 ns  requests /add  sending to take 80 ns"
+    assert lines[3].startswith("+165 ns  /ticker  publishes /tick  take_adjacent 75 ns")
+    assert lines[3].endswith("  thread thread 1  ◀")
+
+
 def test_calls_of_services(empty_database: Path, tmp_path: Path) -> None:
     with database_of("services_forward", empty_database, tmp_path) as database:
         flow = database.flow(callback_instance_id=5)

@@ -4,7 +4,8 @@
 -- description: What a thread sends after it took a request or a response for which no callback is
 --     traced: clients and action servers of rclcpp run their callbacks right behind the take. The
 --     turn ends with the next event of the executor, the next take, and where a callback begins or
---     ends. Threads without executors and callbacks (rclpy) have no turns that a trace would show.
+--     ends. Of threads without executors and callbacks (rclpy) a trace shows one kind of turn: from
+--     the take of a request to the response that the same thread sends to it.
 --     Nothing is linked across a gap of the host. An object that the same thread also sends with
 --     where nothing was taken may do so here as well: then "nothing" is one more candidate. So is
 --     another process, where several with equal ids cannot be told apart.
@@ -29,12 +30,30 @@ executing AS MATERIALIZED (
     SEMI JOIN taken AS k ON t.thread_id = k.thread_id
     WHERE run_id = only_run
 ),
+answered AS (
+    SELECT k.thread_id, k.taken_ns, r.sent_ns, k.taken_request_id
+    FROM taken AS k
+    JOIN store.response AS r
+        ON k.taken_request_id = r.request_id AND k.thread_id = r.sender_thread_id
+    ANTI JOIN executing AS e ON k.thread_id = e.thread_id
+    WHERE r.run_id = only_run
+),
 turn AS (
-    SELECT thread_id, taken_ns AS at_ns, taken_request_id, taken_response_id
+    SELECT k.thread_id, k.taken_ns AS at_ns, k.taken_request_id, k.taken_response_id
     FROM taken AS k
     SEMI JOIN executing AS e ON k.thread_id = e.thread_id
     UNION ALL
     SELECT thread_id, at_ns, NULL, NULL FROM executing
+    UNION ALL
+    SELECT thread_id, taken_ns, taken_request_id, NULL FROM answered
+    UNION ALL
+    SELECT thread_id, sent_ns, NULL, NULL FROM answered
+    UNION ALL
+    -- While its callback waits for another service, the thread may turn to something else.
+    SELECT k.thread_id, k.taken_ns, NULL, NULL
+    FROM taken AS k
+    SEMI JOIN answered AS a ON k.thread_id = a.thread_id
+    ANTI JOIN answered AS o ON k.taken_request_id = o.taken_request_id
     UNION ALL
     SELECT thread_id, taken_ns, NULL, NULL
     FROM store.take AS t
