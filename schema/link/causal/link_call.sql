@@ -52,7 +52,7 @@ turn AS (
     -- While its callback waits for another service, the thread may turn to something else.
     SELECT k.thread_id, k.taken_ns, NULL, NULL
     FROM taken AS k
-    SEMI JOIN answered AS a ON k.thread_id = a.thread_id
+    ANTI JOIN executing AS e ON k.thread_id = e.thread_id
     ANTI JOIN answered AS o ON k.taken_request_id = o.taken_request_id
     UNION ALL
     SELECT thread_id, taken_ns, NULL, NULL
