@@ -110,6 +110,8 @@ def test_why_says_that_messages_end_at_a_node(ask: Msgflow) -> None:
         said = " ".join(ask("real_reference", *words).stderr.split())
         assert "note: 49 messages on /boxes end at /object_fusion, which publishes" in said
         assert "next: msgflow suggest links --db" in said
+    said = ask("real_reference", "why", "--run", "real_reference").stderr
+    assert "next: msgflow suggest links --run real_reference --db" in said
     said = ask("real_reference", "why", "/vehicle").stderr
     assert "suggest links" not in said
 
