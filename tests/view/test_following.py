@@ -21,7 +21,7 @@ Followed = tuple[str, Iterator[WindowReport]]
 @pytest.fixture
 def followed(shared_traces: Path, tmp_path: Path) -> Iterator[Followed]:
     """The address of pages, and the windows that they show."""
-    database = WindowDatabase(tmp_path / "window.duckdb", links=None, clock_sync="none")
+    database = WindowDatabase(tmp_path / "window.duckdb", clock_sync="none")
     watcher = Watcher(
         window_ns=2 * SECOND,
         step_ns=2 * SECOND,
