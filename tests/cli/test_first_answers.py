@@ -174,6 +174,10 @@ def test_messages_are_all_that_were_published(real: Callable[[str], Path], name:
             "SELECT count(DISTINCT m.publication_id), (SELECT count(*) FROM publication), "
             "count(DISTINCT m.take_id), count(*) FROM message AS m"
         ).fetchall()
+        ((unnamed,),) = connection.execute(
+            "SELECT count(*) FROM message JOIN publication USING (publication_id) "
+            "WHERE topic_name IS NULL AND rmw_ns > 0 AND rcl_ns IS NULL AND NOT is_internal"
+        ).fetchall()
         ((all_takes, untaken),) = connection.execute(
             "SELECT (SELECT count(*) FROM take), count(*) FROM publication "
             "WHERE publication_id NOT IN (SELECT publication_id FROM link_transport)"
@@ -182,6 +186,8 @@ def test_messages_are_all_that_were_published(real: Callable[[str], Path], name:
     assert takes == all_takes
     assert rows == takes + untaken
     assert untaken > 0
+    # The middleware speaks, too: its messages are not those of a node.
+    assert unnamed == 0
 
 
 def test_an_export_says_where_to_start(ask: Msgflow) -> None:
