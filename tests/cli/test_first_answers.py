@@ -116,6 +116,14 @@ def test_why_says_that_messages_end_at_a_node(ask: Msgflow) -> None:
     assert "suggest links" not in said
 
 
+def test_why_asks_for_nothing_without_a_name(ask: Msgflow) -> None:
+    said = ask("real_late", "why").stderr.splitlines()
+    steps = [line.partition(" --db ")[0] for line in said if line.startswith("next: ")]
+    assert steps[0] == "next: msgflow suggest links"
+    for step in steps:
+        ask("real_late", *step.split()[2:])
+
+
 QUERIES = [header for header in load_queries() if header.brief]
 
 
