@@ -65,12 +65,19 @@ def command(
         is_explained = detail and is_text
         quality = opened.query("info", section="quality", run=run) if is_explained else None
         every = opened.runs()
-        runs = every if detail else choose_runs(every, run)
+        chosen = choose_runs(every, run)
+        runs = every if detail else chosen
         verdicts = opened.clock_verdicts(run=run, only_several=True)
     labels = {one.run_id: one.title for one in runs} if len(runs) > 1 else {}
     _report(findings, form, output, run_labels=labels, notes=verdicts, table=quality)
-    for step in commands_after(findings) if runs else ["msgflow ingest TRACE"]:
-        print_next(step.split(), database, run)
+    if not runs:
+        print_next(["msgflow", "ingest", "TRACE"], database)
+    else:
+        # Most commands explain one run: what is worst comes first, else what is newest.
+        shown = [one.run_id for one in chosen]
+        about = next((each.run_id for each in findings if each.run_id in shown), shown[-1])
+        for step in commands_after([each for each in findings if each.run_id == about]):
+            print_next(step.split(), database, None if run is None else about)
     if any(finding.severity == "error" for finding in findings):
         raise typer.Exit(ExitCode.FAILED)
 

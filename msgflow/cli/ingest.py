@@ -155,7 +155,7 @@ def command(
 
 def _note_archives(traces: list[str], database: Path) -> None:
     """Say which archives below the given directories were not read, and how to name them."""
-    from msgflow.cli.output import print_note
+    from msgflow.cli.output import database_option, print_note
     from msgflow.text.values import count
     from msgflow.trace.discovery import archives_below
 
@@ -165,7 +165,7 @@ def _note_archives(traces: list[str], database: Path) -> None:
         words = ["msgflow", "ingest", *traces, *archives[:ARCHIVES_SHOWN], "--replace"]
         print_note(
             f"{count(len(archives), 'archive')} beside the traces {verb} not read; to read what is"
-            f" of the same recording: {shlex.join([*words, *_database_option(database)])}"
+            f" of the same recording: {shlex.join([*words, *database_option(database)])}"
         )
 
 
@@ -205,10 +205,6 @@ def _print_next(report: IngestReport, database: Path) -> None:
     from msgflow.db.finding import next_command
 
     print_next(next_command(report.findings).split(), database)
-
-
-def _database_option(database: Path) -> list[str]:
-    return [] if database == DEFAULT_DATABASE else ["--db", str(database)]
 
 
 def _hosts(texts: list[str]) -> dict[str, list[str]]:

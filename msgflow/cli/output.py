@@ -50,8 +50,12 @@ def print_status(text: str) -> None:
 def print_next(words: Sequence[str], database: Path, run: str | int | None = None) -> None:
     """Print a command that runs as it is printed."""
     chosen = ["--run", str(run)] if run is not None else []
-    place = ["--db", str(database)] if database != DEFAULT_DATABASE else []
-    print_status(f"next: {shlex.join([*words, *chosen, *place])}")
+    print_status(f"next: {shlex.join([*words, *chosen, *database_option(database)])}")
+
+
+def database_option(database: Path) -> list[str]:
+    """Return the words that name a database in a command; none for the default one."""
+    return ["--db", str(database)] if database != DEFAULT_DATABASE else []
 
 
 def is_asked() -> bool:

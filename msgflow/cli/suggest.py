@@ -41,6 +41,7 @@ def links(
     from msgflow.atomic import replacing
     from msgflow.cli.links import print_applied
     from msgflow.cli.output import (
+        database_option,
         print_next,
         print_note,
         print_runs,
@@ -63,7 +64,7 @@ def links(
     path = output or (DEFAULT_LINKS if apply else None)
     words = ["msgflow", "links", "apply", str(path or "FILE")]
     words += ["--run", run] if run is not None else []
-    words += ["--db", str(database)] if database != DEFAULT_DATABASE else []
+    words += database_option(database)
     with Database(database) as opened:
         found = opened.suggest_links(run=run)
         print_runs(found.runs)

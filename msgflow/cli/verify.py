@@ -78,9 +78,9 @@ def command(
     else:
         chosen = None if form is None else Format(form.value)
         print_result(verification.result, chosen, output, wide=wide)
-    if form is VerifyFormat.JUNIT or output is not None:
-        for line in verification.unmet():
-            print_status(line)
+    # A table has what failed; of what has no value, it may lack room for the reason.
+    for line in verification.unmet(with_value=form is VerifyFormat.JUNIT or output is not None):
+        print_status(line)
     numbers = {verdict: verification.count(verdict) for verdict in Verdict}
     print_status(", ".join(f"{number} {verdict}" for verdict, number in numbers.items()))
     if numbers[Verdict.FAILED]:

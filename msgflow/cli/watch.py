@@ -139,7 +139,6 @@ def command(
             keep.absolute(),
             most=most_kept,
             window_ns=window_ns,
-            links=links,
             clock_sync=clock_sync,
             note=print_note,
         )
@@ -147,7 +146,7 @@ def command(
     if prometheus is not None:
         exporter = Exporter()
         exporter.serve(prometheus)
-    with _pages(ui, links, clock_sync) as database, ExitStack() as stack:
+    with _pages(ui, clock_sync) as database, ExitStack() as stack:
         watcher = Watcher(
             window_ns=window_ns,
             step_ns=step_ns,
@@ -204,22 +203,20 @@ def command(
 
 
 @contextmanager
-def _pages(
-    port: int | None, links: Path | None, clock_sync: str
-) -> Iterator[WindowDatabase | None]:
+def _pages(port: int | None, clock_sync: str) -> Iterator[WindowDatabase | None]:
     """Serve pages of the last window during the block, unless there is no port for them."""
+    if port is None:
+        yield None
+        return
     from msgflow.cli.output import print_status
     from msgflow.confined_query import WarmSql
     from msgflow.view.server import serving
     from msgflow.view.sql_page import MOST_SECONDS
     from msgflow.watch import WindowDatabase
 
-    if port is None:
-        yield None
-        return
     with tempfile.TemporaryDirectory(prefix="msgflow-window-") as directory:
         path = Path(directory) / "window.duckdb"
-        database = WindowDatabase(path, links=links, clock_sync=clock_sync)
+        database = WindowDatabase(path, clock_sync=clock_sync)
         with (
             closing(WarmSql(path, memory_limit=None, seconds=MOST_SECONDS)) as sql,
             serving(path, sql, database, place="msgflow watch", port=port) as address,

@@ -116,12 +116,12 @@ def _more(found: Explanation, part: Slice, database: Path) -> Iterator[str]:
 
 def _command(step: tuple[str, ...], part: Slice, database: Path) -> str:
     """Return a command that runs as it is printed."""
+    from msgflow.cli.output import database_option
+
+    # Of a flow the identity tells the run; suggestions are from all of a run.
+    taken = {"query": asdict(part), "suggest": {"run": part.run}}.get(step[0], {})
     words = ["msgflow", *step]
-    if step[0] == "query":
-        # Of a flow the identity tells the run.
-        for name, value in asdict(part).items():
-            if value is not None:
-                words += [f"--{name.replace('_', '-')}", str(value)]
-    if database != DEFAULT_DATABASE:
-        words += ["--db", str(database)]
-    return shlex.join(words)
+    for name, value in taken.items():
+        if value is not None:
+            words += [f"--{name.replace('_', '-')}", str(value)]
+    return shlex.join([*words, *database_option(database)])

@@ -35,6 +35,9 @@ _BY_NODE = {
 _BY_STATE = {"preempted": "preemption", "runnable": "wakeup-latency"}
 _BY_TOPIC = dict.fromkeys(("network_or_idle", "undecided"), ("topics", "--measure", "latency"))
 _LINKS = ("suggest", "links")
+# What a path has in place of a topic without a name.
+_UNNAMED = "?"
+_NO_NAMES = (None, _UNNAMED)
 # Queries with rows of callbacks: none of what a node without traced callbacks did.
 _OF_CALLBACKS = ("callbacks", "waits")
 
@@ -98,10 +101,7 @@ def explain(
     callbacks = {(row["node"], row["what"]) for row in parts.table.to_pylist()}
     shown = [path] if place is None else paths.table["path"].to_pylist()
     ends_here = list(dict.fromkeys(_ending(dead_ends, shown)))
-    waits = _longest(
-        _chosen(ask("waits-pair"), lambda row: (row["node"], row["callback"]) in callbacks),
-        "worst_ns",
-    ).first(_WAITS)
+    waits = _chosen(ask("waits-pair"), lambda row: (row["node"], row["callback"]) in callbacks)
     losses = _chosen(
         ask("topics-delivery"),
         lambda row: (
@@ -115,10 +115,10 @@ def explain(
         place=place,
         paths=_slowest_first(paths, path),
         nodes=_by_node(parts),
-        slowest_flow=_longest_pieces(flow),
-        waits=waits,
+        slowest_flow=_longest(flow),
+        waits=waits.first(_WAITS),
         losses=losses,
-        steps=(*(_LINKS for _ in ends_here[:1]), *_steps(pieces, losses)),
+        steps=tuple(dict.fromkeys(_steps(places, ends_here, pieces, losses))),
         notes=tuple(
             dict.fromkeys(
                 [
@@ -199,12 +199,6 @@ def _chosen(result: QueryResult, is_wanted: Callable[[dict[str, Any]], bool]) ->
     return _taken(result, [place for place, row in enumerate(rows) if is_wanted(row)])
 
 
-def _longest(result: QueryResult, name: str) -> QueryResult:
-    """Return the rows, those with the longest duration in a column first."""
-    durations = result.table[name].to_pylist()
-    return _taken(result, sorted(range(len(durations)), key=lambda place: -durations[place]))
-
-
 def _taken(result: QueryResult, places: Sequence[int]) -> QueryResult:
     import pyarrow
 
@@ -245,14 +239,24 @@ def _by_node(parts: QueryResult) -> QueryResult:
     return replace(parts, table=pyarrow.Table.from_pylist(nodes, pyarrow.schema(fields)))
 
 
-def _longest_pieces(flow: QueryResult) -> QueryResult:
+def _longest(flow: QueryResult) -> QueryResult:
     rows = flow.table.to_pylist()
     longest = sorted(range(len(rows)), key=lambda place: -rows[place]["duration_ns"])[:_PIECES]
     return _taken(flow, sorted(longest))
 
 
-def _steps(pieces: Sequence[dict[str, Any]], losses: QueryResult) -> Iterator[tuple[str, ...]]:
-    """Yield the commands that show more: of the longest piece, the flow, and lost messages."""
+def _steps(
+    places: Sequence[str],
+    dead_ends: Sequence[str],
+    pieces: Sequence[dict[str, Any]],
+    losses: QueryResult,
+) -> Iterator[tuple[str, ...]]:
+    """Yield the commands that show more: of the longest piece, the flow, and lost messages.
+
+    First comes what the path lacks: links, or names of topics.
+    """
+    if dead_ends or _UNNAMED in places:
+        yield _LINKS
     longest = max(pieces, key=lambda row: row["duration_ns"])
     if of_state := _BY_STATE.get(longest["state"] or ""):
         yield ("query", of_state)
@@ -263,7 +267,7 @@ def _steps(pieces: Sequence[dict[str, Any]], losses: QueryResult) -> Iterator[tu
         and (longest["callback_instance_id"] is not None or of_node[0] not in _OF_CALLBACKS)
     ):
         yield ("query", *of_node, "--node", longest["node"])
-    elif longest["what"] is not None and (of_topic := _BY_TOPIC.get(longest["activity"])):
+    elif (of_topic := _BY_TOPIC.get(longest["activity"])) and longest["what"] not in _NO_NAMES:
         yield ("query", *of_topic, "--topic", longest["what"])
     yield ("flow", "--take", str(pieces[0]["take_id"]), "--why")
     if len(losses):

@@ -103,13 +103,17 @@ class Verification:
         verdicts: list[str] = self.result.table["verdict"].to_pylist()
         return verdicts.count(Verdict(verdict))
 
-    def unmet(self) -> list[str]:
-        """Return a line for each requirement that is not met, or has no value, with the reason."""
+    def unmet(self, *, with_value: bool = True) -> list[str]:
+        """Return a line for each requirement that is not met, or has no value, with the reason.
+
+        Args:
+            with_value: also those that were measured and failed.
+        """
         return [
             f"{row['verdict']}: {row['subject'] or row['target']}: {row['metric']}"
             f" {row['condition']}: {row['measured'] or row['reason']}"
             for row in self.result.table.to_pylist()
-            if row["verdict"] != Verdict.PASSED
+            if row["value"] is None or (with_value and row["verdict"] == Verdict.FAILED)
         ]
 
     def to_junit(self, *, allow_not_measured: bool = False) -> str:

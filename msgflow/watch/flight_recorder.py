@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING
 
 from msgflow.errors import MsgflowError
 from msgflow.ingest import ingest
-from msgflow.watch.learned_answers import write_learned
+from msgflow.watch.learned_answers import LEARNED_FILE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from pathlib import Path
 
+    from msgflow.links import LinksFile
     from msgflow.watch.kept_traces import KeptTraces
 
 _DATABASE = "msgflow.duckdb"
@@ -33,7 +34,6 @@ class FlightRecorder:
         *,
         most: int,
         window_ns: int,
-        links: Path | None,
         clock_sync: str,
         note: Callable[[str], None],
     ) -> None:
@@ -43,20 +43,23 @@ class FlightRecorder:
             directory: gets a directory per violation.
             most: how many of them stay.
             window_ns: length of a window.
-            links: file with indirect links to declare.
             clock_sync: how clocks of several hosts are brought together, as `ingest` takes it.
             note: gets a sentence about what was kept, or why not.
         """
         self._directory = directory
         self._most = most
         self._window_ns = window_ns
-        self._links = links
         self._clock_sync = clock_sync
         self._note = note
         self._until_ns = 0
 
     def keep(
-        self, end_ns: int, traces: KeptTraces, chunks: Sequence[Path], learned: str | None
+        self,
+        end_ns: int,
+        traces: KeptTraces,
+        chunks: Sequence[Path],
+        links: LinksFile | None,
+        learned: str | None,
     ) -> None:
         """Keep the last chunks, unless a violation in the same window has kept them.
 
@@ -64,7 +67,8 @@ class FlightRecorder:
             end_ns: until when they were recorded.
             traces: their events, with the names of all objects.
             chunks: their directories; of those that are gone only the events are kept.
-            learned: a file of links that earlier windows have shown, if any are needed.
+            links: all that are declared, with those that were learned.
+            learned: a file of the latter, which is kept, too; None if there are none.
         """
         if end_ns < self._until_ns:
             return
@@ -80,11 +84,13 @@ class FlightRecorder:
                 if chunk.is_dir():
                     session = chunk.parents[1].relative_to(common)
                     shutil.copytree(chunk, target / "archives" / session / chunk.name)
+            if learned is not None:
+                (target / LEARNED_FILE).write_text(learned, encoding="utf-8")
             ingest(
                 [target],
                 target / _DATABASE,
                 name=target.name,
-                links=write_learned(target, self._links, learned),
+                links=links,
                 clock_sync=self._clock_sync,
                 traces=traces,
             )

@@ -13,7 +13,7 @@ from msgflow.yaml_file import quoted
 if TYPE_CHECKING:
     import duckdb
 
-_FILE = "links.yaml"
+LEARNED_FILE = "links.yaml"
 _PAIRS = """
 SELECT
     n.full_name, o.pid, h.hostname, s.topic_name, p.topic_name,
@@ -86,20 +86,5 @@ class LearnedAnswers:
 
 def with_learned(links: LinksFile | None, learned: str) -> LinksFile:
     """Return links that a user declared, if any, with those that were learned."""
-    file = read_links(Path(_FILE), learned)
+    file = read_links(Path(LEARNED_FILE), learned)
     return file if links is None else replace(links, links=(*links.links, *file.links))
-
-
-def write_learned(directory: Path, links: Path | None, learned: str | None) -> Path | None:
-    """Write a file of what was learned, and return it; a file of the user is enough.
-
-    Args:
-        directory: where to write.
-        links: the file that a user declared.
-        learned: what was learned, if anything.
-    """
-    if links is not None or learned is None:
-        return links
-    path = directory / _FILE
-    path.write_text(learned, encoding="utf-8")
-    return path

@@ -86,7 +86,9 @@ class Watcher:
         self._clock_offset_ns = _clock_offset_ns()
         self._clock_step_ns = 0
         self._answers = LearnedAnswers()
-        self._violated: tuple[int, KeptTraces, list[Path], str | None] | None = None
+        self._violated: tuple[int, KeptTraces, list[Path], LinksFile | None, str | None] | None = (
+            None
+        )
         self._after = Continuation()
         self.numbers: dict[Path, int] = {}
 
@@ -156,11 +158,12 @@ class Watcher:
     def _con(self) -> duckdb.DuckDBPyConnection:
         return database_in_memory()
 
-    def _ingest(self, traces: KeptTraces) -> str | None:
+    def _ingest(self, traces: KeptTraces) -> tuple[LinksFile | None, str | None]:
         """Ingest what a window needs; links of nodes that are not there yet are left out.
 
         Returns:
-            A file of links that were learned from earlier windows; None if none are needed.
+            The links that are declared in it, and a file of those of them that were learned from
+            earlier windows; None if there are none.
         """
         try:
             ingest_again(self._con, traces, _RUN, links=self._links, clocks=self._clocks)
@@ -173,11 +176,12 @@ class Watcher:
             ingest_again(self._con, traces, _RUN, links=None, clocks=self._clocks)
         else:
             self._lacks_links = False
+        links = None if self._lacks_links else self._links
         learned = self._answers.doubted(self._con)
         if learned is not None:
-            declared = None if self._lacks_links else self._links
-            link_again(self._con, links=with_learned(declared, learned), clocks=self._clocks)
-        return learned
+            links = with_learned(links, learned)
+            link_again(self._con, links=links, clocks=self._clocks)
+        return links, learned
 
     def _lag_s(self) -> float:
         """Return how old the last event is; the tracer knows nothing of a clock that was set."""
@@ -193,7 +197,7 @@ class Watcher:
 
     def _report(self, window: Window, *, is_final: bool, is_live: bool) -> WindowReport:
         traces = self.history.traces(window)
-        learned = self._ingest(traces)
+        links, learned = self._ingest(traces)
         report = report_of(self._con, window, is_final=is_final)
         if self._alarm is not None:
             # What came after the window counts, too: an alarm must be early.
@@ -205,10 +209,10 @@ class Watcher:
             start_ns = window.start_ns if since_ns is None else since_ns
             self._exporter.count(self._con, Window(start_ns, window.end_ns))
         if self._database is not None:
-            self._database.offer(window.end_ns, traces, learned)
+            self._database.offer(window.end_ns, traces, links)
         if report.violations:
             paths = self.history.paths(window)
-            self._violated = (self.history.border_ns, traces, paths, learned)
+            self._violated = (self.history.border_ns, traces, paths, links, learned)
         self.history.note_longest(report.longest_ns)
         if is_live:
             report = replace(report, lag_s=self._lag_s())

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 from msgflow.db import empty_database
 from msgflow.ingest import ingest
-from msgflow.watch.learned_answers import write_learned
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from msgflow.links import LinksFile
     from msgflow.watch.kept_traces import KeptTraces
 
 
@@ -24,49 +24,46 @@ class WindowDatabase:
     goes on with the window that it shows.
     """
 
-    def __init__(self, path: Path, *, links: Path | None, clock_sync: str) -> None:
+    def __init__(self, path: Path, *, clock_sync: str) -> None:
         """Write a database without a run.
 
         Args:
             path: of the file, which does not exist yet.
-            links: file with indirect links to declare.
             clock_sync: how clocks of several hosts are brought together, as `ingest` takes it.
         """
         self.path = path
         self._prepared = path.with_name(f"next-{path.name}")
-        self._links = links
         self._clock_sync = clock_sync
-        # Of the last window that is not prepared yet: when it ended, its events, learned links.
-        self._last: tuple[int, KeptTraces, str | None] | None = None
+        # Of the last window that is not prepared yet: when it ended, its events, declared links.
+        self._last: tuple[int, KeptTraces, LinksFile | None] | None = None
         # The watcher has another thread than the pages.
         self._lock = Lock()
         empty_database.write_empty(path)
 
-    def offer(self, end_ns: int, traces: KeptTraces, learned: str | None) -> None:
+    def offer(self, end_ns: int, traces: KeptTraces, links: LinksFile | None) -> None:
         """Take over a further window.
 
         Args:
             end_ns: when it ended.
             traces: its events, with those around it.
-            learned: a file of links that earlier windows have shown, if any are needed.
+            links: all that are declared, with those that were learned.
         """
         with self._lock:
-            self._last = (end_ns, traces, learned)
+            self._last = (end_ns, traces, links)
 
     def prepare(self) -> None:
         """Write the last window beside the database, unless that was done before.
 
         Raises:
-            MsgflowError: it cannot be written, or the links do not fit it.
+            MsgflowError: it cannot be written.
         """
         with self._lock:
             last, self._last = self._last, None
         if last is None:
             return
-        end_ns, traces, learned = last
+        end_ns, traces, links = last
         name = time.strftime("window-%Y%m%d-%H%M%S", time.gmtime(end_ns // 1_000_000_000))
         self._prepared.unlink(missing_ok=True)
-        links = write_learned(self.path.parent, self._links, learned)
         ingest(
             [name], self._prepared, name=name, links=links, clock_sync=self._clock_sync,
             traces=traces,

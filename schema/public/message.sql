@@ -17,7 +17,8 @@
 -- column: candidate_count BIGINT  Publications that it may have been; more than 1: a guess; NULL:
 --     no publication is known, or no take
 -- column: is_loss_affected BOOLEAN  A gap of the trace may have changed it
--- column: is_internal BOOLEAN  ROS uses the topic for itself
+-- column: is_internal BOOLEAN  ROS uses the topic for itself; or the middleware sent the message
+--     for itself, past rcl
 SELECT
     t.take_id,
     coalesce(t.run_id, b.run_id) AS run_id,
@@ -32,7 +33,11 @@ SELECT
     b.publication_id,
     l.candidate_count,
     coalesce(l.is_loss_affected, t.is_loss_affected, b.is_loss_affected) AS is_loss_affected,
-    coalesce(s.is_internal, o.is_internal, false) AS is_internal
+    coalesce(
+        s.is_internal,
+        o.is_internal,
+        t.take_id IS NULL AND coalesce(b.intra_ns, b.rclcpp_ns, b.rcl_ns, b.publisher_id) IS NULL
+    ) AS is_internal
 FROM main.take AS t
 LEFT JOIN main.subscription AS s ON t.subscription_id = s.subscription_id
 LEFT JOIN main.node AS n ON s.node_id = n.node_id

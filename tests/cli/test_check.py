@@ -139,9 +139,23 @@ def test_findings_of_several_runs_say_which(msgflow: Msgflow, database: Path) ->
 def test_runs_of_a_label_are_several_runs(msgflow: Msgflow, database: Path) -> None:
     labels = {"labels": "['site=berlin']"}
     add(database, "run", *({"run_id": n, "name": f"other {n}"} | labels for n in ("2", "3")))
-    text = msgflow("check", "--run", "site=berlin", "--db", database).stdout
-    assert "   run other 2 (2): everything — nothing was published" in text
-    assert "   run other 3 (3): everything — nothing was published" in text
+    result = msgflow("check", "--run", "site=berlin", "--db", database)
+    assert "   run other 2 (2): everything — nothing was published" in result.stdout
+    assert "   run other 3 (3): everything — nothing was published" in result.stdout
+
+
+def test_the_next_step_is_about_one_run(msgflow: Msgflow, database: Path) -> None:
+    def steps(*run: str) -> list[str]:
+        lines = msgflow("check", *run, "--db", database).stderr.splitlines()
+        return [line.partition(" --db")[0] for line in lines if line.startswith("next: ")]
+
+    assert steps("--run", "all") == ["next: msgflow why --run 1"]
+    add(database, "run", {"run_id": "2", "name": "second"})
+    add(database, "run", {"run_id": "3", "name": "third"})
+    # Nothing was published in both: the first of them.
+    assert steps("--run", "all") == ["next: msgflow why --run 2"]
+    assert steps("--run", "third") == ["next: msgflow why --run 3"]
+    assert steps() == ["next: msgflow why"]
 
 
 def test_a_database_without_runs(msgflow: Msgflow, fresh_database: Path) -> None:

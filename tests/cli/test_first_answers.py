@@ -110,8 +110,18 @@ def test_why_says_that_messages_end_at_a_node(ask: Msgflow) -> None:
         said = " ".join(ask("real_reference", *words).stderr.split())
         assert "note: 49 messages on /boxes end at /object_fusion, which publishes" in said
         assert "next: msgflow suggest links --db" in said
+    said = ask("real_reference", "why", "--run", "real_reference").stderr
+    assert "next: msgflow suggest links --run real_reference --db" in said
     said = ask("real_reference", "why", "/vehicle").stderr
     assert "suggest links" not in said
+
+
+def test_why_asks_for_nothing_without_a_name(ask: Msgflow) -> None:
+    said = ask("real_late", "why").stderr.splitlines()
+    steps = [line.partition(" --db ")[0] for line in said if line.startswith("next: ")]
+    assert steps[0] == "next: msgflow suggest links"
+    for step in steps:
+        ask("real_late", *step.split()[2:])
 
 
 QUERIES = [header for header in load_queries() if header.brief]
@@ -172,6 +182,10 @@ def test_messages_are_all_that_were_published(real: Callable[[str], Path], name:
             "SELECT count(DISTINCT m.publication_id), (SELECT count(*) FROM publication), "
             "count(DISTINCT m.take_id), count(*) FROM message AS m"
         ).fetchall()
+        ((unnamed,),) = connection.execute(
+            "SELECT count(*) FROM message JOIN publication USING (publication_id) "
+            "WHERE topic_name IS NULL AND rmw_ns > 0 AND rcl_ns IS NULL AND NOT is_internal"
+        ).fetchall()
         ((all_takes, untaken),) = connection.execute(
             "SELECT (SELECT count(*) FROM take), count(*) FROM publication "
             "WHERE publication_id NOT IN (SELECT publication_id FROM link_transport)"
@@ -180,6 +194,8 @@ def test_messages_are_all_that_were_published(real: Callable[[str], Path], name:
     assert takes == all_takes
     assert rows == takes + untaken
     assert untaken > 0
+    # The middleware speaks, too: its messages are not those of a node.
+    assert unnamed == 0
 
 
 def test_an_export_says_where_to_start(ask: Msgflow) -> None:

@@ -82,6 +82,24 @@ def test_with_a_file_it_says_what_failed(demo: Msgflow, tmp_path: Path, name: st
     assert summary == "1 passed, 1 failed, 0 not measured, 0 no data"
 
 
+def test_a_narrow_table_leaves_no_requirement_without_a_name(
+    demo: Msgflow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    file = tmp_path / "targets.yaml"
+    file.write_text(
+        "targets:\n  - topic: /imu/data\n    rate: 1 Hz ± 5 %\n"
+        "  - topic: /gone\n    rate: 10 Hz ± 5 %\n"
+    )
+    result = demo("verify", file)
+    assert result.exit_code == 1
+    said = " ".join(result.stderr.split())
+    assert "not measured: /gone: rate 10 Hz ± 5 %: the run has no such topic — /gone" in said
+    # The table names what failed.
+    assert "failed: " not in said
+    assert "failed" in result.stdout
+
+
 def test_several_runs_are_refused(demo: Msgflow, tmp_path: Path) -> None:
     with duckdb.connect("msgflow.duckdb") as connection:
         connection.execute(

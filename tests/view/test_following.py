@@ -21,7 +21,7 @@ Followed = tuple[str, Iterator[WindowReport]]
 @pytest.fixture
 def followed(shared_traces: Path, tmp_path: Path) -> Iterator[Followed]:
     """The address of pages, and the windows that they show."""
-    database = WindowDatabase(tmp_path / "window.duckdb", links=None, clock_sync="none")
+    database = WindowDatabase(tmp_path / "window.duckdb", clock_sync="none")
     watcher = Watcher(
         window_ns=2 * SECOND,
         step_ns=2 * SECOND,
@@ -79,6 +79,25 @@ def test_pages_move_on_until_somebody_looks_closer(page: Page, followed: Followe
 
     follow.click()
     wait_for_another(page, second)
+
+
+def test_a_page_that_is_left_while_the_next_one_comes_hears_no_keys(
+    page: Page, followed: Followed
+) -> None:
+    """Those of the timeline are letters, which somebody may type elsewhere."""
+    address, windows = followed
+    page.open(f"{address}#/timeline")
+    next(windows)
+    wait_for_another(page, "no run")
+    # The next one does not come.
+    page.page.route("**/api/segments*", lambda route: None)
+    next(windows)
+    page.page.wait_for_selector(".next", state="attached", timeout=60_000)
+    page.go("#/sql")
+    editor = page.page.locator(".cm-content")
+    editor.click()
+    page.page.keyboard.type("sandwiches")
+    assert "sandwiches" in editor.inner_text()
 
 
 def test_a_window_is_written_only_if_somebody_asks(followed: Followed, tmp_path: Path) -> None:

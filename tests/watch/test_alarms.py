@@ -143,11 +143,11 @@ def test_sessions_of_one_name_on_two_hosts_are_kept(tmp_path: Path) -> None:
     read = [read_chunk(chunk, Continuation()) for chunk in chunks]
     notes: list[str] = []
     recorder = FlightRecorder(
-        tmp_path / "kept", most=1, window_ns=SECOND, links=None, clock_sync="none",
+        tmp_path / "kept", most=1, window_ns=SECOND, clock_sync="none",
         note=notes.append,
     )  # fmt: skip
     traces = KeptTraces([], [chunk for chunk in read if chunk is not None])
-    recorder.keep(SECOND, traces, [chunk.path for chunk in chunks], None)
+    recorder.keep(SECOND, traces, [chunk.path for chunk in chunks], None, None)
     assert notes[0].startswith("kept: ")
     assert len(list((tmp_path / "kept").glob("*/archives/*/drive/chunk-0"))) == 2
 

@@ -6,10 +6,12 @@ import os
 import pty
 import re
 import select
+import subprocess
 import sys
 import termios
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -61,10 +63,27 @@ def test_keys_sort_and_pick_a_path(terminal: Terminal) -> None:
     terminal.wait_for("missing▾")
     terminal.press(b"s")
     terminal.wait_for("max▾")
-    terminal.press(b"\x1b[B")
-    terminal.wait_for("flows: ")
+    # Of a key that is held, several come at once.
+    terminal.press(b"sss\x1b[B\x1b[B")
+    shown = terminal.wait_for("flows: ")
+    assert "p99▾" in shown
+    assert "/s▾" in shown
     # Other keys do nothing, and Ctrl-C ends the view.
     terminal.press(b"z")
     assert terminal.end() == 0
     # What is typed next is shown again.
     assert termios.tcgetattr(terminal.side) == terminal.before
+
+
+def test_a_terminal_that_controls_no_session_has_no_keys(shared_traces: Path) -> None:
+    side, other = pty.openpty()
+    directory = str(shared_traces / "real_rotate")
+    command = [sys.executable, "-m", "msgflow", "watch", "--once", directory]
+    with subprocess.Popen(command, stdin=other, stdout=other, start_new_session=True) as run:
+        os.close(other)
+        # The terminal fails when its program has ended.
+        with suppress(OSError):
+            while os.read(side, 65536):
+                pass
+    os.close(side)
+    assert run.returncode == 0

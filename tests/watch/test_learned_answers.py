@@ -9,6 +9,7 @@ import pytest
 
 from msgflow.clocks import read_clock_sync
 from msgflow.database import Database
+from msgflow.links import read_links
 from msgflow.watch import Watcher, WindowDatabase, watch_finished
 from msgflow.watch.learned_answers import LearnedAnswers, with_learned
 
@@ -54,17 +55,26 @@ def test_what_most_windows_have_shown_counts_where_one_doubts_it() -> None:
     assert doubted(2) is None
 
 
+@pytest.mark.parametrize(
+    "of_user",
+    [
+        None,
+        "links: [{kind: direct, node: /filter, inputs: [/scan], outputs: [/rosout]}]",
+        "links: [{kind: direct, node: /later, inputs: [/scan], outputs: [/filtered]}]",
+    ],
+    ids=["alone", "beside_others", "beside_others_that_do_not_fit"],
+)
 def test_what_is_learned_is_declared(
-    shared_traces: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    shared_traces: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, of_user: str | None
 ) -> None:
     """Here the contrary of what is true, to see it, also in what is kept of a window."""
     declared = "links: [{kind: independent, node: /filter, inputs: [/scan], outputs: [/filtered]}]"
     monkeypatch.setattr(LearnedAnswers, "doubted", lambda self, con: declared)
-    database = WindowDatabase(tmp_path / "window.duckdb", links=None, clock_sync="none")
+    database = WindowDatabase(tmp_path / "window.duckdb", clock_sync="none")
     watcher = Watcher(
         window_ns=8 * SECOND,
         step_ns=8 * SECOND,
-        links=None,
+        links=None if of_user is None else read_links(Path("links.yaml"), of_user),
         clocks=read_clock_sync("none"),
         note=print,
         database=database,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import select
 import sys
 from contextlib import contextmanager
@@ -17,8 +18,9 @@ except ImportError:  # Windows has no such terminals
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-# What terminals send.
-_NAMES = {b"\x1b[A": "up", b"\x1b[B": "down", b"\x1bOA": "up", b"\x1bOB": "down", b"\x1b": "escape"}
+# What terminals send: of a key that is held, several times at once.
+_KEY = re.compile(r"\x1b[\[O][\d;]*[A-Za-z~]|.", re.DOTALL)
+_NAMES = {"\x1b[A": "up", "\x1b[B": "down", "\x1bOA": "up", "\x1bOB": "down", "\x1b": "escape"}
 _MOST_BYTES = 64
 
 
@@ -56,8 +58,12 @@ def noted_keys(pressed: Callable[[str], None]) -> Iterator[None]:
 def _has_keys() -> bool:
     if termios is None or sys.stdin is None or not sys.stdin.isatty():
         return False
-    # Another program has the terminal if this one was started with &.
-    return os.tcgetpgrp(sys.stdin.fileno()) == os.getpgrp()
+    try:
+        # Another program has the terminal if this one was started with &.
+        return os.tcgetpgrp(sys.stdin.fileno()) == os.getpgrp()
+    except OSError:
+        # It controls another session, or none.
+        return False
 
 
 def _read(terminal: int, ended: int, pressed: Callable[[str], None]) -> None:
@@ -65,4 +71,5 @@ def _read(terminal: int, ended: int, pressed: Callable[[str], None]) -> None:
         ready, _, _ = select.select([terminal, ended], [], [])
         if ended in ready or not (sent := os.read(terminal, _MOST_BYTES)):
             return
-        pressed(_NAMES.get(sent) or sent.decode(errors="replace")[0])
+        for key in _KEY.findall(sent.decode(errors="replace")):
+            pressed(_NAMES.get(key, key))

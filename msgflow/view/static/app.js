@@ -106,6 +106,8 @@ class App {
   constructor(source) {
     this.source = source;
     this.steps = [];
+    // The page that is shown, and the one that comes next.
+    this.open = [];
   }
 
   async start() {
@@ -205,9 +207,8 @@ class App {
     if (!Page) { go({ page: Object.keys(this.pages)[0] }); return; }
     this.linksMoved();
     document.title = `${title} – ${this.run?.name ?? "msgflow"}`;
-    const before = this.page;
     if (!isNext) {
-      before?.leave?.();
+      this.leaveAllBut(null);
       clear(this.main, waiting());
     }
     if (!this.run) {
@@ -226,6 +227,7 @@ class App {
     if (isNext) this.main.append(root); else clear(this.main, root);
     const page = new Page(this, root);
     this.page = page;
+    this.open.push(page);
     try {
       await page.ready;
       if (isNext) await page.complete;
@@ -234,11 +236,16 @@ class App {
     }
     // Meanwhile somebody may have gone to another page.
     if (isNext && this.page === page) {
-      before?.leave?.();
+      this.leaveAllBut(page);
       root.className = "";
       this.main.replaceChildren(root);
     }
     this.done();
+  }
+
+  leaveAllBut(page) {
+    for (const each of this.open) if (each !== page) each.leave?.();
+    this.open = this.open.filter((each) => each === page);
   }
 
   // For tests and benchmarks: when the page stands, and how long each drawing took [ms].
