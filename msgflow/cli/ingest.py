@@ -129,6 +129,7 @@ def command(
                         f"{len(recordings)} recordings, whose times do not overlap, become as many"
                         " runs: --together makes one"
                     )
+            reports = []
             for recording in recordings:
                 report = opened.ingest(
                     recording.paths,
@@ -144,13 +145,14 @@ def command(
                     events=events or [],
                     progress=progress,
                 )
+                reports.append(report)
                 if not quiet:
                     _print_report(report, database)
                 for warning in report.warnings:
                     print_note(warning)
             if not quiet:
                 _note_archives(traces, database)
-                _print_next(report, database)
+                _print_next(reports, database)
 
 
 def _note_archives(traces: list[str], database: Path) -> None:
@@ -200,11 +202,17 @@ def _print_report(report: IngestReport, database: Path) -> None:
             print_note(f"{name}: {len(places) - PLACES_SHOWN} more places: msgflow check")
 
 
-def _print_next(report: IngestReport, database: Path) -> None:
+def _print_next(reports: list[IngestReport], database: Path) -> None:
     from msgflow.cli.output import print_next
     from msgflow.db.finding import next_command
 
-    print_next(next_command(report.findings).split(), database)
+    words = next_command([each for report in reports for each in report.findings]).split()
+    if len(reports) == 1:
+        print_next(words, database)
+    else:
+        # Of several runs, `why` explains one.
+        several = words if words[-1] == "check" else ["msgflow", "query", "e2e-latency"]
+        print_next(several, database, "all")
 
 
 def _hosts(texts: list[str]) -> dict[str, list[str]]:

@@ -105,7 +105,7 @@ def explain(
     losses = _chosen(
         ask("topics-delivery"),
         lambda row: (
-            row["topic_name"] in places
+            (row["topic_name"] or _UNNAMED) in places
             and row["subscriber"] in places
             and row["delivered"] < row["published"]
         ),
@@ -271,5 +271,6 @@ def _steps(
         yield ("query", *of_topic, "--topic", longest["what"])
     yield ("flow", "--take", str(pieces[0]["take_id"]), "--why")
     if len(losses):
-        topics = sorted(set(losses.table["topic_name"].to_pylist()))
-        yield ("query", "topics", "--measure", "unmatched", "--topic", ",".join(topics))
+        topics = set(losses.table["topic_name"].to_pylist())
+        named = () if None in topics else ("--topic", ",".join(sorted(topics)))
+        yield ("query", "topics", "--measure", "unmatched", *named)

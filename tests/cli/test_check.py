@@ -68,7 +68,7 @@ def test_nothing_is_wrong(msgflow: Msgflow, database: Path) -> None:
     assert result.stdout == ""
     said, next_steps = result.stderr.split("next: ", maxsplit=1)
     assert said == "nothing is wrong with the recording\n"
-    assert next_steps.startswith("msgflow ")
+    assert next_steps == f"msgflow why --db {database}\n"
 
 
 def test_warnings_leave_the_exit_code_at_0(msgflow: Msgflow, database: Path) -> None:
@@ -85,7 +85,7 @@ def test_warnings_leave_the_exit_code_at_0(msgflow: Msgflow, database: Path) -> 
     ]
     said, next_steps = result.stderr.split("next: ", maxsplit=1)
     assert said == "0 errors, 1 warning\n"
-    assert next_steps.startswith("msgflow ")
+    assert next_steps == f"msgflow why --db {database}\n"
 
 
 def test_errors_make_it_1_and_come_first(msgflow: Msgflow, database: Path) -> None:
@@ -101,7 +101,7 @@ def test_errors_make_it_1_and_come_first(msgflow: Msgflow, database: Path) -> No
     assert "--subbuf-size=128K" in result.stdout
     said, next_steps = result.stderr.split("next: ", maxsplit=1)
     assert said == "1 error, 1 warning\n"
-    assert next_steps.startswith("msgflow ")
+    assert next_steps == f"msgflow why --db {database}\n"
 
 
 def test_json_has_every_place_under_the_number_of_its_finding(
@@ -163,7 +163,7 @@ def test_a_database_without_runs(msgflow: Msgflow, fresh_database: Path) -> None
     assert result.exit_code == 0
     said, next_steps = result.stderr.split("next: ", maxsplit=1)
     assert said == "nothing is wrong with the recording\n"
-    assert next_steps.startswith("msgflow ")
+    assert next_steps == f"msgflow ingest TRACE --db {fresh_database}\n"
 
 
 def test_broken_rules_of_the_database_are_shown_alike(
@@ -181,7 +181,7 @@ def test_broken_rules_of_the_database_are_shown_alike(
     assert "2. error: A word is not of the vocabulary (vocabulary_is_closed)" in lines
     said, next_steps = result.stderr.split("next: ", maxsplit=1)
     assert said == "2 errors, 1 warning\n"
-    assert next_steps.startswith("msgflow ")
+    assert next_steps == f"msgflow why --db {fresh_database}\n"
     rows = json.loads(
         msgflow("check", "--detail", "--format", "json", "--db", fresh_database).stdout
     )

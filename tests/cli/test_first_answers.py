@@ -206,10 +206,6 @@ def test_an_export_says_where_to_start(ask: Msgflow) -> None:
     assert "note:" not in ask("real_tiny", "export", "csv", "node", "-o", "one").stderr
 
 
-def test_a_share_is_written_in_one_way(ask: Msgflow) -> None:
-    assert "<0.001" not in ask("real_reference", "query", "path-breakdown").stdout
-
-
 def test_suggestions_say_how_to_keep_them(ask: Msgflow) -> None:
     for words, step in (
         (("targets",), "suggest targets -o targets.yaml"),

@@ -48,10 +48,11 @@ def test_recordings_of_different_times_are_runs_of_their_own(
     msgflow: Msgflow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     given = []
+    wrong: list[Finding] = []
 
     def ingest(paths: object, *_: object, **__: object) -> IngestReport:
         given.append(paths)
-        return IngestReport(len(given), f"run{len(given)}", (), 9, {"reading": 1.0})
+        return IngestReport(len(given), f"run{len(given)}", tuple(wrong), 9, {"reading": 1.0})
 
     recordings = [Recording([tmp_path / name], {}) for name in ("a", "b")]
     monkeypatch.setattr("msgflow.ingest.ingest", ingest)
@@ -62,12 +63,17 @@ def test_recordings_of_different_times_are_runs_of_their_own(
         "note: 2 recordings, whose times do not overlap, become as many runs: --together makes one"
     )
     assert ["as run run1 (1)" in said[1], "as run run2 (2)" in said[2]] == [True, True]
+    every = f"--run all --db {tmp_path / 'x.duckdb'}"
+    assert said[-1] == f"next: msgflow query e2e-latency {every}"
     assert msgflow("ingest", tmp_path, *database, "--quiet").stderr == ""
     for option in ("--name", "--keep-staging"):
         refused = msgflow("ingest", tmp_path, *database, option, "x")
         assert refused.exit_code == 2
         assert f"{option} is for one run" in refused.stderr
     assert given == [[tmp_path / "a"], [tmp_path / "b"]] * 2
+    wrong.append(finding("lost_packets", 3, "robot/ust", trace_id=1))
+    said = msgflow("ingest", tmp_path, *database).stderr.splitlines()
+    assert said[-1] == f"next: msgflow check {every}"
     given.clear()
     for options in (["--together"], ["--clock-sync", "messages"]):
         assert msgflow("ingest", tmp_path, *database, *options).exit_code == 0

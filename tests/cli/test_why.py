@@ -99,6 +99,22 @@ def _duration(row: dict[str, Any]) -> int:
     return duration
 
 
+def test_losses_on_topics_without_a_name_are_told(empty_database: Path, tmp_path: Path) -> None:
+    path = Path(shutil.copy(empty_database, tmp_path / "run.duckdb"))
+    case = Path(__file__).parents[1] / "query/cases/e2e-latency/lost_and_edge.case"
+    losses = []
+    with duckdb.connect(str(path)) as connection:
+        fill_case(connection, case)
+    for named in (True, False):
+        if not named:
+            with duckdb.connect(str(path)) as connection:
+                for table in ("publisher", "subscription"):
+                    connection.execute(f"UPDATE store.{table} SET topic_name = NULL")
+        with Database(path) as database:
+            losses.append(database.why().losses.table.drop(["topic_name"]).to_pylist())
+    assert losses[0] == losses[1] != []
+
+
 def test_without_a_place_it_is_the_path_of_the_slowest_flow(demo: Path) -> None:
     with Database(demo) as database:
         longest = max(row["max_ns"] or 0 for row in database.query("e2e-latency").table.to_pylist())
