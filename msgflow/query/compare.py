@@ -388,6 +388,11 @@ def _doubts(
                 f" events: {affected} of its {_UNITS[what]} have a gap in their time, others may be"
                 " missing altogether"
             )
+    if any(row["verdict"] == "too few independent values" for row in rows):
+        yield (
+            "values that follow each other are alike, so that they count as few independent ones:"
+            " longer recordings tell more; a_independent and b_independent of --wide say how many"
+        )
     if any(row["verdict"] in ("B is longer", "B is shorter") for row in rows):
         yield (
             "longer and shorter are said of these two recordings; the same system started again"

@@ -258,8 +258,9 @@ def test_each_statistic_is_worth_what_lies_beyond_it(fresh_database: Path) -> No
 def test_what_is_alike_all_along_has_no_interval(fresh_database: Path) -> None:
     _fill(fresh_database, shift_ns=1_000_000, callbacks=10, values=320, held=80)
     with msgflow.open_db(fresh_database) as database:
-        rows = _rows(database, "after", resamples=400)
-    for row in rows:
+        found = database.compare("before", "after", what="callbacks", resamples=400).result
+    assert any(note.startswith("values that follow each other are alike") for note in found.notes)
+    for row in found.to_arrow().to_pylist():
         if row["statistic"] in ("median", "mean"):
             assert row["verdict"] == "too few independent values"
             assert (row["low_ns"], row["high_ns"]) == (None, None)
