@@ -28,6 +28,7 @@ from msgflow.errors import ExitCode, RecordingError
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+    from msgflow.links import LinksFile
     from msgflow.live import Status
     from msgflow.sql.interrupt import Interrupts
     from msgflow.watch import Alarm, WindowDatabase, WindowReport
@@ -132,6 +133,7 @@ def command(
 
     step_ns = duration_ns(step, "--step")
     window_ns = duration_ns(window, "--window")
+    declared = None if links is None else read_links(links)
     alarm = None if targets is None else _alarm(targets, paths)
     recorder = None
     if keep is not None:
@@ -139,7 +141,7 @@ def command(
             keep.absolute(),
             most=most_kept,
             window_ns=window_ns,
-            links=links,
+            links=declared,
             clock_sync=clock_sync,
             note=print_note,
         )
@@ -147,11 +149,11 @@ def command(
     if prometheus is not None:
         exporter = Exporter()
         exporter.serve(prometheus)
-    with _pages(ui, links, clock_sync) as database, ExitStack() as stack:
+    with _pages(ui, declared, clock_sync) as database, ExitStack() as stack:
         watcher = Watcher(
             window_ns=window_ns,
             step_ns=step_ns,
-            links=None if links is None else read_links(links),
+            links=declared,
             clocks=read_clock_sync(clock_sync),
             note=print_note,
             alarm=alarm,
@@ -183,8 +185,8 @@ def command(
             show(watch_finished(place, watcher))
         elif len(words) == 1 and (source := _source(words[0], place)) is not None:
             found, session = source
-            with _rotated(session, step_ns), _until_interrupted() as interrupts:
-                is_over = _session_is_over(session)
+            with _rotated(session, step_ns) as go_on, _until_interrupted() as interrupts:
+                is_over = _session_is_over(session, go_on)
 
                 def ends() -> bool:
                     interrupts.check()
@@ -205,7 +207,7 @@ def command(
 
 @contextmanager
 def _pages(
-    port: int | None, links: Path | None, clock_sync: str
+    port: int | None, links: LinksFile | None, clock_sync: str
 ) -> Iterator[WindowDatabase | None]:
     """Serve pages of the last window during the block, unless there is no port for them."""
     from msgflow.cli.output import print_status
@@ -288,11 +290,11 @@ def _record(
         print_note(f"{words[0]} ended with exit code {recorded.exit_code}")
 
 
-def _rotated(session: str | None, step_ns: int) -> AbstractContextManager[None]:
-    """Let a session rotate during a block, if there is one."""
+def _rotated(session: str | None, step_ns: int) -> AbstractContextManager[Callable[[], None]]:
+    """Let a session rotate during a block, if there is one, as `rotated` does."""
     from msgflow.live import rotated
 
-    return nullcontext() if session is None else rotated(session, step_ns)
+    return nullcontext(lambda: None) if session is None else rotated(session, step_ns)
 
 
 @contextmanager
@@ -333,8 +335,13 @@ def _source(word: str, place: Path) -> tuple[Path, str | None] | None:
     return place, next(below, None)
 
 
-def _session_is_over(name: str | None) -> Callable[[], bool]:
-    """Return a function that tells whether a session has ended; without one, nothing tells."""
+def _session_is_over(name: str | None, go_on: Callable[[], None]) -> Callable[[], bool]:
+    """Return a function that tells whether a session has ended; without one, nothing tells.
+
+    Args:
+        name: of the session.
+        go_on: keeps it rotating, while it is there.
+    """
     from msgflow.live import sessions
 
     last = time.monotonic()
@@ -350,6 +357,8 @@ def _session_is_over(name: str | None) -> Callable[[], bool]:
         except RecordingError:
             is_there = False
         absences = 0 if is_there else absences + 1
+        if is_there:
+            go_on()
         # The last chunk may come half a second after its session has gone.
         return absences > 1
 

@@ -97,7 +97,7 @@ def ingest(
     replace: bool = False,
     hosts: Mapping[str, str | Path | Sequence[str | Path]] | None = None,
     keep_staging: Path | None = None,
-    links: Path | None = None,
+    links: Path | LinksFile | None = None,
     clock_sync: str | Path = "none",
     reader: str = "auto",
     strict: bool = False,
@@ -121,7 +121,7 @@ def ingest(
         hosts: name of a host -> path or paths; the traces below belong to that host. Where several
             paths lead to a trace, the deepest counts.
         keep_staging: directory to which the staged events are written as Parquet.
-        links: file with indirect links to declare.
+        links: file with indirect links to declare, or what was read of one.
         clock_sync: how clocks of several hosts are brought together: 'none', 'messages', or a file
             with the offset of each.
         reader: which reader to use: 'auto', 'msgflow' or 'bt2'.
@@ -144,7 +144,7 @@ def ingest(
         KeyboardInterrupt: Ctrl-C came before the run was stored.
     """
     _require_usable(paths, name)
-    declared = None if links is None else read_links(links)
+    declared = read_links(links) if isinstance(links, Path) else links
     clocks = read_clock_sync(clock_sync)
     if database.is_symlink():
         database = Path(os.path.realpath(database))

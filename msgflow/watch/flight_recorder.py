@@ -10,15 +10,17 @@ from typing import TYPE_CHECKING
 
 from msgflow.errors import MsgflowError
 from msgflow.ingest import ingest
-from msgflow.watch.learned_answers import write_learned
+from msgflow.watch.learned_answers import with_learned
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from pathlib import Path
 
+    from msgflow.links import LinksFile
     from msgflow.watch.kept_traces import KeptTraces
 
 _DATABASE = "msgflow.duckdb"
+_LEARNED = "links.yaml"
 
 
 class FlightRecorder:
@@ -33,7 +35,7 @@ class FlightRecorder:
         *,
         most: int,
         window_ns: int,
-        links: Path | None,
+        links: LinksFile | None,
         clock_sync: str,
         note: Callable[[str], None],
     ) -> None:
@@ -43,7 +45,7 @@ class FlightRecorder:
             directory: gets a directory per violation.
             most: how many of them stay.
             window_ns: length of a window.
-            links: file with indirect links to declare.
+            links: indirect links to declare.
             clock_sync: how clocks of several hosts are brought together, as `ingest` takes it.
             note: gets a sentence about what was kept, or why not.
         """
@@ -80,11 +82,13 @@ class FlightRecorder:
                 if chunk.is_dir():
                     session = chunk.parents[1].relative_to(common)
                     shutil.copytree(chunk, target / "archives" / session / chunk.name)
+            if learned is not None:
+                (target / _LEARNED).write_text(learned, encoding="utf-8")
             ingest(
                 [target],
                 target / _DATABASE,
                 name=target.name,
-                links=write_learned(target, self._links, learned),
+                links=with_learned(self._links, learned),
                 clock_sync=self._clock_sync,
                 traces=traces,
             )

@@ -13,7 +13,7 @@ from msgflow.yaml_file import quoted
 if TYPE_CHECKING:
     import duckdb
 
-_FILE = "links.yaml"
+_FILE = "learned links"
 _PAIRS = """
 SELECT
     n.full_name, o.pid, h.hostname, s.topic_name, p.topic_name,
@@ -84,22 +84,9 @@ class LearnedAnswers:
         return "\n".join(["links:", *(pair.entry for pair in doubted), ""])
 
 
-def with_learned(links: LinksFile | None, learned: str) -> LinksFile:
-    """Return links that a user declared, if any, with those that were learned."""
+def with_learned(links: LinksFile | None, learned: str | None) -> LinksFile | None:
+    """Return links that a user declared, if any, with those that were learned, if any."""
+    if learned is None:
+        return links
     file = read_links(Path(_FILE), learned)
     return file if links is None else replace(links, links=(*links.links, *file.links))
-
-
-def write_learned(directory: Path, links: Path | None, learned: str | None) -> Path | None:
-    """Write a file of what was learned, and return it; a file of the user is enough.
-
-    Args:
-        directory: where to write.
-        links: the file that a user declared.
-        learned: what was learned, if anything.
-    """
-    if links is not None or learned is None:
-        return links
-    path = directory / _FILE
-    path.write_text(learned, encoding="utf-8")
-    return path

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING
 
 from msgflow.db import empty_database
 from msgflow.ingest import ingest
-from msgflow.watch.learned_answers import write_learned
+from msgflow.watch.learned_answers import with_learned
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from msgflow.links import LinksFile
     from msgflow.watch.kept_traces import KeptTraces
 
 
@@ -24,12 +25,12 @@ class WindowDatabase:
     goes on with the window that it shows.
     """
 
-    def __init__(self, path: Path, *, links: Path | None, clock_sync: str) -> None:
+    def __init__(self, path: Path, *, links: LinksFile | None, clock_sync: str) -> None:
         """Write a database without a run.
 
         Args:
             path: of the file, which does not exist yet.
-            links: file with indirect links to declare.
+            links: indirect links to declare.
             clock_sync: how clocks of several hosts are brought together, as `ingest` takes it.
         """
         self.path = path
@@ -66,11 +67,14 @@ class WindowDatabase:
         end_ns, traces, learned = last
         name = time.strftime("window-%Y%m%d-%H%M%S", time.gmtime(end_ns // 1_000_000_000))
         self._prepared.unlink(missing_ok=True)
-        links = write_learned(self.path.parent, self._links, learned)
         ingest(
-            [name], self._prepared, name=name, links=links, clock_sync=self._clock_sync,
+            [name],
+            self._prepared,
+            name=name,
+            links=with_learned(self._links, learned),
+            clock_sync=self._clock_sync,
             traces=traces,
-        )  # fmt: skip
+        )
 
     def show(self) -> None:
         """Put the window that was prepared last in place of the database."""

@@ -9,6 +9,7 @@ import pytest
 
 from msgflow.clocks import read_clock_sync
 from msgflow.database import Database
+from msgflow.links import read_links
 from msgflow.watch import Watcher, WindowDatabase, watch_finished
 from msgflow.watch.learned_answers import LearnedAnswers, with_learned
 
@@ -43,7 +44,9 @@ def test_what_most_windows_have_shown_counts_where_one_doubts_it() -> None:
     assert [doubted(1, 1, 2), doubted(1, 2), doubted(1)] == [None] * 3
     learned = doubted(1, 2, 2)
     assert learned is not None
-    (link,) = with_learned(None, learned).links
+    declared = with_learned(None, learned)
+    assert declared is not None
+    (link,) = declared.links
     assert (link.kind, link.node.value) == ("direct", "/filter")
     assert (link.process.value, link.host.value) == ("42", "robot")
     assert ([each.value for each in link.inputs], [each.value for each in link.outputs]) == (
@@ -54,17 +57,23 @@ def test_what_most_windows_have_shown_counts_where_one_doubts_it() -> None:
     assert doubted(2) is None
 
 
+# What a user declares beside it, if anything.
+OWN = "links: [{kind: direct, node: /filter, inputs: [/scan], outputs: [/filtered]}]"
+
+
+@pytest.mark.parametrize("own", [None, OWN])
 def test_what_is_learned_is_declared(
-    shared_traces: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    shared_traces: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, own: str | None
 ) -> None:
     """Here the contrary of what is true, to see it, also in what is kept of a window."""
-    declared = "links: [{kind: independent, node: /filter, inputs: [/scan], outputs: [/filtered]}]"
-    monkeypatch.setattr(LearnedAnswers, "doubted", lambda self, con: declared)
-    database = WindowDatabase(tmp_path / "window.duckdb", links=None, clock_sync="none")
+    learned = "links: [{kind: independent, node: /filter, inputs: [/scan], outputs: [/filtered]}]"
+    monkeypatch.setattr(LearnedAnswers, "doubted", lambda self, con: learned)
+    links = None if own is None else read_links(tmp_path / "links.yaml", own)
+    database = WindowDatabase(tmp_path / "window.duckdb", links=links, clock_sync="none")
     watcher = Watcher(
         window_ns=8 * SECOND,
         step_ns=8 * SECOND,
-        links=None,
+        links=links,
         clocks=read_clock_sync("none"),
         note=print,
         database=database,
