@@ -11,6 +11,8 @@ from analysis import Analyse, Analysis
 from random_executor import random_executor
 from thorough import few
 
+from msgflow.run.window import Window
+
 KINDS = [(threads, with_events) for threads in (1, 2, 3) for with_events in (True, False)]
 SEEDS = range(3)
 ACTIVITIES = (
@@ -102,7 +104,12 @@ def a_window_has_the_activities_that_reach_into_it(model: Analysis) -> None:
     activities = model.rows(ACTIVITIES)
     breaks = model.rows("SELECT thread_id, resumed_ns FROM thread_break")
     moments = sorted({start for _, _, start, _, _ in activities})
-    for since, until in zip(moments[::9], moments[5::7], strict=False):
+    without_limits = Window()
+    windows = [
+        *zip(moments[::9], moments[5::7], strict=False),
+        (without_limits.start_ns, without_limits.end_ns),
+    ]
+    for since, until in windows:
         expected = set()
         for thread, activity, start, end, run in activities:
             # What began before, and ended in a gap before.

@@ -80,13 +80,18 @@ marked AS NOT MATERIALIZED (
         CASE WHEN step IN (1, 3) THEN event_id * 4 + step END AS run_mark
     FROM change
 ),
--- The window by the clock of each thread, which is rounded.
+-- The window by the clock of each thread, which is rounded. A window without limits has the least
+-- and the greatest number, from which nothing can be subtracted.
 extent AS (
     SELECT
         t.thread_id,
-        derive.recorded_ns(window_start_ns, p.offset_ns, p.drift_ppb, p.reference_ns) - 1
-            AS start_ns,
-        derive.recorded_ns(window_end_ns, p.offset_ns, p.drift_ppb, p.reference_ns) + 1 AS end_ns
+        derive.recorded_ns(
+            greatest(window_start_ns, -4611686018427387904),
+            p.offset_ns, p.drift_ppb, p.reference_ns
+        ) - 1 AS start_ns,
+        derive.recorded_ns(
+            least(window_end_ns, 4611686018427387904), p.offset_ns, p.drift_ppb, p.reference_ns
+        ) + 1 AS end_ns
     FROM store.thread AS t
     JOIN derive.process_clock AS p ON t.process_id = p.process_id
     WHERE window_start_ns IS NOT NULL
