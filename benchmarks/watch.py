@@ -16,7 +16,7 @@ import statistics
 import tempfile
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from msgflow.clocks import read_clock_sync
 from msgflow.sim import Recording, simulate
@@ -79,13 +79,16 @@ def measured(events: int, chunks: int) -> tuple[float, float, int, int]:
 class _Timed(Watcher):
     """A watcher that knows how long it took to read each chunk."""
 
-    reading: list[float]
+    def __init__(self, **given: Any) -> None:
+        """Start like any watcher."""
+        super().__init__(**given)
+        self.reading: list[float] = []
 
     def read(self, chunk: Chunk) -> None:
         """Read a chunk."""
         begin = time.process_time()
         super().read(chunk)
-        self.__dict__.setdefault("reading", []).append(time.process_time() - begin)
+        self.reading.append(time.process_time() - begin)
 
 
 def _resident_megabytes() -> int:

@@ -62,9 +62,8 @@ activity AS (
             WHEN b.resumed_ns > a.start_ns THEN a.start_ns
             ELSE 9223372036854775807
         END AS end_ns
-    FROM main.executor_activity AS a
+    FROM main.executor_activity_within($runs, $start_ns, $end_ns) AS a
     LEFT JOIN broken AS b ON a.thread_id = b.thread_id
-    WHERE list_contains($runs, a.run_id)
 ),
 spent AS (
     SELECT

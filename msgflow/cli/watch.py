@@ -182,8 +182,8 @@ def command(
             show(watch_finished(place, watcher))
         elif len(words) == 1 and (source := _source(words[0], place)) is not None:
             found, session = source
-            with _rotated(session, step_ns), _until_interrupted() as interrupts:
-                is_over = _session_is_over(session)
+            with _rotated(session, step_ns) as go_on, _until_interrupted() as interrupts:
+                is_over = _session_is_over(session, go_on)
 
                 def ends() -> bool:
                     interrupts.check()
@@ -285,11 +285,11 @@ def _record(
         print_note(f"{words[0]} ended with exit code {recorded.exit_code}")
 
 
-def _rotated(session: str | None, step_ns: int) -> AbstractContextManager[None]:
-    """Let a session rotate during a block, if there is one."""
+def _rotated(session: str | None, step_ns: int) -> AbstractContextManager[Callable[[], None]]:
+    """Let a session rotate during a block, if there is one, as `rotated` does."""
     from msgflow.live import rotated
 
-    return nullcontext() if session is None else rotated(session, step_ns)
+    return nullcontext(lambda: None) if session is None else rotated(session, step_ns)
 
 
 @contextmanager
@@ -330,8 +330,13 @@ def _source(word: str, place: Path) -> tuple[Path, str | None] | None:
     return place, next(below, None)
 
 
-def _session_is_over(name: str | None) -> Callable[[], bool]:
-    """Return a function that tells whether a session has ended; without one, nothing tells."""
+def _session_is_over(name: str | None, go_on: Callable[[], None]) -> Callable[[], bool]:
+    """Return a function that tells whether a session has ended; without one, nothing tells.
+
+    Args:
+        name: of the session.
+        go_on: keeps it rotating, while it is there.
+    """
     from msgflow.live import sessions
 
     last = time.monotonic()
@@ -347,6 +352,8 @@ def _session_is_over(name: str | None) -> Callable[[], bool]:
         except RecordingError:
             is_there = False
         absences = 0 if is_there else absences + 1
+        if is_there:
+            go_on()
         # The last chunk may come half a second after its session has gone.
         return absences > 1
 

@@ -15,7 +15,7 @@ from msgflow.live.kernel_events import KERNEL_EVENTS
 from msgflow.live.lttng import lttng, sessions
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
 CONTEXTS = ("vpid", "vtid", "procname")
 KERNEL_CONTEXTS = ("pid", "vpid", "vtid", "procname")
@@ -85,25 +85,29 @@ def recording_session(
 
 
 @contextmanager
-def rotated(name: str, length_ns: int) -> Iterator[None]:
+def rotated(name: str, length_ns: int) -> Iterator[Callable[[], None]]:
     """Let a session cut its recording into chunks during the block; one that does so goes on.
+
+    Yields:
+        What to call now and then: whoever made the session do so may end it.
 
     Raises:
         RecordingError: it cannot, as one with a live connection or a snapshot session.
     """
-    try:
-        _rotate(name, length_ns)
-    except RecordingError as error:
-        if "already set" not in error.message:
-            raise
-        yield
-        return
-    try:
-        yield
-    finally:
+    is_ours = _is_first_to_rotate(name, length_ns)
+
+    def go_on() -> None:
+        nonlocal is_ours
         # It may have ended.
         with suppress(RecordingError):
-            lttng("disable-rotation", f"--session={name}", "--timer")
+            is_ours = is_ours or _is_first_to_rotate(name, length_ns)
+
+    try:
+        yield go_on
+    finally:
+        if is_ours:
+            with suppress(RecordingError):
+                lttng("disable-rotation", f"--session={name}", "--timer")
 
 
 def record_snapshot(name: str, directory: Path) -> None:
@@ -170,6 +174,17 @@ def _set_up_kernel(name: str, channel: Channel) -> None:
 
 def _rotate(name: str, length_ns: int) -> None:
     lttng("enable-rotation", f"--session={name}", f"--timer={length_ns // 1000}us")
+
+
+def _is_first_to_rotate(name: str, length_ns: int) -> bool:
+    """Let a session rotate, and tell whether nobody had before."""
+    try:
+        _rotate(name, length_ns)
+    except RecordingError as error:
+        if "already set" not in error.message:
+            raise
+        return False
+    return True
 
 
 def _enable_channel(domain: str, name: str, channel: Channel) -> None:

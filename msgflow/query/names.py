@@ -75,11 +75,13 @@ def require_places(
     Raises:
         UsageError: a name that no run has; the message names similar ones, or the first few.
     """
+    places = []
     for key in PLACE_PARAMETERS:
         given = bound.get(key)
         texts = given.split(",") if isinstance(given, str) else given
         if isinstance(texts, list):
-            require_names(connection, runs, "place", [str(text).strip() for text in texts])
+            places += [str(text).strip() for text in texts]
+    require_names(connection, runs, "place", places)
 
 
 def require_names(

@@ -134,7 +134,7 @@ class Alarm:
         take_id = take_of(row["see"])
         pieces: list[Row] = []
         if take_id is not None:
-            asked = {"take": take_id}
+            asked = {"take": take_id, **_ends(row["path"])}
             pieces = run_query(con, load_query("critical-path"), asked, part).table.to_pylist()
         at_ns = row["worst_at_ns"]
         return {
@@ -190,6 +190,17 @@ def blamed(pieces: Sequence[Row], path: str | None) -> Iterator[str]:
                 activity=piece["activity"].replace("_", " "),
                 time=format_duration(piece["duration_ns"]),
             )
+
+
+def _ends(path: str | None) -> Row:
+    """Return the topics between which a flow is looked at: a target may be part of a longer path.
+
+    Args:
+        path: its nodes and topics; topics that are not known are '?', services in parentheses.
+    """
+    topics = (path or "").split(" → ")[1:-1]
+    ends = {"from": topics[0], "to": topics[-1]} if topics else {}
+    return {word: topic for word, topic in ends.items() if topic.startswith("/")}
 
 
 def _sender(hop: int | None, path: str | None) -> str | None:

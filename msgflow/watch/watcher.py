@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError, UsageError
@@ -19,8 +18,6 @@ from msgflow.watch.window_report import report_of
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
-
-    import duckdb
 
     from msgflow.clocks import ClockSync
     from msgflow.links import LinksFile
@@ -90,6 +87,7 @@ class Watcher:
             None
         )
         self._after = Continuation()
+        self._con = database_in_memory()
         self.numbers: dict[Path, int] = {}
 
     def read(self, chunk: Chunk) -> None:
@@ -145,18 +143,12 @@ class Watcher:
 
     def close(self) -> None:
         """Free the memory of the database."""
-        # The first window makes the database.
-        if "_con" in self.__dict__:
-            self._con.close()
+        self._con.close()
 
     def _forget(self, window: Window) -> None:
         for path in self.history.forget(window):
             if self.on_passed is not None:
                 self.on_passed(path)
-
-    @cached_property
-    def _con(self) -> duckdb.DuckDBPyConnection:
-        return database_in_memory()
 
     def _ingest(self, traces: KeptTraces) -> tuple[LinksFile | None, str | None]:
         """Ingest what a window needs; links of nodes that are not there yet are left out.

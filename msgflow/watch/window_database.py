@@ -65,9 +65,13 @@ class WindowDatabase:
         name = time.strftime("window-%Y%m%d-%H%M%S", time.gmtime(end_ns // 1_000_000_000))
         self._prepared.unlink(missing_ok=True)
         ingest(
-            [name], self._prepared, name=name, links=links, clock_sync=self._clock_sync,
+            [name],
+            self._prepared,
+            name=name,
+            links=links,
+            clock_sync=self._clock_sync,
             traces=traces,
-        )  # fmt: skip
+        )
 
     def show(self) -> None:
         """Put the window that was prepared last in place of the database."""

@@ -15,14 +15,4 @@
 -- column: start_ns BIGINT [epoch ns]  Begin
 -- column: end_ns BIGINT [epoch ns]  End; NULL: not known (the last, or a gap follows)
 -- column: callback_instance_id BIGINT  Innermost callback that ran
-SELECT
-    a.run_id,
-    a.executor_id,
-    a.thread_id,
-    a.activity,
-    derive.corrected_ns(a.start_ns, p.offset_ns, p.drift_ppb, p.reference_ns) AS start_ns,
-    derive.corrected_ns(a.end_ns, p.offset_ns, p.drift_ppb, p.reference_ns) AS end_ns,
-    a.callback_instance_id
-FROM derive.thread_activity AS a
-JOIN store.thread AS t ON a.thread_id = t.thread_id
-JOIN derive.process_clock AS p ON t.process_id = p.process_id
+FROM main.executor_activity_within(NULL, NULL, NULL)

@@ -112,6 +112,29 @@ def test_a_session_is_rotated_and_its_end_noticed(
     assert found[-1]["end_ns"] > window["end_ns"]
 
 
+def test_two_watchers_of_one_session(watch: Watch, session: Path, robot: list[str]) -> None:
+    """The first one made it rotate, and ends; the session rotates until the second one does."""
+    with subprocess.Popen([*robot, "0.05"]) as node:
+        try:
+            first = watch("drive")
+            wait_for_window(first)
+            second = watch("drive")
+            wait_for_window(second)
+            first.send_signal(signal.SIGINT)
+            found, _ = windows(first)
+            end = time.monotonic() + 30
+            while "rotat" not in lttng("list", "drive").stdout:
+                assert time.monotonic() < end
+                time.sleep(0.1)
+            while wait_for_window(second)["start_ns"] <= found[-1]["end_ns"]:
+                pass
+            second.send_signal(signal.SIGINT)
+            windows(second)
+        finally:
+            node.kill()
+    assert "rotat" not in lttng("list", "drive").stdout
+
+
 def test_ctrl_c_ends_the_view_and_not_the_session(watch: Watch, session: Path) -> None:
     process = watch("drive")
     time.sleep(6)

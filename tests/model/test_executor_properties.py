@@ -11,6 +11,8 @@ from analysis import Analyse, Analysis
 from random_executor import random_executor
 from thorough import few
 
+from msgflow.run.window import Window
+
 KINDS = [(threads, with_events) for threads in (1, 2, 3) for with_events in (True, False)]
 SEEDS = range(3)
 ACTIVITIES = (
@@ -71,6 +73,7 @@ def test_properties(analyse: Analyse, seed: int, threads: int, with_events: bool
     model = analyse(random_executor(seed, threads=threads, with_events=with_events))
     activities_never_overlap_and_add_up_to_the_states(model)
     no_activity_reaches_across_a_gap(model)
+    a_window_has_the_activities_that_reach_into_it(model)
     bounds_are_in_order(model)
     interference_is_that_of_all_pairs(model)
     busy_is_counted_instant_by_instant(model)
@@ -95,6 +98,32 @@ def no_activity_reaches_across_a_gap(model: Analysis) -> None:
         "SELECT a.start_ns FROM executor_activity AS a JOIN thread_break AS b "
         "ON a.thread_id = b.thread_id AND b.resumed_ns > a.start_ns AND b.resumed_ns < a.end_ns"
     )
+
+
+def a_window_has_the_activities_that_reach_into_it(model: Analysis) -> None:
+    activities = model.rows(ACTIVITIES)
+    breaks = model.rows("SELECT thread_id, resumed_ns FROM thread_break")
+    moments = sorted({start for _, _, start, _, _ in activities})
+    without_limits = Window()
+    windows = [
+        *zip(moments[::9], moments[5::7], strict=False),
+        (without_limits.start_ns, without_limits.end_ns),
+    ]
+    for since, until in windows:
+        expected = set()
+        for thread, activity, start, end, run in activities:
+            # What began before, and ended in a gap before.
+            is_over = end is None and any(
+                thread == other and start < at < since for other, at in breaks
+            )
+            if start < until and (end is None or end > since) and not is_over:
+                expected.add((thread, activity, start, end, run))
+        found = model.rows(
+            "SELECT thread_id, activity, start_ns, end_ns, callback_instance_id "
+            f"FROM main.executor_activity_within(NULL, {since}, {until})"
+        )
+        assert len(found) == len(expected)
+        assert set(found) == expected
 
 
 def bounds_are_in_order(model: Analysis) -> None:

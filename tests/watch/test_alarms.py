@@ -95,6 +95,21 @@ def test_a_target_that_falls_silent_is_said_once(tmp_path: Path) -> None:
     assert result.exit_code == 0
 
 
+def test_a_target_on_part_of_a_path_names_the_culprit(tmp_path: Path) -> None:
+    """Messages of the last topic go on to further nodes."""
+    recording = Recording(rotations=(SECOND // 4,))
+    simulate("autoware", tmp_path / "trace", factor=0.05, recording=recording)
+    file = tmp_path / "targets.yaml"
+    topics = "[/FrontLidarDriver, /PointsTransformerFront]"
+    file.write_text(f"targets: [{{path: {topics}, latency: max < 1 ms}}]")
+    words = ["watch", tmp_path / "trace", "--once", "--json", "--targets", file]
+    result = CliRunner().invoke(app, [str(word) for word in words])
+    windows = [json.loads(line) for line in result.stdout.splitlines()]
+    culprits = [each["culprit"] for window in windows for each in window["violations"]]
+    assert culprits
+    assert all("/PointsTransformerFront" in (culprit or "") for culprit in culprits)
+
+
 def test_what_was_kept_before_stays(watched, tmp_path: Path) -> None:
     """The same recording is watched twice: the name of its violation is taken."""
     options = ("--window", "3s", "--step", "3s", "--keep-on-violation", tmp_path / "kept")

@@ -20,8 +20,8 @@ did AS (
     SELECT
         thread_id, start_ns, end_ns,
         CASE WHEN activity IN ('take', 'service') THEN 'callback' ELSE activity END AS activity
-    FROM main.executor_activity
-    WHERE run_id = $run AND end_ns IS NOT NULL
+    FROM main.executor_activity_within([$run], $start_ns, $end_ns)
+    WHERE end_ns IS NOT NULL
 ),
 clipped AS (
     SELECT
@@ -30,7 +30,6 @@ clipped AS (
         least(d.end_ns, $end_ns) - $start_ns AS end_at
     FROM did AS d
     CROSS JOIN extent AS e
-    WHERE d.start_ns < $end_ns AND d.end_ns > $start_ns
 ),
 whole AS (
     SELECT thread_id, activity, width, begin_at, end_at, begin_at // width AS bin

@@ -1,21 +1,38 @@
 -- name: derive.thread_activity
+-- kind: macro
 -- description: What executor threads did, in detail (main.executor_activity), by the clock of their
---     executor.
+--     executor: all activities that reach into a window. A few around it may be there as well, and
+--     the end of those behind it is not known.
 -- grain: one row per interval of a thread in which nothing changed
+-- param: runs BIGINT[]  Runs to look at; NULL: all
+-- param: window_start_ns BIGINT  Begin of the window, epoch ns; NULL: there is none
+-- param: window_end_ns BIGINT  End of the window, epoch ns
+CREATE OR REPLACE MACRO derive.thread_activity(runs, window_start_ns, window_end_ns) AS TABLE
 WITH instance AS (
     SELECT
         i.run_id, i.thread_id, i.callback_instance_id, i.parent_id, i.start_ns, i.end_ns,
         i.start_event_id, i.end_event_id, i.effective_end_event_id, i.take_id, c.kind
     FROM store.callback_instance AS i
     JOIN store.callback AS c ON i.callback_id = c.callback_id
+    WHERE runs IS NULL OR list_contains(runs, i.run_id)
+),
+executor_state AS NOT MATERIALIZED (
+    SELECT run_id, thread_id, state, start_ns, start_event_id
+    FROM store.executor_state
+    WHERE runs IS NULL OR list_contains(runs, run_id)
+),
+thread_break AS NOT MATERIALIZED (
+    SELECT run_id, thread_id, resumed_ns, resumed_event_id
+    FROM store.thread_break
+    WHERE runs IS NULL OR list_contains(runs, run_id)
 ),
 -- A callback never seen to end was over at the first event that cannot be inside of it.
 outside AS (
-    SELECT start_event_id AS event_id, thread_id, start_ns AS at_ns FROM store.executor_state
+    SELECT start_event_id AS event_id, thread_id, start_ns AS at_ns FROM executor_state
     UNION ALL
-    SELECT start_event_id, thread_id, start_ns FROM store.callback_instance
+    SELECT start_event_id, thread_id, start_ns FROM instance
     UNION ALL
-    SELECT resumed_event_id, thread_id, resumed_ns FROM store.thread_break
+    SELECT resumed_event_id, thread_id, resumed_ns FROM thread_break
 ),
 closed AS (
     SELECT
@@ -31,7 +48,7 @@ change AS (
     SELECT
         run_id, thread_id, resumed_event_id AS event_id, 0 AS step, resumed_ns AS at_ns,
         NULL::BIGINT AS running_id, 0 AS state, NULL AS kind
-    FROM store.thread_break
+    FROM thread_break
     UNION ALL
     SELECT run_id, thread_id, end_event_id, 1, end_ns, parent_id, 0, NULL
     FROM instance
@@ -43,7 +60,7 @@ change AS (
     SELECT
         run_id, thread_id, start_event_id, 2, start_ns, NULL,
         CASE state WHEN 'wait' THEN 1 WHEN 'process' THEN 2 ELSE 3 END, NULL
-    FROM store.executor_state
+    FROM executor_state
     UNION ALL
     SELECT run_id, thread_id, start_event_id, 3, start_ns, callback_instance_id, 0, kind
     FROM instance
@@ -52,17 +69,59 @@ change AS (
     FROM store.take AS t
     LEFT JOIN instance AS i ON t.take_id = i.take_id
     WHERE t.method <> 'callback_only' AND t.start_event_id IS NOT NULL
+        AND (runs IS NULL OR list_contains(runs, t.run_id))
 ),
--- Each of these is the number of an event, with a digit that says which or what.
+-- Each mark is the number of an event, with a digit that says which or what.
+marked AS NOT MATERIALIZED (
+    SELECT
+        run_id, thread_id, event_id, step, event_id * 8 + step AS place, at_ns, kind,
+        CASE WHEN step = 0 THEN event_id END AS break_mark,
+        CASE WHEN state > 0 THEN event_id * 4 + state END AS state_mark,
+        CASE WHEN step IN (1, 3) THEN event_id * 4 + step END AS run_mark
+    FROM change
+),
+-- The window by the clock of each thread, which is rounded. A window without limits has the least
+-- and the greatest number, from which nothing can be subtracted.
+extent AS (
+    SELECT
+        t.thread_id,
+        derive.recorded_ns(
+            greatest(window_start_ns, -4611686018427387904),
+            p.offset_ns, p.drift_ppb, p.reference_ns
+        ) - 1 AS start_ns,
+        derive.recorded_ns(
+            least(window_end_ns, 4611686018427387904), p.offset_ns, p.drift_ppb, p.reference_ns
+        ) + 1 AS end_ns
+    FROM store.thread AS t
+    JOIN derive.process_clock AS p ON t.process_id = p.process_id
+    WHERE window_start_ns IS NOT NULL
+),
+-- Where the changes of a thread around the window begin and end, and what held before.
+reach AS (
+    SELECT
+        m.thread_id,
+        max(m.event_id) FILTER (m.at_ns < e.start_ns AND m.step < 4) AS first_event_id,
+        min(m.event_id) FILTER (m.at_ns > e.end_ns AND m.step < 4) AS last_event_id,
+        max(m.break_mark) FILTER (m.at_ns < e.start_ns) AS break_mark,
+        max(m.state_mark) FILTER (m.at_ns < e.start_ns) AS state_mark,
+        max(m.run_mark) FILTER (m.at_ns < e.start_ns) AS run_mark
+    FROM marked AS m
+    JOIN extent AS e ON m.thread_id = e.thread_id
+    GROUP BY m.thread_id
+),
+-- Marks grow: the last one is the highest. DuckDB takes longer for max over such a frame.
 situation AS (
     SELECT
-        run_id, thread_id, event_id, step, at_ns, kind,
-        coalesce(max(CASE WHEN step = 0 THEN event_id END) OVER so_far, -1) AS break_event_id,
-        max(CASE WHEN state > 0 THEN event_id * 4 + state END) OVER so_far AS state_mark,
-        max(CASE WHEN step IN (1, 3) THEN event_id * 4 + step END) OVER so_far AS run_mark
-    FROM change
+        m.run_id, m.thread_id, m.event_id, m.step, m.place, m.at_ns, m.kind,
+        greatest(arg_max(m.break_mark, m.place) OVER so_far, r.break_mark, -1) AS break_event_id,
+        greatest(arg_max(m.state_mark, m.place) OVER so_far, r.state_mark) AS state_mark,
+        greatest(arg_max(m.run_mark, m.place) OVER so_far, r.run_mark) AS run_mark
+    FROM marked AS m
+    LEFT JOIN reach AS r ON m.thread_id = r.thread_id
+    WHERE coalesce(m.event_id >= r.first_event_id, true)
+        AND coalesce(m.event_id <= r.last_event_id, true)
     WINDOW so_far AS (
-        PARTITION BY run_id, thread_id ORDER BY event_id, step ROWS UNBOUNDED PRECEDING
+        PARTITION BY m.run_id, m.thread_id ORDER BY m.place ROWS UNBOUNDED PRECEDING
     )
 ),
 -- A take while the executor executes is what it is about to do anyway.
@@ -77,7 +136,7 @@ split AS (
         lead(kind) OVER on_thread AS next_kind
     FROM situation
     WHERE step < 4 OR state_mark IS NULL OR state_mark % 4 = 2 OR state_mark // 4 < break_event_id
-    WINDOW on_thread AS (PARTITION BY run_id, thread_id ORDER BY event_id, step)
+    WINDOW on_thread AS (PARTITION BY run_id, thread_id ORDER BY place)
 ),
 run_change AS (
     SELECT thread_id, event_id * 4 + step AS run_mark, running_id
