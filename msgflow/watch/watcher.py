@@ -80,8 +80,7 @@ class Watcher:
         self._database = database
         self.on_passed: Callable[[Path], None] | None = None
         self._lacks_links = False
-        self._clock_offset_ns = _clock_offset_ns()
-        self._clock_step_ns = 0
+        self._clock_offset_ns = self._last_clock_offset_ns = _clock_offset_ns()
         self._answers = LearnedAnswers()
         self._violated: tuple[int, KeptTraces, list[Path], LinksFile | None, str | None] | None = (
             None
@@ -170,21 +169,27 @@ class Watcher:
             self._lacks_links = False
         links = None if self._lacks_links else self._links
         learned = self._answers.doubted(self._con)
-        if learned is not None:
-            links = with_learned(links, learned)
-            link_again(self._con, links=links, clocks=self._clocks)
-        return links, learned
+        if learned is None:
+            return links, None
+        try:
+            link_again(self._con, links=with_learned(links, learned), clocks=self._clocks)
+        except UsageError as error:
+            self._note(f"what earlier windows have shown is left out: {error.message}")
+            return links, None
+        return with_learned(links, learned), learned
 
     def _lag_s(self) -> float:
         """Return how old the last event is; the tracer knows nothing of a clock that was set."""
-        step_ns = _clock_offset_ns() - self._clock_offset_ns
-        if abs(step_ns - self._clock_step_ns) > _LEAST_STEP_NS:
-            self._clock_step_ns = step_ns
+        offset_ns = _clock_offset_ns()
+        step_ns = offset_ns - self._last_clock_offset_ns
+        self._last_clock_offset_ns = offset_ns
+        # What time servers correct bit by bit is no step.
+        if abs(step_ns) > _LEAST_STEP_NS:
             self._note(
-                f"the clock of this machine was set, by {step_ns / _SECOND_NS:+.1f} s since the"
-                " begin: times of the tracer go on as before"
+                f"the clock of this machine was set by {step_ns / _SECOND_NS:+.1f} s, or the"
+                " machine slept: times of the tracer go on as before"
             )
-        now_ns = time.time_ns() - self._clock_step_ns
+        now_ns = time.monotonic_ns() + self._clock_offset_ns
         return (now_ns - self.history.last_event_ns) / _SECOND_NS
 
     def _report(self, window: Window, *, is_final: bool, is_live: bool) -> WindowReport:
