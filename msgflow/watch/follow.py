@@ -68,6 +68,7 @@ def watch_live(
         is_over: tells whether no further chunk comes.
         note: gets sentences about what goes wrong.
     """
+    begin = time.monotonic()
     lags = False
     while True:
         # Asked first: what came until then is read.
@@ -85,9 +86,17 @@ def watch_live(
         if (report := watcher.final_report(is_live=True)) is None:
             time.sleep(_BETWEEN_LOOKS)
             continue
-        is_late = report.lag_s is not None and report.lag_s * _SECOND_NS > _MOST_LAG * step_ns
+        lag_s = report.lag_s or 0
+        is_late = lag_s * _SECOND_NS > _MOST_LAG * step_ns
         if is_late and not lags:
-            note(f"the view lags by {report.lag_s:.0f} s: steps are longer until it has caught up")
+            # What is older than the view itself has another cause.
+            said = (
+                f"the view lags by {lag_s:.0f} s: steps are longer until it has caught up"
+                if (lag_s - time.monotonic() + begin) * _SECOND_NS < _MOST_LAG * step_ns
+                else f"the last event is {lag_s:.0f} s old: if the recording has ended, --once"
+                " shows all of it"
+            )
+            note(said)
         lags = is_late
         yield report
         watcher.keep_violation()

@@ -15,7 +15,7 @@ from msgflow.database import Database
 from msgflow.errors import TraceError
 from msgflow.links import read_links
 from msgflow.sim import Recording, simulate
-from msgflow.watch import Watcher, WindowReport, finished_chunks, watch_finished
+from msgflow.watch import Watcher, WindowReport, finished_chunks, watch_finished, watch_live
 from msgflow.watch.learned_answers import LearnedAnswers
 
 SECOND = 1_000_000_000
@@ -198,6 +198,28 @@ def test_what_was_learned_may_not_fit_a_window(
     (said,) = notes
     assert said.startswith("what earlier windows have shown is left out: ")
     assert "/later" in said
+
+
+def test_a_recording_that_ended_long_ago_is_no_lag(simulated: Path) -> None:
+    notes: list[str] = []
+    watcher = Watcher(
+        window_ns=SECOND // 2,
+        step_ns=SECOND // 2,
+        links=None,
+        clocks=read_clock_sync("none"),
+        note=notes.append,
+    )
+    looks = iter([False, True])
+    found = list(
+        watch_live(
+            simulated, watcher, step_ns=SECOND // 2, is_over=lambda: next(looks), note=notes.append
+        )
+    )
+    watcher.close()
+    assert found
+    (said,) = notes
+    assert said.startswith("the last event is ")
+    assert "--once" in said
 
 
 def test_a_recording_without_chunks(tmp_path: Path) -> None:
