@@ -10,6 +10,7 @@ each time. Needs LTTng, its headers, and gcc. The figures are of the watcher alo
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import os
 import statistics
@@ -76,7 +77,9 @@ def report(run: subprocess.Popen[str]) -> None:
     end_ns = 0
     for line in run.stdout:
         window = json.loads(line)
-        last = _megabytes(run.pid), _cpu_seconds(run.pid)
+        # Behind its last line, the watcher may have ended.
+        with contextlib.suppress(StopIteration, FileNotFoundError):
+            last = _megabytes(run.pid), _cpu_seconds(run.pid)
         if time.monotonic() - begin < _EARLY_SECONDS:
             early = last
         if window["lag_s"] is not None:
