@@ -52,7 +52,7 @@ BEHIND_CONDITION = {
     "AND", "OR", "THEN", "GROUP", "HAVING", "QUALIFY", "WINDOW", "ORDER", "LIMIT", "UNION",
     "JOIN", "LEFT", "ASOF", "SEMI", "ANTI", "CROSS", "WHERE", "AS", "ELSE", "END", ",",
 }  # fmt: skip
-ONLY_RUN = re.compile(r"(\w+\.)?run_id = (only_run|\w+\.run_id)")
+ONLY_RUN = re.compile(r"(\w+\.)?run_id (= (only_run|\w+\.run_id)|IN \(SELECT run_id FROM \w+\))")
 # Findings with numbers of their own: their golden cases have to notice when one changes.
 FINDINGS = (
     "busy_waiting",
@@ -80,14 +80,23 @@ RULES = (
         ("schema/cases/derive.link_transport_nearest",),
     ),
     ("link/causal/answer_doubtful.sql", ("schema/test_answer_doubtful.py",)),
-    ("link/causal/timed_publisher.sql", ("schema/test_answer_doubtful.py",)),
+    (
+        "link/causal/timed_publisher.sql",
+        ("schema/cases/derive.timed_publisher", "schema/test_answer_doubtful.py"),
+    ),
     ("link/causal/link_causal_polled.sql", ("model/test_polled_links.py",)),
     (
         "link/causal/link_causal_take_adjacent.sql",
         ("schema/cases/derive.link_causal_take_adjacent", "model/test_take_adjacent_links.py"),
     ),
     ("link/causal/link_call.sql", ("schema/cases/derive.link_call", "model/test_call_links.py")),
-    ("link/causal/approximate_set.sql", ("schema/cases/derive.link_causal_indirect",)),
+    *(
+        (
+            f"link/causal/{each}.sql",
+            (f"schema/cases/derive.{each}", "schema/cases/derive.link_causal_indirect"),
+        )
+        for each in ("approximate_message", "approximate_set")
+    ),
     (
         "delivery/delivery_limit.sql",
         ("schema/test_delivery_rules.py", "schema/test_orphan_rules.py"),
