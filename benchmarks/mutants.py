@@ -63,6 +63,8 @@ FINDINGS = (
     "process_fell_silent",
     "stream_ends_early",
 )
+# No finding of the input says that it found nothing.
+NOTHING_FOUND = "model/test_findings.py"
 # Likewise rules, and the tests that are about them.
 RULES = (
     (
@@ -73,6 +75,7 @@ RULES = (
             "schema/test_clock_rules.py",
             "schema/test_stamp_clock.py",
             "schema/cases/derive.clock_set_back",
+            "schema/cases/derive.standing_difference",
         ),
     ),
     (
@@ -118,6 +121,11 @@ RULES = (
     ("public/action_server.sql", ("schema/cases/main.action_server",)),
     ("stat/action", ("schema/cases/main.goal", "schema/cases/main.action_server")),
     *((f"health/recording/{each}.sql", (f"schema/cases/finding.{each}",)) for each in FINDINGS),
+    *(
+        (f"health/input/{each.stem}.sql", (f"schema/cases/finding.{each.stem}", NOTHING_FOUND))
+        for each in sorted((ROOT / "schema" / "health" / "input").glob("*.sql"))
+        if each.stem != "process_label"
+    ),
 )
 
 

@@ -7,8 +7,8 @@
 --     does not show: no stretch has a difference outside of the range that all of them allow.
 -- grain: one row per clock and stretch in which the clocks stood
 -- param: pairs VARCHAR  Name of rows of clock_id, stretch, least_ns, greatest_ns
--- param: chosen VARCHAR  Name of rows of clock_id, place, stretch, offset_ns, least_ns, greatest_ns,
---     most_count
+-- param: chosen VARCHAR  Name of rows of clock_id, place, stretch, offset_ns, least_ns,
+--     greatest_ns, most_count
 CREATE OR REPLACE MACRO derive.standing_difference(pairs, chosen) AS TABLE
 WITH span AS MATERIALIZED (
     SELECT
