@@ -63,6 +63,11 @@ FINDINGS = (
     "process_fell_silent",
     "stream_ends_early",
 )
+# Rules about messages that are matched by time, with cases of their own.
+NEAREST = (
+    "agreed_difference", "clock_drift", "clock_set_back", "close_pair", "publication_beside_gap",
+    "standing_difference", "unstamped_call", "unstamped_message", "unstamped_publication",
+)  # fmt: skip
 # No finding of the input says that it found nothing.
 NOTHING_FOUND = "model/test_findings.py"
 # Likewise rules, and the tests that are about them.
@@ -70,12 +75,11 @@ RULES = (
     (
         "link/nearest",
         (
+            *(f"schema/cases/derive.{each}" for each in NEAREST),
             "schema/test_nearest_rules.py",
             "schema/test_pair_rules.py",
             "schema/test_clock_rules.py",
             "schema/test_stamp_clock.py",
-            "schema/cases/derive.clock_set_back",
-            "schema/cases/derive.standing_difference",
         ),
     ),
     (
