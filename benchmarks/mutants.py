@@ -66,6 +66,7 @@ FINDINGS = (
 # Rules about messages that are matched by time, with cases of their own.
 NEAREST = (
     "agreed_difference", "clock_drift", "clock_set_back", "close_pair", "publication_beside_gap",
+    "sharp_difference",
     "standing_difference", "unstamped_call", "unstamped_message", "unstamped_publication",
 )  # fmt: skip
 # No finding of the input says that it found nothing.
