@@ -67,6 +67,7 @@ ARGUMENTS = {
     "callbacks": ["'same_callbacks'"],
     "parts": ["'same_parts'"],
     "vertices": ["'same_vertices'"],
+    "intervals": ["'same_intervals'"],
 }
 TABLES = {
     "same_flows": "main.end_to_end_flow([1])",
@@ -74,6 +75,8 @@ TABLES = {
     "same_callbacks": "(SELECT i.*, w.busy_min_ns, w.busy_max_ns FROM main.callback_instance AS i"
     " LEFT JOIN main.executor_wait AS w USING (callback_instance_id))",
     "same_parts": "main.end_to_end_part([1], flow_case := 'every_pair', most_flows := 3)",
+    "same_intervals": "(SELECT callback_instance_id AS interval_id, thread_id, start_ns AS from_ns,"
+    " end_ns AS to_ns FROM main.callback_instance WHERE end_ns IS NOT NULL)",
     "same_vertices": "(SELECT 0 AS key, 'take' AS kind, take_id AS id, 0 AS depth FROM main.take)",
 }
 ROWS_SHOWN = 3
