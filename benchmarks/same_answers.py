@@ -52,6 +52,7 @@ OWN = {"created_at", "derivation_hash", "msgflow_version"}
 # What table macros are called with, one call for each value where there are several.
 ARGUMENTS = {
     "runs": ["[1]"],
+    "only_run": ["1"],
     "run_a": ["1"],
     "run_b": ["1"],
     "what": ["'paths'", "'callbacks'", "'topics'"],
