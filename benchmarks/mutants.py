@@ -66,8 +66,8 @@ FINDINGS = (
 # Rules about messages that are matched by time, with cases of their own.
 NEAREST = (
     "agreed_difference", "clock_drift", "clock_set_back", "close_pair", "publication_beside_gap",
-    "sharp_difference",
-    "standing_difference", "unstamped_call", "unstamped_message", "unstamped_publication",
+    "sharp_difference", "standing_difference", "unstamped_call", "unstamped_message",
+    "unstamped_publication",
 )  # fmt: skip
 # No finding of the input says that it found nothing.
 NOTHING_FOUND = "model/test_findings.py"
@@ -106,6 +106,10 @@ RULES = (
         for each in ("approximate_message", "approximate_set")
     ),
     (
+        "link/causal/link_causal_indirect.sql",
+        ("schema/cases/derive.link_causal_indirect", "model/test_nested_inputs.py"),
+    ),
+    (
         "delivery/delivery_limit.sql",
         ("schema/test_delivery_rules.py", "schema/test_orphan_rules.py"),
     ),
@@ -119,6 +123,8 @@ RULES = (
     ("model/gap/pause_limit.sql", ("model/test_loss.py",)),
     ("model/gap/silence.sql", ("model/test_loss.py",)),
     ("model/gap/pause.sql", ("model/test_loss.py",)),
+    ("model/identity/process_life.sql", ("model/test_process.py",)),
+    ("model/callback/user_event.sql", ("model/test_user_event.py",)),
     ("overlap/session_container.sql", ("schema/test_session_container.py",)),
     ("overlap/session_pair.sql", ("schema/test_session_pair.py",)),
     ("public/goal.sql", ("schema/cases/main.goal",)),
