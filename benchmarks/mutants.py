@@ -52,7 +52,7 @@ BEHIND_CONDITION = {
     "AND", "OR", "THEN", "GROUP", "HAVING", "QUALIFY", "WINDOW", "ORDER", "LIMIT", "UNION",
     "JOIN", "LEFT", "ASOF", "SEMI", "ANTI", "CROSS", "WHERE", "AS", "ELSE", "END", ",",
 }  # fmt: skip
-ONLY_RUN = re.compile(r"(\w+\.)?run_id = (only_run|\w+\.run_id)")
+ONLY_RUN = re.compile(r"(\w+\.)?run_id (= (only_run|\w+\.run_id)|IN \(SELECT run_id FROM \w+\))")
 # Findings with numbers of their own: their golden cases have to notice when one changes.
 FINDINGS = (
     "busy_waiting",
@@ -63,16 +63,24 @@ FINDINGS = (
     "process_fell_silent",
     "stream_ends_early",
 )
+# Rules about messages that are matched by time, with cases of their own.
+NEAREST = (
+    "agreed_difference", "clock_drift", "clock_set_back", "close_pair", "publication_beside_gap",
+    "sharp_difference", "standing_difference", "unstamped_call", "unstamped_message",
+    "unstamped_publication",
+)  # fmt: skip
+# No finding of the input says that it found nothing.
+NOTHING_FOUND = "model/test_findings.py"
 # Likewise rules, and the tests that are about them.
 RULES = (
     (
         "link/nearest",
         (
+            *(f"schema/cases/derive.{each}" for each in NEAREST),
             "schema/test_nearest_rules.py",
             "schema/test_pair_rules.py",
             "schema/test_clock_rules.py",
             "schema/test_stamp_clock.py",
-            "schema/cases/derive.clock_set_back",
         ),
     ),
     (
@@ -80,14 +88,27 @@ RULES = (
         ("schema/cases/derive.link_transport_nearest",),
     ),
     ("link/causal/answer_doubtful.sql", ("schema/test_answer_doubtful.py",)),
-    ("link/causal/timed_publisher.sql", ("schema/test_answer_doubtful.py",)),
+    (
+        "link/causal/timed_publisher.sql",
+        ("schema/cases/derive.timed_publisher", "schema/test_answer_doubtful.py"),
+    ),
     ("link/causal/link_causal_polled.sql", ("model/test_polled_links.py",)),
     (
         "link/causal/link_causal_take_adjacent.sql",
         ("schema/cases/derive.link_causal_take_adjacent", "model/test_take_adjacent_links.py"),
     ),
     ("link/causal/link_call.sql", ("schema/cases/derive.link_call", "model/test_call_links.py")),
-    ("link/causal/approximate_set.sql", ("schema/cases/derive.link_causal_indirect",)),
+    *(
+        (
+            f"link/causal/{each}.sql",
+            (f"schema/cases/derive.{each}", "schema/cases/derive.link_causal_indirect"),
+        )
+        for each in ("approximate_message", "approximate_set")
+    ),
+    (
+        "link/causal/link_causal_indirect.sql",
+        ("schema/cases/derive.link_causal_indirect", "model/test_nested_inputs.py"),
+    ),
     (
         "delivery/delivery_limit.sql",
         ("schema/test_delivery_rules.py", "schema/test_orphan_rules.py"),
@@ -102,6 +123,8 @@ RULES = (
     ("model/gap/pause_limit.sql", ("model/test_loss.py",)),
     ("model/gap/silence.sql", ("model/test_loss.py",)),
     ("model/gap/pause.sql", ("model/test_loss.py",)),
+    ("model/identity/process_life.sql", ("model/test_process.py",)),
+    ("model/callback/user_event.sql", ("model/test_user_event.py",)),
     ("overlap/session_container.sql", ("schema/test_session_container.py",)),
     ("overlap/session_pair.sql", ("schema/test_session_pair.py",)),
     ("public/goal.sql", ("schema/cases/main.goal",)),
@@ -109,6 +132,11 @@ RULES = (
     ("public/action_server.sql", ("schema/cases/main.action_server",)),
     ("stat/action", ("schema/cases/main.goal", "schema/cases/main.action_server")),
     *((f"health/recording/{each}.sql", (f"schema/cases/finding.{each}",)) for each in FINDINGS),
+    *(
+        (f"health/input/{each.stem}.sql", (f"schema/cases/finding.{each.stem}", NOTHING_FOUND))
+        for each in sorted((ROOT / "schema" / "health" / "input").glob("*.sql"))
+        if each.stem != "process_label"
+    ),
 )
 
 

@@ -41,8 +41,8 @@ compared AS (
         count(*) FILTER (l.ts_ns - r.ts_ns <= $twin_ns) AS twin_count
     FROM (FROM event WHERE session = left_session) AS l
     ASOF LEFT JOIN (FROM event WHERE session = right_session) AS r
-        ON l.left_session = r.left_session
-        AND l.right_session = r.right_session
+        -- The twins that a session has are the same in each pair.
+        ON l.right_session = r.right_session
         AND l.thread = r.thread
         AND l.tracepoint = r.tracepoint
         AND l.cpu_id = r.cpu_id

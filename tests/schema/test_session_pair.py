@@ -10,21 +10,22 @@ import pytest
 from msgflow.ingest.overlapping_traces import statements
 
 TWIN_NS = 10
-# (session, thread, tracepoint), and when.
-Events = dict[tuple[int, int, int], Sequence[int]]
+# (session, thread, tracepoint, CPU), and when. Without a CPU: on CPU 0.
+Events = dict[tuple[int, ...], Sequence[int]]
 
 
 def pairs(events: Events) -> list[tuple[int, int, bool]]:
     """Return (one session, a later one, whether they recorded the same threads)."""
-    rows = [(*key, ts) for key, times in events.items() for ts in times]
+    rows = [(*(*key, 0)[:4], ts) for key, times in events.items() for ts in times]
     with duckdb.connect(config={"threads": 1}) as con:
         con.execute(
             "CREATE TABLE session_event AS "
             "SELECT unnest($session) AS session, unnest($thread) AS thread, "
-            "unnest($tracepoint) AS tracepoint, unnest($ts_ns)::BIGINT AS ts_ns, 0 AS cpu_id",
+            "unnest($tracepoint) AS tracepoint, unnest($cpu_id) AS cpu_id, "
+            "unnest($ts_ns)::BIGINT AS ts_ns",
             dict(
                 zip(
-                    ("session", "thread", "tracepoint", "ts_ns"),
+                    ("session", "thread", "tracepoint", "cpu_id", "ts_ns"),
                     (list(column) for column in zip(*rows, strict=True)),
                     strict=True,
                 )
@@ -75,6 +76,23 @@ def test_a_twin_is_of_the_same_thread_and_tracepoint() -> None:
         ) == [(0, 1, False)]  # fmt: skip
 
 
+def test_a_twin_is_of_the_same_cpu() -> None:
+    same = [0, 1_000, 2_000]
+    assert pairs({(0, 1, 1, 0): same, (1, 1, 1, 1): same}) == [(0, 1, False)]
+
+
+@pytest.mark.parametrize("other", [(2, 1), (1, 2)])
+def test_what_only_one_recorded_does_not_count(other: tuple[int, int]) -> None:
+    """Another thread, or tracepoint; or both recorded it, one after the other."""
+    left, right = [0, 1_000, 2_000, 3_000], [0, 1_000, 2_500, 2_900]
+    alone: Events = {(0, 1, 1): left, (1, 1, 1): right, (1, *other): [2_000, 3_500]}
+    assert pairs(alone) == [(0, 1, True)]
+    same = [0, 1_000, 2_000]
+    before, behind = [100, 200, 300, 400], [1_100, 1_200, 1_300, 1_400]
+    apart: Events = {(0, 1, 1): same, (1, 1, 1): same, (0, *other): before, (1, *other): behind}
+    assert pairs(apart) == [(0, 1, True)]
+
+
 def test_each_thread_and_tracepoint_has_its_own_number_of_events() -> None:
     few = [1_000, 2_000]
     many = [*range(1_000, 2_000, 40), 2_000]
@@ -89,3 +107,13 @@ def test_each_pair_is_judged_by_itself() -> None:
     same, other = [0, 1_000, 2_000], [500, 1_500, 2_500]
     events: Events = {(0, 1, 1): same, (1, 1, 1): other, (2, 1, 1): same}
     assert pairs(events) == [(0, 1, False), (0, 2, True), (1, 2, False)]
+
+
+def test_each_pair_has_its_own_number_of_events() -> None:
+    """The last session recorded more while the second did than while the first did."""
+    events: Events = {
+        (0, 1, 1): [0, 500, 1_000, 1_500, 2_000, 2_500, 2_900, 3_000],
+        (1, 1, 1): [0, 9_000],
+        (2, 1, 1): [0, 1_000, 1_700, 2_700, *range(4_000, 10_000, 1_000)],
+    }
+    assert pairs(events) == [(0, 1, True), (0, 2, True), (1, 2, True)]

@@ -17,7 +17,7 @@ WITH packet_use AS (
     JOIN staging.trace AS t ON p.trace_id = t.trace_id
     JOIN staging.host AS h ON t.host_id = h.host_id
     LEFT JOIN staging.single_packet AS s ON p.event_id = s.event_id
-    HAVING count(*) > 0 AND (SELECT count(*) FROM staging.clock) > 1
+    HAVING (SELECT count(*) FROM staging.clock) > 1
 )
 SELECT
     u.number - l.ends AS count,

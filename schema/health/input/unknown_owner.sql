@@ -15,9 +15,5 @@ SELECT
 FROM staging.callback AS c
 JOIN process_label AS l ON c.process_id = l.process_id
 WHERE c.kind = 'unknown'
-    AND c.callback_id IN (
-        SELECT callback_id
-        FROM staging.callback_number
-        WHERE callback_id IN (SELECT callback_id FROM staging.callback WHERE kind = 'unknown')
-    )
+    AND c.callback_id IN (SELECT callback_id FROM staging.callback_number)
 HAVING count(*) > 0

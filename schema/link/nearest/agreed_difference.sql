@@ -24,7 +24,6 @@ level AS MATERIALIZED (
 most AS (
     SELECT clock_id, stretch, max(vote_count) AS most_count
     FROM level
-    WHERE until_ns > from_ns
     GROUP BY clock_id, stretch
 ),
 high AS (
@@ -45,10 +44,8 @@ separated AS (
     FROM (
         SELECT
             clock_id, stretch, from_ns, until_ns, vote_count, most_count,
-            coalesce(
-                from_ns = lag(until_ns) OVER (PARTITION BY clock_id, stretch ORDER BY from_ns),
-                false
-            ) AS follows
+            from_ns = lag(until_ns) OVER (PARTITION BY clock_id, stretch ORDER BY from_ns)
+                AS follows
         FROM high
     )
 ),

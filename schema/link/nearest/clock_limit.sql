@@ -31,8 +31,6 @@ CREATE OR REPLACE MACRO derive.clock_limit() AS {
     -- publishers that are not traced, fewer agree, but no other difference is a rival. If the drift
     -- is wrong, each stretch has a difference of its own.
     'sharp_share': 0.95,
-    -- Of clocks that stand, the drift is found to be less than this in some stretch.
-    'still_ppb': 1000,
     -- If the clocks stood, one difference explains what the stretches do with one each; if they
     -- drifted by as little as 20 ppm, it explains less, even in bursts.
     'standing_share': 0.99,

@@ -12,7 +12,7 @@ CREATE OR REPLACE MACRO derive.clock_set_back(only_run) AS TABLE
 WITH sole AS (
     SELECT topic_name
     FROM store.publisher
-    WHERE run_id = only_run AND topic_name IS NOT NULL
+    WHERE run_id = only_run
     GROUP BY topic_name
     HAVING count(*) = 1
 ),

@@ -95,8 +95,7 @@ sharp AS MATERIALIZED (
 ),
 chosen AS MATERIALIZED (
     SELECT
-        c.clock_id, c.place, c.stretch, c.at_ns, c.offset_ns, r.least_ns, r.greatest_ns,
-        r.most_count
+        c.clock_id, c.place, c.stretch, c.offset_ns, r.least_ns, r.greatest_ns, r.most_count
     FROM course AS c
     JOIN region AS r
         ON c.clock_id = r.clock_id AND c.stretch = r.stretch AND c.offset_ns = r.difference_ns

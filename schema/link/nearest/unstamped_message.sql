@@ -19,7 +19,6 @@ stamped AS (
     LEFT JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
     LEFT JOIN topic AS w ON p.topic_name = w.topic_name
     WHERE b.run_id = only_run
-        AND b.source_timestamp_ns <> 0
         AND (w.topic_name IS NOT NULL OR p.topic_name IS NULL)
 ),
 received AS (
