@@ -43,7 +43,7 @@
 -- column: is_internal BOOLEAN       Infrastructure of ROS
 -- slowest: wait_ns
 -- brief: start_ns, node, callback, wait_ns, reason, busy_max_ns, meanwhile, run_queue_ns,
---     preempted_ns, until_arrival_ns, cpu_taken_by, busy_min_ns, since, rest_max_ns, rest_min_ns,
+--     cpu_taken_by, preempted_ns, until_arrival_ns, busy_min_ns, since, rest_max_ns, rest_min_ns,
 --     callback_instance_id
 -- note: clocks
 WITH waited AS MATERIALIZED (

@@ -47,7 +47,7 @@
 -- column: callback_id BIGINT        Identity of the callback
 -- column: is_internal BOOLEAN       Infrastructure of ROS
 -- brief: node, callback, busy_worst_ns, wait_median_ns, wait_max_ns, run_queue_worst_ns,
---     meanwhile, preempted_worst_ns, cpu_taken_by, count, delayed_min, delayed_max,
+--     meanwhile, cpu_taken_by, preempted_worst_ns, count, delayed_min, delayed_max,
 --     busy_total_min_ns, busy_total_max_ns
 -- note: clocks
 WITH waited AS MATERIALIZED (

@@ -67,13 +67,17 @@ def real_time() -> Scenario:
         timers=(Timer(5 * MILLISECOND, ("/effort",), Work(600 * MICROSECOND, 200 * MICROSECOND)),),
     )
     joints = Node("joints", subscriptions=(Subscription("/effort"),))
+    recorder = Node(
+        "recorder",
+        subscriptions=(Subscription("/image", work=Work(9 * MILLISECOND, 3 * MILLISECOND)),),
+    )
     return Scenario(
         name="real_time",
-        description="A controller of SCHED_FIFO takes the CPU from a detector, which takes turns.",
+        description="A controller of SCHED_FIFO takes the CPU from a recorder, which takes turns.",
         hosts=(Host("robot", cpu_count=1, kernel=KernelTrace((_BACKUP,))),),
         processes=(
             Process("camera", "robot", 1101, (_CAMERA,)),
-            Process("detector", "robot", 1201, (_DETECTOR,), start_ns=3 * MILLISECOND),
+            Process("recorder", "robot", 1201, (recorder,), start_ns=3 * MILLISECOND),
             # Nothing lets itself be interrupted while it starts.
             Process(
                 "controller", "robot", 1301, (controller,),
