@@ -157,7 +157,7 @@ GAP_RECORDINGS = (
 TIMED_LAYOUTS = ("humble", "iron")
 TIMED_SYSTEMS = ("bursts", "bursts_two_hosts")
 # What the kernel does, does not depend on the layout.
-KERNEL_SYSTEMS = ("cpu_hog", "real_time", "kernel_losses")
+KERNEL_SYSTEMS = ("cpu_hog", "real_time", "shared_map", "kernel_losses")
 # What comes and goes in these does so after a second; clocks that drift, or are known from few
 # messages, take one to be known.
 WHOLE = (

@@ -41,7 +41,8 @@
 --     short for a line of their own
 -- column: state VARCHAR            What the thread did, as in thread_state, where the kernel was
 --     traced
--- column: who VARCHAR              What took the CPU, or ended the sleep: thread or interrupt
+-- column: who VARCHAR              What took the CPU, or ended the sleep: thread or interrupt;
+--     where another thread ran that was waited for, that one
 -- column: node VARCHAR [node]      Node that did it, or that waited; 'between nodes' where neither
 --     worked: network_or_idle, unless its thread is known to have run or waited for a CPU
 -- column: what VARCHAR             The callback, or the topic of the message
@@ -167,6 +168,8 @@ piece AS (
         CASE
             WHEN bt.thread_id IS NOT NULL THEN printf('%s %d', coalesce(bt.name, '?'), bt.tid)
             WHEN c.by_kind = 'thread' THEN bo.name
+            WHEN c.by_kind IS NULL AND c.wakers > 0 AND c.state = 'running'
+                THEN printf('%s %d', coalesce(t.name, '?'), t.tid)
             ELSE c.by_kind
         END AS who,
         c.by_priority AS who_priority,

@@ -11,7 +11,8 @@ JOIN analysed.store.host AS h ON p.host_id = h.host_id;
 
 CREATE OR REPLACE TEMP TABLE truth_state AS
 SELECT
-    t.host, t.pid, t.tid, t.state, t.cpu, t.start_ns, t.end_ns, t.waker_kind,
+    t.host, t.pid, t.tid, t.state, t.cpu, t.start_ns, t.end_ns,
+    concat_ws(' ', t.waker_kind, t.waker_tid) AS waker,
     EXISTS (
         FROM simulated_kernel_loss AS l
         WHERE l.host = t.host AND l.end_ns > t.start_ns
@@ -32,11 +33,14 @@ SELECT
     concat_ws(
         ' ', s.state,
         CASE WHEN t.end_ns IS NOT NULL OR t.start_ns IS NULL THEN s.end_ns END,
-        CASE WHEN s.state IN ('running', 'preempted') THEN s.cpu END, s.waker_kind
+        CASE WHEN s.state IN ('running', 'preempted') THEN s.cpu END,
+        -- Of an interrupt, the waker is only what it interrupted.
+        concat_ws(' ', s.waker_kind, CASE WHEN s.waker_kind = 'thread' THEN w.tid END)
     ) AS value,
     s.is_loss_affected AS is_marked
 FROM analysed.store.thread_state AS s
 JOIN schedule_place AS p ON s.thread_id = p.thread_id
+LEFT JOIN schedule_place AS w ON s.waker_thread_id = w.thread_id
 LEFT JOIN truth_state AS t
     ON p.host = t.host AND p.pid = t.pid AND p.tid = t.tid AND s.start_ns = t.start_ns
 UNION ALL
@@ -104,7 +108,7 @@ SELECT
     concat_ws(' ', host, pid, tid, start_ns) AS key,
     concat_ws(
         ' ', state, end_ns, CASE WHEN state IN ('running', 'preempted') THEN cpu END,
-        CASE WHEN end_ns IS NOT NULL THEN waker_kind END
+        waker
     ) AS value,
     NOT is_lost AS is_decided
 FROM truth_state
@@ -158,7 +162,7 @@ LEFT JOIN truth_link AS l
     ON l.kind = 'transport' AND l.to_id = t.take_id::VARCHAR AND l.is_decided
 LEFT JOIN truth_state AS s
     ON t.host = s.host AND t.pid = s.pid AND t.tid = s.tid AND a.arrived_ns = s.start_ns
-    AND s.state = 'runnable' AND s.waker_kind = 'softirq';
+    AND s.state = 'runnable' AND s.waker = 'softirq';
 
 CREATE OR REPLACE TEMP TABLE schedule_score AS
 WITH found AS (

@@ -102,7 +102,8 @@ arrival — one row per take of a message that came by DDS, where the kernel is 
     take_id, arrived_ns (when it was in the queue of its subscription)
 thread_state — one row per state of a thread of a process with nodes, where the kernel is traced:
     host, pid, tid, state ('running', 'preempted', 'sleeping', 'runnable'), cpu (that it has, had or
-    waits for), start_ns, end_ns, waker_kind (what ended the sleep: 'timer', 'softirq')
+    waits for), start_ns, end_ns (NULL: the last), waker_kind (what ended the sleep: 'timer',
+    'softirq', 'thread'), waker_tid (that thread, of the same process)
 cpu_run — one row per stretch of time in which a thread had a CPU, likewise, of all processes:
     host, cpu, kernel_tid, name, priority, start_ns, end_ns
 kernel_loss — one row per time in which events of the kernel were lost:

@@ -26,6 +26,7 @@ class Work:
         percent_before: how much is done before the first publication, the rest after the last.
         sleep_ns: how long the thread sleeps before the first publication, where the kernel is
             traced.
+        mutex: name of one of the process that is locked meanwhile, likewise; none if empty.
     """
 
     typical_ns: int = 20 * MICROSECOND
@@ -34,6 +35,7 @@ class Work:
     slow_ns: int = 0
     percent_before: int = 80
     sleep_ns: int = field(default=0, repr=False)
+    mutex: str = field(default="", repr=False)
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,6 +6,7 @@ CPU, one with an equal priority after a slice of time. What happened is kept.
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Protocol
 
@@ -14,8 +15,9 @@ if TYPE_CHECKING:
 
     from msgflow.sim import system
 
-TIMER, SOFTIRQ = "timer", "softirq"
-"""What wakes threads: a timer that expires, or what an interrupt of the network left for later."""
+TIMER, SOFTIRQ, THREAD = "timer", "softirq", "thread"
+"""What wakes threads: a timer that expires, what an interrupt of the network left for later, or a
+thread that gives a mutex away."""
 
 _NETWORK_CPU = 0
 
@@ -53,11 +55,12 @@ class Scheduled(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Waking:
-    """A thread is woken: when, by what, and on which CPU that was."""
+    """A thread is woken: when, by what, on which CPU that was, and by which thread."""
 
     time: int
     kind: str
     cpu: int
+    by: Scheduled | None = None
 
 
 @dataclass(slots=True)
@@ -85,8 +88,27 @@ class Kernel:
         self._latest: dict[Scheduled, Run] = {}
         self._wakings: dict[Scheduled, Waking] = {}
         self._wanted: dict[Scheduled, int] = {}
+        # Threads that have a mutex or wait for it, in this order.
+        self._mutexes: dict[tuple[int, str], deque[Scheduled]] = {}
 
-    def wake(self, thread: Scheduled, time: int, kind: str) -> int | None:
+    def lock(self, thread: Scheduled, mutex: str) -> bool:
+        """Have a mutex of the process, or wait for it; returns whether the thread has it now."""
+        queue = self._mutexes.setdefault((thread.description.pid, mutex), deque())
+        queue.append(thread)
+        return queue[0] is thread
+
+    def unlock(self, thread: Scheduled, mutex: str, time: int) -> None:
+        """Give a mutex away: the next thread that waits for it has it, and is woken."""
+        queue = self._mutexes[thread.description.pid, mutex]
+        queue.popleft()
+        if queue:
+            woken = self.wake(queue[0], time, THREAD, thread)
+            assert woken is not None
+            queue[0].go_on(woken)
+
+    def wake(
+        self, thread: Scheduled, time: int, kind: str, by: Scheduled | None = None
+    ) -> int | None:
         """Wake a thread that sleeps at `time`, which may be later than now.
 
         Returns when it can go on; None if something else wakes it earlier.
@@ -96,8 +118,8 @@ class Kernel:
         known = self._wakings.get(thread)
         if known is not None and known.time <= time:
             return None
-        cpu = _NETWORK_CPU if kind is SOFTIRQ else latest.cpu
-        self._wakings[thread] = Waking(time, kind, cpu)
+        cpu = latest.cpu if by is None else by.cpu
+        self._wakings[thread] = Waking(time, kind, _NETWORK_CPU if kind is SOFTIRQ else cpu, by)
         return time + _WAKE_UP_NS
 
     def take(self, thread: Scheduled, time: int) -> int:

@@ -196,11 +196,13 @@ def _changes(before: Run, run: Run) -> Iterator[_Event]:
     if waking is not None:
         kind, cpu = waking.kind, waking.cpu
         woken = (*_of(thread), run.cpu)
-        yield _Event(waking.time, 1, cpu, _BEGIN[kind], _VALUES[kind])
+        if kind in _BEGIN:
+            yield _Event(waking.time, 1, cpu, _BEGIN[kind], _VALUES[kind])
         yield _Event(waking.time, 2, cpu, "sched_waking", woken)
         if before.cpu != run.cpu:
             yield _Event(waking.time, 3, cpu, "sched_migrate_task", moved)
-        yield _Event(waking.time, 4, cpu, _END[kind], _VALUES[kind][:1])
+        if kind in _END:
+            yield _Event(waking.time, 4, cpu, _END[kind], _VALUES[kind][:1])
     elif before.cpu != run.cpu:
         yield _Event(run.start, 3, run.cpu, "sched_migrate_task", moved)
 
@@ -225,21 +227,24 @@ def _write_truth(
             continue
         place = (hostname, thread.description.pid, thread.tid)
         for before, after in zip(own, (*own[1:], None), strict=True):
-            states: list[tuple[str, int, int, int | None, str | None]] = [
-                ("running", before.cpu, before.start, before.end, None)
+            waking = None if after is None else after.waking
+            states: list[tuple[str, int, int, int | None]] = [
+                ("running", before.cpu, before.start, before.end)
             ]
             if after is None and before.end == last:
-                states = [("running", before.cpu, before.start, None, None)]
+                states = [("running", before.cpu, before.start, None)]
             elif after is None:
                 state = "preempted" if before.is_preempted else "sleeping"
-                states.append((state, before.cpu, before.end, None, None))
-            elif after.waking is not None:
-                woken = after.waking.time
-                states.append(("sleeping", before.cpu, before.end, woken, after.waking.kind))
-                states.append(("runnable", after.cpu, woken, after.start, after.waking.kind))
+                states.append((state, before.cpu, before.end, None))
+            elif waking is not None:
+                states.append(("sleeping", before.cpu, before.end, waking.time))
+                states.append(("runnable", after.cpu, waking.time, after.start))
             else:
-                states.append(("preempted", before.cpu, before.end, after.start, None))
-            for state, cpu, start, end, kind in states:
+                states.append(("preempted", before.cpu, before.end, after.start))
+            for state, cpu, start, end in states:
+                woken: tuple[str | None, int | None] = (None, None)
+                if waking is not None and state in {"sleeping", "runnable"}:
+                    woken = waking.kind, None if waking.by is None else waking.by.tid
                 if end is None or end > start:
                     end_ns = None if end is None else end + clock
-                    truth.thread_state.add(*place, state, cpu, start + clock, end_ns, kind)
+                    truth.thread_state.add(*place, state, cpu, start + clock, end_ns, *woken)

@@ -271,6 +271,21 @@ class Thread:
             time = yield later
         return time
 
+    def lock(self, time: int, mutex: str) -> Steps:
+        """Have a mutex of the process from `time` on, or as soon as others have given it away."""
+        kernel = self.machine.kernel
+        if kernel is not None and not kernel.lock(self, mutex):
+            self.keep_cpu(time)
+            time = yield None
+            while later := self.take_cpu(time):
+                time = yield later
+        return time
+
+    def unlock(self, time: int, mutex: str) -> None:
+        """Give a mutex away."""
+        if self.machine.kernel is not None:
+            self.machine.kernel.unlock(self, mutex, time)
+
     def begin(self, time: int, steps: Steps) -> None:
         """Let the thread do something from `time` on."""
         self._steps = steps

@@ -120,7 +120,7 @@ _SCHEMAS: Mapping[str, pa.Schema] = {
     "arrival": _schema(take_id=_ID, arrived_ns=_TIME),
     "thread_state": _schema(
         host=_TEXT, pid=_NUMBER, tid=_NUMBER, state=_TEXT, cpu=_NUMBER, start_ns=_TIME,
-        end_ns=_TIME, waker_kind=_TEXT,
+        end_ns=_TIME, waker_kind=_TEXT, waker_tid=_NUMBER,
     ),
     "cpu_run": _schema(
         host=_TEXT, cpu=_NUMBER, kernel_tid=_NUMBER, name=_TEXT, priority=_NUMBER, start_ns=_TIME,

@@ -150,6 +150,11 @@ def _step(
     instance: CallbackInstance | None,
     cause: Callable[[str, int], CallbackInstance] | None,
 ) -> Steps:
+    mutex = code.work.mutex
+    if mutex:
+        # Others may have locked or unlocked it before that moment.
+        start = yield thread.hold(start)
+        start = yield from thread.lock(start, mutex)
     time = yield from thread.compute(start, before)
     if code.work.sleep_ns:
         time = yield from thread.sleep(time, code.work.sleep_ns)
@@ -167,4 +172,6 @@ def _step(
     if code.log is not None:
         time = publish(thread, middleware, code.log, time, instance)
     time = yield from thread.compute(time, rest)
+    if mutex:
+        thread.unlock(time, mutex)
     return (yield thread.hold(time))

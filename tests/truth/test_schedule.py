@@ -14,13 +14,13 @@ from thorough import few
 from msgflow.sim import Simulation, simulate
 
 # How much of each is simulated: the losses come after 0.7 s of 5 s.
-SYSTEMS = {"cpu_hog": 0.1, "real_time": 0.2, "kernel_losses": 0.17}
+SYSTEMS = {"cpu_hog": 0.1, "real_time": 0.2, "shared_map": 0.2, "kernel_losses": 0.17}
 KINDS = {"thread_state", "preemptor", "callback_schedule", "arrival"}
 
 Traced = tuple[Simulation, Path]
 
 
-@pytest.fixture(scope="module", params=few(SYSTEMS, "real_time", "kernel_losses"))
+@pytest.fixture(scope="module", params=few(SYSTEMS, "real_time", "shared_map", "kernel_losses"))
 def traced(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Traced:
     directory = tmp_path_factory.mktemp(request.param)
     simulation = simulate(request.param, directory / "trace", factor=SYSTEMS[request.param])
@@ -91,3 +91,39 @@ def test_a_cpu_has_one_thread_at_a_time(traced: Traced) -> None:
         f"ORDER BY start_ns) AS before_ns FROM '{simulation.truth['thread_state']}') "
         "WHERE before_ns < start_ns"
     ).fetchall() == [(0,)]
+
+
+def test_who_waits_for_a_mutex_waits_for_the_thread_that_has_it(tmp_path: Path) -> None:
+    """Critical paths have what that thread did in place of the sleep."""
+    simulation = simulate("shared_map", tmp_path / "trace", factor=SYSTEMS["shared_map"])
+    ingested = ingest_one(simulation.directory, tmp_path / "run.duckdb")
+    ((callbacks, differing),) = ingested.rows(f"""
+        WITH found AS (
+            SELECT
+                callback_instance_id,
+                coalesce(sum(duration_ns) FILTER (WHERE wakers > 0), 0) AS waited_ns,
+                bool_and(state_thread_id <> i.thread_id) FILTER (WHERE wakers > 0) AS is_other
+            FROM critical_path([1], most_flows := 1000)
+            JOIN callback_instance AS i USING (callback_instance_id)
+            WHERE hop = 1 AND activity = 'callback'
+            GROUP BY callback_instance_id
+        ),
+        happened AS (
+            SELECT i.callback_instance_id, sum(s.end_ns - s.start_ns) AS waited_ns
+            FROM '{simulation.truth["thread_state"]}' AS s
+            JOIN thread AS t ON s.tid = t.tid
+            JOIN callback_instance AS i
+                ON t.thread_id = i.thread_id AND s.start_ns BETWEEN i.start_ns AND i.end_ns
+            WHERE s.state = 'sleeping' AND s.waker_kind = 'thread'
+            GROUP BY i.callback_instance_id
+        )
+        SELECT
+            count(h.waited_ns),
+            count(*) FILTER (
+                WHERE f.waited_ns <> coalesce(h.waited_ns, 0) OR f.is_other IS FALSE
+            )
+        FROM found AS f
+        LEFT JOIN happened AS h ON f.callback_instance_id = h.callback_instance_id
+    """)
+    assert differing == 0
+    assert callbacks > 5

@@ -90,6 +90,7 @@ def scenarios() -> Mapping[str, Scenario]:
         rtabmap.rtabmap(),
         scheduling.cpu_hog(),
         scheduling.real_time(),
+        scheduling.shared_map(),
         scheduling.kernel_losses(),
     )
     return MappingProxyType({scenario.name: scenario for scenario in built_in})

@@ -13,7 +13,7 @@ from msgflow.sim.entity import (
     Timer,
     Work,
 )
-from msgflow.sim.system import Host, KernelTrace, Load, Node, Process, Scenario
+from msgflow.sim.system import Executor, Host, KernelTrace, Load, Node, Process, Scenario
 
 _CAMERA = Node(
     "camera",
@@ -86,6 +86,46 @@ def real_time() -> Scenario:
             Process(
                 "joints", "robot", 1401, (joints,), start_ns=103 * MILLISECOND, priority=60
             ),
+        ),
+        duration_ns=3 * SECOND,
+    )  # fmt: skip
+
+
+def shared_map() -> Scenario:
+    """Two threads of a process that wait for each other."""
+    lidar = Node(
+        "lidar", publishers=(Publisher("/points"),), timers=(Timer(50 * MILLISECOND, ("/points",)),)
+    )
+    mapper = Node(
+        "mapper",
+        subscriptions=(
+            Subscription("/points", work=Work(12 * MILLISECOND, 4 * MILLISECOND, mutex="map")),
+        ),
+    )
+    localizer = Node(
+        "localizer",
+        executor=1,
+        publishers=(Publisher("/pose"),),
+        timers=(
+            Timer(
+                10 * MILLISECOND,
+                ("/pose",),
+                Work(500 * MICROSECOND, 500 * MICROSECOND, mutex="map"),
+            ),
+        ),
+    )
+    control = Node("control", subscriptions=(Subscription("/pose"),))
+    return Scenario(
+        name="shared_map",
+        description="A localizer that waits for the mapper in its process to give a mutex away.",
+        hosts=(Host("robot", cpu_count=2, kernel=KernelTrace((_BACKUP,))),),
+        processes=(
+            Process("lidar", "robot", 1101, (lidar,)),
+            Process(
+                "slam", "robot", 1201, (mapper, localizer), start_ns=3 * MILLISECOND,
+                executors=(Executor(), Executor()),
+            ),
+            Process("control", "robot", 1301, (control,), start_ns=5 * MILLISECOND),
         ),
         duration_ns=3 * SECOND,
     )  # fmt: skip
