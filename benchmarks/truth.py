@@ -156,9 +156,14 @@ GAP_RECORDINGS = (
 # Links found by time alone depend on how stamps and the trace's clock differ.
 TIMED_LAYOUTS = ("humble", "iron")
 TIMED_SYSTEMS = ("bursts", "bursts_two_hosts")
+# What the kernel does, does not depend on the layout.
+KERNEL_SYSTEMS = ("cpu_hog", "real_time", "shared_map", "kernel_losses")
 # What comes and goes in these does so after a second; clocks that drift, or are known from few
 # messages, take one to be known.
-WHOLE = ("losses", "restarts", "container_restarts", "host_chain", "services", "actions", "stall")
+WHOLE = (
+    "losses", "restarts", "container_restarts", "host_chain", "services", "actions", "stall",
+    *KERNEL_SYSTEMS,
+)  # fmt: skip
 # The truth names hosts as their traces do: holes of one would be looked for in the other.
 ONE_NAME = {"containers_one_hostname"}
 QUICK = (("pipeline", "jazzy"), ("two_hosts", "humble-fastdds"))
@@ -206,6 +211,9 @@ def cases(arguments: argparse.Namespace) -> Iterator[Case]:
                 yield Case(LONG, "humble", "drift", long_recording(), 1)
             continue
         for layout in arguments.layout or layouts():
+            is_left_out = system in KERNEL_SYSTEMS and layout != EVERY_LAYOUT
+            if is_left_out and not arguments.layout:
+                continue
             for recording in arguments.recording or RECORDINGS:
                 is_faulty = recording != PERFECT
                 is_asked_for = arguments.system or arguments.layout or arguments.recording

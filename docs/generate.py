@@ -100,12 +100,15 @@ _OPTIONS = {
     "links": " --run declared",
     "objects": " --limit 8",
     "path-breakdown": " --limit 12",
+    "preemption": " --limit 5",
     "topics --measure unmatched": " --limit 5",
     "waits": " --limit 5",
     "waits --by instance": " --limit 5",
     "waits --by pair": " --limit 5",
 }
+_OF_THE_KERNEL = ("callback-schedule", "cpu-usage", "preemption", "thread-states", "wakeup-latency")
 _SETUPS = {
+    **dict.fromkeys(_OF_THE_KERNEL, "msgflow simulate cpu_hog -o trace\nmsgflow ingest trace\n"),
     "links": (
         "msgflow simulate periodic_async -o declared\n"
         "msgflow simulate demo -o undeclared\n"
@@ -117,13 +120,6 @@ _SETUPS = {
         "msgflow simulate services -o trace\nmsgflow ingest trace --clock-sync messages\n"
     ),
 }
-_OF_THE_KERNEL = (
-    "callback-schedule",
-    "cpu-usage",
-    "preemption",
-    "thread-states",
-    "wakeup-latency",
-)
 _CONSOLE = re.compile(r"^```console\n.*?^```$", re.MULTILINE | re.DOTALL)
 _PHASES = {
     "input": "The input: what was read, and how it was understood",
@@ -182,10 +178,8 @@ def query_page(base: str) -> str:
     for header in _variants(base):
         if header.words != base:
             parts.append(f"\n## {header.words}\n")
-        example = ""
-        if base not in _OF_THE_KERNEL:
-            options = _OPTIONS.get(header.words, "")
-            example = f"\n```console\n$ msgflow query {header.words}{options}\n```\n"
+        options = _OPTIONS.get(header.words, "")
+        example = f"\n```console\n$ msgflow query {header.words}{options}\n```\n"
         parts.append(f"\n**{header.title}.** {_body(header, example)}")
     return "".join(parts)
 

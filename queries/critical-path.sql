@@ -41,7 +41,8 @@
 --     short for a line of their own
 -- column: state VARCHAR            What the thread did, as in thread_state, where the kernel was
 --     traced
--- column: who VARCHAR              What took the CPU, or ended the sleep: thread or interrupt
+-- column: who VARCHAR              What took the CPU, or ended the sleep: thread or interrupt;
+--     where another thread ran that was waited for, that one
 -- column: node VARCHAR [node]      Node that did it, or that waited; 'between nodes' where neither
 --     worked: network_or_idle, unless its thread is known to have run or waited for a CPU
 -- column: what VARCHAR             The callback, or the topic of the message
@@ -167,6 +168,8 @@ piece AS (
         CASE
             WHEN bt.thread_id IS NOT NULL THEN printf('%s %d', bl.label, bt.tid)
             WHEN c.by_kind = 'thread' THEN bo.name
+            WHEN c.by_kind IS NULL AND c.wakers > 0 AND c.state = 'running'
+                THEN printf('%s %d', tl.label, t.tid)
             ELSE c.by_kind
         END AS who,
         c.by_priority AS who_priority,
@@ -183,6 +186,7 @@ piece AS (
     ) AS o
         ON t.process_id = o.process_id AND c.wakers = 0
     LEFT JOIN main.thread AS bt ON c.by_thread_id = bt.thread_id
+    LEFT JOIN main.thread_label AS tl ON c.state_thread_id = tl.thread_id
     LEFT JOIN main.thread_label AS bl ON c.by_thread_id = bl.thread_id
     LEFT JOIN main.other_thread AS bo ON c.by_other_thread_id = bo.other_thread_id
     LEFT JOIN main.callback_instance AS i ON c.callback_instance_id = i.callback_instance_id

@@ -87,43 +87,10 @@ late AS MATERIALIZED (
     SELECT
         i.callback_id, i.callback_instance_id, i.thread_id, i.start_ns,
         w.wait_ns AS lateness_ns, w.busy_max_ns AS busy_ns, w.meanwhile_callback_ids,
-        w.meanwhile_ns
+        w.meanwhile_ns, w.run_queue_ns + w.preempted_ns AS queue_ns
     FROM instance AS i
     JOIN main.executor_wait_explained($runs) AS w ON i.callback_instance_id = w.callback_instance_id
     WHERE w.since = 'timer' AND NOT i.is_loss_affected
-),
--- When their threads waited for a CPU. What begins and ends a callback needs one: such a wait lies
--- inside of a callback, or outside.
-queued AS (
-    SELECT
-        s.thread_id, s.start_ns, s.end_ns,
-        sum(s.end_ns - s.start_ns) OVER (
-            PARTITION BY s.thread_id ORDER BY s.start_ns
-        ) AS total_ns
-    FROM main.thread_state AS s
-    ASOF LEFT JOIN (
-        SELECT thread_id, start_ns, end_ns FROM main.callback_instance WHERE parent_id IS NULL
-    ) AS i
-        ON s.thread_id = i.thread_id AND s.start_ns >= i.start_ns
-    WHERE s.state IN ('preempted', 'runnable')
-        AND s.thread_id IN (SELECT thread_id FROM late)
-        AND coalesce(i.end_ns <= s.start_ns, true)
-),
-edge AS (
-    SELECT callback_id, thread_id, start_ns AS at_ns, 1 AS sign FROM late
-    UNION ALL
-    SELECT callback_id, thread_id, start_ns - lateness_ns, -1 FROM late
-),
-in_queue AS (
-    SELECT
-        e.callback_id,
-        sum(
-            e.sign * coalesce(q.total_ns - greatest(q.end_ns - e.at_ns, 0), 0)
-        ) AS queue_ns
-    FROM edge AS e
-    ASOF LEFT JOIN queued AS q ON e.thread_id = q.thread_id AND e.at_ns >= q.start_ns
-    WHERE e.thread_id IN (SELECT thread_id FROM main.thread_state)
-    GROUP BY e.callback_id
 ),
 usual AS (
     SELECT callback_id, quantile_disc(interval_ns, 0.5) AS median_ns
@@ -174,10 +141,9 @@ delayed AS (
         quantile_disc(l.lateness_ns, [0.5, 0.95, 0.99, 1]) AS lateness,
         sum(l.lateness_ns // nullif(a.period_ns, 0))::BIGINT AS missed,
         sum(l.busy_ns) / nullif(sum(l.lateness_ns), 0) AS busy_share,
-        any_value(q.queue_ns) / nullif(sum(l.lateness_ns), 0) AS run_queue_share
+        sum(l.queue_ns) / nullif(sum(l.lateness_ns), 0) AS run_queue_share
     FROM late AS l
     JOIN asked AS a ON l.callback_id = a.callback_id
-    LEFT JOIN in_queue AS q ON l.callback_id = q.callback_id
     GROUP BY l.callback_id
 ),
 ran AS (

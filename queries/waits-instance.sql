@@ -3,7 +3,8 @@
 -- description: For every callback instance: the time since the end of the publication of its
 --     message (or since the timer was due, or the request was sent), for how much of it the
 --     executor was busy with other callbacks, as bounds, and with which. Instances nested in others
---     are left out.
+--     are left out. Where the kernel was traced, it shows when the message arrived, and for how
+--     long the thread waited for a CPU.
 -- grain: one row per callback instance that is not nested in another
 -- param: callback_id BIGINT = NULL  Only instances of this callback_id (query waits lists
 --     them)
@@ -24,24 +25,32 @@
 -- column: reason VARCHAR            What took the most of the wait, if the message came at once:
 --     'executor busy' (it ran others; its threads are one, or when they waited is not known), 'all
 --     threads busy', 'excluded' (a callback ran that never runs beside this one) or 'network or
---     idle'
+--     idle'. Where the kernel was traced also 'run queue' (its thread was woken or preempted, and
+--     waited for a CPU) and 'until arrival'
 -- column: rest_min_ns BIGINT [ns]   Network, idle or overhead, at least
 -- column: rest_max_ns BIGINT [ns]   Network, idle or overhead, at most
 -- column: meanwhile VARCHAR         What ran meanwhile and for how long, the longest first, with
 --     its node if it is another one
+-- column: until_arrival_ns BIGINT [ns]  Until the message arrived; empty: the kernel was not
+--     traced, or does not show that exactly
+-- column: run_queue_ns BIGINT [ns]  From then on (else from when it can have been ready), its
+--     thread was woken and waited for a CPU, outside of callbacks; empty: not traced by the kernel
+-- column: preempted_ns BIGINT [ns]  Likewise, another thread had the CPU that its thread had lost
+-- column: cpu_taken_by VARCHAR      What had the CPU in both, and for how long, the longest first
 -- column: is_loss_affected BOOLEAN  A gap of the trace lies in it
 -- column: callback_instance_id BIGINT  Identity of the callback instance
 -- column: callback_id BIGINT        Identity of the callback
 -- column: is_internal BOOLEAN       Infrastructure of ROS
 -- slowest: wait_ns
--- brief: start_ns, node, callback, wait_ns, reason, busy_max_ns, meanwhile, busy_min_ns, since,
---     rest_max_ns, rest_min_ns, callback_instance_id
+-- brief: start_ns, node, callback, wait_ns, reason, busy_max_ns, meanwhile, run_queue_ns,
+--     cpu_taken_by, preempted_ns, until_arrival_ns, busy_min_ns, since, rest_max_ns, rest_min_ns,
+--     callback_instance_id
 -- note: clocks
 WITH waited AS MATERIALIZED (
     SELECT
         run_id, callback_instance_id, callback_id, start_ns, since, wait_ns, busy_min_ns,
         busy_max_ns, blocked_max_ns, held_max_ns, is_loss_affected, meanwhile_callback_ids,
-        meanwhile_ns
+        meanwhile_ns, until_arrival_ns, run_queue_ns, preempted_ns, cpu_taken_by, cpu_taken_ns
     FROM main.executor_wait_explained($runs)
     WHERE start_ns >= $start_ns
         AND start_ns < $end_ns
@@ -68,6 +77,22 @@ meanwhile AS (
     JOIN main.callback_label AS l ON p.callback_id = l.callback_id
     JOIN main.callback_label AS o ON p.meanwhile_callback_id = o.callback_id
     GROUP BY p.callback_instance_id
+),
+taken AS (
+    SELECT
+        callback_instance_id,
+        unnest(cpu_taken_by) AS name,
+        unnest(cpu_taken_ns) AS length_ns
+    FROM waited
+),
+taker AS (
+    SELECT
+        callback_instance_id,
+        string_agg(
+            printf('%s %.3f ms', name, length_ns / 1e6), ', ' ORDER BY length_ns DESC, name
+        ) AS names
+    FROM taken
+    GROUP BY callback_instance_id
 )
 SELECT
     w.run_id,
@@ -81,6 +106,8 @@ SELECT
     w.held_max_ns,
     CASE
         WHEN w.wait_ns IS NULL OR w.busy_max_ns IS NULL THEN NULL
+        WHEN 2 * (w.run_queue_ns + w.preempted_ns) > w.wait_ns THEN 'run queue'
+        WHEN 2 * w.until_arrival_ns > w.wait_ns THEN 'until arrival'
         WHEN 2 * (w.busy_max_ns + coalesce(w.held_max_ns, 0)) < w.wait_ns THEN 'network or idle'
         WHEN 2 * w.blocked_max_ns > w.busy_max_ns + coalesce(w.held_max_ns, 0) THEN 'excluded'
         WHEN w.held_max_ns IS NULL THEN 'executor busy'
@@ -89,6 +116,10 @@ SELECT
     w.wait_ns - w.busy_max_ns - coalesce(w.held_max_ns, 0) AS rest_min_ns,
     w.wait_ns - w.busy_min_ns AS rest_max_ns,
     m.names AS meanwhile,
+    w.until_arrival_ns,
+    w.run_queue_ns,
+    w.preempted_ns,
+    k.names AS cpu_taken_by,
     w.is_loss_affected,
     w.callback_instance_id,
     w.callback_id,
@@ -96,4 +127,5 @@ SELECT
 FROM waited AS w
 JOIN main.callback_label AS l ON w.callback_id = l.callback_id
 LEFT JOIN meanwhile AS m ON w.callback_instance_id = m.callback_instance_id
+LEFT JOIN taker AS k ON w.callback_instance_id = k.callback_instance_id
 ORDER BY w.run_id, w.start_ns, w.callback_instance_id

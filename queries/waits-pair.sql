@@ -3,13 +3,16 @@
 -- description: For every pair of callbacks of one executor: how long one ran while the other
 --     waited. The literature calls this interference, or blocking if the one that ran should not
 --     have come first; callbacks are never interrupted. Bounds are those of waits. Threads
---     of an executor that ran the other callback at once count once, but for thread_max.
--- grain: one row per waiting callback and callback that ran meanwhile
+--     of an executor that ran the other callback at once count once, but for thread_max. Where the
+--     kernel was traced, what had the CPU while the thread waited for one has rows of its own.
+-- grain: one row per waiting callback and callback that ran meanwhile, or thread that had the CPU
 -- column: run_id BIGINT             Run
 -- column: node VARCHAR [node]  Node of the callback that waited
 -- column: callback VARCHAR [callback]  What triggers it
 -- column: meanwhile_node VARCHAR [node]  Node of the callback that ran
 -- column: meanwhile_callback VARCHAR [callback]  What triggers it
+-- column: meanwhile_thread VARCHAR  Instead of a callback: thread that had the CPU for which the
+--     thread of the waiting callback waited, outside of callbacks
 -- column: waits BIGINT              Waits during which the other callback may have run
 -- column: instances BIGINT          Callback instances that ran during these waits
 -- column: overlap_min_ns BIGINT [ns]  How long it ran during waits, at least
@@ -20,12 +23,12 @@
 -- column: callback_id BIGINT        Identity of the callback that waited
 -- column: meanwhile_callback_id BIGINT  Identity of the callback that ran
 -- column: is_internal BOOLEAN       The callback that waited is infrastructure of ROS
--- brief: node, meanwhile_node, worst_ns, share, callback, meanwhile_callback, waits,
---     overlap_max_ns, overlap_min_ns, instances
+-- brief: node, meanwhile_node, worst_ns, share, meanwhile_thread, callback, meanwhile_callback,
+--     waits, overlap_max_ns, overlap_min_ns, instances
 WITH waited AS MATERIALIZED (
     SELECT
         run_id, callback_instance_id, callback_id, meanwhile_callback_ids, meanwhile_ns,
-        meanwhile_certain_ns, meanwhile_thread_ns, meanwhile_instances
+        meanwhile_certain_ns, meanwhile_thread_ns, meanwhile_instances, cpu_taken_by, cpu_taken_ns
     FROM main.executor_wait_explained($runs)
     WHERE start_ns >= $start_ns AND start_ns < $end_ns
 ),
@@ -40,11 +43,16 @@ pair AS (
         unnest(meanwhile_thread_ns) AS thread_max_ns
     FROM waited
 ),
+taken AS (
+    SELECT run_id, callback_id, unnest(cpu_taken_by) AS name, unnest(cpu_taken_ns) AS length_ns
+    FROM waited
+),
 measured AS (
     SELECT
         run_id,
         callback_id,
         meanwhile_callback_id,
+        NULL::VARCHAR AS meanwhile_thread,
         count(*) AS waits,
         sum(instances)::BIGINT AS instances,
         sum(overlap_min_ns)::BIGINT AS overlap_min_ns,
@@ -53,6 +61,12 @@ measured AS (
         sum(thread_max_ns)::BIGINT AS thread_max_ns
     FROM pair
     GROUP BY run_id, callback_id, meanwhile_callback_id
+    UNION ALL
+    SELECT
+        run_id, callback_id, NULL, name, count(*), NULL, sum(length_ns)::BIGINT,
+        sum(length_ns)::BIGINT, max(length_ns), NULL
+    FROM taken
+    GROUP BY run_id, callback_id, name
 )
 SELECT
     m.run_id,
@@ -60,6 +74,7 @@ SELECT
     l.label AS callback,
     o.node AS meanwhile_node,
     o.label AS meanwhile_callback,
+    m.meanwhile_thread,
     m.waits,
     m.instances,
     m.overlap_min_ns,
@@ -72,5 +87,7 @@ SELECT
     l.is_internal
 FROM measured AS m
 JOIN main.callback_label AS l ON m.callback_id = l.callback_id
-JOIN main.callback_label AS o ON m.meanwhile_callback_id = o.callback_id
-ORDER BY m.run_id, m.worst_ns DESC, m.callback_id, m.meanwhile_callback_id
+LEFT JOIN main.callback_label AS o ON m.meanwhile_callback_id = o.callback_id
+ORDER BY
+    m.run_id, m.worst_ns DESC, m.callback_id, m.meanwhile_callback_id NULLS LAST,
+    m.meanwhile_thread

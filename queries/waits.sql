@@ -5,9 +5,11 @@
 --     callbacks. A trace does not say when a message arrived, so the busy time is given as bounds.
 --     At least: what ran after the executor had certainly found it ready. At most: what ran since
 --     the earliest moment at which it can have been there. The rest of the wait was the network, an
---     idle executor or its overhead. Totals are over the callback instances in the time window. The
---     callback that others kept waiting longest comes first. With --by instance, the waits are
---     listed one by one, with --by pair, the callbacks that ran meanwhile.
+--     idle executor or its overhead. Where the kernel was traced, the rest is divided: until the
+--     message arrived, and for how long the thread then waited for a CPU. Totals are over the
+--     callback instances in the time window. The callback that others kept waiting longest comes
+--     first. With --by instance, the waits are listed one by one, with --by pair, the callbacks
+--     that ran meanwhile.
 -- grain: one row per callback object that ran
 -- variant: by VARCHAR {callback|pair|instance} = 'callback'  What a row is: a callback that
 --     waited, with another that ran meanwhile, or one of its waits
@@ -29,17 +31,30 @@
 -- column: rest_total_max_ns BIGINT [ns]  Network, idle or overhead, where known, at most
 -- column: meanwhile VARCHAR         What ran meanwhile: the three with the largest share, with
 --     their node if it is another one
+-- column: arrived BIGINT            Of these, those of which the kernel shows exactly when the
+--     message arrived; empty: the kernel was not traced
+-- column: until_arrival_total_ns BIGINT [ns]  Of the waits of these, until the message arrived
+-- column: run_queue_worst_ns BIGINT [ns]  Longest time in one wait for which its thread was woken
+--     and waited for a CPU, outside of callbacks, since the message arrived (else since it can have
+--     been ready)
+-- column: run_queue_total_ns BIGINT [ns]  Sum of these times over all waits
+-- column: preempted_worst_ns BIGINT [ns]  Likewise, another thread had the CPU that its thread had
+--     lost
+-- column: preempted_total_ns BIGINT [ns]  Sum of these times over all waits
+-- column: cpu_taken_by VARCHAR      What had the CPU in both: the three with the largest share
 -- column: unknown BIGINT            Of these, with an unknown start of the wait
 -- column: loss_affected BIGINT      Of these, with a gap of the trace in their wait
 -- column: callback_id BIGINT        Identity of the callback
 -- column: is_internal BOOLEAN       Infrastructure of ROS
--- brief: node, callback, busy_worst_ns, wait_median_ns, wait_max_ns, meanwhile, count,
---     delayed_min, delayed_max, busy_total_min_ns, busy_total_max_ns
+-- brief: node, callback, busy_worst_ns, wait_median_ns, wait_max_ns, run_queue_worst_ns,
+--     meanwhile, cpu_taken_by, preempted_worst_ns, count, delayed_min, delayed_max,
+--     busy_total_min_ns, busy_total_max_ns
 -- note: clocks
 WITH waited AS MATERIALIZED (
     SELECT
         run_id, callback_instance_id, callback_id, wait_ns, busy_min_ns, busy_max_ns,
-        held_max_ns, is_loss_affected, meanwhile_callback_ids, meanwhile_ns
+        held_max_ns, is_loss_affected, meanwhile_callback_ids, meanwhile_ns, until_arrival_ns,
+        run_queue_ns, preempted_ns, cpu_taken_by, cpu_taken_ns
     FROM main.executor_wait_explained($runs)
     WHERE start_ns >= $start_ns AND start_ns < $end_ns
 ),
@@ -58,6 +73,12 @@ measured AS (
         sum(CASE WHEN wait_ns IS NOT NULL THEN held_max_ns END)::BIGINT AS held_total_max_ns,
         sum(wait_ns - busy_max_ns - coalesce(held_max_ns, 0))::BIGINT AS rest_total_min_ns,
         sum(wait_ns - busy_min_ns)::BIGINT AS rest_total_max_ns,
+        CASE WHEN count(run_queue_ns) > 0 THEN count(until_arrival_ns) END AS arrived,
+        sum(until_arrival_ns)::BIGINT AS until_arrival_total_ns,
+        max(run_queue_ns) AS run_queue_worst_ns,
+        sum(run_queue_ns)::BIGINT AS run_queue_total_ns,
+        max(preempted_ns) AS preempted_worst_ns,
+        sum(preempted_ns)::BIGINT AS preempted_total_ns,
         count(*) - count(wait_ns) AS unknown,
         count(*) FILTER (WHERE is_loss_affected) AS loss_affected
     FROM waited
@@ -98,6 +119,28 @@ meanwhile AS (
     JOIN main.callback_label AS o ON r.meanwhile_id = o.callback_id
     WHERE r.place <= 3 AND r.share >= 0.005
     GROUP BY r.callback_id
+),
+taken AS (
+    SELECT callback_id, unnest(cpu_taken_by) AS name, unnest(cpu_taken_ns) AS length_ns
+    FROM waited
+),
+taker AS (
+    SELECT
+        callback_id, name,
+        sum(length_ns) / sum(sum(length_ns)) OVER (PARTITION BY callback_id) AS share,
+        row_number() OVER (
+            PARTITION BY callback_id ORDER BY sum(length_ns) DESC, name
+        ) AS place
+    FROM taken
+    GROUP BY callback_id, name
+),
+preemptor AS (
+    SELECT
+        callback_id,
+        string_agg(printf('%s %.0f %%', name, 100 * share), ', ' ORDER BY place) AS shares
+    FROM taker
+    WHERE place <= 3 AND share >= 0.005
+    GROUP BY callback_id
 )
 SELECT
     m.run_id,
@@ -115,6 +158,13 @@ SELECT
     m.rest_total_min_ns,
     m.rest_total_max_ns,
     w.shares AS meanwhile,
+    m.arrived,
+    m.until_arrival_total_ns,
+    m.run_queue_worst_ns,
+    m.run_queue_total_ns,
+    m.preempted_worst_ns,
+    m.preempted_total_ns,
+    p.shares AS cpu_taken_by,
     m.unknown,
     m.loss_affected,
     m.callback_id,
@@ -122,4 +172,5 @@ SELECT
 FROM measured AS m
 JOIN main.callback_label AS l ON m.callback_id = l.callback_id
 LEFT JOIN meanwhile AS w ON m.callback_id = w.callback_id
+LEFT JOIN preemptor AS p ON m.callback_id = p.callback_id
 ORDER BY m.run_id, m.busy_worst_ns DESC NULLS LAST, l.node, l.label, m.callback_id

@@ -97,6 +97,9 @@ def compare_simulated(
         for name, path in truth.items():
             connection.execute(f"CREATE TEMP VIEW simulated_{name} AS FROM '{path}'")
         scores = _score(connection, "simulated")
+        if connection.execute("SELECT count(*) > 0 FROM simulated_cpu_run").fetchone() == (True,):
+            connection.execute((_SQL / "schedule.sql").read_text())
+            scores += [Score(*row) for row in connection.execute("FROM schedule_score").fetchall()]
         columns = connection.execute(
             "SELECT column_name FROM duckdb_columns() "
             "WHERE database_name = 'analysed' AND schema_name = 'main' "

@@ -40,7 +40,7 @@ _SHOWN = {
     ),
     "waits": (
         "what kept its callbacks waiting",
-        "node callback meanwhile_node meanwhile_callback worst_ns",
+        "node callback meanwhile_node meanwhile_callback meanwhile_thread worst_ns",
     ),
     "losses": (
         "messages not delivered",

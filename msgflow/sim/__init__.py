@@ -1,7 +1,8 @@
 """Simulated ROS 2 systems: real CTF traces of systems whose truth is known.
 
 `simulate("pipeline", directory)` writes for each host a trace as LTTng-UST would have recorded it
-(`directory/HOSTNAME/ust/uid/1000/64-bit`), and the truth into `directory/truth`: what happened, not
+(`directory/HOSTNAME/ust/uid/1000/64-bit`; the kernel's in `directory/HOSTNAME/kernel`, if the
+scenario has one), and the truth into `directory/truth`: what happened, not
 what can be seen. `scenarios()` lists what can be simulated; a `Scenario` of your own works as well.
 
 `layout` names the release of ROS 2 whose events the trace has, see `layouts()`. `recording` is how
@@ -97,6 +98,16 @@ missing_packet — one row per packet without events that is not in a trace, but
 emitted — one row per event that came into the buffers of a trace, recorded or not, of recordings
 that are not perfect:
     host, pid, tid, cpu, ts_ns
+arrival — one row per take of a message that came by DDS, where the kernel is traced:
+    take_id, arrived_ns (when it was in the queue of its subscription)
+thread_state — one row per state of a thread of a process with nodes, where the kernel is traced:
+    host, pid, tid, state ('running', 'preempted', 'sleeping', 'runnable'), cpu (that it has, had or
+    waits for), start_ns, end_ns (NULL: the last), waker_kind (what ended the sleep: 'timer',
+    'softirq', 'thread'), waker_tid (that thread, of the same process)
+cpu_run — one row per stretch of time in which a thread had a CPU, likewise, of all processes:
+    host, cpu, kernel_tid, name, priority, start_ns, end_ns
+kernel_loss — one row per time in which events of the kernel were lost:
+    host, start_ns, end_ns
 executor_state — one row per executor event, lasting until the next one of the thread:
     host, pid, tid, start_ns, end_ns (NULL: the last), state ('process' for get_next_ready,
     'wait' for wait_for_work, 'execute' for execute)

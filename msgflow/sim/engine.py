@@ -16,18 +16,21 @@ from msgflow.sim.ctf import TraceIdentity
 from msgflow.sim.discovery import Discovery
 from msgflow.sim.entity import SECOND
 from msgflow.sim.host_clock import HostClock
+from msgflow.sim.kernel import Kernel
 from msgflow.sim.layout import layouts
+from msgflow.sim.load_thread import LoadThread
 from msgflow.sim.machine import Machine, RunningProcess
 from msgflow.sim.recorder import Recorder
 from msgflow.sim.scenario import scenarios
 from msgflow.sim.scheduler import Scheduler
 from msgflow.sim.services import ServiceNetwork
 from msgflow.sim.startup import Startup
+from msgflow.sim.system import Process
 from msgflow.sim.transport import Middleware
 from msgflow.sim.truth import Truth
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from msgflow.sim.layout import Layout
     from msgflow.sim.recording import Recording
@@ -98,6 +101,7 @@ def simulate(
     # Yet traces that differ in anything never pass for the same.
     course = f"{chosen.name}/{seed}"
     identity = f"{chosen!r}/{seed}/{factor!r}/{clock_offset_ns}/{clock_drift_ppm!r}"
+    identity += "".join(f"/{host.kernel!r}" for host in chosen.hosts if host.kernel is not None)
     length = int(chosen.duration_ns * factor)
     truth = Truth(target / "truth")
     for event in _layout(chosen).events:
@@ -115,16 +119,21 @@ def simulate(
     )
     network = ServiceNetwork(scheduler)
     processes = _start(chosen, scheduler, machines, middleware, network, course)
+    loads = [*_loads(chosen, scheduler, machines, course)]
     scheduler.run(length, middleware.arrive)
 
     for process in processes:
         for thread in process.threads:
             thread.finish()
+    for load in loads:
+        load.finish()
     network.finish()
     middleware.finish()
     end = scheduler.end + _STOP_DELAY_NS
     for machine in machines.values():
         machine.recorder.close(end)
+        if machine.kernel is not None:
+            machine.recorder.write_kernel(machine.kernel, end)
     truth.close()
     meta = target / "truth" / "meta.json"
     _write_meta(
@@ -210,6 +219,23 @@ def _start(
     return processes
 
 
+def _loads(
+    scenario: Scenario, scheduler: Scheduler, machines: Mapping[str, Machine], course: str
+) -> Iterator[LoadThread]:
+    """Let everything else that is to run on the hosts do so."""
+    for host in scenario.hosts:
+        for load in () if host.kernel is None else host.kernel.loads:
+            description = Process(
+                load.name, host.hostname, load.tid, (), priority=load.priority, cpus=load.cpus
+            )
+            process = RunningProcess(
+                scheduler, machines[host.hostname], description, load.tid, course
+            )
+            thread = LoadThread(process, load)
+            thread.begin(load.start_ns, thread.work())
+            yield thread
+
+
 def _subscriptions(scenario: Scenario) -> Counter[str]:
     """How many subscriptions of each topic there will be."""
     expected: Counter[str] = Counter()
@@ -276,6 +302,7 @@ def _machine(
     )
     return Machine(
         identity.hostname, clock, recorder, recording, host.stamp_resolution_ns, host.publish_pace,
+        None if host.kernel is None else Kernel(host.kernel, host.cpu_count),
     )  # fmt: skip
 
 

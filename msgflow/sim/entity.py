@@ -5,7 +5,7 @@ Data only, no behaviour. All durations are nanoseconds.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from msgflow.errors import UsageError
 
@@ -24,6 +24,9 @@ class Work:
         slow_probability: share of the runs (0..1) that take up to `slow_ns` longer.
         slow_ns: greatest additional duration of a slow run; it is at least half of that.
         percent_before: how much is done before the first publication, the rest after the last.
+        sleep_ns: how long the thread sleeps before the first publication, where the kernel is
+            traced.
+        mutex: name of one of the process that is locked meanwhile, likewise; none if empty.
     """
 
     typical_ns: int = 20 * MICROSECOND
@@ -31,6 +34,8 @@ class Work:
     slow_probability: float = 0.0
     slow_ns: int = 0
     percent_before: int = 80
+    sleep_ns: int = field(default=0, repr=False)
+    mutex: str = field(default="", repr=False)
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,7 +24,8 @@ class FieldKind(Enum):
     """Kinds of payload fields: `struct` code and the TSDL of one element.
 
     PADDED is an array of bytes: the first 16 are given, the others are zero. SEQUENCE
-    holds as many pointers as it says, its length before it.
+    holds as many pointers as it says, its length before it; NUMBERS likewise, of 32 bits.
+    NAME is a text in a field of fixed length.
     """
 
     POINTER = ("Q", _POINTER)
@@ -35,6 +36,8 @@ class FieldKind(Enum):
     BYTES = ("s", _BYTE)
     PADDED = ("16s8x", _BYTE)
     SEQUENCE = (None, _POINTER)
+    NUMBERS = (None, "integer { size = 32; align = 8; signed = 1; encoding = none; base = 10; }")
+    NAME = ("s", "integer { size = 8; align = 8; signed = 1; encoding = UTF8; base = 10; }")
     STRING = (None, "string")
 
     def __init__(self, code: str | None, tsdl: str) -> None:
@@ -44,7 +47,7 @@ class FieldKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class EventField:
-    """A payload field; `length` is the number of elements of BYTES and PADDED."""
+    """A payload field; `length` is the number of elements of BYTES, PADDED and NAME."""
 
     name: str
     kind: FieldKind
@@ -134,3 +137,24 @@ OWN_SIGNATURES: Mapping[str, tuple[EventField, ...]] = MappingProxyType(
     {"my_pkg:frame_done": parse_fields("frame unsigned, score double, label string")}
 )
 """Events of tracepoints of the user's own, which no release of ROS 2 has."""
+
+KERNEL_SIGNATURES: Mapping[str, tuple[EventField, ...]] = MappingProxyType(
+    {
+        name: parse_fields(fields)
+        for name, fields in {
+            "sched_switch": "prev_comm name 16, prev_tid signed_32, prev_prio signed_32, "
+            "prev_state signed, next_comm name 16, next_tid signed_32, next_prio signed_32",
+            "sched_waking": "comm name 16, tid signed_32, prio signed_32, target_cpu signed_32",
+            "sched_migrate_task": "comm name 16, tid signed_32, prio signed_32, "
+            "orig_cpu signed_32, dest_cpu signed_32",
+            "sched_process_fork": "parent_comm name 16, parent_tid signed_32, "
+            "parent_pid signed_32, child_comm name 16, child_tid signed_32, vtids numbers, "
+            "child_pid signed_32, child_ns_inum unsigned",
+            "irq_softirq_entry": "vec signed_32",
+            "irq_softirq_exit": "vec signed_32",
+            "timer_hrtimer_expire_entry": "hrtimer pointer, now signed, function pointer",
+            "timer_hrtimer_expire_exit": "hrtimer pointer",
+        }.items()
+    }
+)
+"""Events of the kernel, as lttng-modules has them."""

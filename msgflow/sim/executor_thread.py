@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from msgflow.sim.callbacks import run_buffer, run_subscription, run_timer
 from msgflow.sim.entity import MICROSECOND
+from msgflow.sim.kernel import SOFTIRQ, TIMER
 from msgflow.sim.machine import Run, RunningProcess, Steps, Thread
 from msgflow.sim.objects import IntraBuffer, SubscriptionObject, TimerObject
 from msgflow.sim.services import ClientObject, ServiceObject, run_client, run_service
@@ -52,9 +53,14 @@ class ExecutorThread(Thread):
         self._asleep_since = 0
         self._wake_at: int | None = None
 
-    def wake(self, time: int) -> None:
+    def wake(self, time: int, kind: str = SOFTIRQ) -> None:
         """Something has arrived at `time` for the executor that the thread waits in."""
         start = max(time, self._asleep_since)
+        if self.machine.kernel is not None:
+            woken = self.machine.kernel.wake(self, start, kind)
+            if woken is not None:
+                self.go_on(woken)
+            return
         wake_at = start + 6 * MICROSECOND + self.scheduler.tail(5 * MICROSECOND)
         if self._wake_at is None or wake_at < self._wake_at:
             self._wake_at = wake_at
@@ -188,9 +194,9 @@ class ExecutorThread(Thread):
         if until is not None and (due is None or until < due):
             due = until
         if due is not None:
-            self.wake(due)
+            self.wake(due, TIMER)
         if random() < _SPURIOUS_WAKE_UP:
-            self.wake(asleep + 15 * MICROSECOND)
+            self.wake(asleep + 15 * MICROSECOND, TIMER)
 
     def _emit_timer(self, time: int, period: int) -> None:
         """A wait of rclpy that may time out has a timer, which exists as long as the wait."""

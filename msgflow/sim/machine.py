@@ -7,12 +7,14 @@ from random import Random
 from typing import TYPE_CHECKING
 
 from msgflow.sim.ctf import thread_context
+from msgflow.sim.kernel import TIMER
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from msgflow.sim import system
     from msgflow.sim.host_clock import HostClock
+    from msgflow.sim.kernel import Kernel
     from msgflow.sim.recorder import Recorder
     from msgflow.sim.recording import Recording
     from msgflow.sim.scheduler import Scheduler
@@ -33,6 +35,7 @@ class Machine:
         tracepoints: the events that can be emitted.
         free_at: for each CPU the time from which on it is free.
         publish_pace: how long a publication takes from layer to layer, as a share of the usual.
+        kernel: what gives CPUs to threads where that is traced.
     """
 
     def __init__(
@@ -43,7 +46,9 @@ class Machine:
         recording: Recording,
         stamp_resolution: int = 1,
         publish_pace: float = 1.0,
+        kernel: Kernel | None = None,
     ) -> None:
+        self.kernel = kernel
         self.hostname = hostname
         self._stamp_resolution = stamp_resolution
         self.publish_pace = publish_pace
@@ -177,6 +182,9 @@ class Thread:
         context: its part of each record.
         emit: `emit(tracepoint, time, context, *values)` on the CPU it has.
         running: identifiers of the callback instances that go on, the innermost last.
+        description: of its process.
+        priority: as the kernel has it.
+        computing: from when to when it has nothing else to do, so that others may have its CPU.
     """
 
     def __init__(self, process: RunningProcess, tid: int) -> None:
@@ -188,6 +196,9 @@ class Thread:
         self.cpu = process.number % len(self.machine.emitters)
         self.emit: Callable[..., None] = self.machine.emitters[self.cpu]
         self.running: list[int] = []
+        self.description = process.description
+        self.priority = process.description.priority
+        self.computing = (0, 0)
         self._steps: Steps | None = None
         # A step that was planned before another one replaced it is recognised by this.
         self._plan = 0
@@ -200,6 +211,8 @@ class Thread:
         period, length = self.process.description.starved_ns
         if length and (passed := time % period) >= period - length:
             return time - passed + period
+        if self.machine.kernel is not None:
+            return self.machine.kernel.take(self, time)
         free_at = self.machine.free_at
         cpu = self.cpu
         if self.scheduler.random() < _MIGRATION:
@@ -208,13 +221,19 @@ class Thread:
             cpu = min(range(len(free_at)), key=free_at.__getitem__)
             if free_at[cpu] > time:
                 return free_at[cpu]
+        self.move(cpu)
+        return 0
+
+    def move(self, cpu: int) -> None:
+        """Go on on a CPU."""
         self.cpu = cpu
         self.emit = self.machine.emitters[cpu]
-        return 0
 
     def keep_cpu(self, until: int) -> None:
         """Have the CPU until that time, which is after the last event emitted."""
         self.machine.free_at[self.cpu] = until
+        if self.machine.kernel is not None:
+            self.machine.kernel.keep(self, until)
         if until > self.scheduler.end:
             self.scheduler.end = until
 
@@ -222,6 +241,50 @@ class Thread:
         """Keep the CPU up to the next step at `time`; returns that, to be yielded."""
         self.keep_cpu(time + 1)
         return time
+
+    def compute(self, time: int, length: int) -> Steps:
+        """Compute for so long from `time` on; returns when that is done.
+
+        Where the kernel is traced, others may have the CPU in between.
+        """
+        if self.machine.kernel is None:
+            return time + length
+        while True:
+            self.computing = (time, time + length)
+            end = yield self.hold(time + length)
+            length -= end - time
+            time = end
+            self.computing = (0, 0)
+            if not length:
+                return time
+            while later := self.take_cpu(time):
+                time = yield later
+
+    def sleep(self, time: int, length: int) -> Steps:
+        """Sleep for so long; returns when the thread has a CPU again."""
+        self.keep_cpu(time)
+        woken: int | None = time + length
+        if self.machine.kernel is not None:
+            woken = self.machine.kernel.wake(self, time + length, TIMER)
+        time = yield woken
+        while later := self.take_cpu(time):
+            time = yield later
+        return time
+
+    def lock(self, time: int, mutex: str) -> Steps:
+        """Have a mutex of the process from `time` on, or as soon as others have given it away."""
+        kernel = self.machine.kernel
+        if kernel is not None and not kernel.lock(self, mutex):
+            self.keep_cpu(time)
+            time = yield None
+            while later := self.take_cpu(time):
+                time = yield later
+        return time
+
+    def unlock(self, time: int, mutex: str) -> None:
+        """Give a mutex away."""
+        if self.machine.kernel is not None:
+            self.machine.kernel.unlock(self, mutex, time)
 
     def begin(self, time: int, steps: Steps) -> None:
         """Let the thread do something from `time` on."""

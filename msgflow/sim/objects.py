@@ -158,7 +158,8 @@ class PublisherObject:
 class SubscriptionObject:
     """A subscription as it exists in its process, with the queue of its reader; `ended` or not.
 
-    `is_silent`: its release of ROS 2 has no events for this kind of take.
+    `is_silent`: its release of ROS 2 has no events for this kind of take. `arrivals`: when messages
+    came, by the number of their publication, where the kernel is traced.
     """
 
     subscription_id: int
@@ -181,6 +182,7 @@ class SubscriptionObject:
     addresses: tuple[int, ...] = ()
     intra: IntraBuffer | None = None
     ended: int | None = None
+    arrivals: dict[int, int] = field(default_factory=dict)
 
     def is_ready(self, time: int) -> bool:
         """Whether a message is there."""

@@ -20,6 +20,7 @@ from msgflow.sim.ctf import (
     thread_of,
 )
 from msgflow.sim.events import OWN_SIGNATURES, SIGNATURES
+from msgflow.sim.kernel_trace import write_kernel
 from msgflow.sim.recording import Buffers, Recording
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from msgflow.sim.host_clock import HostClock
+    from msgflow.sim.kernel import Kernel
     from msgflow.sim.layout import Layout
     from msgflow.sim.truth import Truth
 
@@ -140,6 +142,12 @@ class Recorder:
             self._snapshot.close(min(end, start))
         for writer in self._writers.values():
             writer.close(max(end, start + 1))
+
+    def write_kernel(self, kernel: Kernel, end: int) -> None:
+        """Write the trace of the kernel up to time `end`."""
+        write_kernel(
+            kernel, self._directory / "kernel", self._identity, self._clock, self._truth, end
+        )
 
     # What a stream asks when it is recorded with faults.
 

@@ -5,7 +5,7 @@ All durations are nanoseconds. A scenario is immutable; `dataclasses.replace` ma
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from msgflow.errors import UsageError
 from msgflow.sim.entity import (
@@ -127,6 +127,9 @@ class Process:
             already goes on.
         threads_from: threads other than the main one have ids above this; the process id if None.
         container: the container of its host that it runs in, which numbers processes by itself.
+        priority: of its threads, as the kernel has it: 0 to 99 real-time (less is more urgent), 100
+            to 139 nice -20 to 19. It counts where the kernel is traced; likewise `cpus`.
+        cpus: on which its threads may run; on all if there are none.
     """
 
     name: str
@@ -141,12 +144,49 @@ class Process:
     starved_ns: tuple[int, int] = (0, 0)
     threads_from: int | None = None
     container: str = ""
+    priority: int = field(default=120, repr=False)
+    cpus: tuple[int, ...] = field(default=(), repr=False)
 
     def tid(self, number: int) -> int:
         """Id of a thread; number 0 is the main one."""
         if number == 0 or self.threads_from is None:
             return self.pid + number
         return self.threads_from + number
+
+
+@dataclass(frozen=True, slots=True)
+class Load:
+    """A thread of a process without ROS that computes for `busy_ns`, every `period_ns`.
+
+    Attributes:
+        name: of it, 15 characters at most.
+        tid: its number.
+        priority: as of a process; likewise `cpus`.
+        start_ns: when it does so first.
+    """
+
+    name: str
+    tid: int
+    period_ns: int
+    busy_ns: int
+    priority: int = 120
+    cpus: tuple[int, ...] = ()
+    start_ns: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class KernelTrace:
+    """A trace of the kernel's scheduling, beside that of ROS.
+
+    Attributes:
+        loads: what else runs on the host.
+        has_ids: it tells the ids of threads when they are created.
+        losses: all CPUs lose what the kernel does between these times, and count it.
+    """
+
+    loads: tuple[Load, ...] = ()
+    has_ids: bool = True
+    losses: tuple[tuple[int, int], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,6 +205,7 @@ class Host:
         recording: how it is recorded; None: as the scenario says.
         publish_pace: how long a publication takes from layer to layer, as a share of the usual.
         recorded_as: hostname that its trace shows, and the truth; its own if empty.
+        kernel: its kernel is traced as well; None: it is not.
     """
 
     hostname: str
@@ -176,6 +217,7 @@ class Host:
     recording: Recording | None = None
     publish_pace: float = 1.0
     recorded_as: str = ""
+    kernel: KernelTrace | None = field(default=None, repr=False)
 
 
 @dataclass(frozen=True, slots=True)

@@ -52,6 +52,9 @@ class Taken:
             message.publication_id, instance_id, is_internal, self.method, self.dequeue_ns,
             subscription.subscription_id,
         )  # fmt: skip
+        arrived = subscription.arrivals.pop(message.publication_id, None)
+        if arrived is not None:
+            truth.arrival.add(self.take_id, arrived + machine.epoch)
         since = message.intra if self.method == "ring_buffer" else message.rmw
         assert since is not None
         truth.transport.add(

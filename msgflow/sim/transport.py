@@ -139,6 +139,8 @@ class Middleware:
             if self._overwrites:
                 self.drop(queue.popleft(), subscription, "overwritten")
         queue.append(message)
+        if subscription.process.machine.kernel is not None:
+            subscription.arrivals[message.publication_id] = time
         subscription.executor.wake(time)
 
     def next_message(self, subscription: SubscriptionObject, time: int) -> Message | None:

@@ -117,6 +117,16 @@ _SCHEMAS: Mapping[str, pa.Schema] = {
     "missing_packet": _schema(
         host=_TEXT, pid=_NUMBER, cpu=_NUMBER, since_ns=_TIME, end_ns=_TIME, cause=_TEXT
     ),
+    "arrival": _schema(take_id=_ID, arrived_ns=_TIME),
+    "thread_state": _schema(
+        host=_TEXT, pid=_NUMBER, tid=_NUMBER, state=_TEXT, cpu=_NUMBER, start_ns=_TIME,
+        end_ns=_TIME, waker_kind=_TEXT, waker_tid=_NUMBER,
+    ),
+    "cpu_run": _schema(
+        host=_TEXT, cpu=_NUMBER, kernel_tid=_NUMBER, name=_TEXT, priority=_NUMBER, start_ns=_TIME,
+        end_ns=_TIME,
+    ),
+    "kernel_loss": _schema(host=_TEXT, start_ns=_TIME, end_ns=_TIME),
     "emitted": _schema(host=_TEXT, pid=_NUMBER, tid=_NUMBER, cpu=_NUMBER, ts_ns=_TIME),
 }  # fmt: skip
 

@@ -120,10 +120,11 @@ def _execute(
 ) -> Run:
     work = code.work
     duration = _duration(thread, work)
-    time = start + 200 + duration * work.percent_before // 100
+    before = duration * work.percent_before // 100
     rest = 200 + duration * (100 - work.percent_before) // 100
-    if code.is_stepwise:
-        return _step(thread, middleware, code, time, rest, instance, cause)
+    if code.is_stepwise or thread.machine.kernel is not None:
+        return _step(thread, middleware, code, start + 200, before, rest, instance, cause)
+    time = start + 200 + before
     for publisher in code.publishers:
         time = publish(thread, middleware, publisher, time, instance)
     if code.log is not None:
@@ -143,11 +144,20 @@ def _step(
     thread: Thread,
     middleware: Middleware,
     code: UserCode,
-    time: int,
+    start: int,
+    before: int,
     rest: int,
     instance: CallbackInstance | None,
     cause: Callable[[str, int], CallbackInstance] | None,
 ) -> Steps:
+    mutex = code.work.mutex
+    if mutex:
+        # Others may have locked or unlocked it before that moment.
+        start = yield thread.hold(start)
+        start = yield from thread.lock(start, mutex)
+    time = yield from thread.compute(start, before)
+    if code.work.sleep_ns:
+        time = yield from thread.sleep(time, code.work.sleep_ns)
     for publisher in code.publishers:
         time = yield thread.hold(time)
         # What has ended before it began is known by now, on whatever thread it was.
@@ -161,4 +171,7 @@ def _step(
         time = yield from deed(thread, middleware, time, instance)
     if code.log is not None:
         time = publish(thread, middleware, code.log, time, instance)
-    return (yield thread.hold(time + rest))
+    time = yield from thread.compute(time, rest)
+    if mutex:
+        thread.unlock(time, mutex)
+    return (yield thread.hold(time))

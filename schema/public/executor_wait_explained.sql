@@ -2,7 +2,8 @@
 -- kind: macro
 -- description: How long callback instances waited in their executor (main.executor_wait), and which
 --     callbacks its threads ran meanwhile (main.executor_interference, summed up by callback). Both
---     at once take hardly longer than one of them.
+--     at once take hardly longer than one of them. Where a kernel trace shows exactly when a
+--     message arrived (main.arrival), it was ready then: the bounds are one.
 -- grain: one row per callback instance that is not nested in another
 -- param: runs BIGINT[]  Runs to look at
 -- column: run_id BIGINT  Run that the row belongs to
@@ -36,18 +37,37 @@
 -- column: meanwhile_certain_ns BIGINT[] [ns]  The same from latest_ns on
 -- column: meanwhile_thread_ns BIGINT[] [ns]  The same as meanwhile_ns, of all threads added up
 -- column: meanwhile_instances BIGINT[]  How many callback instances of each that were
+-- column: until_arrival_ns BIGINT [ns]  From the end of the publication until its message arrived,
+--     where a kernel trace shows that exactly; else NULL
+-- column: run_queue_ns BIGINT [ns]  From earliest_ns on (from latest_ns if that is unknown), its
+--     thread was woken and waited for a CPU, outside of callbacks; NULL: not traced by the kernel
+-- column: preempted_ns BIGINT [ns]  Likewise, another thread had the CPU that its thread had lost
+-- column: cpu_taken_by VARCHAR[]  Threads that had the CPU in both, the longest first; NULL: none
+-- column: cpu_taken_ns BIGINT[] [ns]  For how long each of them did
 CREATE OR REPLACE MACRO main.executor_wait_explained(runs) AS TABLE
 WITH executor AS (
     SELECT executor_id, NULL::BIGINT AS until_ns
     FROM derive.executor_size
     WHERE list_contains(runs, run_id)
 ),
+arrived AS (
+    SELECT
+        i.callback_instance_id, a.until_arrival_ns,
+        t.taken_ns - a.run_queue_ns - a.executor_ns AS arrived_ns
+    FROM main.arrival AS a
+    JOIN store.take AS t ON a.take_id = t.take_id
+    JOIN store.callback_instance AS i ON a.take_id = i.take_id
+    WHERE list_contains(runs, a.run_id) AND a.is_exact AND a.executor_ns IS NOT NULL
+),
 ready AS MATERIALIZED (
     SELECT
-        run_id, executor_id, thread_id, callback_id, callback_instance_id, since, origin_ns,
-        earliest_ns, latest_ns, start_ns, thread_count, picked_ns, wait_start_ns, wait_end_ns,
-        wait_before_ns, previous_wait_end_ns, is_loss_affected
-    FROM derive.callback_ready('executor')
+        r.run_id, r.executor_id, r.thread_id, r.callback_id, r.callback_instance_id, r.since,
+        r.origin_ns, coalesce(a.arrived_ns, r.earliest_ns) AS earliest_ns,
+        coalesce(a.arrived_ns, r.latest_ns) AS latest_ns, r.start_ns, r.thread_count, r.picked_ns,
+        r.wait_start_ns, r.wait_end_ns, r.wait_before_ns, r.previous_wait_end_ns,
+        r.is_loss_affected, a.until_arrival_ns
+    FROM derive.callback_ready('executor') AS r
+    LEFT JOIN arrived AS a ON r.callback_instance_id = a.callback_instance_id
 ),
 -- Of bursts there are far more pairs than waits: nothing may keep them all.
 together AS (
@@ -114,6 +134,9 @@ SELECT
     w.origin_ns, w.earliest_ns, w.latest_ns, w.start_ns, w.wait_ns, w.busy_min_ns, w.busy_max_ns,
     w.blocked_max_ns, w.idle_ns, w.is_loss_affected,
     w.held_max_ns, m.meanwhile_callback_ids, m.meanwhile_ns, m.meanwhile_certain_ns,
-    m.meanwhile_thread_ns, m.meanwhile_instances
+    m.meanwhile_thread_ns, m.meanwhile_instances, r.until_arrival_ns, q.run_queue_ns,
+    q.preempted_ns, q.cpu_taken_by, q.cpu_taken_ns
 FROM derive.executor_waits('ready') AS w
+JOIN ready AS r ON w.callback_instance_id = r.callback_instance_id
+LEFT JOIN derive.executor_queue('ready') AS q ON w.callback_instance_id = q.callback_instance_id
 LEFT JOIN listed AS m ON w.callback_instance_id = m.callback_instance_id

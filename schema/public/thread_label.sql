@@ -4,11 +4,15 @@
 -- grain: one row per thread
 -- column: run_id BIGINT     Run that the row belongs to
 -- column: thread_id BIGINT  The thread
--- column: label VARCHAR     Nodes of its process (main.process_label), and its name
+-- column: label VARCHAR     Nodes of its process (main.process_label), and its name; without nodes
+--     its name
 SELECT
     t.run_id,
     t.thread_id,
-    l.nodes || coalesce(' ' || nullif(t.name, p.name), '') AS label
+    CASE
+        WHEN l.nodes LIKE '/%' THEN l.nodes || coalesce(' ' || nullif(t.name, p.name), '')
+        ELSE coalesce(t.name, '?')
+    END AS label
 FROM main.thread AS t
 JOIN main.process AS p ON t.process_id = p.process_id
 JOIN main.process_label AS l ON t.process_id = l.process_id

@@ -137,6 +137,30 @@ def test_arrivals(shared_kernel: Path, tmp_path: Path, name: str) -> None:
     assert exact > 0.45 * callbacks
 
 
+@pytest.mark.parametrize("name", few(("pipeline", "autoware"), "pipeline"))
+def test_waits(shared_kernel: Path, tmp_path: Path, name: str) -> None:
+    """Where the arrival is exact, the time in the run queue is that of the truth.
+
+    What is left of such a wait is the work of the executor: it looks for what is ready, and takes.
+    Once in thousands a page is missing meanwhile, and the thread waits for a CPU again.
+    """
+    con = compared(tmp_path / "run.duckdb", shared_kernel / name, "trace-chrisnux")
+    ((waits, equal, wrong, shortest, longest),) = con.execute(
+        "SELECT count(*), count(*) FILTER (w.run_queue_ns = c.start_wake_ns), "
+        "count(*) FILTER (w.run_queue_ns < c.start_wake_ns OR w.busy_max_ns > 0 "
+        "OR list_sum(w.cpu_taken_ns) > w.run_queue_ns + w.preempted_ns), "
+        "min(rest_ns), max(rest_ns) "
+        "FROM compared AS c "
+        "JOIN (SELECT *, wait_ns - until_arrival_ns - run_queue_ns - preempted_ns AS rest_ns "
+        "FROM executor_wait_explained([1]) WHERE until_arrival_ns IS NOT NULL) AS w "
+        "ON c.callback_instance_id = w.callback_instance_id"
+    ).fetchall()
+    assert wrong == 0
+    assert waits > 1000
+    assert equal > 0.999 * waits
+    assert 4_000 < shortest < longest < 80_000
+
+
 @pytest.mark.parametrize("name", few(("real_jazzy_pipeline", "real_py_timer"), "real_py_timer"))
 def test_arrivals_of_real_systems(shared_traces: Path, tmp_path: Path, name: str) -> None:
     path, recording = tmp_path / "run.duckdb", shared_traces / name

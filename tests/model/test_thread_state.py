@@ -186,6 +186,19 @@ def test_a_kernel_trace_that_contradicts_the_events_is_not_joined(
     ]
 
 
+def test_a_kernel_trace_without_cpus_says_so(system: RosSystem, analyse: Analyse) -> None:
+    """Of an old perf, which wrote all CPUs into one stream."""
+    kernel = Kernel(system, clock="perf", tracer="perf")
+    kernel.switch(900, 0, 41, cpu=None)
+    kernel.switch(2100, 41, 0, BLOCKED, cpu=None)
+    call(system, 1000, 2000)
+    model = analyse(system)
+    assert model.rows(STATES) == []
+    assert model.rows("SELECT detail FROM finding WHERE name = 'kernel_trace_not_joined'") == [
+        ("the kernel trace does not say on which CPUs its events happened: not joined",)
+    ]
+
+
 def test_a_process_that_was_started_again_has_other_numbers(
     system: RosSystem, analyse: Analyse
 ) -> None:

@@ -33,6 +33,8 @@ from msgflow.trace import bt2_library
 _LENGTH = 0.15
 # Some things happen only later in a scenario.
 _LENGTHS = {
+    # Nothing is lost before.
+    "kernel_losses": 0.1,
     "losses": 0.7,
     "restarts": 0.9,
     "container_restarts": 0.9,
@@ -90,7 +92,7 @@ def bt2() -> ModuleType:
 
 
 def read_events(bt2: ModuleType, directory: Path) -> tuple[ReadEvent, ...]:
-    """All events below a directory; fails on anything that babeltrace 2 complains about."""
+    """All ROS events below a directory; fails on anything that babeltrace 2 complains about."""
     events = []
     for message in bt2.TraceCollectionMessageIterator(str(directory)):
         kind = type(message).__name__
@@ -98,6 +100,8 @@ def read_events(bt2: ModuleType, directory: Path) -> tuple[ReadEvent, ...]:
         if kind != "_EventMessageConst":
             continue
         event = message.event
+        if event.stream.trace.environment["domain"] == "kernel":
+            continue
         context = event.common_context_field
         events.append(
             ReadEvent(

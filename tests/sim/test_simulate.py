@@ -33,7 +33,7 @@ def test_same_seed_gives_the_same_bytes(tmp_path, name):
     # calls.
     alike = {
         f"truth/{table}.parquet"
-        for table in ("trace", "declared", "unrecorded", "dds_event", "link_call")
+        for table in ("trace", "declared", "unrecorded", "dds_event", "link_call", "kernel_loss")
     }
     assert alike < one.keys()
     rows = json.loads((tmp_path / "one" / "truth" / "meta.json").read_text())["rows"]

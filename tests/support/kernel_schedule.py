@@ -24,12 +24,14 @@ class Kernel:
         given = {"hostname": "alpha", "clock": "boot", "tracer": "lttng-modules 2.13.9"} | source
         system.add_source(trace, **given)
 
-    def add(self, name: str, ts: int, cpu: int = 0, **fields: Any) -> int:
+    def add(self, name: str, ts: int, cpu: int | None = 0, **fields: Any) -> int:
         where = Thread(-1, cpu=cpu, trace=self._trace, name=None)
         self._system.add(name, where, ts=ts + self.shift_ns, **fields)
         return ts
 
-    def switch(self, ts: int, before: int, after: int, state: int = LOST, cpu: int = 0) -> int:
+    def switch(
+        self, ts: int, before: int, after: int, state: int = LOST, cpu: int | None = 0
+    ) -> int:
         """Let a thread take the CPU from another one."""
         return self.add(
             "sched_switch", ts, cpu, prev_tid=before, prev_prio=20, prev_state=state,

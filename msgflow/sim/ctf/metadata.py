@@ -171,7 +171,7 @@ def _event_text(event: EventType, event_id: int) -> str:
 
 
 def _field_lines(field: EventField) -> Iterator[str]:
-    if field.kind is FieldKind.SEQUENCE:
+    if field.kind in {FieldKind.SEQUENCE, FieldKind.NUMBERS}:
         length = f"__{field.name}_length"
         yield f"{FieldKind.UNSIGNED.tsdl} {length}"
         yield f"{field.kind.tsdl} _{field.name}[ {length} ]"

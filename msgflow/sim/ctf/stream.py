@@ -143,6 +143,7 @@ class StreamWriter:
     def __init__(
         self,
         directory: Path,
+        channel: str,
         uuid: UUID,
         cpu: int,
         origin: int,
@@ -158,6 +159,7 @@ class StreamWriter:
 
         Args:
             directory: of the trace; its folder `index` exists.
+            channel: its name, with which those of files begin.
             uuid: of the trace.
             cpu: number of the CPU.
             origin: clock value (cycles) at time 0.
@@ -169,6 +171,7 @@ class StreamWriter:
             kept_packets: so many are kept in memory, older ones are overwritten, and only breaks
                 write them; 0: each is written once it is full.
         """
+        self._name = f"{channel}_{cpu}"
         self._uuid = uuid.bytes
         self._cpu = cpu
         self._origin = origin
@@ -363,8 +366,8 @@ class StreamWriter:
             self._faults.unrecorded(self._cpu, tracepoint, time, context, cause)
 
     def _open(self, directory: Path) -> None:
-        self._file = (directory / f"ros2_{self._cpu}").open("wb")
-        self._index = (directory / "index" / f"ros2_{self._cpu}.idx").open("wb")
+        self._file = (directory / self._name).open("wb")
+        self._index = (directory / "index" / f"{self._name}.idx").open("wb")
         self._index.write(_INDEX_HEADER.pack(_INDEX_MAGIC, 1, 1, _INDEX_ENTRY.size))
         self._offset = 0
 

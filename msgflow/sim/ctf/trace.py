@@ -32,7 +32,8 @@ class TraceIdentity:
         boot_uuid: of the host's boot, hence of its clock.
         epoch_ns: time 0 of the trace in ns since the epoch, on the host's own clock.
         uptime_ns: how long before time 0 the host booted, which is what its clock shows then.
-        buffering: 'uid' or 'pid', with what belongs to it: the id and, for 'pid', the name.
+        buffering: 'uid' or 'pid', with what belongs to it: the id and, for 'pid', the name;
+            'global' is a trace of the kernel.
     """
 
     session: str
@@ -45,7 +46,7 @@ class TraceIdentity:
 
 
 class TraceWriter:
-    """Writes one LTTng-UST trace, a stream for each CPU.
+    """Writes one trace of LTTng, a stream for each CPU.
 
     Attributes:
         directory: where `metadata` lies, in the first chunk of a rotated trace.
@@ -92,6 +93,7 @@ class TraceWriter:
         self.streams = tuple(
             StreamWriter(
                 directory,
+                "kernel" if identity.buffering[0] == "global" else "ros2",
                 identity.uuid,
                 cpu,
                 identity.uptime_ns,
@@ -118,6 +120,22 @@ class TraceWriter:
 def _environment(identity: TraceIdentity, tracer_minor: int) -> dict[str, str | int]:
     created = datetime.fromtimestamp(identity.epoch_ns // _NANOSECONDS, UTC)
     scheme, buffering_id, process_name = identity.buffering
+    common: dict[str, str | int] = {
+        "trace_name": f"{identity.session}-{created:%Y%m%d%H%M%S}",
+        "trace_creation_datetime": f"{created:%Y%m%dT%H%M%S}+0000",
+        "hostname": identity.hostname,
+    }
+    if scheme == "global":
+        return {
+            "domain": "kernel",
+            "sysname": "Linux",
+            "kernel_release": "6.8.0-45-generic",
+            "tracer_name": "lttng-modules",
+            "tracer_major": 2,
+            "tracer_minor": tracer_minor,
+            "trace_buffering_scheme": scheme,
+            **common,
+        }
     named: dict[str, str | int] = {}
     if scheme == "pid":
         named = {"procname": process_name, "vpid": buffering_id}
@@ -130,7 +148,5 @@ def _environment(identity: TraceIdentity, tracer_minor: int) -> dict[str, str | 
         "tracer_buffering_id": buffering_id,
         "architecture_bit_width": 64,
         **named,
-        "trace_name": f"{identity.session}-{created:%Y%m%d%H%M%S}",
-        "trace_creation_datetime": f"{created:%Y%m%dT%H%M%S}+0000",
-        "hostname": identity.hostname,
+        **common,
     }

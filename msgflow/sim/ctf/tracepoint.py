@@ -19,6 +19,7 @@ COMPACT_HEADER_SIZE = 6
 _EXTENDED_HEADER = Struct("<HIQ")
 _EXTENDED_ID = 65535
 _LENGTH = Struct("<Q")
+_NUMBER = Struct("<i")
 
 
 def thread_context(pid: int, tid: int, name: str) -> bytes:
@@ -106,7 +107,7 @@ def _packer(fields: Sequence[EventField]) -> Callable[..., bytes]:
 
 
 def _code(field: EventField) -> str | None:
-    if field.kind is FieldKind.BYTES:
+    if field.kind in {FieldKind.BYTES, FieldKind.NAME}:
         return f"{field.length}s"
     return field.kind.code
 
@@ -119,7 +120,12 @@ def _sequence(values: Sequence[int]) -> bytes:
     return _LENGTH.pack(len(values)) + b"".join(map(_LENGTH.pack, values))
 
 
+def _numbers(values: Sequence[int]) -> bytes:
+    return _LENGTH.pack(len(values)) + b"".join(map(_NUMBER.pack, values))
+
+
 _VARIABLE: dict[FieldKind, Callable[..., bytes]] = {
     FieldKind.STRING: _text,
     FieldKind.SEQUENCE: _sequence,
+    FieldKind.NUMBERS: _numbers,
 }

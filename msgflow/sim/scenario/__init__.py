@@ -26,6 +26,7 @@ from msgflow.sim.scenario import (
     rivals,
     robot,
     rtabmap,
+    scheduling,
     services,
     starvation,
     traffic,
@@ -87,5 +88,9 @@ def scenarios() -> Mapping[str, Scenario]:
         autoware.autoware(),
         autoware.autoware_two_threads(),
         rtabmap.rtabmap(),
+        scheduling.cpu_hog(),
+        scheduling.real_time(),
+        scheduling.shared_map(),
+        scheduling.kernel_losses(),
     )
     return MappingProxyType({scenario.name: scenario for scenario in built_in})

@@ -3,7 +3,7 @@
 import { h, clear, color } from "./dom.js";
 import { count, duration, moment, percent } from "./labels.js";
 import { pageAddress } from "./address.js";
-import { dataTable, besides } from "./table.js";
+import { dataTable, besides, filled } from "./table.js";
 import { downloads } from "./download.js";
 import { command, failed, notes, waiting } from "./notice.js";
 import { fill, section } from "./overview.js";
@@ -57,13 +57,13 @@ export class ExecutorsPage {
         const table = await app.query("waits-pair");
         return [h("p", { className: "soft" }, "Callbacks that were ready while another one ran on their executor, and how long that ran: shorter callbacks, other callback groups or more threads help here."),
           dataTable(table, { label: "interference", sort: { name: "overlap_max_ns", down: true }, shown: 20, nothing: "No callback waited for another one.",
-          columns: ["node", "callback", "meanwhile_node", "meanwhile_callback", "waits", "instances", "overlap_min_ns", "overlap_max_ns", "worst_ns", "share"] }), notes(table.meta.notes), command(table.meta.command)];
+          columns: ["node", "callback", "meanwhile_node", "meanwhile_callback", ...filled(table, ["meanwhile_thread"]), "waits", "instances", "overlap_min_ns", "overlap_max_ns", "worst_ns", "share"] }), notes(table.meta.notes), command(table.meta.command)];
       }),
       fill(waits, async () => {
         const table = await app.query("waits");
         return [h("p", { className: "soft" }, "From the moment at which a callback could have run to its start. At least and at most: when a message came to the host is not recorded, only when it was taken."),
           dataTable(table, { label: "waits", sort: { name: "busy_worst_ns", down: true }, shown: 20, nothing: "No callback is known to have waited.",
-          columns: ["node", "callback", "count", "delayed_min", "delayed_max", "wait_median_ns", "wait_max_ns", "busy_worst_ns", "busy_total_min_ns", "busy_total_max_ns", "meanwhile", "unknown", "loss_affected"] }), notes(table.meta.notes), command(table.meta.command)];
+          columns: ["node", "callback", "count", "delayed_min", "delayed_max", "wait_median_ns", "wait_max_ns", "busy_worst_ns", "busy_total_min_ns", "busy_total_max_ns", "meanwhile", ...filled(table, ["run_queue_worst_ns", "preempted_worst_ns", "cpu_taken_by"]), "unknown", "loss_affected"] }), notes(table.meta.notes), command(table.meta.command)];
       }),
     ]);
     this.onResize = () => this.drawStrips();

@@ -7,6 +7,11 @@ import { doubt } from "./notice.js";
 const SHOWN = 100;
 const HIDDEN = new Set(["run_id"]);
 
+// Those of some columns that have a value in any row.
+export function filled(table, names) {
+  return names.filter((name) => Array.from(table[name] ?? []).some((value) => value !== null && value !== undefined && !Number.isNaN(value)));
+}
+
 // A column of the table may have a label in place of its name, and shown(row): the text of a cell.
 // Options: columns (names, in order), onPick(row), picked (row), sort, label, shown, order (compares
 // two rows before any column is chosen), once (a column that is left empty below an equal value),

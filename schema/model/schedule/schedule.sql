@@ -11,6 +11,7 @@
 -- column: event_count BIGINT  Events of ROS processes that it covers
 -- column: agreeing_count BIGINT  Those that agree with it
 -- column: is_joined BOOLEAN  It is of that clock
+-- column: has_cpus BOOLEAN  It says on which CPU a switch was
 WITH initialisation AS (
     SELECT t.trace_index, t.pid_ns, t.vpid, i.event_id
     FROM raw.ros2_rcl_init AS i
@@ -52,7 +53,8 @@ SELECT
     c.shift_ns,
     coalesce(a.event_count, 0) AS event_count,
     coalesce(a.agreeing_count, 0) AS agreeing_count,
-    coalesce(a.agreeing_count >= 0.95 * a.event_count, false) AS is_joined
+    coalesce(a.agreeing_count >= 0.95 * a.event_count, false) AS is_joined,
+    c.has_cpus
 FROM staging.schedule_candidate AS c
 LEFT JOIN agreement AS a USING (trace_index, clock_key, shift_ns)
 QUALIFY row_number() OVER (
