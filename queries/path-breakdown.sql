@@ -48,7 +48,7 @@
 --     places
 -- column: total_ns BIGINT [ns]     Sum over all flows; all parts add up to their time
 -- column: path VARCHAR [path]  Nodes and topics
--- brief: path, hop, part, node, what, median_ns, max_ns, share, p95_ns, mean_ns, total_ns, flows,
+-- brief: path, hop, part, node, what, median_ns, share, max_ns, p95_ns, mean_ns, total_ns, flows,
 --     overlaps
 -- zero: total_ns
 -- note: clocks
