@@ -18,8 +18,11 @@
 -- column: p99_ns BIGINT [ns]        99 % of the waits are at most this
 -- column: max_ns BIGINT [ns]        Longest wait
 -- column: total_ns BIGINT [ns]      Sum of the waits
+-- column: meanwhile VARCHAR         Threads that had the CPU meanwhile: the three that had it
+--     longest
 -- column: thread_id BIGINT          Identity of the thread
--- brief: nodes, thread, tid, median_ns, max_ns, p99_ns, count, priority, total_ns, process, host
+-- brief: nodes, max_ns, meanwhile, median_ns, p99_ns, count, thread, tid, priority, total_ns,
+--     process, host
 -- note: kernel
 WITH waited AS (
     SELECT
@@ -33,6 +36,28 @@ WITH waited AS (
         AND list_contains($runs, run_id)
         AND start_ns >= $start_ns
         AND start_ns < $end_ns
+    GROUP BY run_id, thread_id, priority
+),
+taken AS (
+    SELECT
+        m.run_id, m.thread_id, m.thread_priority AS priority, coalesce(b.label, o.name) AS name,
+        sum(m.end_ns - m.start_ns) AS length_ns
+    FROM main.preemptor AS m
+    LEFT JOIN main.thread_label AS b ON m.preemptor_thread_id = b.thread_id
+    LEFT JOIN main.other_thread AS o ON m.preemptor_other_thread_id = o.other_thread_id
+    WHERE m.state = 'runnable'
+        AND list_contains($runs, m.run_id)
+        AND m.start_ns >= $start_ns
+        AND m.start_ns < $end_ns
+        -- An idle CPU is not taken.
+        AND coalesce(o.tid <> 0, true)
+    GROUP BY ALL
+),
+meanwhile AS (
+    SELECT
+        run_id, thread_id, priority,
+        array_to_string(list(name ORDER BY length_ns DESC, name)[:3], ', ') AS names
+    FROM taken
     GROUP BY run_id, thread_id, priority
 )
 SELECT
@@ -49,10 +74,15 @@ SELECT
     w.quantiles[2] AS p99_ns,
     w.max_ns,
     w.total_ns,
+    n.names AS meanwhile,
     w.thread_id
 FROM waited AS w
 JOIN main.thread AS t ON w.thread_id = t.thread_id
 JOIN main.process AS p ON t.process_id = p.process_id
 JOIN main.process_label AS l ON t.process_id = l.process_id
 JOIN main.host AS h ON p.host_id = h.host_id
+LEFT JOIN meanwhile AS n
+    ON w.run_id = n.run_id
+    AND w.thread_id = n.thread_id
+    AND w.priority IS NOT DISTINCT FROM n.priority
 ORDER BY w.run_id, w.max_ns DESC, w.thread_id, w.priority

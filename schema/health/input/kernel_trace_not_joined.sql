@@ -3,7 +3,8 @@
 -- description: At most events of ROS processes, the kernel trace says that another thread ran on
 --     their CPU. It is of another clock or machine, so that nothing is said of scheduling.
 -- cause: The clocks differ: perf recorded without -k CLOCK_MONOTONIC, or another machine. Or an
---     old perf wrote all CPUs into one stream, and does not say which one an event is of.
+--     old perf wrote all CPUs into one stream, and does not say which one an event is of. Or
+--     switches are missing: in some virtual machines, perf has none of a CPU that was idle.
 -- cure: Record again with the clock of LTTng (docs/scheduling.md); convert with a newer perf.
 -- grain: one row per kernel trace
 -- severity: warning
