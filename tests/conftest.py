@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import os
 import shutil
 import signal
 import sys
@@ -55,12 +54,6 @@ def pytest_configure(config: pytest.Config) -> None:
         # An import of it fails then as where it is missing, and no other place is searched.
         sys.modules["bt2"] = None  # type: ignore[assignment]
         bt2_library.PREFIXES = ()
-
-
-@pytest.hookimpl(optionalhook=True)
-def pytest_xdist_auto_num_workers() -> int:
-    """Return one worker more than there are CPUs: tests of recordings and of pages often wait."""
-    return (os.cpu_count() or 1) + 1
 
 
 def pytest_collection_finish() -> None:

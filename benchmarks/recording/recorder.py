@@ -46,11 +46,16 @@ def systems(python: Path) -> dict[str, list[str]]:
     return named
 
 
-def require(python: Path) -> None:
-    """Raise a `NotPossibleError` unless LTTng, a compiler and rclpy are there."""
+def require_lttng() -> None:
+    """Raise a `NotPossibleError` unless LTTng and a compiler are there."""
     for program in ("lttng", "lttng-sessiond", "gcc"):
         if shutil.which(program) is None:
             raise NotPossibleError(f"no {program}")
+
+
+def require(python: Path) -> None:
+    """Raise a `NotPossibleError` unless LTTng, a compiler and rclpy are there."""
+    require_lttng()
     needed = [str(python), "-c", "import rclpy.action, std_msgs.msg, test_msgs.action"]
     if not python.exists() or subprocess.run(needed, capture_output=True).returncode:
         raise NotPossibleError(f"no Python with rclpy and test_msgs — {python}")

@@ -6,12 +6,11 @@ import json
 import re
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import duckdb
 import pytest
-from recording.recorder import NotPossibleError, require, session
+from recording.recorder import NotPossibleError, require_lttng, session
 from recording.tracetools import build_tracetools
 
 from msgflow.ingest import ingest
@@ -58,7 +57,7 @@ EVENT = re.compile(r"my_pkg:frame_done:.*\{ frame = (\d+), score = ([\d.e+]+), l
 @pytest.fixture
 def trace(tmp_path: Path) -> Path:
     try:
-        require(Path(sys.executable))
+        require_lttng()
     except NotPossibleError as error:
         pytest.skip(f"cannot record: {error}")
     files = dict(FILE.findall(PAGE.read_text(encoding="utf-8")))
