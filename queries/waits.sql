@@ -31,9 +31,9 @@
 -- column: rest_total_max_ns BIGINT [ns]  Network, idle or overhead, where known, at most
 -- column: meanwhile VARCHAR         What ran meanwhile: the three with the largest share, with
 --     their node if it is another one
--- column: arrived BIGINT            Of these, those of which the kernel shows exactly when the
---     message arrived; empty: the kernel was not traced
--- column: until_arrival_total_ns BIGINT [ns]  Of the waits of these, until the message arrived
+-- column: arrived BIGINT            Waits whose message has an exact arrival; empty: the kernel was
+--     not traced
+-- column: until_arrival_total_ns BIGINT [ns]  Sum of the times until these messages arrived
 -- column: run_queue_worst_ns BIGINT [ns]  Longest time in one wait for which its thread was woken
 --     and waited for a CPU, outside of callbacks, since the message arrived (else since it can have
 --     been ready)

@@ -2,7 +2,7 @@
 -- one, how the time of callbacks divides, and when messages arrived. Truth is what the simulation
 -- decided (the views simulated_…): it knows nothing of the events of a kernel trace. Where these
 -- were lost, what is marked is not decided.
--- A thread without events of ROS is none of ours.
+-- The truth has only threads with events of ROS.
 CREATE OR REPLACE TEMP TABLE schedule_place AS
 SELECT t.thread_id, t.name, h.hostname AS host, p.pid, t.tid
 FROM analysed.store.thread AS t

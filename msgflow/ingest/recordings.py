@@ -160,7 +160,8 @@ def _with_kernel(
     """
     joined = list(groups)
     for kernel in of_kernel:
-        near = _nearest(joined, session_folder(kernel[0].path))
+        of_ros = [group for group in joined if {trace.domain for trace in group} != {"kernel"}]
+        near = _nearest(of_ros, session_folder(kernel[0].path))
         if len(near) > 1:
             near = [group for group in near if len(_by_time([group, kernel])) == 1]
         place = min((joined.index(group) for group in near), default=len(joined))

@@ -89,7 +89,7 @@ def rotated(name: str, length_ns: int) -> Iterator[Callable[[], None]]:
     """Let a session cut its recording into chunks during the block; one that does so goes on.
 
     Yields:
-        What to call now and then: whoever made the session do so may end it.
+        A function to call now and then: it starts the rotation anew if another program ended it.
 
     Raises:
         RecordingError: it cannot, as one with a live connection or a snapshot session.
@@ -177,7 +177,7 @@ def _rotate(name: str, length_ns: int) -> None:
 
 
 def _is_first_to_rotate(name: str, length_ns: int) -> bool:
-    """Let a session rotate, and tell whether nobody had before."""
+    """Let a session rotate; return False if it rotates already."""
     try:
         _rotate(name, length_ns)
     except RecordingError as error:

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from msgflow.query.catalogue import load_query
-from msgflow.query.runner import bind
-from msgflow.query.selection import INTERNAL_COLUMN
+from msgflow.query.runner import run_query
+from msgflow.run.slice import Slice
 from msgflow.text.json_value import json_value
 
 if TYPE_CHECKING:
@@ -28,8 +28,7 @@ _EXECUTOR = (
     "host", "process", "pid", "tid", "executor_kind", "callback_share", "callbacks", "seen_ns",
     "callback_ns", "blocked_ns",
 )  # fmt: skip
-_LOSS = ("topic_name", "subscriber", "published", "delivered", "dropped", "lost", "reasons")
-_RUNS = "SELECT run_id FROM store.run"
+_LOSS = ("topic", "subscriber", "published", "delivered", "dropped", "lost", "reasons")
 _DISCARDED = """
 SELECT coalesce(sum(event_count), 0)::BIGINT
 FROM main.gap
@@ -39,7 +38,7 @@ WHERE kind = 'loss' AND start_ns >= $start_ns AND start_ns < $end_ns
 _LONGEST = """
 SELECT greatest(
     (SELECT coalesce(max(latency_ns), 0) FROM main.link_transport),
-    (SELECT coalesce(max(wait_ns), 0) FROM main.link_causal WHERE kind <> 'direct')
+    (SELECT coalesce(max(wait_ns), 0) FROM main.link_causal)
 )
 """
 
@@ -97,21 +96,13 @@ def report_of(con: duckdb.DuckDBPyConnection, window: Window, *, is_final: bool)
         is_final: see `WindowReport`.
     """
 
-    runs = [run_id for (run_id,) in con.execute(_RUNS).fetchall()]
-
     def ask(name: str, columns: Sequence[str]) -> list[Row]:
-        # What a user may get wrong, or wants to know beside the rows, takes a third of the time.
-        header = load_query(name)
-        (statement,) = con.extract_statements(header.body)
-        values = bind(header, {}) | {"runs": runs, **window.bindings}
-        con.execute(statement, {used: values[used] for used in statement.named_parameters})
-        names = [name for name, *_ in con.description or ()]
-        rows = [dict(zip(names, row, strict=True)) for row in con.fetchall()]
-        return [
-            {column.removesuffix("_name"): row[column] for column in columns}
-            for row in rows
-            if not row.get(INTERNAL_COLUMN)
-        ]
+        part = Slice(start=window.start_ns, end=window.end_ns)
+        table = run_query(con, load_query(name), {}, part).table
+        if "topic_name" in table.column_names:
+            table = table.rename_columns({"topic_name": "topic"})
+        rows: list[Row] = table.select(list(columns)).to_pylist()
+        return rows
 
     paths = ask("e2e-latency", _PATH)
     executors = ask("executor-usage", _EXECUTOR)

@@ -5,8 +5,8 @@
 --     since a gap follows, is among them only if the gap ends in the window or later.
 -- grain: one row per interval of a thread in which nothing changed
 -- param: runs BIGINT[]  Runs to look at; NULL: all
--- param: window_start_ns BIGINT  Begin of the window, epoch ns; NULL: there is none
--- param: window_end_ns BIGINT  End of the window, epoch ns, exclusive; NULL likewise
+-- param: window_start_ns BIGINT  Begin of the window, epoch ns; NULL: from the first event
+-- param: window_end_ns BIGINT  End of the window, epoch ns, exclusive; NULL: to the last event
 -- column: run_id BIGINT  Run that the row belongs to
 -- column: executor_id BIGINT  Executor
 -- column: thread_id BIGINT  Thread it happened on

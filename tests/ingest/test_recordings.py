@@ -155,6 +155,15 @@ def test_of_several_sessions_beside_it_a_kernel_trace_belongs_to_those_of_its_ti
     ]
 
 
+def test_kernel_traces_of_no_session_stay_apart(tmp_path: Path) -> None:
+    for name, begin in (("day", 10_100), ("night", 10_500)):
+        _record(tmp_path / name, begin, begin + 100)
+    for name in ("one", "two"):
+        _record(tmp_path / name, 10, 90, event="sched_switch", clock=2)
+    alone = [[tmp_path / name] for name in ("day", "night", "one", "two")]
+    assert _found(tmp_path) == alone
+
+
 def test_each_recording_has_its_hosts(tmp_path: Path) -> None:
     first = _record(tmp_path / "a", 100, 200)
     second = _record(tmp_path / "b", 300, 400)

@@ -13,7 +13,7 @@ import pytest
 from msgflow.clocks import read_clock_sync
 from msgflow.database import Database
 from msgflow.errors import TraceError
-from msgflow.links import read_links
+from msgflow.links import LinksFile, read_links
 from msgflow.sim import Recording, simulate
 from msgflow.watch import Watcher, WindowReport, finished_chunks, watch_finished, watch_live
 from msgflow.watch.learned_answers import LearnedAnswers
@@ -25,14 +25,19 @@ Row = dict[str, Any]
 def reports(
     directory: Path, *, window: float, step: float, notes: list[str] | None = None
 ) -> list[WindowReport]:
-    watcher = Watcher(
+    return list(watch_finished(directory, watching([] if notes is None else notes, window, step)))
+
+
+def watching(
+    notes: list[str], window: float, step: float, links: LinksFile | None = None
+) -> Watcher:
+    return Watcher(
         window_ns=round(window * SECOND),
         step_ns=round(step * SECOND),
-        links=None,
+        links=links,
         clocks=read_clock_sync("none"),
-        note=lambda text: None if notes is None else notes.append(text),
+        note=notes.append,
     )
-    return list(watch_finished(directory, watcher))
 
 
 def asked(database: Database, query: str, report: WindowReport) -> list[Row]:
@@ -145,13 +150,7 @@ def test_a_clock_that_is_set_is_said_and_is_no_lag(
 ) -> None:
     """The tracer goes on with the clock that it began with."""
     notes: list[str] = []
-    watcher = Watcher(
-        window_ns=SECOND // 2,
-        step_ns=SECOND // 2,
-        links=None,
-        clocks=read_clock_sync("none"),
-        note=notes.append,
-    )
+    watcher = watching(notes, 0.5, 0.5)
     now = time.time_ns
     lags = []
     for number, chunk in enumerate(finished_chunks(simulated)):
@@ -174,14 +173,7 @@ def test_links_of_a_node_that_is_not_there_are_said(simulated: Path, tmp_path: P
     file = tmp_path / "links.yaml"
     file.write_text("links: [{kind: direct, node: /later, inputs: [/a], outputs: [/b]}]")
     notes: list[str] = []
-    watcher = Watcher(
-        window_ns=9 * SECOND,
-        step_ns=9 * SECOND,
-        links=read_links(file),
-        clocks=read_clock_sync("none"),
-        note=notes.append,
-    )
-    (report,) = watch_finished(simulated, watcher)
+    (report,) = watch_finished(simulated, watching(notes, 9, 9, read_links(file)))
     assert sum(path["reached"] for path in report.paths) > 0
     assert [note for note in notes if "left out for now" in note and "/later" in note]
 
@@ -202,13 +194,7 @@ def test_what_was_learned_may_not_fit_a_window(
 
 def test_a_recording_that_ended_long_ago_is_no_lag(simulated: Path) -> None:
     notes: list[str] = []
-    watcher = Watcher(
-        window_ns=SECOND // 2,
-        step_ns=SECOND // 2,
-        links=None,
-        clocks=read_clock_sync("none"),
-        note=notes.append,
-    )
+    watcher = watching(notes, 0.5, 0.5)
     looks = iter([False, True])
     found = list(
         watch_live(

@@ -5,7 +5,7 @@
 --     the end of those behind it is not known.
 -- grain: one row per interval of a thread in which nothing changed
 -- param: runs BIGINT[]  Runs to look at; NULL: all
--- param: window_start_ns BIGINT  Begin of the window, epoch ns; NULL: there is none
+-- param: window_start_ns BIGINT  Begin of the window, epoch ns; NULL: from the first event
 -- param: window_end_ns BIGINT  End of the window, epoch ns
 CREATE OR REPLACE MACRO derive.thread_activity(runs, window_start_ns, window_end_ns) AS TABLE
 WITH instance AS (
@@ -81,16 +81,16 @@ marked AS NOT MATERIALIZED (
     FROM change
 ),
 -- The window by the clock of each thread, which is rounded. A window without limits has the least
--- and the greatest number, from which nothing can be subtracted.
+-- and the greatest number: less of them leaves room for the offset of a clock.
 extent AS (
     SELECT
         t.thread_id,
         derive.recorded_ns(
-            greatest(window_start_ns, -4611686018427387904),
+            greatest(window_start_ns, -(1::BIGINT << 62)),
             p.offset_ns, p.drift_ppb, p.reference_ns
         ) - 1 AS start_ns,
         derive.recorded_ns(
-            least(window_end_ns, 4611686018427387904), p.offset_ns, p.drift_ppb, p.reference_ns
+            least(window_end_ns, 1::BIGINT << 62), p.offset_ns, p.drift_ppb, p.reference_ns
         ) + 1 AS end_ns
     FROM store.thread AS t
     JOIN derive.process_clock AS p ON t.process_id = p.process_id
