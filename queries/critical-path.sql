@@ -63,12 +63,16 @@
 -- brief: rank, at_ns, duration_ns, share, activity, state, who, node, what, is_certain, pieces,
 --     hop, part, thread, priority, who_priority
 -- note: clocks
+CREATE OR REPLACE TEMP TABLE named_path AS
+SELECT path_id, path, subscriptions
+FROM main.flow_path(
+    $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths, only_paths := true
+);
+
 CREATE OR REPLACE TEMP TABLE critical_part AS
 WITH path AS (
     SELECT path_id
-    FROM main.flow_path(
-        $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths, only_paths := true
-    )
+    FROM named_path
     WHERE ($via IS NOT NULL OR $without IS NOT NULL)
         AND coalesce(list_bool_and(list_transform(
             string_split($via, ','),
@@ -114,20 +118,14 @@ WITH untraced AS (
         END AS message_id
     FROM main.critical_piece('critical_part', $runs)
 ),
-named AS (
-    SELECT path_id, path, subscriptions
-    FROM main.flow_path(
-        $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths, only_paths := true
-    )
-    WHERE path_id IN (SELECT path_id FROM critical_part)
-),
 -- A row per message: the list of a long path in each of its pieces would take much memory.
 reader AS (
     SELECT
         path_id,
         unnest(range(1, len(subscriptions) + 1)) AS hop,
         unnest(subscriptions) AS subscription_id
-    FROM named
+    FROM named_path
+    WHERE path_id IN (SELECT path_id FROM critical_part)
 ),
 piece AS (
     SELECT
@@ -314,5 +312,5 @@ SELECT
     -- The path of a flow of a thousand hops is long: only the first of its rows has it.
     n.path
 FROM ordered AS s
-LEFT JOIN named AS n ON s.path_id = n.path_id AND s.place = 1
+LEFT JOIN named_path AS n ON s.path_id = n.path_id AND s.place = 1
 ORDER BY s.run_id, s.flow_rank, s.place

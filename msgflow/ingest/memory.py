@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,6 +21,8 @@ from msgflow.sql.interrupt import noted_interrupts
 from msgflow.sql.quoting import literal
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     import duckdb
 
     from msgflow.clocks import ClockSync
@@ -46,6 +49,14 @@ def database_in_memory() -> duckdb.DuckDBPyConnection:
     con.execute("SET threads = 1")
     shut_in(con, lock=False)
     return con
+
+
+@contextmanager
+def beside(con: duckdb.DuckDBPyConnection) -> Iterator[duckdb.DuckDBPyConnection]:
+    """Open a further connection to such a database, for another thread."""
+    with con.cursor() as other:
+        other.execute("USE target")
+        yield other
 
 
 def ingest_again(
