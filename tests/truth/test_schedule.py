@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import duckdb
@@ -12,7 +13,9 @@ from ingested import ingest_one
 from scoring import Score, compare_simulated
 from thorough import few
 
-from msgflow.sim import Recording, Simulation, simulate
+from msgflow.sim import Recording, Simulation, scenarios, simulate
+from msgflow.sim.entity import MILLISECOND, SECOND
+from msgflow.sim.system import KernelTrace
 
 # How much of each is simulated: the losses come after 0.7 s of 5 s.
 SYSTEMS = {
@@ -22,6 +25,7 @@ SYSTEMS = {
     "shared_memory": 0.4,
     "kernel_losses": 0.17,
 }
+LOSS_NS = 41 * MILLISECOND
 KINDS = {"thread_state", "preemptor", "callback_schedule", "arrival"}
 
 Traced = tuple[Simulation, Path]
@@ -221,3 +225,52 @@ def test_who_waits_for_another_thread_waits_for_what_that_does(
         """).fetchall()[0]
     assert (differing, deepest) == (0, depth)
     assert waits > 5
+
+
+@pytest.mark.parametrize("tracer", ["lttng", "perf"])
+def test_what_losses_leave_open_is_not_guessed(tmp_path: Path, tracer: str) -> None:
+    """Where a switch was lost, no other thread passes for the one that ran."""
+    system = scenarios()["shared_memory"]
+    # A thread whose switch was lost still runs after most of these.
+    losses = tuple((time, time + 3 * MILLISECOND) for time in range(SECOND // 2, SECOND, LOSS_NS))
+    host = replace(system.hosts[0], kernel=KernelTrace(system.hosts[0].kernel.loads, losses=losses))
+    simulation = simulate(
+        replace(system, hosts=(host,)),
+        tmp_path / "trace",
+        factor=0.4,
+        recording=Recording(kernel_tracer=tracer),
+    )
+    database = tmp_path / "run.duckdb"
+    ingest_one(simulation.directory, database).connection.close()
+    with duckdb.connect(str(database), read_only=True) as connection:
+        wakers = connection.execute(f"""
+            SELECT
+                count(*) FILTER (WHERE k.tid = t.waker_tid),
+                count(*) FILTER (
+                    WHERE s.waker_kind = 'thread' AND k.tid IS DISTINCT FROM t.waker_tid
+                )
+            FROM store.thread_state AS s
+            JOIN store.thread AS o ON s.thread_id = o.thread_id
+            LEFT JOIN store.thread AS k ON s.waker_thread_id = k.thread_id
+            JOIN '{simulation.truth["thread_state"]}' AS t
+                ON o.tid = t.tid AND s.end_ns = t.end_ns AND t.state = 'sleeping'
+            WHERE s.state = 'sleeping'
+        """).fetchall()[0]
+        preemptors = connection.execute(f"""
+            SELECT count(r.cpu), count(*) - count(r.cpu)
+            FROM store.preemptor AS s
+            LEFT JOIN store.thread AS t ON s.preemptor_thread_id = t.thread_id
+            LEFT JOIN store.other_thread AS o
+                ON s.preemptor_other_thread_id = o.other_thread_id
+            LEFT JOIN '{simulation.truth["cpu_run"]}' AS r
+                ON s.cpu = r.cpu AND r.kernel_tid = coalesce(t.tid, o.tid)
+                AND r.start_ns <= s.start_ns AND r.end_ns >= s.end_ns
+            WHERE o.tid IS DISTINCT FROM 0
+                -- A thread that is back before a loss ends seems not to have gone.
+                AND NOT EXISTS (
+                    FROM '{simulation.truth["kernel_loss"]}' AS l
+                    WHERE s.start_ns < l.end_ns AND s.end_ns > l.start_ns
+                )
+        """).fetchall()[0]
+    assert (wakers[1], preemptors[1]) == (0, 0)
+    assert min(wakers[0], preemptors[0]) > 30
