@@ -50,6 +50,7 @@ if TYPE_CHECKING:
 SHARED_TRACES = Path(__file__).parents[1] / ".." / "shared" / "traces"
 SECOND = 1_000_000_000
 PERFECT = "perfect"
+PERF = "perf"
 OWN_EVENTS = ("my_pkg:*",)
 LONG = "long_recording"
 # Recall of the half an hour in which clocks drift apart by 36 ms; and of bursts that another host
@@ -129,6 +130,7 @@ RECORDINGS = {
     # The clock that makes stamps is set, to and fro; one step is as long as bursts are apart.
     "steps": Recording(realtime_steps=((SECOND // 5, 7_000), (SECOND // 2, -40_000_000))),
     "far": Recording(realtime_offset_ns=7_000_000),
+    PERF: Recording(kernel_tracer="perf"),
     "everything": Recording(
         start_ns=SECOND // 20,
         pauses=((SECOND // 3, SECOND // 2),),
@@ -157,7 +159,7 @@ GAP_RECORDINGS = (
 TIMED_LAYOUTS = ("humble", "iron")
 TIMED_SYSTEMS = ("bursts", "bursts_two_hosts")
 # What the kernel does, does not depend on the layout.
-KERNEL_SYSTEMS = ("cpu_hog", "real_time", "shared_map", "kernel_losses")
+KERNEL_SYSTEMS = ("cpu_hog", "real_time", "shared_map", "shared_memory", "kernel_losses")
 # What comes and goes in these does so after a second; clocks that drift, or are known from few
 # messages, take one to be known.
 WHOLE = (
@@ -215,12 +217,16 @@ def cases(arguments: argparse.Namespace) -> Iterator[Case]:
             if is_left_out and not arguments.layout:
                 continue
             for recording in arguments.recording or RECORDINGS:
+                # Nothing else differs.
+                if recording == PERF and system not in KERNEL_SYSTEMS:
+                    continue
                 is_faulty = recording != PERFECT
                 is_asked_for = arguments.system or arguments.layout or arguments.recording
                 is_usual = (
                     not is_faulty
                     or (system in FAULTY_SYSTEMS and layout in FAULTY_LAYOUTS)
                     or (system in TIMED_SYSTEMS and layout in TIMED_LAYOUTS)
+                    or recording == PERF
                     or (
                         layout == (CHANNEL_LAYOUT if system == "channels" else EVERY_LAYOUT)
                         and recording in EVERY_FAULT

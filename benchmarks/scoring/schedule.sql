@@ -25,6 +25,11 @@ JOIN schedule_place AS p ON t.host = p.host AND t.pid = p.pid AND t.tid = p.tid
 JOIN (SELECT host, max(start_ns) AS last_ns FROM simulated_thread_state GROUP BY host) AS r
     ON t.host = r.host;
 
+-- Of what perf loses, the trace does not tell.
+CREATE OR REPLACE TEMP VIEW unmarked_loss AS
+FROM simulated_kernel_loss
+WHERE NOT is_counted;
+
 CREATE OR REPLACE TEMP TABLE schedule_found AS
 -- The last state of a thread goes on after the recording.
 SELECT
@@ -37,7 +42,10 @@ SELECT
         -- Of an interrupt, the waker is only what it interrupted.
         concat_ws(' ', s.waker_kind, CASE WHEN s.waker_kind = 'thread' THEN w.tid END)
     ) AS value,
-    s.is_loss_affected AS is_marked
+    s.is_loss_affected OR EXISTS (
+        FROM unmarked_loss AS l
+        WHERE l.host = p.host AND l.end_ns >= s.start_ns AND l.start_ns <= s.end_ns
+    ) AS is_marked
 FROM analysed.store.thread_state AS s
 JOIN schedule_place AS p ON s.thread_id = p.thread_id
 LEFT JOIN schedule_place AS w ON s.waker_thread_id = w.thread_id
@@ -69,9 +77,12 @@ SELECT
     concat_ws(' ', p.host, p.pid, p.tid, i.start_ns),
     concat_ws(
         ' ', s.running_ns, s.preempted_ns, s.runnable_ns, s.sleeping_ns, s.uninterruptible_ns,
-        s.unknown_ns, s.preemption_count
+        s.unknown_ns, s.irq_ns, s.softirq_ns, s.preemption_count
     ),
-    s.is_loss_affected
+    s.is_loss_affected OR EXISTS (
+        FROM unmarked_loss AS l
+        WHERE l.host = p.host AND l.end_ns >= i.start_ns AND l.start_ns <= i.end_ns
+    )
 FROM analysed.store.callback_schedule AS s
 JOIN analysed.store.callback_instance AS i ON s.callback_instance_id = i.callback_instance_id
 JOIN schedule_place AS p ON i.thread_id = p.thread_id
@@ -87,7 +98,32 @@ JOIN schedule_place AS p ON t.thread_id = p.thread_id
 WHERE a.is_exact;
 
 CREATE OR REPLACE TEMP TABLE schedule_truth AS
-WITH part AS (
+WITH handled AS (
+    SELECT
+        i.host, i.pid, i.tid, i.start_ns, n.kind,
+        sum(
+            least(n.end_ns, s.end_ns, i.end_ns) - greatest(n.start_ns, s.start_ns, i.start_ns)
+        ) AS length_ns
+    FROM simulated_callback_instance AS i
+    JOIN truth_state AS s
+        ON i.host = s.host AND i.pid = s.pid AND i.tid = s.tid AND s.end_ns > i.start_ns
+            AND s.start_ns < i.end_ns
+    JOIN simulated_interrupt AS n
+        ON s.host = n.host AND s.cpu = n.cpu
+            AND n.end_ns > greatest(s.start_ns, i.start_ns)
+            AND n.start_ns < least(s.end_ns, i.end_ns)
+    WHERE s.state = 'running'
+    GROUP BY ALL
+),
+interrupted AS (
+    SELECT
+        host, pid, tid, start_ns,
+        sum(length_ns) FILTER (WHERE kind = 'interrupt') AS irq_ns,
+        sum(length_ns) FILTER (WHERE kind = 'softirq') AS softirq_ns
+    FROM handled
+    GROUP BY ALL
+),
+part AS (
     SELECT
         i.host, i.pid, i.tid, i.start_ns, s.state,
         sum(least(s.end_ns, i.end_ns) - greatest(s.start_ns, i.start_ns)) AS length_ns,
@@ -131,8 +167,10 @@ SELECT
         coalesce(sum(p.length_ns) FILTER (WHERE p.state = 'preempted'), 0),
         coalesce(sum(p.length_ns) FILTER (WHERE p.state = 'runnable'), 0),
         coalesce(sum(p.length_ns) FILTER (WHERE p.state = 'sleeping'), 0),
+        coalesce(sum(p.length_ns) FILTER (WHERE p.state = 'uninterruptible'), 0),
         0,
-        0,
+        coalesce(any_value(n.irq_ns), 0),
+        coalesce(any_value(n.softirq_ns), 0),
         coalesce(sum(p.begun) FILTER (WHERE p.state = 'preempted'), 0)
     ),
     NOT EXISTS (
@@ -143,6 +181,8 @@ FROM simulated_callback_instance AS i
 JOIN part AS p
     ON i.host = p.host AND i.pid = p.pid AND i.tid = p.tid AND i.start_ns = p.start_ns
 JOIN schedule_place AS c ON i.host = c.host AND i.pid = c.pid AND i.tid = c.tid
+LEFT JOIN interrupted AS n
+    ON i.host = n.host AND i.pid = n.pid AND i.tid = n.tid AND i.start_ns = n.start_ns
 -- Whether callbacks are found, and their ends, other figures judge.
 JOIN analysed.store.callback_instance AS f
     ON c.thread_id = f.thread_id AND i.start_ns = f.start_ns AND i.end_ns = f.end_ns

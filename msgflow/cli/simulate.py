@@ -126,6 +126,14 @@ def command(
             rich_help_panel=_RECORDING,
         ),
     ] = 0,
+    perf: Annotated[
+        bool,
+        typer.Option(
+            "--perf",
+            help="perf, not LTTng, records the kernel, in systems with a kernel trace",
+            rich_help_panel=_RECORDING,
+        ),
+    ] = False,
     slew: Annotated[
         float,
         typer.Option(
@@ -174,6 +182,7 @@ def command(
         lost_packet_share=lose_packets,
         cut_streams=cut,
         slew_ppm=slew,
+        kernel_tracer="perf" if perf else "lttng",
     )
     done = simulate(
         scenario,

@@ -1,9 +1,10 @@
 """Simulated ROS 2 systems: real CTF traces of systems whose truth is known.
 
 `simulate("pipeline", directory)` writes for each host a trace as LTTng-UST would have recorded it
-(`directory/HOSTNAME/ust/uid/1000/64-bit`; the kernel's in `directory/HOSTNAME/kernel`, if the
-scenario has one), and the truth into `directory/truth`: what happened, not
-what can be seen. `scenarios()` lists what can be simulated; a `Scenario` of your own works as well.
+(`directory/HOSTNAME/ust/uid/1000/64-bit`; that of the kernel, if the scenario has one, in
+`directory/HOSTNAME/kernel`, or in `…/perf` if perf has recorded it), and the truth into
+`directory/truth`: what happened, not what can be seen. `scenarios()` lists what can be simulated;
+a `Scenario` of your own works as well.
 
 `layout` names the release of ROS 2 whose events the trace has, see `layouts()`. `recording` is how
 they are recorded: the recording starts late, pauses, loses events or packets, is rotated, … A
@@ -101,13 +102,15 @@ that are not perfect:
 arrival — one row per take of a message that came by DDS, where the kernel is traced:
     take_id, arrived_ns (when it was in the queue of its subscription)
 thread_state — one row per state of a thread of a process with nodes, where the kernel is traced:
-    host, pid, tid, state ('running', 'preempted', 'sleeping', 'runnable'), cpu (that it has, had or
-    waits for), start_ns, end_ns (NULL: the last), waker_kind (what ended the sleep: 'timer',
-    'softirq', 'thread'), waker_tid (that thread, of the same process)
+    host, pid, tid, state ('running', 'preempted', 'sleeping', 'uninterruptible', 'runnable'), cpu
+    (that it has, had or waits for), start_ns, end_ns (NULL: the last), waker_kind (what ended the
+    sleep: 'timer', 'interrupt', 'softirq', 'thread'), waker_tid (that thread)
 cpu_run — one row per stretch of time in which a thread had a CPU, likewise, of all processes:
     host, cpu, kernel_tid, name, priority, start_ns, end_ns
+interrupt — one row per interrupt that woke a thread, and what one left for later, likewise:
+    host, cpu, kind ('interrupt', 'softirq'), start_ns, end_ns
 kernel_loss — one row per time in which events of the kernel were lost:
-    host, start_ns, end_ns
+    host, start_ns, end_ns, is_counted (the trace says that it lost some)
 executor_state — one row per executor event, lasting until the next one of the thread:
     host, pid, tid, start_ns, end_ns (NULL: the last), state ('process' for get_next_ready,
     'wait' for wait_for_work, 'execute' for execute)

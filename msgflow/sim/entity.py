@@ -25,8 +25,12 @@ class Work:
         slow_ns: greatest additional duration of a slow run; it is at least half of that.
         percent_before: how much is done before the first publication, the rest after the last.
         sleep_ns: how long the thread sleeps before the first publication, where the kernel is
-            traced.
-        mutex: name of one of the process that is locked meanwhile, likewise; none if empty.
+            traced. What follows counts there only, too.
+        page_fault_ns: how long it then waits for a page from the disk.
+        mutex: what is locked meanwhile; nothing if empty. A name that begins with a slash is one
+            of all processes of the host, others are of the process.
+        waits_for: a condition that it waits for first, without the mutex; likewise.
+        signals: a condition that it signals after the last publication; likewise.
     """
 
     typical_ns: int = 20 * MICROSECOND
@@ -35,7 +39,10 @@ class Work:
     slow_ns: int = 0
     percent_before: int = 80
     sleep_ns: int = field(default=0, repr=False)
+    page_fault_ns: int = field(default=0, repr=False)
     mutex: str = field(default="", repr=False)
+    waits_for: str = field(default="", repr=False)
+    signals: str = field(default="", repr=False)
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,8 +7,9 @@ case nothing is written.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
+from functools import cache
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
@@ -32,6 +33,7 @@ class FieldKind(Enum):
     UNSIGNED = ("Q", "integer { size = 64; align = 8; signed = 0; encoding = none; base = 10; }")
     SIGNED = ("q", "integer { size = 64; align = 8; signed = 1; encoding = none; base = 10; }")
     DOUBLE = ("d", "floating_point { exp_dig = 11; mant_dig = 53; align = 8; }")
+    UNSIGNED_32 = ("I", "integer { size = 32; align = 8; signed = 0; encoding = none; base = 10; }")
     SIGNED_32 = ("i", "integer { size = 32; align = 8; signed = 1; encoding = none; base = 10; }")
     BYTES = ("s", _BYTE)
     PADDED = ("16s8x", _BYTE)
@@ -150,11 +152,37 @@ KERNEL_SIGNATURES: Mapping[str, tuple[EventField, ...]] = MappingProxyType(
             "sched_process_fork": "parent_comm name 16, parent_tid signed_32, "
             "parent_pid signed_32, child_comm name 16, child_tid signed_32, vtids numbers, "
             "child_pid signed_32, child_ns_inum unsigned",
-            "irq_softirq_entry": "vec signed_32",
-            "irq_softirq_exit": "vec signed_32",
+            "irq_handler_entry": "irq signed_32, name string",
+            "irq_handler_exit": "irq signed_32, ret signed_32",
+            "irq_softirq_entry": "vec unsigned_32",
+            "irq_softirq_exit": "vec unsigned_32",
             "timer_hrtimer_expire_entry": "hrtimer pointer, now signed, function pointer",
             "timer_hrtimer_expire_exit": "hrtimer pointer",
         }.items()
     }
 )
 """Events of the kernel, as lttng-modules has them."""
+
+PERF_NAMES: Mapping[str, str] = MappingProxyType(
+    {
+        name: f"sched:{name}" if name.startswith("sched") else name.replace("_", ":", 1)
+        for name in KERNEL_SIGNATURES
+    }
+    | {
+        "irq_handler_entry": "irq:irq_handler_entry",
+        "irq_handler_exit": "irq:irq_handler_exit",
+    }
+)
+"""What perf calls these."""
+
+_OF_NAMESPACES = {"parent_pid", "child_pid", "vtids", "child_ns_inum"}
+
+
+@cache
+def perf_fields(event: str) -> tuple[EventField, ...]:
+    """Fields of an event of the kernel that perf has, with their names in `KERNEL_SIGNATURES`."""
+    return tuple(
+        replace(field, kind=FieldKind.STRING, length=0) if field.kind is FieldKind.NAME else field
+        for field in KERNEL_SIGNATURES[event]
+        if field.name not in _OF_NAMESPACES
+    )

@@ -7,7 +7,7 @@ CPU, one with an equal priority after a slice of time. What happened is kept.
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Protocol
 
 if TYPE_CHECKING:
@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 
     from msgflow.sim import system
 
-TIMER, SOFTIRQ, THREAD = "timer", "softirq", "thread"
-"""What wakes threads: a timer that expires, what an interrupt of the network left for later, or a
-thread that gives a mutex away."""
+TIMER, INTERRUPT, SOFTIRQ, THREAD = "timer", "interrupt", "softirq", "thread"
+"""What wakes threads: a timer that expires, the interrupt of a disk, what that of the network left
+for later, or a thread that gives a mutex away or signals a condition."""
 
 _NETWORK_CPU = 0
 
@@ -67,7 +67,7 @@ class Waking:
 class Run:
     """A thread has a CPU. `waking` ended the sleep before it, if it slept.
 
-    `is_preempted`: at the end it had more to do.
+    `is_preempted`: at the end it had more to do. `is_uninterruptible`: it waits for the disk then.
     """
 
     thread: Scheduled
@@ -76,6 +76,15 @@ class Run:
     end: int
     waking: Waking | None = None
     is_preempted: bool = False
+    is_uninterruptible: bool = False
+
+
+@dataclass(slots=True)
+class _Semaphore:
+    """A binary one: a mutex that is free or not, or a condition that is signalled or not."""
+
+    is_free: bool
+    waiting: deque[Scheduled] = field(default_factory=deque)
 
 
 class Kernel:
@@ -88,23 +97,35 @@ class Kernel:
         self._latest: dict[Scheduled, Run] = {}
         self._wakings: dict[Scheduled, Waking] = {}
         self._wanted: dict[Scheduled, int] = {}
-        # Threads that have a mutex or wait for it, in this order.
-        self._mutexes: dict[tuple[int, str], deque[Scheduled]] = {}
+        self._semaphores: dict[tuple[int, str], _Semaphore] = {}
 
-    def lock(self, thread: Scheduled, mutex: str) -> bool:
-        """Have a mutex of the process, or wait for it; returns whether the thread has it now."""
-        queue = self._mutexes.setdefault((thread.description.pid, mutex), deque())
-        queue.append(thread)
-        return queue[0] is thread
+    def acquire(self, thread: Scheduled, name: str, *, is_free: bool) -> bool:
+        """Have a mutex, which is free at first, or see a condition signalled, which is not.
 
-    def unlock(self, thread: Scheduled, mutex: str, time: int) -> None:
-        """Give a mutex away: the next thread that waits for it has it, and is woken."""
-        queue = self._mutexes[thread.description.pid, mutex]
-        queue.popleft()
-        if queue:
-            woken = self.wake(queue[0], time, THREAD, thread)
-            assert woken is not None
-            queue[0].go_on(woken)
+        Returns whether that is so now; else it is when the thread is woken.
+        """
+        semaphore = self._semaphore(thread, name, is_free=is_free)
+        if not semaphore.is_free:
+            semaphore.waiting.append(thread)
+            return False
+        semaphore.is_free = False
+        return True
+
+    def release(self, thread: Scheduled, name: str, time: int) -> None:
+        """Give a mutex away, or signal a condition: the next thread that waits is woken."""
+        semaphore = self._semaphore(thread, name, is_free=False)
+        if not semaphore.waiting:
+            semaphore.is_free = True
+            return
+        next_thread = semaphore.waiting.popleft()
+        woken = self.wake(next_thread, time, THREAD, thread)
+        assert woken is not None
+        next_thread.go_on(woken)
+
+    def _semaphore(self, thread: Scheduled, name: str, *, is_free: bool) -> _Semaphore:
+        """That of the process, or where its name begins with a slash, of all processes."""
+        pid = 0 if name.startswith("/") else thread.description.pid
+        return self._semaphores.setdefault((pid, name), _Semaphore(is_free))
 
     def wake(
         self, thread: Scheduled, time: int, kind: str, by: Scheduled | None = None
@@ -118,6 +139,7 @@ class Kernel:
         known = self._wakings.get(thread)
         if known is not None and known.time <= time:
             return None
+        latest.is_uninterruptible = kind is INTERRUPT
         cpu = latest.cpu if by is None else by.cpu
         self._wakings[thread] = Waking(time, kind, _NETWORK_CPU if kind is SOFTIRQ else cpu, by)
         return time + _WAKE_UP_NS

@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 # A woken thread sometimes finds itself on another CPU.
 _MIGRATION = 1 / 128
 _ALIGNMENT = 16
+# From the moment in which a thread gives a mutex away until it sleeps, and from that in which it
+# goes on until it asks for the mutex again.
+_CALL_NS = 300
 
 
 class Machine:
@@ -260,31 +263,48 @@ class Thread:
             while later := self.take_cpu(time):
                 time = yield later
 
-    def sleep(self, time: int, length: int) -> Steps:
-        """Sleep for so long; returns when the thread has a CPU again."""
+    def sleep(self, time: int, length: int, kind: str = TIMER) -> Steps:
+        """Sleep until something wakes it after so long; returns when it has a CPU again."""
         self.keep_cpu(time)
         woken: int | None = time + length
         if self.machine.kernel is not None:
-            woken = self.machine.kernel.wake(self, time + length, TIMER)
+            woken = self.machine.kernel.wake(self, time + length, kind)
         time = yield woken
         while later := self.take_cpu(time):
             time = yield later
         return time
 
     def lock(self, time: int, mutex: str) -> Steps:
-        """Have a mutex of the process from `time` on, or as soon as others have given it away."""
+        """Have a mutex from `time` on, or as soon as others have given it away."""
         kernel = self.machine.kernel
-        if kernel is not None and not kernel.lock(self, mutex):
-            self.keep_cpu(time)
-            time = yield None
-            while later := self.take_cpu(time):
-                time = yield later
+        if kernel is not None and not kernel.acquire(self, mutex, is_free=True):
+            time = yield from self._wait(time)
         return time
 
-    def unlock(self, time: int, mutex: str) -> None:
-        """Give a mutex away."""
+    def wait(self, time: int, condition: str, mutex: str) -> Steps:
+        """Wait until a condition is signalled, without the mutex, and have that again."""
+        kernel = self.machine.kernel
+        if kernel is not None and not kernel.acquire(self, condition, is_free=False):
+            if mutex:
+                self.release(time, mutex)
+            time = yield from self._wait(time + _CALL_NS)
+            if mutex:
+                time = yield self.hold(time + _CALL_NS)
+                time = yield from self.lock(time, mutex)
+        return time
+
+    def release(self, time: int, name: str) -> None:
+        """Give a mutex away, or signal a condition."""
         if self.machine.kernel is not None:
-            self.machine.kernel.unlock(self, mutex, time)
+            self.machine.kernel.release(self, name, time)
+
+    def _wait(self, time: int) -> Steps:
+        """Sleep until another thread wakes it; returns when it has a CPU again."""
+        self.keep_cpu(time)
+        time = yield None
+        while later := self.take_cpu(time):
+            time = yield later
+        return time
 
     def begin(self, time: int, steps: Steps) -> None:
         """Let the thread do something from `time` on."""

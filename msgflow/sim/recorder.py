@@ -146,8 +146,9 @@ class Recorder:
     def write_kernel(self, kernel: Kernel, end: int) -> None:
         """Write the trace of the kernel up to time `end`."""
         write_kernel(
-            kernel, self._directory / "kernel", self._identity, self._clock, self._truth, end
-        )
+            kernel, self._directory, self._identity, self._clock, self._truth, end,
+            self._recording.kernel_tracer,
+        )  # fmt: skip
 
     # What a stream asks when it is recorded with faults.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 
 from msgflow.errors import UsageError
@@ -51,6 +51,7 @@ class Recording:
             at the begin.
         slew_ppm: parts per million by which it is faster than the trace's clock.
         realtime_steps: it is set: at these times, forward by so much.
+        kernel_tracer: what records the kernel, if anything does: 'lttng' or 'perf'.
     """
 
     start_ns: int = 0
@@ -77,11 +78,16 @@ class Recording:
     realtime_offset_ns: int = 0
     slew_ppm: float = 0.0
     realtime_steps: tuple[tuple[int, int], ...] = ()
+    kernel_tracer: str = field(default="lttng", repr=False)
 
     def __post_init__(self) -> None:
         for share in (self.lost_event_share, self.lost_packet_share, self.filled_share):
             if not 0 <= share <= 1:
                 raise UsageError(f"not a share — {share}", "give a number between 0 and 1")
+        if self.kernel_tracer not in {"lttng", "perf"}:
+            raise UsageError(
+                f"unknown tracer of the kernel — {self.kernel_tracer}", "choose lttng or perf"
+            )
         if not abs(self.slew_ppm) < 1000:
             raise UsageError(
                 f"no clock runs {self.slew_ppm} ppm too fast", "give less than 1000 ppm"
@@ -135,6 +141,7 @@ class Recording:
             realtime_offset_ns=self.realtime_offset_ns,
             slew_ppm=self.slew_ppm,
             realtime_steps=self.realtime_steps,
+            kernel_tracer=self.kernel_tracer,
         )
 
 

@@ -126,7 +126,8 @@ _SCHEMAS: Mapping[str, pa.Schema] = {
         host=_TEXT, cpu=_NUMBER, kernel_tid=_NUMBER, name=_TEXT, priority=_NUMBER, start_ns=_TIME,
         end_ns=_TIME,
     ),
-    "kernel_loss": _schema(host=_TEXT, start_ns=_TIME, end_ns=_TIME),
+    "interrupt": _schema(host=_TEXT, cpu=_NUMBER, kind=_TEXT, start_ns=_TIME, end_ns=_TIME),
+    "kernel_loss": _schema(host=_TEXT, start_ns=_TIME, end_ns=_TIME, is_counted=_FLAG),
     "emitted": _schema(host=_TEXT, pid=_NUMBER, tid=_NUMBER, cpu=_NUMBER, ts_ns=_TIME),
 }  # fmt: skip
 

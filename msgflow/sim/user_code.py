@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from msgflow.sim.entity import Work
 from msgflow.sim.intra_process import publish_intra
+from msgflow.sim.kernel import INTERRUPT
 from msgflow.sim.machine import settle
 from msgflow.sim.publication import publish
 
@@ -150,14 +151,19 @@ def _step(
     instance: CallbackInstance | None,
     cause: Callable[[str, int], CallbackInstance] | None,
 ) -> Steps:
-    mutex = code.work.mutex
-    if mutex:
-        # Others may have locked or unlocked it before that moment.
+    mutex, condition = code.work.mutex, code.work.waits_for
+    if mutex or condition:
+        # Others may have locked, unlocked or signalled it before that moment.
         start = yield thread.hold(start)
+    if mutex:
         start = yield from thread.lock(start, mutex)
+    if condition:
+        start = yield from thread.wait(start, condition, mutex)
     time = yield from thread.compute(start, before)
     if code.work.sleep_ns:
         time = yield from thread.sleep(time, code.work.sleep_ns)
+    if code.work.page_fault_ns:
+        time = yield from thread.sleep(time, code.work.page_fault_ns, INTERRUPT)
     for publisher in code.publishers:
         time = yield thread.hold(time)
         # What has ended before it began is known by now, on whatever thread it was.
@@ -171,7 +177,10 @@ def _step(
         time = yield from deed(thread, middleware, time, instance)
     if code.log is not None:
         time = publish(thread, middleware, code.log, time, instance)
+    if code.work.signals:
+        time = yield thread.hold(time)
+        thread.release(time, code.work.signals)
     time = yield from thread.compute(time, rest)
     if mutex:
-        thread.unlock(time, mutex)
+        thread.release(time, mutex)
     return (yield thread.hold(time))

@@ -310,6 +310,11 @@ def test_simulate_into_a_folder_of_the_name_of_the_system(msgflow: Msgflow) -> N
     assert list(Path("pipeline").rglob("metadata"))
 
 
+def test_perf_records_the_kernel_if_asked(msgflow: Msgflow) -> None:
+    msgflow("simulate", "cpu_hog", "-o", "out", "--factor", 0.02, "--perf")
+    assert (Path("out/robot/perf/metadata")).exists()
+
+
 def test_simulate_a_layout_and_a_recording_with_faults(msgflow: Msgflow) -> None:
     arguments = ("--factor", 0.03, "--layout", "humble-fastdds", "--start-late", 0.05)
     result = msgflow(

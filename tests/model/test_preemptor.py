@@ -44,6 +44,22 @@ def test_all_that_had_the_cpu_have_their_time(system: RosSystem, analyse: Analys
     assert model.rows("SELECT preemption_count, preempted_ns FROM callback_schedule") == [(1, 200)]
 
 
+def test_what_the_next_switch_contradicts_did_not_have_the_cpu(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    """What got the CPU lost it unseen to what leaves it, at an unknown time."""
+    kernel = Kernel(system)
+    kernel.switch(900, 0, 41)
+    kernel.switch(1100, 41, HOG)
+    kernel.switch(1150, OTHER, HOG)
+    kernel.switch(1300, HOG, 41)
+    kernel.switch(2100, 41, 0, BLOCKED)
+    call(system, 1000, 2000)
+    model = analyse(system)
+    assert waits(model) == [(HOG, "preempted", 0, 1150, 1300, 119, 120)]
+    assert model.rows("SELECT preemption_count, preempted_ns FROM callback_schedule") == [(1, 200)]
+
+
 def test_a_callback_counts_only_its_own_part(system: RosSystem, analyse: Analyse) -> None:
     """The thread was preempted before the callback began, and woken when it had not yet ended."""
     recorded(system)

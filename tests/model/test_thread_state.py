@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 from analysis import Analyse, Analysis
-from kernel_schedule import BLOCKED, HOG, KERNEL, MAIN, Kernel, call, recorded
+from kernel_schedule import BLOCKED, HOG, KERNEL, MAIN, TIMER, Kernel, call, recorded
 from ros_system import RosSystem
 from staged_events import Thread
 
@@ -90,6 +90,27 @@ def test_a_switch_ends_an_interrupt(system: RosSystem, analyse: Analyse) -> None
         "SELECT waker_kind, o.tid FROM thread_state AS s JOIN other_thread AS o "
         "ON s.waker_other_thread_id = o.other_thread_id WHERE state = 'runnable'"
     ) == [("thread", HOG)]
+
+
+@pytest.mark.parametrize(("left", "waker"), [(HOG, HOG), (TIMER, None)])
+def test_a_waker_that_the_next_switch_contradicts_is_not_known(
+    system: RosSystem, analyse: Analyse, left: int, waker: int | None
+) -> None:
+    """Another thread than the one that got the CPU leaves it: either woke the thread."""
+    kernel = Kernel(system)
+    kernel.switch(900, 0, 41)
+    kernel.switch(900, 0, HOG, cpu=1)
+    kernel.switch(1200, 41, 0, BLOCKED)
+    kernel.wake(1400, 41, cpu=1)
+    kernel.switch(1500, 0, 41)
+    kernel.switch(1600, left, 0, BLOCKED, cpu=1)
+    kernel.switch(2000, 41, 0, BLOCKED)
+    call(system, 1000, 1800)
+    kind = None if waker is None else "thread"
+    assert analyse(system).rows(
+        "SELECT waker_kind, o.tid FROM thread_state AS s LEFT JOIN other_thread AS o "
+        "ON s.waker_other_thread_id = o.other_thread_id WHERE state = 'runnable'"
+    ) == [(kind, waker)]
 
 
 def test_a_waking_may_come_before_the_switch_that_it_undoes(

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import duckdb
@@ -11,19 +13,31 @@ from ingested import ingest_one
 from scoring import Score, compare_simulated
 from thorough import few
 
-from msgflow.sim import Simulation, simulate
+from msgflow.sim import Recording, Simulation, scenarios, simulate
+from msgflow.sim.entity import MILLISECOND, SECOND
+from msgflow.sim.system import KernelTrace
 
 # How much of each is simulated: the losses come after 0.7 s of 5 s.
-SYSTEMS = {"cpu_hog": 0.1, "real_time": 0.2, "shared_map": 0.2, "kernel_losses": 0.17}
+SYSTEMS = {
+    "cpu_hog": 0.1,
+    "real_time": 0.2,
+    "shared_map": 0.2,
+    "shared_memory": 0.4,
+    "kernel_losses": 0.17,
+}
+LOSS_NS = 41 * MILLISECOND
 KINDS = {"thread_state", "preemptor", "callback_schedule", "arrival"}
 
 Traced = tuple[Simulation, Path]
 
 
-@pytest.fixture(scope="module", params=few(SYSTEMS, "real_time", "shared_map", "kernel_losses"))
+@pytest.fixture(scope="module", params=few(SYSTEMS, "real_time", "shared_memory", "kernel_losses"))
 def traced(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Traced:
-    directory = tmp_path_factory.mktemp(request.param)
-    simulation = simulate(request.param, directory / "trace", factor=SYSTEMS[request.param])
+    return ingested(request.param, tmp_path_factory.mktemp(request.param), Recording())
+
+
+def ingested(system: str, directory: Path, recording: Recording) -> Traced:
+    simulation = simulate(system, directory / "trace", factor=SYSTEMS[system], recording=recording)
     path = directory / "run.duckdb"
     ingest_one(simulation.directory, path).connection.close()
     return simulation, path
@@ -46,6 +60,43 @@ def test_all_is_found_and_nothing_else(traced: Traced) -> None:
 
 
 @pytest.mark.parametrize(
+    "traced", few(SYSTEMS, "shared_memory", "kernel_losses"), indirect=True, scope="module"
+)
+def test_perf_gives_the_same_answers(traced: Traced, tmp_path: Path) -> None:
+    """But it does not tell what it has lost."""
+    simulation, database = traced
+    system = json.loads(simulation.meta.read_text())["scenario"]
+    by_perf, other = ingested(system, tmp_path, Recording(kernel_tracer="perf"))
+    assert (by_perf.directory / "robot" / "perf" / "metadata").exists()
+    assert not (by_perf.directory / "robot" / "kernel").exists()
+    with duckdb.connect() as connection:
+        connection.execute(f"ATTACH '{database}' AS lttng (READ_ONLY)")
+        connection.execute(f"ATTACH '{other}' AS perf (READ_ONLY)")
+        for table in (
+            "store.thread_state",
+            "store.preemptor",
+            "store.callback_schedule",
+            "store.callback_preemptor",
+            "main.arrival",
+        ):
+            columns = "COLUMNS(lambda c: c <> 'is_loss_affected')"
+            rows, differing = connection.execute(
+                f"SELECT (SELECT count(*) FROM lttng.{table}), count(*) FROM ("
+                f"FROM (SELECT {columns} FROM lttng.{table}) "
+                f"EXCEPT ALL SELECT {columns} FROM perf.{table} UNION ALL "
+                f"(SELECT {columns} FROM perf.{table} "
+                f"EXCEPT ALL SELECT {columns} FROM lttng.{table}))"
+            ).fetchall()[0]
+            assert (table, differing) == (table, 0)
+            assert rows > 10
+        assert connection.execute(
+            "SELECT bool_or(is_loss_affected) FROM perf.store.thread_state"
+        ).fetchall() == [(False,)]
+    for kind, score in scores(by_perf, other).items():
+        assert (kind, score.wrong, score.missing) == (kind, 0, 0)
+
+
+@pytest.mark.parametrize(
     ("kind", "change"),
     [
         ("thread_state", "UPDATE thread_state SET end_ns = end_ns + 1 WHERE state = 'runnable'"),
@@ -59,6 +110,8 @@ def test_all_is_found_and_nothing_else(traced: Traced) -> None:
         ("preemptor", "UPDATE preemptor SET preemptor_priority = preemptor_priority + 1"),
         ("callback_schedule", "UPDATE callback_schedule SET running_ns = running_ns + 1"),
         ("callback_schedule", "UPDATE callback_schedule SET preemption_count = 0"),
+        ("callback_schedule", "UPDATE callback_schedule SET irq_ns = irq_ns + 1"),
+        ("callback_schedule", "UPDATE callback_schedule SET softirq_ns = 0"),
         ("arrival", "UPDATE thread_state SET waker_kind = 'timer' WHERE waker_kind = 'softirq'"),
         ("arrival", "UPDATE thread_state SET end_ns = end_ns - 1 WHERE state = 'sleeping'"),
     ],
@@ -93,37 +146,131 @@ def test_a_cpu_has_one_thread_at_a_time(traced: Traced) -> None:
     ).fetchall() == [(0,)]
 
 
-def test_who_waits_for_a_mutex_waits_for_the_thread_that_has_it(tmp_path: Path) -> None:
-    """Critical paths have what that thread did in place of the sleep."""
-    simulation = simulate("shared_map", tmp_path / "trace", factor=SYSTEMS["shared_map"])
-    ingested = ingest_one(simulation.directory, tmp_path / "run.duckdb")
-    ((callbacks, differing),) = ingested.rows(f"""
-        WITH found AS (
-            SELECT
-                callback_instance_id,
-                coalesce(sum(duration_ns) FILTER (WHERE wakers > 0), 0) AS waited_ns,
-                bool_and(state_thread_id <> i.thread_id) FILTER (WHERE wakers > 0) AS is_other
-            FROM critical_path([1], most_flows := 1000)
-            JOIN callback_instance AS i USING (callback_instance_id)
-            WHERE hop = 1 AND activity = 'callback'
-            GROUP BY callback_instance_id
-        ),
-        happened AS (
-            SELECT i.callback_instance_id, sum(s.end_ns - s.start_ns) AS waited_ns
-            FROM '{simulation.truth["thread_state"]}' AS s
-            JOIN thread AS t ON s.tid = t.tid
-            JOIN callback_instance AS i
-                ON t.thread_id = i.thread_id AND s.start_ns BETWEEN i.start_ns AND i.end_ns
-            WHERE s.state = 'sleeping' AND s.waker_kind = 'thread'
-            GROUP BY i.callback_instance_id
-        )
-        SELECT
-            count(h.waited_ns),
-            count(*) FILTER (
-                WHERE f.waited_ns <> coalesce(h.waited_ns, 0) OR f.is_other IS FALSE
+def test_a_disk_ends_waits_that_nothing_else_does(tmp_path: Path) -> None:
+    simulation, database = ingested("shared_memory", tmp_path, Recording())
+    with duckdb.connect(str(database), read_only=True) as connection:
+        found = connection.execute(
+            "SELECT tid, waker_kind, count(*) FROM store.thread_state "
+            "JOIN store.thread USING (thread_id) "
+            "WHERE state = 'uninterruptible' AND waker_kind IS NOT NULL GROUP BY ALL"
+        ).fetchall()
+    ((happened,),) = duckdb.sql(
+        f"SELECT count(*) FROM '{simulation.truth['callback_instance']}' AS c "
+        f"JOIN '{simulation.truth['take']}' AS t USING (take_id) "
+        "WHERE topic_name = '/objects' AND end_ns IS NOT NULL"
+    ).fetchall()
+    assert found == [(1301, "interrupt", happened)]
+    assert happened > 10
+
+
+@pytest.mark.parametrize(("system", "depth"), [("shared_map", 1), ("shared_memory", 2)])
+def test_who_waits_for_another_thread_waits_for_what_that_does(
+    tmp_path: Path, system: str, depth: int
+) -> None:
+    """Critical paths have what the threads did that gave a mutex away or signalled a condition.
+
+    In shared_memory the tracker waits for the detector, and that for the driver, of another
+    process.
+    """
+    simulation, database = ingested(system, tmp_path, Recording())
+    with duckdb.connect(str(database), read_only=True) as connection:
+        differing, deepest, waits = connection.execute(f"""
+            WITH RECURSIVE piece AS MATERIALIZED (
+                SELECT
+                    callback_instance_id, wakers, t.tid, state, from_ns, to_ns, duration_ns
+                FROM critical_path([1], most_flows := 1000)
+                JOIN thread AS t ON state_thread_id = t.thread_id
+                WHERE hop = 1 AND activity = 'callback'
+            ),
+            whole AS (
+                SELECT
+                    callback_instance_id, min_by(tid, from_ns) FILTER (WHERE wakers = 0) AS tid,
+                    min(from_ns) AS from_ns, max(to_ns) AS to_ns
+                FROM piece
+                GROUP BY callback_instance_id
+            ),
+            happened AS (
+                SELECT
+                    w.callback_instance_id, 0 AS wakers, s.tid, s.state, s.waker_tid,
+                    greatest(s.start_ns, w.from_ns) AS from_ns, least(s.end_ns, w.to_ns) AS to_ns
+                FROM whole AS w
+                JOIN '{simulation.truth["thread_state"]}' AS s
+                    ON w.tid = s.tid AND s.start_ns < w.to_ns AND s.end_ns > w.from_ns
+                UNION ALL
+                SELECT
+                    h.callback_instance_id, h.wakers + 1, s.tid, s.state, s.waker_tid,
+                    greatest(s.start_ns, h.from_ns), least(s.end_ns, h.to_ns)
+                FROM happened AS h
+                JOIN '{simulation.truth["thread_state"]}' AS s
+                    ON h.waker_tid = s.tid AND s.start_ns < h.to_ns AND s.end_ns > h.from_ns
+                WHERE h.state = 'sleeping'
+            ),
+            expected AS (
+                SELECT callback_instance_id, wakers, tid, state, sum(to_ns - from_ns) AS ns
+                FROM happened
+                WHERE state <> 'sleeping' OR waker_tid IS NULL
+                GROUP BY ALL
+            ),
+            found AS (
+                SELECT callback_instance_id, wakers, tid, state, sum(duration_ns) AS ns
+                FROM piece
+                GROUP BY ALL
             )
-        FROM found AS f
-        LEFT JOIN happened AS h ON f.callback_instance_id = h.callback_instance_id
-    """)
-    assert differing == 0
-    assert callbacks > 5
+            SELECT
+                count(*) FILTER (WHERE e.ns IS NULL OR f.ns IS NULL),
+                max(wakers),
+                count(DISTINCT callback_instance_id) FILTER (WHERE wakers > 0)
+            FROM expected AS e
+            FULL JOIN found AS f USING (callback_instance_id, wakers, tid, state, ns)
+        """).fetchall()[0]
+    assert (differing, deepest) == (0, depth)
+    assert waits > 5
+
+
+@pytest.mark.parametrize("tracer", ["lttng", "perf"])
+def test_what_losses_leave_open_is_not_guessed(tmp_path: Path, tracer: str) -> None:
+    """Where a switch was lost, no other thread passes for the one that ran."""
+    system = scenarios()["shared_memory"]
+    # A thread whose switch was lost still runs after most of these.
+    losses = tuple((time, time + 3 * MILLISECOND) for time in range(SECOND // 2, SECOND, LOSS_NS))
+    host = replace(system.hosts[0], kernel=KernelTrace(system.hosts[0].kernel.loads, losses=losses))
+    simulation = simulate(
+        replace(system, hosts=(host,)),
+        tmp_path / "trace",
+        factor=0.4,
+        recording=Recording(kernel_tracer=tracer),
+    )
+    database = tmp_path / "run.duckdb"
+    ingest_one(simulation.directory, database).connection.close()
+    with duckdb.connect(str(database), read_only=True) as connection:
+        wakers = connection.execute(f"""
+            SELECT
+                count(*) FILTER (WHERE k.tid = t.waker_tid),
+                count(*) FILTER (
+                    WHERE s.waker_kind = 'thread' AND k.tid IS DISTINCT FROM t.waker_tid
+                )
+            FROM store.thread_state AS s
+            JOIN store.thread AS o ON s.thread_id = o.thread_id
+            LEFT JOIN store.thread AS k ON s.waker_thread_id = k.thread_id
+            JOIN '{simulation.truth["thread_state"]}' AS t
+                ON o.tid = t.tid AND s.end_ns = t.end_ns AND t.state = 'sleeping'
+            WHERE s.state = 'sleeping'
+        """).fetchall()[0]
+        preemptors = connection.execute(f"""
+            SELECT count(r.cpu), count(*) - count(r.cpu)
+            FROM store.preemptor AS s
+            LEFT JOIN store.thread AS t ON s.preemptor_thread_id = t.thread_id
+            LEFT JOIN store.other_thread AS o
+                ON s.preemptor_other_thread_id = o.other_thread_id
+            LEFT JOIN '{simulation.truth["cpu_run"]}' AS r
+                ON s.cpu = r.cpu AND r.kernel_tid = coalesce(t.tid, o.tid)
+                AND r.start_ns <= s.start_ns AND r.end_ns >= s.end_ns
+            WHERE o.tid IS DISTINCT FROM 0
+                -- A thread that is back before a loss ends seems not to have gone.
+                AND NOT EXISTS (
+                    FROM '{simulation.truth["kernel_loss"]}' AS l
+                    WHERE s.start_ns < l.end_ns AND s.end_ns > l.start_ns
+                )
+        """).fetchall()[0]
+    assert (wakers[1], preemptors[1]) == (0, 0)
+    assert min(wakers[0], preemptors[0]) > 30

@@ -1,10 +1,11 @@
-"""Writer of CTF 1.8 as LTTng-UST writes it on x86-64: packed, little endian.
+"""Writer of CTF 1.8 as LTTng and perf write it on x86-64: packed, little endian.
 
 It knows layouts and bytes, nothing of ROS 2 or of the simulation.
 """
 
 from __future__ import annotations
 
+from msgflow.sim.ctf.perf import PerfWriter
 from msgflow.sim.ctf.stream import Break, Ending, Faults, StreamWriter
 from msgflow.sim.ctf.trace import USER_ID, TraceIdentity, TraceWriter
 from msgflow.sim.ctf.tracepoint import Tracepoint, thread_context, thread_of
@@ -14,6 +15,7 @@ __all__ = [
     "Break",
     "Ending",
     "Faults",
+    "PerfWriter",
     "StreamWriter",
     "TraceIdentity",
     "TraceWriter",

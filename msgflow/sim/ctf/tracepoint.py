@@ -13,7 +13,6 @@ if TYPE_CHECKING:
 
 _CONTEXT = Struct("<ii17s")
 CONTEXT_SIZE = _CONTEXT.size
-_HEADER_CODE = f"<HI{CONTEXT_SIZE}s"
 
 COMPACT_HEADER_SIZE = 6
 _EXTENDED_HEADER = Struct("<HIQ")
@@ -39,9 +38,9 @@ class Tracepoint:
     Attributes:
         id: number of the event class in the trace.
         name: full name.
-        pack: (id, low 32 bits of the clock, thread context, values of the signature…) → record.
-            Strings are given as `str`, arrays of bytes as `bytes`, sequences as such. None if the
-            trace does not have this event class.
+        pack: (id, clock, thread context, values of the signature…) → record. Of the clock, LTTng
+            has the low 32 bits. Strings are given as `str`, arrays of bytes as `bytes`, sequences
+            as such. None if the trace does not have this event class.
         count: records written so far; raised by the stream.
     """
 
@@ -53,6 +52,7 @@ class Tracepoint:
         event_id: int,
         signature: Sequence[EventField],
         fields: Sequence[EventField] | None,
+        header: str = f"<HI{CONTEXT_SIZE}s",
     ) -> None:
         """Prepare the records.
 
@@ -61,10 +61,11 @@ class Tracepoint:
             event_id: number of the event class.
             signature: the values that are given.
             fields: those of them that are recorded, by name; None if the event is not recorded.
+            header: `struct` codes of id, clock and context.
         """
         self.id = event_id
         self.name = name
-        self.pack = None if fields is None else _chosen(signature, fields)
+        self.pack = None if fields is None else _chosen(signature, fields, header)
         self.count = 0
 
 
@@ -73,9 +74,11 @@ def extended(record: bytes, event_id: int, cycles: int) -> bytes:
     return _EXTENDED_HEADER.pack(_EXTENDED_ID, event_id, cycles) + record[COMPACT_HEADER_SIZE:]
 
 
-def _chosen(signature: Sequence[EventField], fields: Sequence[EventField]) -> Callable[..., bytes]:
+def _chosen(
+    signature: Sequence[EventField], fields: Sequence[EventField], header: str
+) -> Callable[..., bytes]:
     """A packer that takes the values of the signature and records the fields."""
-    pack = _packer(fields)
+    pack = _packer(fields, header)
     given = [field.name for field in signature]
     positions = [given.index(field.name) for field in fields]
     if positions == list(range(len(given))):
@@ -87,12 +90,12 @@ def _chosen(signature: Sequence[EventField], fields: Sequence[EventField]) -> Ca
     return lambda event_id, low, context, *values: pack(event_id, low, context, *choose(values))
 
 
-def _packer(fields: Sequence[EventField]) -> Callable[..., bytes]:
+def _packer(fields: Sequence[EventField], header_code: str) -> Callable[..., bytes]:
     codes = [_code(field) for field in fields]
     known = [code for code in codes if code is not None]
     if len(known) == len(codes):
-        return Struct(_HEADER_CODE + "".join(known)).pack
-    header = Struct(_HEADER_CODE)
+        return Struct(header_code + "".join(known)).pack
+    header = Struct(header_code)
     parts = [
         _VARIABLE[field.kind] if code is None else Struct("<" + code).pack
         for field, code in zip(fields, codes, strict=True)

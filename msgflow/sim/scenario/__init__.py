@@ -91,6 +91,7 @@ def scenarios() -> Mapping[str, Scenario]:
         scheduling.cpu_hog(),
         scheduling.real_time(),
         scheduling.shared_map(),
+        scheduling.shared_memory(),
         scheduling.kernel_losses(),
     )
     return MappingProxyType({scenario.name: scenario for scenario in built_in})

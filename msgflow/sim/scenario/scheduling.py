@@ -131,6 +131,78 @@ def shared_map() -> Scenario:
     )  # fmt: skip
 
 
+def shared_memory() -> Scenario:
+    """Threads of two processes that wait for conditions, and one that waits for a disk."""
+    driver = Node(
+        "driver",
+        timers=(
+            Timer(
+                33 * MILLISECOND,
+                work=Work(2 * MILLISECOND, MILLISECOND, mutex="/frame", signals="/captured"),
+            ),
+        ),
+    )
+    detector = Node(
+        "detector",
+        publishers=(Publisher("/objects"),),
+        timers=(
+            Timer(
+                20 * MILLISECOND,
+                ("/objects",),
+                Work(
+                    3 * MILLISECOND,
+                    MILLISECOND,
+                    mutex="/frame",
+                    waits_for="/captured",
+                    signals="detected",
+                ),
+            ),
+        ),
+    )
+    tracker = Node(
+        "tracker",
+        executor=1,
+        publishers=(Publisher("/tracks"),),
+        timers=(
+            Timer(
+                20 * MILLISECOND,
+                ("/tracks",),
+                Work(4 * MILLISECOND, MILLISECOND, waits_for="detected"),
+            ),
+        ),
+    )
+    planner = Node(
+        "planner",
+        subscriptions=(
+            Subscription(
+                "/objects",
+                work=Work(
+                    4 * MILLISECOND,
+                    MILLISECOND,
+                    percent_before=10,
+                    page_fault_ns=700 * MICROSECOND,
+                ),
+            ),
+        ),
+    )
+    display = Node("display", subscriptions=(Subscription("/tracks"),))
+    return Scenario(
+        name="shared_memory",
+        description="A detector that waits for a driver to signal a frame; a map on a disk.",
+        hosts=(Host("robot", cpu_count=2, kernel=KernelTrace((_BACKUP,))),),
+        processes=(
+            Process("driver", "robot", 1101, (driver,)),
+            Process(
+                "perception", "robot", 1201, (detector, tracker), start_ns=3 * MILLISECOND,
+                executors=(Executor(), Executor()), cpus=(0,),
+            ),
+            Process("planner", "robot", 1301, (planner,), start_ns=5 * MILLISECOND, cpus=(0,)),
+            Process("display", "robot", 1401, (display,), start_ns=7 * MILLISECOND),
+        ),
+        duration_ns=3 * SECOND,
+    )  # fmt: skip
+
+
 def kernel_losses() -> Scenario:
     """The detector in a container; the trace of the kernel tells no ids, and has lost events."""
     system = cpu_hog()

@@ -1,5 +1,6 @@
 -- name: staging.cpu_taken
--- description: What ran on the CPU for which a thread waited, one thread after the other.
+-- description: What ran on the CPU for which a thread waited, one thread after the other. What the
+--     next switch contradicts is not known.
 -- grain: one row per wait for a CPU and stretch of time in which another thread had it
 -- when: staging.cpu_wait
 -- column: thread_id BIGINT  The thread that waited
@@ -55,4 +56,4 @@ JOIN raw.sched_switch AS r
 JOIN staging.source AS o ON w.trace_index = o.trace_index
 LEFT JOIN raw.sched_switch AS e
     ON w.trace_index = e.trace_index AND w.cpu = e.cpu_id AND w.number + 1 = e.switch_number
-WHERE r.next_tid <> w.tid
+WHERE r.next_tid <> w.tid AND (e.event_id IS NULL OR e.run_start_ns IS NOT NULL)

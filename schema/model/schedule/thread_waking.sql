@@ -1,6 +1,7 @@
 -- name: staging.thread_waking
 -- description: When threads of ROS processes were woken, and by what: the interrupt that the CPU
---     was handling, else the thread that ran there. A switch ends every interrupt.
+--     was handling, else the thread that ran there. A switch ends every interrupt. Where the next
+--     switch contradicts that the thread ran, it is not known.
 -- grain: one row per waking of such a thread
 -- when: staging.thread_tid
 -- column: thread_id BIGINT  The thread
@@ -43,4 +44,12 @@ SELECT
     r.next_tid AS waker_tid,
     r.next_comm AS waker_name
 FROM woken AS w
-LEFT JOIN raw.sched_switch AS r ON w.switch_event_id = r.event_id
+LEFT JOIN (
+    SELECT r.event_id, r.next_tid, r.next_comm
+    FROM raw.sched_switch AS r
+    LEFT JOIN raw.sched_switch AS e
+        ON r.trace_index = e.trace_index
+        AND r.cpu_id = e.cpu_id
+        AND r.switch_number + 1 = e.switch_number
+    WHERE e.event_id IS NULL OR e.run_start_ns IS NOT NULL
+) AS r ON w.switch_event_id = r.event_id
