@@ -44,6 +44,21 @@ def test_all_that_had_the_cpu_have_their_time(system: RosSystem, analyse: Analys
     assert model.rows("SELECT preemption_count, preempted_ns FROM callback_schedule") == [(1, 200)]
 
 
+def test_an_idle_cpu_takes_nothing_where_a_switch_to_another_thread_is_missing(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    kernel = Kernel(system)
+    kernel.switch(900, 0, 41)
+    kernel.switch(1200, 41, 0, BLOCKED)
+    kernel.wake(1300, 41)
+    kernel.switch(1500, HOG, 41)
+    kernel.switch(2100, 41, 0, BLOCKED)
+    call(system, 1000, 2000)
+    model = analyse(system)
+    assert waits(model) == []
+    assert model.rows("SELECT runnable_ns, sleeping_ns FROM callback_schedule") == [(200, 100)]
+
+
 def test_a_callback_counts_only_its_own_part(system: RosSystem, analyse: Analyse) -> None:
     """The thread was preempted before the callback began, and woken when it had not yet ended."""
     recorded(system)

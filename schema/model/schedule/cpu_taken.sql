@@ -56,3 +56,5 @@ JOIN staging.source AS o ON w.trace_index = o.trace_index
 LEFT JOIN raw.sched_switch AS e
     ON w.trace_index = e.trace_index AND w.cpu = e.cpu_id AND w.number + 1 = e.switch_number
 WHERE r.next_tid <> w.tid
+    -- Whatever left a CPU that was idle had got it without a switch that was recorded.
+    AND (r.next_tid <> 0 OR e.event_id IS NULL OR e.run_start_ns IS NOT NULL)
