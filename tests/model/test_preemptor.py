@@ -163,6 +163,29 @@ def test_cpu_time_of_all_threads_by_second(system: RosSystem, analyse: Analyse) 
     ]
 
 
+def test_a_second_has_the_mean_frequency_of_its_cpu(system: RosSystem, analyse: Analyse) -> None:
+    """Before its first event the frequency is not known; of CPU 1 there is none."""
+    second = 1_000_000_000
+    kernel = Kernel(system)
+    kernel.switch(900, 0, 41)
+    kernel.switch(900, 0, HOG, cpu=1)
+    for at, khz in ((second // 2, 1000), (second * 3 // 4, 3000), (second * 9 // 4, 4000)):
+        kernel.add("power_cpu_frequency", at, 1, of_cpu=0, frequency_khz=khz)
+    kernel.switch(2 * second + 500_000_000, 41, 0, BLOCKED)
+    kernel.switch(2 * second + 500_000_000, HOG, 0, cpu=1)
+    call(system, 1000, 1100)
+    assert analyse(system).rows(
+        "SELECT cpu, start_ns, frequency_hz FROM cpu_usage ORDER BY cpu, start_ns"
+    ) == [
+        (0, 0, 2_000_000),
+        (0, second, 3_000_000),
+        (0, 2 * second, 3_500_000),
+        (1, 0, None),
+        (1, second, None),
+        (1, 2 * second, None),
+    ]
+
+
 def test_what_two_kernel_traces_show_counts_once(system: RosSystem, analyse: Analyse) -> None:
     """The second one has the end of the first, too. A second of both is one row."""
     kernel = Kernel(system)
