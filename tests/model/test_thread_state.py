@@ -238,6 +238,53 @@ def test_declared_numbers_hold_where_no_event_tells_them(
     ) == [(100, 2000, "running"), (101, 1500, "running")]
 
 
+NUMBERS = """
+    SELECT t.tid, k.tid, k.source FROM staging.thread_tid AS k
+    JOIN staging.thread AS t ON k.thread_id = t.thread_id ORDER BY k.thread_id
+"""
+
+
+def in_container(
+    system: RosSystem, kernel: Kernel, begin: int, tid: int, pid_ns: int | None
+) -> None:
+    """Let a process run whose second thread has its only events before its CPU's first switch."""
+    ids = (100, 101, pid_ns)
+    system.add(
+        "ros2:rcl_init", Thread(100, pid_ns=pid_ns), ts=begin, context_handle=1, version="8.4.0"
+    )
+    call(system, begin + 60, begin + 70, Thread(100, 101, cpu=begin // 2000, pid_ns=pid_ns))
+    kernel.switch(begin - 10, 0, 41)
+    kernel.switch(begin + 700, tid, 0, BLOCKED, cpu=begin // 2000, ids=ids)
+    kernel.switch(begin + 800, tid, 0, 0x10, cpu=begin // 2000, ids=(0, 0, pid_ns))
+    call(system, begin + 200, begin + 900, Thread(100, pid_ns=pid_ns))
+    kernel.switch(begin + 1000, 41, 0, BLOCKED)
+
+
+@pytest.mark.parametrize("pid_ns", [None, 9])
+def test_contexts_of_switches_tell_the_numbers_of_a_container(
+    system: RosSystem, analyse: Analyse, pid_ns: int | None
+) -> None:
+    """They come before a dump, which may be of another thread that had the ids."""
+    kernel = Kernel(system)
+    kernel.add("lttng_statedump_process_state", 900, tid=60, namespace_tid=101, namespace_pid=100)
+    in_container(system, kernel, 2000, 42, pid_ns)
+    if pid_ns is not None:
+        kernel.switch(2900, 77, 0, BLOCKED, cpu=1, ids=(100, 101, pid_ns + 1))
+    assert analyse(system).rows(NUMBERS) == [(100, 41, "schedule"), (101, 42, "context")]
+
+
+def test_contexts_hold_for_the_life_of_a_process(system: RosSystem, analyse: Analyse) -> None:
+    kernel = Kernel(system)
+    in_container(system, kernel, 2000, 42, 9)
+    in_container(system, kernel, 4000, 43, 9)
+    assert analyse(system).rows(NUMBERS) == [
+        (100, 41, "schedule"),
+        (101, 42, "context"),
+        (100, 41, "schedule"),
+        (101, 43, "context"),
+    ]
+
+
 def test_a_thread_that_nothing_tells_is_said(system: RosSystem, analyse: Analyse) -> None:
     recorded(system)
     call(system, 800, 810, Thread(100, 101))
