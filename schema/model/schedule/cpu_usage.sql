@@ -71,7 +71,12 @@ speed AS (
         JOIN staging.schedule AS s ON f.trace_index = s.trace_index
         WHERE s.is_joined
     )
-    JOIN (SELECT clock_key, max(end_ns) AS last_ns FROM own GROUP BY clock_key) USING (clock_key)
+    JOIN (
+        SELECT s.clock_key, max(w.ts_ns + s.shift_ns) AS last_ns
+        FROM raw.sched_switch AS w
+        JOIN staging.schedule AS s ON w.trace_index = s.trace_index
+        GROUP BY s.clock_key
+    ) USING (clock_key)
 ),
 frequency AS (
     SELECT

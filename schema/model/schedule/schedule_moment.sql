@@ -13,8 +13,8 @@
 -- column: tid INTEGER  What left its CPU at the next switch
 -- column: contradiction_id BIGINT [event order]  The next switch, if it contradicts the one before
 SELECT
-    e.trace_index, e.clock_key, e.shift_ns, e.event_id, e.thread_index, e.at_ns, w.prev_tid AS tid,
-    CASE WHEN w.run_start_ns IS NULL THEN w.event_id END AS contradiction_id
+    e.trace_index, e.clock_key, e.shift_ns, e.event_id, e.thread_index, e.at_ns, w.tid,
+    w.contradiction_id
 FROM (
     SELECT
         c.trace_index, c.clock_key, c.shift_ns, v.event_id, v.thread_index, v.cpu_id,
@@ -23,6 +23,13 @@ FROM (
     JOIN staging.source AS s ON v.trace_index = s.trace_index
     JOIN staging.schedule_candidate AS c ON s.clock_key = c.clock_key
 ) AS e
-ASOF JOIN raw.sched_switch AS w
+ASOF JOIN (
+    -- Few and narrow columns: all switches are sorted.
+    SELECT
+        trace_index, cpu_id, ts_ns,
+        CASE WHEN switch_number > 0 THEN prev_tid END AS tid,
+        CASE WHEN run_start_ns IS NULL THEN event_id END AS contradiction_id
+    FROM raw.sched_switch
+) AS w
     ON e.trace_index = w.trace_index AND e.cpu_id = w.cpu_id AND e.at_ns < w.ts_ns
-WHERE w.switch_number > 0
+WHERE w.tid IS NOT NULL

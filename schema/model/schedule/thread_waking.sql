@@ -37,13 +37,15 @@ woken AS (
 during AS (
     SELECT
         w.*, r.trace_index, r.cpu_id AS cpu, r.ts_ns + w.shift_ns AS from_ns, r.next_tid,
-        r.next_comm, e.event_id IS NOT NULL AND e.run_start_ns IS NULL AS is_contradicted
+        r.next_comm, e.number IS NOT NULL AS is_contradicted
     FROM woken AS w
     LEFT JOIN raw.sched_switch AS r ON w.switch_event_id = r.event_id
-    LEFT JOIN raw.sched_switch AS e
-        ON r.trace_index = e.trace_index
-        AND r.cpu_id = e.cpu_id
-        AND r.switch_number + 1 = e.switch_number
+    LEFT JOIN (
+        SELECT trace_index, cpu_id, switch_number - 1 AS number
+        FROM raw.sched_switch
+        WHERE run_start_ns IS NULL
+    ) AS e
+        ON r.trace_index = e.trace_index AND r.cpu_id = e.cpu_id AND r.switch_number = e.number
 ),
 found AS (
     SELECT
