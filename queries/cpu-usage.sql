@@ -17,8 +17,10 @@
 -- column: share DOUBLE [share]      That divided by the time for which one CPU was traced
 -- column: most_share DOUBLE [share]  The largest share of a CPU in one second
 -- column: cpus BIGINT               CPUs that it ran on
+-- column: frequency_hz DOUBLE [Hz]  Mean frequency of its CPUs in the seconds in which it ran, by
+--     its time there; NULL: not recorded
 -- column: thread_id BIGINT          Identity of the thread
--- brief: nodes, thread, tid, share, running_ns, most_share, cpus, process, pid, host
+-- brief: nodes, thread, tid, share, running_ns, most_share, cpus, process, pid, frequency_hz, host
 -- note: kernel
 WITH chosen AS (
     SELECT *
@@ -35,7 +37,9 @@ traced AS (
 second AS (
     SELECT
         run_id, host_id, thread_id, CASE WHEN thread_id IS NULL THEN tid END AS other_tid,
-        name, start_ns, sum(running_ns) AS running_ns, list(DISTINCT cpu) AS cpus
+        name, start_ns, sum(running_ns) AS running_ns, list(DISTINCT cpu) AS cpus,
+        sum(running_ns) FILTER (WHERE frequency_hz IS NOT NULL) AS measured_ns,
+        sum(running_ns * frequency_hz::DOUBLE) AS cycles
     FROM chosen
     WHERE tid <> 0
     GROUP BY ALL
@@ -44,7 +48,8 @@ measured AS (
     SELECT
         run_id, host_id, thread_id, other_tid, any_value(name) AS name,
         sum(running_ns)::BIGINT AS running_ns, max(running_ns) / 1e9 AS most_share,
-        len(list_distinct(flatten(list(cpus)))) AS cpus
+        len(list_distinct(flatten(list(cpus)))) AS cpus,
+        sum(cycles) / sum(measured_ns) AS frequency_hz
     FROM second
     GROUP BY run_id, host_id, thread_id, other_tid
 )
@@ -60,6 +65,7 @@ SELECT
     m.running_ns / c.length_ns AS share,
     m.most_share,
     m.cpus,
+    m.frequency_hz,
     m.thread_id
 FROM measured AS m
 JOIN traced AS c ON m.run_id = c.run_id AND m.host_id = c.host_id

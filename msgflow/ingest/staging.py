@@ -4,7 +4,8 @@
 it spills, and keep the beginning of each column of each row group. `raw` has one table per
 tracepoint, the packets, and the threads, all as read (`raw.cpu_return`: events of threads that
 changed their CPU twice faster than a thread can; `raw.interrupt`: interrupts, each with the thread
-that it interrupted; `raw.user_event`: the user's events of all names).
+that it interrupted; `raw.kernel_thread`: ids of threads to the kernel and in their PID namespace,
+as contexts of switches have them; `raw.user_event`: the user's events of all names).
 `staging` has `staging.source` (one row per trace), `staging.event_count`, `staging.declared`
 (tracepoints that were enabled in a trace, also if they never occurred), `staging.left_out` (events
 that another trace holds as well),
@@ -54,6 +55,13 @@ CREATE TABLE raw.cpu_return (thread_index INTEGER, event_id BIGINT)
 _INTERRUPT_TABLE = """
 CREATE TABLE raw.interrupt (
     trace_index INTEGER, kind VARCHAR, start_ns BIGINT, end_ns BIGINT, tid INTEGER
+)
+"""
+
+_KERNEL_THREAD_TABLE = """
+CREATE TABLE raw.kernel_thread (
+    trace_index INTEGER, tid INTEGER, vpid INTEGER, vtid INTEGER, pid_ns BIGINT, first_ns BIGINT,
+    last_ns BIGINT
 )
 """
 
@@ -132,6 +140,7 @@ def _tables() -> tuple[str, ...]:
         _PACKET_TABLE,
         _THREAD_TABLES,
         _INTERRUPT_TABLE,
+        _KERNEL_THREAD_TABLE,
         _SOURCE_TABLE,
         _EVENT_COUNT_TABLE,
         _DECLARED_TABLE,
@@ -163,7 +172,8 @@ def narrow(con: duckdb.DuckDBPyConnection, empty: Collection[str]) -> None:
 
 def empty(con: duckdb.DuckDBPyConnection) -> None:
     """Empty `raw`, to read everything again."""
-    for table in (*event_tables(), "packet", "thread", "thread_name", "cpu_return", "interrupt"):
+    others = ("packet", "thread", "thread_name", "cpu_return", "interrupt", "kernel_thread")
+    for table in (*event_tables(), *others):
         con.execute(f"TRUNCATE raw.{table}")
 
 

@@ -57,8 +57,9 @@ behind AS (
 on_cpu AS (
     SELECT w.take_id, r.start_ns AS on_cpu_ns
     FROM woken AS w
-    ASOF JOIN (SELECT * FROM main.thread_state WHERE state = 'running') AS r
+    ASOF JOIN (SELECT * FROM main.thread_state WHERE state IN ('running', 'unknown')) AS r
         ON w.thread_id = r.thread_id AND w.arrived_ns <= r.start_ns
+    WHERE r.state = 'running'
 )
 SELECT
     w.run_id,

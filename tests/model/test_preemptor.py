@@ -60,6 +60,21 @@ def test_what_the_next_switch_contradicts_did_not_have_the_cpu(
     assert model.rows("SELECT preemption_count, preempted_ns FROM callback_schedule") == [(1, 200)]
 
 
+def test_an_idle_cpu_takes_nothing_where_a_switch_to_another_thread_is_missing(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    kernel = Kernel(system)
+    kernel.switch(900, 0, 41)
+    kernel.switch(1200, 41, 0, BLOCKED)
+    kernel.wake(1300, 41)
+    kernel.switch(1500, HOG, 41)
+    kernel.switch(2100, 41, 0, BLOCKED)
+    call(system, 1000, 2000)
+    model = analyse(system)
+    assert waits(model) == []
+    assert model.rows("SELECT runnable_ns, sleeping_ns FROM callback_schedule") == [(200, 100)]
+
+
 def test_a_callback_counts_only_its_own_part(system: RosSystem, analyse: Analyse) -> None:
     """The thread was preempted before the callback began, and woken when it had not yet ended."""
     recorded(system)
@@ -161,6 +176,29 @@ def test_cpu_time_of_all_threads_by_second(system: RosSystem, analyse: Analyse) 
         (second, HOG, None, "thread 7", second),
         (2 * second, 0, None, "thread 0", 20),
         (2 * second, HOG, None, "thread 7", 50),
+    ]
+
+
+def test_a_second_has_the_mean_frequency_of_its_cpu(system: RosSystem, analyse: Analyse) -> None:
+    """Before its first event the frequency is not known; of CPU 1 there is none."""
+    second = 1_000_000_000
+    kernel = Kernel(system)
+    kernel.switch(900, 0, 41)
+    kernel.switch(900, 0, HOG, cpu=1)
+    for at, khz in ((second // 2, 1000), (second * 3 // 4, 3000), (second * 9 // 4, 4000)):
+        kernel.add("power_cpu_frequency", at, 1, of_cpu=0, frequency_khz=khz)
+    kernel.switch(2 * second + 500_000_000, 41, 0, BLOCKED)
+    kernel.switch(2 * second + 500_000_000, HOG, 0, cpu=1)
+    call(system, 1000, 1100)
+    assert analyse(system).rows(
+        "SELECT cpu, start_ns, frequency_hz FROM cpu_usage ORDER BY cpu, start_ns"
+    ) == [
+        (0, 0, 2_000_000),
+        (0, second, 3_000_000),
+        (0, 2 * second, 3_500_000),
+        (1, 0, None),
+        (1, second, None),
+        (1, 2 * second, None),
     ]
 
 

@@ -259,6 +259,53 @@ def test_declared_numbers_hold_where_no_event_tells_them(
     ) == [(100, 2000, "running"), (101, 1500, "running")]
 
 
+NUMBERS = """
+    SELECT t.tid, k.tid, k.source FROM staging.thread_tid AS k
+    JOIN staging.thread AS t ON k.thread_id = t.thread_id ORDER BY k.thread_id
+"""
+
+
+def in_container(
+    system: RosSystem, kernel: Kernel, begin: int, tid: int, pid_ns: int | None
+) -> None:
+    """Let a process run whose second thread has its only events before its CPU's first switch."""
+    ids = (100, 101, pid_ns)
+    system.add(
+        "ros2:rcl_init", Thread(100, pid_ns=pid_ns), ts=begin, context_handle=1, version="8.4.0"
+    )
+    call(system, begin + 60, begin + 70, Thread(100, 101, cpu=begin // 2000, pid_ns=pid_ns))
+    kernel.switch(begin - 10, 0, 41)
+    kernel.switch(begin + 700, tid, 0, BLOCKED, cpu=begin // 2000, ids=ids)
+    kernel.switch(begin + 800, tid, 0, 0x10, cpu=begin // 2000, ids=(0, 0, pid_ns))
+    call(system, begin + 200, begin + 900, Thread(100, pid_ns=pid_ns))
+    kernel.switch(begin + 1000, 41, 0, BLOCKED)
+
+
+@pytest.mark.parametrize("pid_ns", [None, 9])
+def test_contexts_of_switches_tell_the_numbers_of_a_container(
+    system: RosSystem, analyse: Analyse, pid_ns: int | None
+) -> None:
+    """They come before a dump, which may be of another thread that had the ids."""
+    kernel = Kernel(system)
+    kernel.add("lttng_statedump_process_state", 900, tid=60, namespace_tid=101, namespace_pid=100)
+    in_container(system, kernel, 2000, 42, pid_ns)
+    if pid_ns is not None:
+        kernel.switch(2900, 77, 0, BLOCKED, cpu=1, ids=(100, 101, pid_ns + 1))
+    assert analyse(system).rows(NUMBERS) == [(100, 41, "schedule"), (101, 42, "context")]
+
+
+def test_contexts_hold_for_the_life_of_a_process(system: RosSystem, analyse: Analyse) -> None:
+    kernel = Kernel(system)
+    in_container(system, kernel, 2000, 42, 9)
+    in_container(system, kernel, 4000, 43, 9)
+    assert analyse(system).rows(NUMBERS) == [
+        (100, 41, "schedule"),
+        (101, 42, "context"),
+        (100, 41, "schedule"),
+        (101, 43, "context"),
+    ]
+
+
 def test_a_thread_that_nothing_tells_is_said(system: RosSystem, analyse: Analyse) -> None:
     recorded(system)
     call(system, 800, 810, Thread(100, 101))
@@ -296,3 +343,168 @@ def test_a_thread_that_ended_does_not_sleep(
     call(system, 1000, 1100)
     model = analyse(system)
     assert model.rows("SELECT state FROM thread_state WHERE start_ns BETWEEN 1200 AND 2050") == []
+
+
+def without_switches_from_idle(system: RosSystem, kernel: Kernel, count: int) -> None:
+    """Let a thread run on two CPUs in turn; from one of them no switch away from idle is seen.
+
+    The thread is woken at the middle of its sleep, and sleeps again in its callback.
+    """
+    kernel.switch(0, HOG, 0)
+    kernel.switch(0, HOG, 0, cpu=1)
+    for begin in range(1000, 1000 * (count + 1), 1000):
+        cpu = begin // 1000 % 2
+        for on, off in ((begin - 100, begin + 100), (begin + 200, begin + 400)):
+            kernel.wake(on - 50, 41, cpu=cpu)
+            if cpu == 0:
+                kernel.switch(on, 0, 41)
+            kernel.switch(off, 41, 0, BLOCKED, cpu=cpu)
+        call(system, begin, begin + 300, Thread(100, cpu=cpu))
+
+
+def test_only_where_the_schedule_is_known_an_event_can_contradict_it(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    """perf on virtual machines has no switches away from idle, on some CPUs.
+
+    The thread is seen on the CPU at the begin of the callback, and not again until its end.
+    """
+    without_switches_from_idle(system, Kernel(system, clock="perf", tracer="perf"), 4)
+    model = analyse(system)
+    assert model.rows("SELECT name, count, detail FROM finding WHERE name LIKE 'kernel%'") == [
+        (
+            "kernel_switches_missing",
+            4,
+            "what ran is not known for 100.0 % of the time of CPU 1, at 4 of 8 events of ROS "
+            "processes",
+        )
+    ]
+    assert schedules(model) == [
+        (100, 0, 0, 50, 0, 150),
+        (200, 0, 50, 50, 0, 0),
+        (100, 0, 0, 50, 0, 150),
+        (200, 0, 50, 50, 0, 0),
+    ]
+    assert model.rows(STATES)[:9] == [
+        (850, 1000, "unknown", 1),
+        (1000, 1100, "running", 1),
+        (1100, 1150, "sleeping", 1),
+        (1150, 1300, "unknown", 1),
+        (1300, 1400, "running", 1),
+        (1400, 1850, "sleeping", 1),
+        (1850, 1900, "runnable", 1),
+        (1900, 2100, "running", 0),
+        (2100, 2150, "sleeping", 0),
+    ]
+
+
+def test_a_thread_that_is_not_seen_before_it_leaves_a_cpu_is_not_known_to_run(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    """Its switch onto the CPU is missing, and it has no event there."""
+    kernel = Kernel(system)
+    kernel.switch(0, HOG, 0)
+    kernel.switch(0, HOG, 0, cpu=1)
+    kernel.switch(500, 41, 0, BLOCKED, cpu=1)
+    kernel.switch(900, 0, 41)
+    kernel.switch(1200, 41, 0, BLOCKED)
+    kernel.wake(1300, 41)
+    kernel.switch(1400, 41, 0, BLOCKED, cpu=1)
+    kernel.switch(1500, 0, HOG)
+    call(system, 1000, 1100)
+    assert analyse(system).rows(STATES) == [
+        (0, 500, "unknown", 1),
+        (500, 900, "sleeping", 1),
+        (900, 1200, "running", 0),
+        (1200, 1300, "sleeping", 0),
+        (1300, 1400, "unknown", 0),
+        (1400, 1500, "sleeping", 1),
+    ]
+
+
+def test_a_waking_on_an_idle_cpu_may_be_missing_too(system: RosSystem, analyse: Analyse) -> None:
+    """The thread slept at least until the CPU on which it is seen then became idle."""
+    kernel = Kernel(system)
+    kernel.switch(900, 0, 41)
+    kernel.switch(1200, 41, HOG, BLOCKED)
+    kernel.switch(1500, HOG, 0, BLOCKED)
+    kernel.switch(2000, 41, 0, BLOCKED)
+    kernel.switch(3000, 0, HOG)
+    call(system, 1000, 1800)
+    model = analyse(system)
+    assert model.rows(STATES) == [
+        (900, 1200, "running", 0),
+        (1200, 1500, "sleeping", 0),
+        (1500, 1800, "unknown", 0),
+        (1800, 2000, "running", 0),
+        (2000, 3000, "sleeping", 0),
+    ]
+
+
+def test_the_number_of_a_thread_is_known_on_a_cpu_without_switches_from_idle(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    """What leaves the CPU next is the thread, also if its switch to the CPU is missing."""
+    kernel = Kernel(system)
+    kernel.switch(0, HOG, 0, cpu=1)
+    kernel.switch(500, 42, 0, BLOCKED, cpu=1)
+    kernel.switch(900, 0, 41)
+    kernel.switch(1200, 41, 0, BLOCKED)
+    call(system, 300, 400, Thread(100, 101, cpu=1))
+    call(system, 1000, 1100)
+    assert schedules(analyse(system)) == [(100, 0, 0, 0, 0, 0), (100, 0, 0, 0, 0, 0)]
+
+
+def test_what_wakes_is_known_where_it_is_seen(system: RosSystem, analyse: Analyse) -> None:
+    """From a CPU that went idle, and on which a thread is seen only afterwards."""
+    other = Thread(100, 101, cpu=1)
+    kernel = Kernel(system)
+    kernel.switch(0, HOG, 0, cpu=1)
+    kernel.switch(0, HOG, 42)
+    call(system, 10, 20, Thread(100, 101))
+    kernel.switch(30, 42, 41, BLOCKED)
+    for begin in (1000, 2000):
+        kernel.switch(begin, 41, 0, BLOCKED)
+        kernel.wake(begin + (100 if begin == 1000 else 300), 41, cpu=1)
+        call(system, begin + 200, begin + 250, other)
+        kernel.switch(begin + 400, 0, 41)
+        kernel.switch(begin + 500, 42, 0, BLOCKED, cpu=1)
+        call(system, begin + 600, begin + 700)
+    kernel.switch(3000, 41, HOG)
+    model = analyse(system)
+    assert model.rows(
+        "SELECT s.end_ns, s.waker_kind, t.tid, s.waker_other_thread_id FROM thread_state AS s "
+        "LEFT JOIN thread AS t ON s.waker_thread_id = t.thread_id WHERE state = 'sleeping' "
+        "AND s.thread_id = (SELECT thread_id FROM thread WHERE tid = 100) ORDER BY s.start_ns"
+    ) == [(1100, None, None, None), (2300, "thread", 101, None)]
+
+
+def test_a_wrong_clock_is_found_where_most_of_the_schedule_is_unknown(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    kernel = Kernel(system, clock="perf", tracer="perf")
+    kernel.shift_ns = 250
+    without_switches_from_idle(system, kernel, 100)
+    model = analyse(system)
+    assert model.rows(STATES) == []
+    assert model.rows(
+        "SELECT count, detail FROM finding WHERE name = 'kernel_trace_not_joined'"
+    ) == [
+        (
+            50,
+            "the kernel trace agrees with 50.0 % of the events of ROS processes about which thread "
+            "ran, with its times shifted by +0.000000 s: not joined",
+        )
+    ]
+
+
+def test_two_threads_are_not_one_to_the_kernel(system: RosSystem, analyse: Analyse) -> None:
+    """A trace of another boot, in which one thread had the CPU all the time."""
+    kernel = Kernel(system, clock="perf", tracer="perf")
+    kernel.switch(0, 0, HOG)
+    kernel.switch(9000, HOG, 0)
+    for begin in range(1000, 5000, 100):
+        call(system, begin, begin + 10, Thread(100, 100 + begin // 100 % 4))
+    model = analyse(system)
+    assert model.rows(STATES) == []
+    assert model.rows("SELECT count FROM finding WHERE name = 'kernel_trace_not_joined'") == [(60,)]

@@ -24,17 +24,32 @@ class Kernel:
         given = {"hostname": "alpha", "clock": "boot", "tracer": "lttng-modules 2.13.9"} | source
         system.add_source(trace, **given)
 
-    def add(self, name: str, ts: int, cpu: int | None = 0, **fields: Any) -> int:
-        where = Thread(-1, cpu=cpu, trace=self._trace, name=None)
+    def add(
+        self,
+        name: str,
+        ts: int,
+        cpu: int | None = 0,
+        ids: tuple[int, int, int | None] = (-1, -1, None),
+        **fields: Any,
+    ) -> int:
+        """Add an event, in a thread with these ids and namespace of ids, as contexts tell."""
+        pid, tid, pid_ns = ids
+        where = Thread(pid, tid, cpu=cpu, trace=self._trace, name=None, pid_ns=pid_ns)
         self._system.add(name, where, ts=ts + self.shift_ns, **fields)
         return ts
 
     def switch(
-        self, ts: int, before: int, after: int, state: int = LOST, cpu: int | None = 0
+        self,
+        ts: int,
+        before: int,
+        after: int,
+        state: int = LOST,
+        cpu: int | None = 0,
+        ids: tuple[int, int, int | None] = (-1, -1, None),
     ) -> int:
         """Let a thread take the CPU from another one."""
         return self.add(
-            "sched_switch", ts, cpu, prev_tid=before, prev_prio=20, prev_state=state,
+            "sched_switch", ts, cpu, ids, prev_tid=before, prev_prio=20, prev_state=state,
             next_tid=after, next_prio=19, next_comm=f"thread {after}",
         )  # fmt: skip
 

@@ -17,6 +17,8 @@ import msgflow.trace
 TCP, UDP, ICMP = 6, 17, 1
 SENT, RECEIVED = "net_dev_queue", "net_if_receive_skb"
 NOISE = "sched_process_wait"
+FREQUENCY = "power_cpu_frequency"
+KHZ = 2_400_000
 
 _COMMON = ["irq_softirq_raise", *(f"syscall_entry_{number}" for number in range(300))]
 _CONTENT_BYTES = 200_000
@@ -165,7 +167,7 @@ def write_kernel_trace(directory: Path, trace: KernelTrace) -> Path:
 
 def _names(trace: KernelTrace) -> list[str]:
     network = [SENT, RECEIVED, "net_if_rx"] if trace.with_network else []
-    return [*_COMMON, NOISE, *network]
+    return [*_COMMON, NOISE, *network, FREQUENCY]
 
 
 def _split(
@@ -196,6 +198,8 @@ def _body(event: KernelEvent, trace: KernelTrace) -> bytes:
         head = struct.pack("<ii17s", 4242, 4243, b"swapper/0")
     if event.name == NOISE:
         return head + struct.pack("<16siiq16sii", b"swapper", 0, 20, 0, b"ros", 7, 20)
+    if event.name == FREQUENCY:
+        return head + struct.pack("<II", KHZ, event.cpu + 1)
     if event.name in {SENT, RECEIVED, "net_if_rx"}:
         size = 0 if event.header is None else event.header.length + 28
         network = b"\0" if event.header is None else event.header.content()
@@ -296,6 +300,7 @@ def _metadata(trace: KernelTrace) -> str:
     )  # fmt: skip
     network = _network_fields()
     fields = {NOISE: switch, SENT: network, RECEIVED: network, "net_if_rx": network}
+    fields[FREQUENCY] = _struct([f"{_integer(32)} _state", f"{_integer(32)} _cpu_id"])
     other = _struct([f"{number} _value"])
     events = "".join(
         f'event {{\n\tname = "{name}";\n\tid = {place};\n\tstream_id = 0;\n'

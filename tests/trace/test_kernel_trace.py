@@ -11,7 +11,9 @@ from typing import Any
 import pyarrow as pa
 import pytest
 from kernel_traces import (
+    FREQUENCY,
     ICMP,
+    KHZ,
     NOISE,
     RECEIVED,
     SENT,
@@ -91,6 +93,15 @@ def test_headers_are_read(tmp_path: Path, read_rows: Read) -> None:
     ]  # fmt: skip
 
 
+def test_the_cpu_of_a_frequency_is_not_that_of_its_event(tmp_path: Path, read_rows: Read) -> None:
+    events = [KernelEvent(10**18, FREQUENCY, cpu=1)]
+    directory = write_kernel_trace(
+        tmp_path / "kernel", KernelTrace("robot", uuid.UUID(int=9), 10**17, events)
+    )
+    (row,) = read_rows(directory, wanted=WANTED)[FREQUENCY]
+    assert (row["cpu_id"], row["of_cpu"], row["frequency_khz"]) == (1, 2, KHZ)
+
+
 def test_readers_agree(trace: Path, bt2_bindings: object) -> None:
     for wanted in (WANTED, None):
         ours, theirs = (read(trace, reader=name, wanted=wanted) for name in ("msgflow", "bt2"))
@@ -111,7 +122,7 @@ def test_fast_and_slow_agree(trace: Path, monkeypatch: pytest.MonkeyPatch) -> No
 
     monkeypatch.setattr(ClassPlan, "is_field_by_field", property(noted))
     fast = read(trace, wanted=WANTED, batch_rows=100)
-    assert set(plans) == {(SENT, False), (RECEIVED, False)}
+    assert set(plans) == {(SENT, False), (RECEIVED, False), (FREQUENCY, False)}
     monkeypatch.setattr(ClassPlan, "is_field_by_field", property(lambda plan: True))
     assert read(trace, wanted=WANTED, batch_rows=100).rows == fast.rows
 

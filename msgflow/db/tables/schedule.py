@@ -176,6 +176,11 @@ Table(
     Column("tid", INTEGER, nullable=False, comment="Its number to the kernel; 0: idle"),
     text("name", "Its name"),
     number("running_ns", "How long it ran", unit="ns", required=True),
+    number(
+        "frequency_hz",
+        "Mean frequency of the CPU in the second, as far as it is known; NULL: not recorded",
+        unit="Hz",
+    ),
     comment="One row per CPU, second and thread that ran there",
     info={
         "view": "What ran on each CPU, second by second, threads of processes without ROS included."

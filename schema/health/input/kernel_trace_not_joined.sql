@@ -3,8 +3,7 @@
 -- description: At most events of ROS processes, the kernel trace says that another thread ran on
 --     their CPU. It is of another clock or machine, so that nothing is said of scheduling.
 -- cause: The clocks differ: perf recorded without -k CLOCK_MONOTONIC, or another machine. Or an
---     old perf wrote all CPUs into one stream, and does not say which one an event is of. Or
---     switches are missing: in some virtual machines, perf has none of a CPU that was idle.
+--     old perf wrote all CPUs into one stream, and does not say which one an event is of.
 -- cure: Record again with the clock of LTTng (docs/scheduling.md); convert with a newer perf.
 -- grain: one row per kernel trace
 -- severity: warning
@@ -14,6 +13,10 @@ SELECT
     CASE
         WHEN NOT has_cpus
             THEN 'the kernel trace does not say on which CPUs its events happened: not joined'
+        WHEN event_count = 0 AND unknown_count > 0 THEN printf(
+            'the kernel trace contradicts itself at all %d events of ROS processes: not joined',
+            unknown_count
+        )
         WHEN event_count = 0
             THEN 'the kernel trace covers no event of a ROS process: not joined'
         ELSE printf(

@@ -9,6 +9,7 @@
 -- column: tid INTEGER  Its number to the kernel; 0: idle
 -- column: name VARCHAR  Its name, the latest one
 -- column: running_ns BIGINT [ns]  How long it ran
+-- column: frequency_hz BIGINT [Hz]  Mean frequency of the CPU in the second, as far as it is known
 WITH run AS (
     SELECT
         s.clock_key, w.trace_index, w.cpu_id AS cpu, w.prev_tid AS tid,
@@ -58,6 +59,45 @@ named AS (
     WHERE s.is_joined
     GROUP BY ALL
 ),
+speed AS (
+    SELECT
+        clock_key, cpu, hz, at_ns AS start_ns,
+        lead(at_ns, 1, last_ns) OVER (PARTITION BY clock_key, cpu ORDER BY at_ns) AS end_ns
+    FROM (
+        SELECT
+            s.clock_key, f.of_cpu AS cpu, f.frequency_khz * 1000 AS hz,
+            f.ts_ns + s.shift_ns AS at_ns
+        FROM raw.power_cpu_frequency AS f
+        JOIN staging.schedule AS s ON f.trace_index = s.trace_index
+        WHERE s.is_joined
+    )
+    JOIN (
+        SELECT s.clock_key, max(w.ts_ns + s.shift_ns) AS last_ns
+        FROM raw.sched_switch AS w
+        JOIN staging.schedule AS s ON w.trace_index = s.trace_index
+        GROUP BY s.clock_key
+    ) USING (clock_key)
+),
+frequency AS (
+    SELECT
+        clock_key, cpu, second,
+        round(sum(hz * length_ns) / sum(length_ns))::BIGINT AS frequency_hz
+    FROM (
+        SELECT
+            clock_key, cpu, hz, second,
+            least(end_ns, (second + 1) * 1_000_000_000)
+            - greatest(start_ns, second * 1_000_000_000) AS length_ns
+        FROM (
+            SELECT
+                *,
+                unnest(range(start_ns // 1_000_000_000, (end_ns - 1) // 1_000_000_000 + 1))
+                    AS second
+            FROM speed
+            WHERE end_ns > start_ns
+        )
+    )
+    GROUP BY ALL
+),
 host AS (
     SELECT s.clock_key, min(t.host_id) AS host_id
     FROM staging.schedule AS s
@@ -72,10 +112,13 @@ SELECT
     t.thread_id,
     u.tid,
     n.name,
-    u.running_ns
+    u.running_ns,
+    f.frequency_hz
 FROM usage AS u
 JOIN host AS h ON u.clock_key = h.clock_key
 LEFT JOIN named AS n ON u.clock_key = n.clock_key AND u.tid = n.tid
+LEFT JOIN frequency AS f
+    ON u.clock_key = f.clock_key AND u.cpu = f.cpu AND u.second = f.second
 LEFT JOIN staging.thread_tid AS t
     ON u.clock_key = t.clock_key
     AND u.tid = t.tid

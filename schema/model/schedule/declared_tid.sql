@@ -1,6 +1,6 @@
 -- name: staging.declared_tid
--- description: Ids of threads in PID namespaces, as kernel traces declare them: when a recording
---     begins, and when a thread is created.
+-- description: Ids of threads in PID namespaces, as kernel traces declare them: in contexts of
+--     switches, when a recording begins, and when a thread is created.
 -- grain: one row per declaration
 -- when: staging.schedule
 -- column: clock_key VARCHAR  Clock of the kernel trace
@@ -9,7 +9,8 @@
 -- column: vtid INTEGER  Thread, in that PID namespace
 -- column: ns_inum BIGINT  The PID namespace
 -- column: declared_ns BIGINT [epoch ns]  When
--- column: source VARCHAR  'state dump' or 'fork'
+-- column: until_ns BIGINT [epoch ns]  It was still so then; NULL: not known how long
+-- column: source VARCHAR  'context', 'state dump' or 'fork'
 WITH dump AS (
     SELECT
         trace_index, ts_ns, tid, namespace_tid AS vtid, namespace_pid AS vpid, ns_inum
@@ -31,15 +32,21 @@ main_thread AS (
     SELECT trace_index, ts_ns, tid, arg_max(vtid, ns_inum) FROM dump WHERE vtid = vpid GROUP BY ALL
 ),
 declared AS (
-    SELECT trace_index, ts_ns, tid, vpid, vtid, ns_inum, 'state dump' AS source FROM dump
+    SELECT
+        trace_index, first_ns AS ts_ns, last_ns, tid, vpid, vtid, pid_ns AS ns_inum,
+        'context' AS source
+    FROM raw.kernel_thread
     UNION ALL
-    SELECT f.trace_index, f.ts_ns, f.tid, m.vtid, f.vtid, f.child_ns_inum, 'fork'
+    SELECT trace_index, ts_ns, NULL, tid, vpid, vtid, ns_inum, 'state dump' FROM dump
+    UNION ALL
+    SELECT f.trace_index, f.ts_ns, NULL, f.tid, m.vtid, f.vtid, f.child_ns_inum, 'fork'
     FROM fork AS f
     ASOF JOIN main_thread AS m
         ON f.trace_index = m.trace_index AND f.child_pid = m.tid AND f.ts_ns >= m.ts_ns
 )
 SELECT
-    s.clock_key, d.tid, d.vpid, d.vtid, d.ns_inum, d.ts_ns + s.shift_ns AS declared_ns, d.source
+    s.clock_key, d.tid, d.vpid, d.vtid, d.ns_inum, d.ts_ns + s.shift_ns AS declared_ns,
+    d.last_ns + s.shift_ns AS until_ns, d.source
 FROM declared AS d
 JOIN staging.schedule AS s ON d.trace_index = s.trace_index
 WHERE s.is_joined

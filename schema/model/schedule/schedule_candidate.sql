@@ -7,11 +7,9 @@
 -- column: trace_index INTEGER  The kernel trace
 -- column: clock_key VARCHAR  The clock
 -- column: shift_ns BIGINT [ns]  What has to be added to its times
--- column: last_ns BIGINT [epoch ns]  Its last switch, as recorded
 -- column: has_cpus BOOLEAN  It says on which CPU a switch was
 WITH kernel AS (
-    SELECT s.trace_index, s.clock_key, s.clock_origin_ns, max(w.ts_ns) AS last_ns,
-        count(w.cpu_id) > 0 AS has_cpus
+    SELECT s.trace_index, s.clock_key, s.clock_origin_ns, count(w.cpu_id) > 0 AS has_cpus
     FROM raw.sched_switch AS w
     JOIN staging.source AS s ON w.trace_index = s.trace_index
     GROUP BY ALL
@@ -27,7 +25,6 @@ SELECT DISTINCT
     r.clock_key,
     CASE WHEN k.clock_key = r.clock_key OR s.is_of_epoch THEN 0
         ELSE r.clock_origin_ns - k.clock_origin_ns END AS shift_ns,
-    k.last_ns,
     k.has_cpus
 FROM kernel AS k
 JOIN ros AS r ON k.clock_key = r.clock_key OR k.clock_key NOT IN (SELECT clock_key FROM ros)

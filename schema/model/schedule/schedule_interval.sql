@@ -1,6 +1,7 @@
 -- name: staging.schedule_interval
 -- description: What each thread of a ROS process did, from switch to switch and waking. A waking
---     may come before the switch that it undoes. What the next switch contradicts is not known.
+--     may come before the switch that it undoes. What the next switch contradicts is not known. A
+--     thread that is seen on a CPU without a switch to it got it at some time since its waking.
 -- grain: one row per interval in which a thread had one state
 -- when: staging.thread_switch
 -- column: thread_id BIGINT  The thread
@@ -36,6 +37,7 @@ step AS (
         row_number() OVER thread AS number,
         lead(at_ns) OVER thread AS next_ns,
         lead(is_on) OVER thread AS is_next_on,
+        lead(unseen_since_ns) OVER thread AS next_unseen_since_ns,
         lead(cpu) OVER thread AS next_cpu
     FROM staging.thread_switch
     WINDOW thread AS (PARTITION BY thread_id, tid ORDER BY at_ns, event_id)
@@ -58,12 +60,18 @@ placed AS (
         s.*,
         coalesce(s.next_ns, greatest(f.end_ns, s.at_ns)) AS end_ns,
         k.event_id AS waking_event_id,
-        CASE WHEN k.at_ns IS NOT NULL THEN greatest(k.at_ns, s.at_ns) END AS woken_ns,
+        CASE
+            WHEN k.at_ns IS NOT NULL OR s.next_unseen_since_ns IS NOT NULL
+                THEN greatest(coalesce(k.at_ns, s.next_unseen_since_ns), s.at_ns)
+        END AS slept_until_ns,
         CASE
             WHEN s.is_on THEN CASE
-                WHEN s.is_next_on OR s.next_cpu <> s.cpu THEN 'unknown' ELSE 'running' END
-            WHEN NOT s.is_next_on THEN 'unknown'
-            WHEN s.prev_state & 255 = 0 THEN 'preempted'
+                WHEN s.is_next_on OR s.next_cpu <> s.cpu THEN 'unknown'
+                WHEN s.unseen_since_ns IS NULL AND s.next_unseen_since_ns IS NOT NULL THEN 'unknown'
+                ELSE 'running' END
+            WHEN NOT s.is_next_on AND s.next_unseen_since_ns IS NULL THEN 'unknown'
+            WHEN s.prev_state & 255 = 0
+                THEN CASE WHEN s.next_unseen_since_ns IS NULL THEN 'preempted' ELSE 'unknown' END
             -- It ended. 64 means that in old kernels; in others it is parked, and may go on.
             WHEN s.prev_state & 48 <> 0 OR (s.next_ns IS NULL AND s.prev_state & 64 <> 0) THEN NULL
             WHEN s.prev_state & 2 <> 0 THEN 'uninterruptible'
@@ -78,7 +86,7 @@ interval AS (
     SELECT
         thread_id, tid, trace_index, at_ns AS start_ns, at_ns AS left_ns,
         CASE WHEN state IN ('sleeping', 'uninterruptible')
-            THEN coalesce(woken_ns, end_ns) ELSE end_ns END AS end_ns,
+            THEN coalesce(slept_until_ns, end_ns) ELSE end_ns END AS end_ns,
         state, cpu, next_cpu, priority,
         CASE WHEN state IN ('sleeping', 'uninterruptible') THEN waking_event_id END
             AS waking_event_id
@@ -86,20 +94,28 @@ interval AS (
     WHERE state IS NOT NULL
     UNION ALL
     SELECT
-        thread_id, tid, trace_index, woken_ns, at_ns, end_ns, 'runnable', cpu, next_cpu, priority,
-        waking_event_id
+        thread_id, tid, trace_index, slept_until_ns, at_ns, end_ns,
+        CASE WHEN next_unseen_since_ns IS NULL THEN 'runnable' ELSE 'unknown' END,
+        cpu, next_cpu, priority, waking_event_id
     FROM placed
-    WHERE state IN ('sleeping', 'uninterruptible') AND woken_ns IS NOT NULL
+    WHERE state IN ('sleeping', 'uninterruptible') AND slept_until_ns IS NOT NULL
     UNION ALL
     -- What was before the first switch.
     SELECT
         s.thread_id,
         s.tid,
         s.trace_index,
-        CASE WHEN s.is_on THEN k.at_ns ELSE f.start_ns END,
+        CASE
+            WHEN s.is_on OR s.unseen_since_ns IS NOT NULL THEN coalesce(k.at_ns, s.unseen_since_ns)
+            ELSE f.start_ns
+        END,
         NULL,
         s.at_ns,
-        CASE WHEN s.is_on THEN 'runnable' ELSE 'running' END,
+        CASE
+            WHEN s.unseen_since_ns IS NOT NULL THEN 'unknown'
+            WHEN s.is_on THEN 'runnable'
+            ELSE 'running'
+        END,
         s.cpu, s.cpu, s.priority, CASE WHEN s.is_on THEN k.event_id END
     FROM step AS s
     JOIN life AS f ON s.thread_id = f.thread_id AND s.tid = f.tid

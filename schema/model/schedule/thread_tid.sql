@@ -1,13 +1,14 @@
 -- name: staging.thread_tid
--- description: The number that the kernel has for each thread. A declaration counts, the latest
---     while the thread lived, unless it is of several threads or the schedule contradicts it; else
---     what ran on the CPU at most events of the thread.
+-- description: The number that the kernel has for each thread. A declaration counts: contexts of
+--     switches while its process lived, else the latest of the state dump and its creation; unless
+--     it is of several threads or the schedule contradicts it. Else it is what ran on the CPU at
+--     most events of the thread.
 -- grain: one row per thread of a process life and number
 -- when: staging.schedule
 -- column: thread_id BIGINT  The thread
 -- column: clock_key VARCHAR  Clock of its host
 -- column: tid INTEGER  Its number
--- column: source VARCHAR  'state dump', 'fork' or 'schedule'
+-- column: source VARCHAR  'context', 'state dump', 'fork' or 'schedule'
 -- column: from_ns BIGINT [epoch ns]  The number means this thread from here
 -- column: until_ns BIGINT [epoch ns]  It means the next one from here
 WITH ran AS (
@@ -42,7 +43,8 @@ pattern AS (
 lived AS (
     SELECT
         t.thread_id, t.tid AS vtid, t.first_seen_ns, t.last_seen_ns, p.pid AS vpid,
-        p.pid_namespace, c.clock_key
+        p.first_seen_ns AS process_first_ns, p.last_seen_ns AS process_last_ns, p.pid_namespace,
+        c.clock_key
     FROM staging.thread AS t
     JOIN staging.process AS p ON t.process_id = p.process_id
     JOIN staging.host AS h ON p.host_id = h.host_id
@@ -54,16 +56,22 @@ latest AS (
         d.source,
         d.tid,
         d.declared_ns,
-        -- A dump declares all threads at about the same time.
+        -- A dump declares all threads at about the same time, contexts do so again and again.
         CASE d.source WHEN 'fork' THEN d.declared_ns ELSE 0 END AS rank_ns
     FROM lived AS v
     JOIN staging.declared_tid AS d
         ON v.clock_key = d.clock_key
         AND v.vpid = d.vpid
         AND v.vtid = d.vtid
-        AND d.declared_ns <= v.last_seen_ns
+        AND CASE d.source
+            WHEN 'context'
+                THEN d.declared_ns <= v.process_last_ns AND d.until_ns >= v.process_first_ns
+            ELSE d.declared_ns <= v.last_seen_ns
+        END
         AND coalesce(v.pid_namespace = d.ns_inum, true)
-    QUALIFY rank() OVER (PARTITION BY v.thread_id ORDER BY rank_ns DESC) = 1
+    QUALIFY rank() OVER (
+        PARTITION BY v.thread_id ORDER BY d.source = 'context' DESC, rank_ns DESC
+    ) = 1
 ),
 declared AS (
     SELECT thread_id, any_value(tid) AS tid, any_value(source) AS source

@@ -1,7 +1,7 @@
 -- name: staging.thread_waking
 -- description: When threads of ROS processes were woken, and by what: the interrupt that the CPU
---     was handling, else the thread that ran there. A switch ends every interrupt. Where the next
---     switch contradicts that the thread ran, it is not known.
+--     was handling, else the thread that ran there. A switch ends every interrupt. Where the kernel
+--     trace contradicts itself about what ran, only a thread that is seen there is known.
 -- grain: one row per waking of such a thread
 -- when: staging.thread_tid
 -- column: thread_id BIGINT  The thread
@@ -23,7 +23,7 @@ WITH waking AS (
 ),
 woken AS (
     SELECT
-        t.thread_id, t.tid, k.event_id, k.ts_ns + s.shift_ns AS at_ns, s.clock_key,
+        t.thread_id, t.tid, k.event_id, k.ts_ns + s.shift_ns AS at_ns, s.clock_key, s.shift_ns,
         k.switch_event_id, k.interrupt
     FROM waking AS k
     JOIN staging.schedule AS s ON k.trace_index = s.trace_index
@@ -33,23 +33,40 @@ woken AS (
         AND k.ts_ns + s.shift_ns >= t.from_ns
         AND k.ts_ns + s.shift_ns < t.until_ns
     WHERE s.is_joined
+),
+during AS (
+    SELECT
+        w.*, r.trace_index, r.cpu_id AS cpu, r.ts_ns + w.shift_ns AS from_ns, r.next_tid,
+        r.next_comm, e.number IS NOT NULL AS is_contradicted
+    FROM woken AS w
+    LEFT JOIN raw.sched_switch AS r ON w.switch_event_id = r.event_id
+    LEFT JOIN (
+        SELECT trace_index, cpu_id, switch_number - 1 AS number
+        FROM raw.sched_switch
+        WHERE run_start_ns IS NULL
+    ) AS e
+        ON r.trace_index = e.trace_index AND r.cpu_id = e.cpu_id AND r.switch_number = e.number
+),
+found AS (
+    SELECT
+        d.*,
+        CASE
+            WHEN NOT d.is_contradicted THEN d.next_tid
+            WHEN u.at_ns > d.from_ns THEN u.tid
+        END AS waker_tid
+    FROM during AS d
+    ASOF LEFT JOIN (
+        SELECT * FROM staging.thread_switch WHERE is_on AND unseen_since_ns IS NOT NULL
+    ) AS u
+        ON d.trace_index = u.trace_index AND d.cpu = u.cpu AND d.at_ns >= u.at_ns
 )
 SELECT
-    w.thread_id,
-    w.tid,
-    w.event_id,
-    w.at_ns,
-    coalesce(w.interrupt, CASE WHEN r.next_tid IS NOT NULL THEN 'thread' END) AS kind,
-    w.clock_key,
-    r.next_tid AS waker_tid,
-    r.next_comm AS waker_name
-FROM woken AS w
-LEFT JOIN (
-    SELECT r.event_id, r.next_tid, r.next_comm
-    FROM raw.sched_switch AS r
-    LEFT JOIN raw.sched_switch AS e
-        ON r.trace_index = e.trace_index
-        AND r.cpu_id = e.cpu_id
-        AND r.switch_number + 1 = e.switch_number
-    WHERE e.event_id IS NULL OR e.run_start_ns IS NOT NULL
-) AS r ON w.switch_event_id = r.event_id
+    thread_id,
+    tid,
+    event_id,
+    at_ns,
+    coalesce(interrupt, CASE WHEN waker_tid IS NOT NULL THEN 'thread' END) AS kind,
+    clock_key,
+    waker_tid,
+    CASE WHEN NOT is_contradicted THEN next_comm END AS waker_name
+FROM found

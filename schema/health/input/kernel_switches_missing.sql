@@ -1,0 +1,25 @@
+-- name: finding.kernel_switches_missing
+-- title: The kernel trace lacks switches
+-- description: Switches contradict the ones before on their CPU, so that it is not known what ran in
+--     between. A thread that left the CPU then is known to have had it from its first event of ROS
+--     there on. Before that it is 'unknown', since its waking.
+-- cause: In some virtual machines, perf has no switches away from idle, on some CPUs. Or kernel
+--     events were lost (kernel_events_lost).
+-- cure: Record with LTTng's kernel modules, or outside of the virtual machine (docs/scheduling.md).
+-- grain: one row per kernel trace with a CPU of which a twentieth of the time or more is not known
+-- severity: warning
+SELECT
+    s.trace_index + 1 AS trace_id,
+    s.unknown_count AS count,
+    printf(
+        'what ran is not known for %s, at %d of %d events of ROS processes',
+        string_agg(
+            printf('%.1f %% of the time of CPU %d', 100 - 100 * c.known_ns / c.length_ns, c.cpu),
+            ', ' ORDER BY c.cpu
+        ),
+        s.unknown_count, s.event_count + s.unknown_count
+    ) AS detail
+FROM staging.schedule AS s
+JOIN staging.cpu_schedule AS c ON s.trace_index = c.trace_index
+WHERE s.is_joined AND c.length_ns > 0 AND c.known_ns <= 0.95 * c.length_ns
+GROUP BY s.trace_index, s.unknown_count, s.event_count
