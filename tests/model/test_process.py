@@ -244,6 +244,87 @@ def test_initialising_again_is_no_new_life_while_an_old_object_goes_on(
     assert model.column("SELECT topic_name FROM publisher") == ["/a"]
 
 
+def test_nor_while_an_old_callback_is_called(system: RosSystem, analyse: Analyse) -> None:
+    system.context(MAIN)
+    system.timer(MAIN, 0x40, callback=0xC1)
+    system.context(MAIN)
+    system.start(MAIN, 0xC1)
+    system.end(MAIN, 0xC1)
+    assert len(analyse(system).rows(LIVES)) == 1
+
+
+another = pytest.mark.parametrize(
+    "other",
+    [
+        pytest.param(Thread(100, 101, "other", trace=1, pid_ns=1), id="on_another_host"),
+        pytest.param(Thread(100, 101, "other", pid_ns=2), id="in_another_namespace"),
+        pytest.param(Thread(200, 201, "other", pid_ns=1), id="with_another_id"),
+    ],
+)
+OTHERS = "SELECT name, max(life) FROM store.process GROUP BY name ORDER BY name"
+
+
+@another
+def test_what_another_process_goes_on_with_keeps_no_life_going(
+    system: RosSystem, analyse: Analyse, other: Thread
+) -> None:
+    """Not even where the handles of both are the same. Nor does what only begins afterwards."""
+    main, worker = Thread(100, pid_ns=1), Thread(100, 102, "worker", pid_ns=1)
+    system.add_source(1, "beta", "boot-b")
+    system.context(main)
+    system.publisher(main, 0x10, "/a")
+    system.publish(worker, 0x10, 1)
+    system.publisher(other, 0x11, "/b")
+    system.start(other, 0xC1)
+    system.context(main)
+    system.publish(main, 0x11, 2)
+    system.publish(other, 0x10, 3)
+    system.publish(other, 0x11, 4)
+    system.start(worker, 0xC2)
+    system.end(worker, 0xC2)
+    system.end(other, 0xC1)
+    assert analyse(system).rows(OTHERS) == [("main", 2), ("other", 1)]
+
+
+@another
+def test_another_program_begins_a_life_whatever_another_process_does(
+    system: RosSystem, analyse: Analyse, other: Thread
+) -> None:
+    system.add_source(1, "beta", "boot-b")
+    system.context(Thread(100, name="talker", pid_ns=1), 0xC1)
+    system.publish(other, 0x11, 1)
+    system.context(Thread(100, name="listener", pid_ns=1), 0xC2)
+    system.publish(other, 0x11, 2)
+    assert analyse(system).rows(OTHERS) == [("listener", 2), ("other", 1), ("talker", 1)]
+
+
+def test_another_program_may_do_something_before_it_initialises(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    """Only other threads that go on are those of an old life."""
+    listener = Thread(100, name="listener")
+    system.context(Thread(100, name="talker"), 0xC1)
+    system.publish(listener, 0x10, 1)
+    system.context(listener, 0xC2)
+    system.publish(listener, 0x10, 2)
+    assert len(analyse(system).rows(LIVES)) == 2
+
+
+@pytest.mark.parametrize("before", [0xC1, 0xC2])
+def test_a_callback_whose_start_was_lost_may_have_begun_in_the_new_life(
+    system: RosSystem, analyse: Analyse, before: int
+) -> None:
+    """The worker called it before, or was in another one."""
+    worker = Thread(100, 101, "worker")
+    system.context(MAIN)
+    system.start(worker, before)
+    if before == 0xC1:
+        system.end(worker, before)
+    system.context(MAIN)
+    system.end(worker, 0xC1)
+    assert len(analyse(system).rows(LIVES)) == 2
+
+
 def lose(system: RosSystem, trace: int, *gaps: tuple[int, int]) -> None:
     """Declare the gaps of a trace, all on a CPU without events."""
     begin = 0

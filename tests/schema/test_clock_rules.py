@@ -138,6 +138,42 @@ def test_no_clock_begins_in_the_last_two_stretches(
     assert [row for row in found if row[1]] == expected
 
 
+def test_a_clock_of_one_stretch_may_begin_anywhere(rules: duckdb.DuckDBPyConnection) -> None:
+    assert followed(rules, [[(3_000_000, 500, 20)]]) == [(3_000_000, 20, 1)]
+
+
+def test_each_clock_is_followed_by_itself(rules: duckdb.DuckDBPyConnection) -> None:
+    """One has jumped; what the messages of the other agree with changes all the time."""
+    followed(rules, [[(3_000_000, 500, 20)]] * 3)
+    rules.execute(
+        "INSERT INTO region SELECT 2, stretch, least_ns + change, greatest_ns + change, "
+        "difference_ns + change, vote_count, most_count, is_taken_here, stretch_ns "
+        "FROM (SELECT *, 4000000 * stretch AS change FROM region)"
+    )
+    rows = rules.execute(
+        "SELECT clock_id, difference_ns, segment FROM derive.followed_difference('region') "
+        "ORDER BY clock_id, stretch"
+    ).fetchall()
+    assert rows == [(1, 3_000_000, 1)] * 3 + [(2, 0, 0)] * 3
+
+
+@pytest.mark.parametrize(("away", "segment"), [(390_000, 0), (410_000, 1)])
+def test_while_nothing_is_known_a_clock_drifts(
+    rules: duckdb.DuckDBPyConnection, away: int, segment: int
+) -> None:
+    few = [(5_000_000, 0, 7)]
+    found = followed(rules, [[(0, 0, 20)], few, few, *[[(away, 0, 20)]] * 3])
+    assert found[1] == (away, 20, segment)
+
+
+def test_a_clock_drifts_from_where_it_jumped_to(rules: duckdb.DuckDBPyConnection) -> None:
+    """Since then: in five stretches it cannot get to what most messages agree with."""
+    jump, few = 3_000_000, [(5_000_000, 0, 7)]
+    later = [(jump - 480_000, 0, 19), (jump + 550_000, 0, 20)]
+    found = followed(rules, [[(0, 0, 20)], [(jump, 0, 20)], few, few, few, later, later[:1]])
+    assert found[1:] == [(jump, 20, 1), (jump - 480_000, 19, 1), (jump - 480_000, 19, 1)]
+
+
 @pytest.mark.parametrize("order", [1, -1])
 def test_of_equal_differences_a_jump_is_to_the_greatest(
     rules: duckdb.DuckDBPyConnection, order: int

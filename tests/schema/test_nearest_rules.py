@@ -46,6 +46,14 @@ def publish(
     )
 
 
+def of_another_host(con: duckdb.DuckDBPyConnection, topic: str) -> None:
+    """Let a topic be published where another clock counts, which does the same."""
+    con.execute("UPDATE published SET clock_id = 2 WHERE topic_name = ?", [topic])
+    con.execute(
+        "INSERT INTO store.stamp_clock SELECT * REPLACE (2 AS clock_id) FROM store.stamp_clock"
+    )
+
+
 def take(
     con: duckdb.DuckDBPyConnection, *stamps: int, topic: str = "/a", taken: int = 100 * SECOND
 ) -> None:
@@ -101,6 +109,50 @@ def test_a_message_is_stamped_within_its_write_and_taken_behind(
     assert nearest(rules) == expected | ({stamp: (1, 1)} if is_found else {})
 
 
+@pytest.mark.parametrize(
+    ("clocks", "is_found"),
+    [
+        pytest.param([1, 1], False, id="first_here"),
+        pytest.param([1, 2], False, id="here_and_elsewhere"),
+        pytest.param([2, 1], True, id="first_elsewhere"),
+        pytest.param([2, 2], True, id="elsewhere"),
+    ],
+)
+def test_only_a_take_on_its_clock_tells_that_a_message_was_there(
+    rules: duckdb.DuckDBPyConnection, clocks: list[int], *, is_found: bool
+) -> None:
+    """The first of two takes is before the write."""
+    clock(rules, (0, 100, 0))
+    publish(rules, 1, 100_000, 150_000)
+    for clock_id, taken in zip(clocks, (50_000, 160_000), strict=True):
+        rules.execute(
+            "INSERT INTO message (source_timestamp_ns, clock_id, taken_ns) VALUES (120000, ?, ?)",
+            [clock_id, taken],
+        )
+    assert nearest(rules) == {120_000: (1, 1) if is_found else (None, 0)}
+
+
+def test_bursts_are_told_where_nothing_is_said_of_the_drift(
+    rules: duckdb.DuckDBPyConnection,
+) -> None:
+    clock(rules, (0, 100, 0))
+    rules.execute("UPDATE store.stamp_clock SET is_sharp = NULL")
+    publish(rules, 1, 0, MICROSECOND)
+    publish(rules, 2, MICROSECOND, 2 * MICROSECOND)
+    take(rules, 1, MICROSECOND + 1)
+    assert nearest(rules) == {1: (1, 1), MICROSECOND + 1: (2, 1)}
+
+
+def test_a_publication_alone_is_told_also_where_no_drift_is_known(
+    rules: duckdb.DuckDBPyConnection,
+) -> None:
+    clock(rules, (0, 100, 0))
+    rules.execute("UPDATE store.stamp_clock SET is_sharp = false")
+    publish(rules, 1, 0, MICROSECOND)
+    take(rules, 1)
+    assert nearest(rules) == {1: (1, 1)}
+
+
 @pytest.mark.parametrize(("delay", "is_found"), [(5_000_000, True), (5_000_001, False)])
 def test_a_thread_that_is_not_seen_to_go_on_writes_for_five_milliseconds(
     rules: duckdb.DuckDBPyConnection, delay: int, *, is_found: bool
@@ -149,13 +201,22 @@ def test_who_is_seen_again_behind_a_gap_may_have_gone_on_before(
 def test_or_for_twice_what_is_usual_on_its_host(
     rules: duckdb.DuckDBPyConnection, delay: int, *, is_found: bool
 ) -> None:
-    """Its own thread was never seen to go on; those of another topic's publisher were."""
+    """Its own thread was never seen to go on; those of another topic's publisher were.
+
+    A second message of a publication is none, and on another host something else is usual.
+    """
     clock(rules, (0, 100, 0))
     time = 0
     for identity, usual in enumerate(range(1, 201)):
         publish(rules, identity, time, time + MILLISECOND, topic="/b")
         take(rules, time + usual * MICROSECOND, topic="/b")
+        if identity % 10 == 0:
+            take(rules, time + 900_000, topic="/b")
         time += PERIOD
+    for other in range(20):
+        publish(rules, 500 + other, other * PERIOD, other * PERIOD + MILLISECOND, topic="/c")
+        take(rules, other * PERIOD + 800_000, topic="/c")
+    of_another_host(rules, "/c")
     publish(rules, 999, time, None)
     take(rules, time + delay)
     found = nearest(rules)
@@ -181,6 +242,20 @@ def test_who_writes_for_much_of_the_time_has_messages_of_others_within(
     late = round(delay * MILLISECOND)
     periodic(rules, [median * MILLISECOND] * 9 + [late], width * MILLISECOND)
     assert nearest(rules)[9 * PERIOD + late] == (9 if is_found else None, 1)
+
+
+def test_how_much_of_the_time_each_publisher_writes(rules: duckdb.DuckDBPyConnection) -> None:
+    """Half a period or a sixth; both have a message 16 ms after the write."""
+    clock(rules, (0, 100, 0))
+    late = 16 * MILLISECOND
+    for topic, width in (("/a", 50), ("/b", 17)):
+        for n in range(10):
+            written = n * PERIOD + (topic == "/b") * 200_000
+            publish(rules, 100 * ord(topic[1]) + n, written, written + width * MILLISECOND, topic)
+            take(rules, written + (late if n == 9 else MILLISECOND), topic=topic)
+    found = nearest(rules)
+    assert found[9 * PERIOD + late] == (None, 1)
+    assert found[9 * PERIOD + late + 200_000] == (100 * ord("b") + 9, 1)
 
 
 @pytest.mark.parametrize("second", ["thread", "publisher"])
@@ -352,6 +427,29 @@ def test_a_message_of_somebody_else_may_take_the_place_of_one_that_nobody_took(
     assert found[UNUSUAL] == (9 if is_found else None, 1)
 
 
+def test_another_topic_has_its_own_strangers(rules: duckdb.DuckDBPyConnection) -> None:
+    """It has none: one message came before its publications began. Some stamps are the same."""
+    beside_strangers(rules)
+    begin = 50 * MILLISECOND - 10_000
+    for n in range(20):
+        written = begin + n * PERIOD
+        publish(rules, 100 + n, written, written + 10 * MILLISECOND, "/b")
+        if n < 19:
+            take(rules, written + (100_000 if n == 9 else 10_000), topic="/b")
+    take(rules, 20 * MILLISECOND, topic="/b")
+    found = nearest(rules)
+    assert found[UNUSUAL] == (None, 1)
+    assert found[begin + UNUSUAL] == (109, 1)
+
+
+def test_beside_strangers_nothing_is_told_if_nothing_is_usual(
+    rules: duckdb.DuckDBPyConnection,
+) -> None:
+    beside_strangers(rules)
+    rules.execute("UPDATE published SET has_break = true")
+    assert {publication for publication, _ in nearest(rules).values()} == {None}
+
+
 @pytest.mark.parametrize(("delay", "is_found"), [(25_000, True), (24_999, False)])
 def test_else_four_times_what_half_of_them_take(
     rules: duckdb.DuckDBPyConnection, delay: int, *, is_found: bool
@@ -388,6 +486,20 @@ def test_two_messages_of_one_publication(
     assert time + delay + 1 not in found
 
 
+def test_a_message_that_may_be_of_another_publication_is_no_rival(
+    rules: duckdb.DuckDBPyConnection,
+) -> None:
+    """Two messages may both be of the first. So the third, which comes later, is of the other."""
+    clock(rules, (0, 100, 0))
+    time = periodic(rules, [500_000] * 10, MILLISECOND)
+    publish(rules, 998, time, time + MILLISECOND)
+    publish(rules, 999, time + 100_000, time + MILLISECOND, publisher=2)
+    take(rules, time + 20_000, time + 50_000, time + 200_000)
+    found = nearest(rules)
+    assert found[time + 20_000] == found[time + 50_000] == (None, 1)
+    assert found[time + 200_000] == (999, 1)
+
+
 def lose(con: duckdb.DuckDBPyConnection, start: int, end: int) -> None:
     con.execute(
         "INSERT INTO derive.recording_gap (start_ns, covered_until_ns) VALUES (?, ?)", [start, end]
@@ -406,6 +518,14 @@ def test_what_is_stamped_much_sooner_than_usual_may_be_of_a_lost_publication(
     assert nearest(rules)[time + delay] == (999, 1)
     lose(rules, time - 1, time)
     assert nearest(rules)[time + delay] == (999 if is_told else None, 1)
+
+
+def test_nothing_is_too_soon_where_nothing_is_usual(rules: duckdb.DuckDBPyConnection) -> None:
+    clock(rules, (0, 100, 0))
+    publish(rules, 1, 0, None)
+    take(rules, MICROSECOND)
+    lose(rules, -1, 0)
+    assert nearest(rules) == {MICROSECOND: (1, 1)}
 
 
 @pytest.mark.parametrize(
@@ -490,18 +610,27 @@ def test_where_the_clocks_are_not_known_nothing_is_told(rules: duckdb.DuckDBPyCo
 def test_a_clock_goes_on_where_one_stretch_alone_tells_nothing(
     rules: duckdb.DuckDBPyConnection, unknown: int, segment: int, messages: int, *, is_found: bool
 ) -> None:
-    """Half way between the differences on both sides, if it did not jump meanwhile."""
+    """Half way between the differences on both sides, if it did not jump meanwhile.
+
+    Else what is before such a stretch is not known either.
+    """
     clock(rules, (0, 100, 0), *[(7 * SECOND, 0, 0)] * unknown, (200_000, messages, segment))
     written = SECOND + SECOND // 2
     publish(rules, 1, written, written + 50_000)
     stamp = written + 110_000
     take(rules, stamp)
-    assert (nearest(rules)[stamp] == (1, 1)) is is_found
+    publish(rules, 2, SECOND // 2, SECOND // 2 + 50_000)
+    take(rules, SECOND // 2 + 10_000)
+    found = nearest(rules)
+    assert (found[stamp] == (1, 1)) is is_found
+    assert (found[SECOND // 2 + 10_000] == (2, 1)) is is_found
 
 
 def test_and_drifts_as_on_both_sides(rules: duckdb.DuckDBPyConnection) -> None:
     clock(rules, (0, 100, 0), (0, 0, 0), (200_000, 100, 0))
-    rules.execute("UPDATE store.stamp_clock SET drift_ppb = 100000 WHERE message_count > 0")
+    rules.execute(
+        "UPDATE store.stamp_clock SET drift_ppb = 50000 + 50000 * (start_ns // ?)", [SECOND]
+    )
     written = SECOND + SECOND // 10 * 9
     publish(rules, 1, written, written + 5_000)
     take(rules, written + 140_000)
@@ -547,7 +676,118 @@ def test_an_unknown_side_of_a_jump_tells_nothing(rules: duckdb.DuckDBPyConnectio
     clock(rules, (0, 0, 0), (10 * MILLISECOND, 100, 1), (20 * MILLISECOND, 0, 2))
     publish(rules, 1, SECOND + MILLISECOND, SECOND + 2 * MILLISECOND)
     take(rules, SECOND + MILLISECOND + 1, SECOND + 21 * MILLISECOND + 1)
-    assert all(publication is None for publication, _ in nearest(rules).values())
+    assert nearest(rules) == {
+        SECOND + MILLISECOND + 1: (None, 0),
+        SECOND + 21 * MILLISECOND + 1: (None, 0),
+    }
+
+
+def test_before_the_first_stretch_a_clock_is_as_in_it(rules: duckdb.DuckDBPyConnection) -> None:
+    """So nothing is known before one that tells nothing."""
+    clock(rules, (0, 0, 0), (0, 100, 0), (0, 100, 0))
+    publish(rules, 1, -SECOND, MILLISECOND - SECOND)
+    take(rules, MICROSECOND - SECOND)
+    assert nearest(rules) == {MICROSECOND - SECOND: (None, 0)}
+
+
+@pytest.mark.parametrize("written", [SECOND // 2, SECOND + SECOND // 2])
+def test_until_a_jump_the_difference_is_that_of_the_stretch(
+    rules: duckdb.DuckDBPyConnection, written: int
+) -> None:
+    clock(rules, (0, 100, 0), (300_000, 100, 0))
+    publish(rules, 1, written, written + 50_000)
+    take(rules, written + 10, written + 300_010)
+    assert list(nearest(rules)) == [written + 10 if written < SECOND else written + 300_010]
+
+
+def test_beside_a_jump_a_message_is_usual_if_it_is_on_one_side(
+    rules: duckdb.DuckDBPyConnection,
+) -> None:
+    """Who writes for much of the time has it within 5 ms: it comes 6 ms later, or 4 ms."""
+    clock(rules, (0, 100, 0), (2 * MILLISECOND, 100, 1))
+    periodic(rules, [MILLISECOND] * 9 + [6 * MILLISECOND], 46 * MILLISECOND)
+    assert nearest(rules)[9 * PERIOD + 6 * MILLISECOND] == (9, 1)
+
+
+@pytest.mark.parametrize(("segment", "is_told"), [(0, True), (1, False)])
+def test_and_comes_too_soon_if_it_does_on_one_side(
+    rules: duckdb.DuckDBPyConnection, segment: int, *, is_told: bool
+) -> None:
+    """Beside a gap, where another publication may be lost."""
+    clock(rules, (0, 100, 0), (2 * MILLISECOND, 100, segment))
+    soon = 2 * MILLISECOND + MICROSECOND
+    time = periodic(rules, [MILLISECOND] * 199 + [soon], 20 * MILLISECOND, since=-190 * PERIOD)
+    lose(rules, time - PERIOD - 1, time - PERIOD)
+    assert nearest(rules)[9 * PERIOD + soon] == (9 if is_told else None, 1)
+
+
+@pytest.mark.parametrize("segments", [(2, 3), (3, 4)])
+@pytest.mark.parametrize("early", [SECOND - 60 * MILLISECOND, SECOND + 20 * MILLISECOND])
+def test_nor_do_later_ones_of_the_same_side(
+    rules: duckdb.DuckDBPyConnection, early: int, segments: tuple[int, int]
+) -> None:
+    """A publication 40 ms later, seen from the other side, has the same stamp."""
+    back = 40 * MILLISECOND
+    clock(rules, (0, 100, segments[0]), (-back, 100, segments[1]))
+    publish(rules, 1, early, early + MILLISECOND)
+    publish(rules, 2, early + back + 300, early + back + MILLISECOND)
+    take(rules, early + 500, taken=early + MILLISECOND)
+    assert nearest(rules) == {early + 500: (1, 1)}
+
+
+@pytest.mark.parametrize("segment", [0, 1])
+def test_all_messages_until_a_jump_show_whether_a_difference_is_right(
+    rules: duckdb.DuckDBPyConnection, segment: int
+) -> None:
+    """In the second stretch alone, it explains none."""
+    clock(rules, (0, 100, 0), (0, 100, segment))
+    periodic(rules, [10_000] * 5, MILLISECOND)
+    publish(rules, 99, 2 * SECOND - PERIOD, 2 * SECOND - PERIOD + MILLISECOND)
+    stranger = 2 * SECOND - PERIOD // 2
+    take(rules, stranger)
+    found = nearest(rules)
+    assert found[10_000] == (0, 1)
+    assert found.get(stranger) == ((None, 0) if segment else None)
+
+
+def test_each_host_has_its_own_clock(rules: duckdb.DuckDBPyConnection) -> None:
+    """Of the second one it is not known; that of the third explains none of its messages."""
+    clock(rules, (0, 100, 0), (0, 100, 0))
+    for host, (topic, begin) in enumerate((("/a", 0), ("/b", 0), ("/c", 50 * MILLISECOND)), 1):
+        for n in range(10):
+            written = n * PERIOD + begin
+            publish(rules, 100 * host + n, written, written + MILLISECOND, topic)
+            take(rules, n * PERIOD + (20_000 if topic == "/b" else 10_000), topic=topic)
+        rules.execute("UPDATE published SET clock_id = ? WHERE topic_name = ?", [host, topic])
+    rules.execute(
+        "INSERT INTO store.stamp_clock SELECT * REPLACE (3 AS clock_id) FROM store.stamp_clock "
+        "UNION ALL SELECT * REPLACE (2 AS clock_id, 0 AS message_count) FROM store.stamp_clock"
+    )
+    rows = rules.execute(
+        "SELECT topic_name, source_timestamp_ns // 100000000, publication_id "
+        "FROM derive.nearest_message(1) ORDER BY ALL"
+    ).fetchall()
+    assert rows == [
+        *(("/a", n, 100 + n) for n in range(10)),
+        *(("/b", n, None) for n in range(10)),
+        *(("/c", n, None) for n in range(10)),
+    ]
+
+
+def test_a_topic_that_two_hosts_publish(rules: duckdb.DuckDBPyConnection) -> None:
+    """The clock of the second one explains hardly anything: what may be its own has no source."""
+    clock(rules, (0, 100, 0), (0, 100, 0))
+    periodic(rules, [10_000] * 10, MILLISECOND)
+    publish(rules, 999, 50 * MILLISECOND, 51 * MILLISECOND, publisher=2)
+    rules.execute("UPDATE published SET clock_id = publisher_id WHERE publisher_id = 2")
+    rules.execute(
+        "INSERT INTO store.stamp_clock SELECT * REPLACE (2 AS clock_id) FROM store.stamp_clock"
+    )
+    take(rules, 50 * MILLISECOND + 10_000, 70 * MILLISECOND)
+    found = nearest(rules)
+    assert found[10_000] == (0, 1)
+    assert found[50 * MILLISECOND + 10_000] == (None, 1)
+    assert found[70 * MILLISECOND] == (None, 0)
 
 
 @pytest.mark.parametrize("seconds", [10, -10])
@@ -578,6 +818,7 @@ def test_bursts_are_not_told_where_no_drift_is_known(
     apart *= MICROSECOND
     publish(rules, first, 0, 10 * MICROSECOND)
     publish(rules, 3 - first, apart, apart + 10 * MICROSECOND)
+    publish(rules, 9, SECOND // 2, SECOND // 2 + 10 * MICROSECOND)
     take(rules, 1, apart + 1)
     told = {1: (first, 1), apart + 1: (3 - first, 1)}
     assert nearest(rules) == (told if is_told else dict.fromkeys(told, (None, 1)))

@@ -94,6 +94,58 @@ def test_two_dozen_publications_of_a_message(
     assert {is_taken_here for _, _, is_taken_here in found} == {clock_id == 1}
 
 
+def test_a_message_that_several_readers_took(rules: duckdb.DuckDBPyConnection) -> None:
+    """The first take on the clock of its publisher counts. Another publisher has its own times."""
+    publish(rules, *((n, n * MILLISECOND, n * MILLISECOND + 1_000) for n in range(100)))
+    rules.execute(
+        "INSERT INTO published (topic_name, publisher_id, publication_id, written_ns) "
+        "VALUES ('/b', 2, 200, 50000100)"
+    )
+    for clock_id, taken_ns in ((2, 20), (1, 50), (1, 90)):
+        rules.execute(
+            "INSERT INTO message VALUES (1, '/a', 50000200, 0, ?, ?)",
+            [clock_id, taken_ns * MILLISECOND + 300],
+        )
+    found = pairs(rules, "written_ns // 1000000, is_taken_here")
+    assert found == [(n, True) for n in range(26, 51)]
+
+
+HOUR_NS = 3_600 * SECOND
+
+
+def test_each_clock_has_its_own_time(rules: duckdb.DuckDBPyConnection) -> None:
+    """What is published on two of them is taken on two others; once the clock of stamps is set.
+
+    One message waited. When the message with the strange stamp was first taken tells the rest.
+    """
+    for number, (topic, start_ns) in enumerate((("/a", 0), ("/b", -HOUR_NS)), 1):
+        rules.execute(
+            "INSERT INTO published (clock_id, topic_name, publisher_id, publication_id, "
+            "written_ns, next_event_ns) SELECT $number, $topic, $number, n, "
+            "$start + n * 1000000, $start + n * 1000000 + 2000 FROM range(200) AS r(n)",
+            {"number": number, "topic": topic, "start": start_ns},
+        )
+    strange = 3 * HOUR_NS
+    rules.execute(
+        "INSERT INTO message (topic_name, source_timestamp_ns, clock_id, taken_ns) VALUES "
+        "('/a', 500, 3, 200500), ('/a', 100000500, 3, 180200500), ('/a', 600, 4, $later), "
+        "('/b', $earlier, 3, 200500), ('/a', $strange, 3, 50200500), "
+        "('/a', $strange, 3, 150200500)",
+        {"later": HOUR_NS, "earlier": 500 - HOUR_NS, "strange": strange},
+    )
+    found = pairs(rules, "written_ns + greatest_ns AS stamp_ns, written_ns, clock_id")
+    written: dict[tuple[int, int], list[int]] = {}
+    for stamp_ns, written_ns, clock_id in found:
+        written.setdefault((stamp_ns, clock_id), []).append(written_ns // MILLISECOND)
+    assert written == {
+        (500 - HOUR_NS, 2): [n - HOUR_NS // MILLISECOND for n in range(25)],
+        (500, 1): [*range(25)],
+        (600, 1): [*range(25)],
+        (100_000_500, 1): [*range(76, 125)],
+        (strange, 1): [*range(26, 75)],
+    }
+
+
 def test_the_time_that_a_publication_has(rules: duckdb.DuckDBPyConnection) -> None:
     """Until its thread goes on, or the next one is written; 5 ms where neither is known."""
     publish(

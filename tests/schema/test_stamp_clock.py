@@ -261,6 +261,27 @@ def test_a_step_is_no_drift(rules: duckdb.DuckDBPyConnection, by_ns: int, part: 
     assert len(rows) == 10
 
 
+def test_the_clock_of_another_host_changes_nothing(rules: duckdb.DuckDBPyConnection) -> None:
+    """One steps, the other drifts."""
+    record(rules, width_ns=2_000, delay_ns=1_000, ppm=0, per_burst=6)
+    alone = step(rules, 4 * STRETCH_NS, 7_000)
+    rules.execute(
+        "INSERT INTO published SELECT * REPLACE (2 AS clock_id, '/b' AS topic_name, "
+        "2 AS publisher_id) FROM published"
+    )
+    rules.execute(
+        "INSERT INTO message SELECT * EXCLUDE (stamp) REPLACE (2 AS clock_id, '/b' AS topic_name, "
+        "stamp + stamp * 100 // 1000000 AS source_timestamp_ns) "
+        "FROM (SELECT *, taken_ns - 200000 AS stamp FROM message)"
+    )
+    rows = rules.execute(
+        "SELECT clock_id, start_ns, end_ns, difference_ns, drift_ppb, segment "
+        "FROM derive.stamp_clock(1) ORDER BY clock_id, start_ns"
+    ).fetchall()
+    assert [row[1:] for row in rows if row[0] == 1] == alone
+    assert [(round(row[4] / 1_000), row[5]) for row in rows if row[0] == 2] == [(100, 0)] * 8
+
+
 def test_clocks_stand_for_three_stretches_or_it_is_not_said(
     rules: duckdb.DuckDBPyConnection,
 ) -> None:

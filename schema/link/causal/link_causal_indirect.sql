@@ -81,7 +81,6 @@ around (callback_instance_id, outer_id) AS (
     SELECT a.callback_instance_id, i.parent_id
     FROM around AS a
     JOIN store.callback_instance AS i ON a.outer_id = i.callback_instance_id
-    WHERE i.parent_id IS NOT NULL
 ),
 used AS (
     SELECT r.annotation_id, r.callback_instance_id

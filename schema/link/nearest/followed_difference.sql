@@ -68,7 +68,7 @@ ballot AS MATERIALIZED (
         ) AS jump_ns,
         -- Behind the last two stretches there are no two that could agree. In a recording of only
         -- two stretches a clock may begin there all the same.
-        coalesce(bool_or(t.later_ns IS NOT NULL), false) AS has_later,
+        any_value(t.later_ns) IS NOT NULL AS has_later,
         count(*) OVER (PARTITION BY r.clock_id) <= 2 AS is_short
     FROM query_table(regions) AS r
     LEFT JOIN preferred AS t ON r.clock_id = t.clock_id AND r.stretch = t.stretch

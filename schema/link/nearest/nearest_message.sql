@@ -273,7 +273,7 @@ candidate AS MATERIALIZED (
 owned AS MATERIALIZED (
     SELECT
         topic_name, source_timestamp_ns, only_subscription_id, publication_id, is_usual,
-        coalesce(lead(is_prompt) OVER on_publication, false) AS is_rivalled,
+        lead(is_prompt) OVER on_publication AS is_rivalled,
         row_number() OVER on_publication AS place
     FROM candidate
     WHERE candidate_count = 1
@@ -316,10 +316,10 @@ matched AS (
 placed AS (
     SELECT
         m.run_id, m.topic_name, m.source_timestamp_ns, m.publisher_id, p.clock_id,
-        coalesce(g.segment, 0) AS segment, coalesce(g.is_known, true) AS is_known
+        g.segment, g.is_known
     FROM message AS m
     JOIN publisher AS p ON m.publisher_id = p.publisher_id
-    ASOF LEFT JOIN segment AS g
+    ASOF JOIN segment AS g
         ON p.clock_id = g.clock_id AND m.source_timestamp_ns >= g.start_stamp_ns
 ),
 -- The right difference of the clocks explains the messages; one that fits few of them is wrong.
