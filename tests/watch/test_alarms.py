@@ -173,18 +173,21 @@ def test_without_a_window_nothing_is_measured(watched, monkeypatch) -> None:
 
 
 @pytest.mark.parametrize(
-    ("state", "words"),
+    ("state", "who", "words"),
     [
-        (None, "/filter ran 30.000 ms"),
-        ("running", "/filter ran 30.000 ms"),
-        ("preempted", "/filter waited 30.000 ms for a CPU that logger had"),
-        ("runnable", "/filter waited 30.000 ms for a CPU"),
-        ("sleeping", "/filter slept 30.000 ms"),
-        ("uninterruptible", "/filter waited 30.000 ms for a page or a disk"),
+        (None, None, "/filter ran 30.000 ms"),
+        ("running", None, "/filter ran 30.000 ms"),
+        ("running", "/driver 12", "/filter waited 30.000 ms for /driver 12"),
+        ("preempted", "logger", "/filter waited 30.000 ms for a CPU that logger had"),
+        ("runnable", "softirq", "/filter waited 30.000 ms for a CPU"),
+        ("sleeping", "timer", "/filter slept 30.000 ms"),
+        ("uninterruptible", "interrupt", "/filter waited 30.000 ms for a page or a disk"),
     ],
 )
-def test_a_callback_that_had_no_cpu_did_not_run(state: str | None, words: str) -> None:
+def test_a_callback_that_had_no_cpu_did_not_run(
+    state: str | None, who: str | None, words: str
+) -> None:
     """Where the kernel is traced, pieces of a callback have the state of its thread."""
     piece = {"activity": "callback", "node": "/filter", "what": "Subscription(/scan)", "hop": 1}
-    rest = {"state": state, "who": "logger", "share": 0.6, "duration_ns": 30_000_000}
+    rest = {"state": state, "who": who, "share": 0.6, "duration_ns": 30_000_000}
     assert list(blamed([piece | rest], None)) == [words]
