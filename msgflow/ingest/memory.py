@@ -33,8 +33,8 @@ if TYPE_CHECKING:
 def database_in_memory() -> duckdb.DuckDBPyConnection:
     """Make an empty database in memory, for `ingest_again`.
 
-    It works with one thread: to share few rows costs more than it saves, and the system that is
-    watched needs the other CPUs.
+    A query works with one thread: to share few rows costs more than it saves, and the system that
+    is watched needs the other CPUs.
     """
     con = open_memory()
     with tempfile.TemporaryDirectory(prefix="msgflow-") as directory:

@@ -24,13 +24,13 @@ class Work:
         slow_probability: share of the runs (0..1) that take up to `slow_ns` longer.
         slow_ns: greatest additional duration of a slow run; it is at least half of that.
         percent_before: how much is done before the first publication, the rest after the last.
-        sleep_ns: how long the thread sleeps before the first publication, where the kernel is
-            traced. What follows counts there only, too.
+        sleep_ns: how long the thread sleeps before the first publication. This and all below
+            happens only where the kernel is traced.
         page_fault_ns: how long it then waits for a page from the disk.
         mutex: what is locked meanwhile; nothing if empty. A name that begins with a slash is one
             of all processes of the host, others are of the process.
-        waits_for: a condition that it waits for first, without the mutex; likewise.
-        signals: a condition that it signals after the last publication; likewise.
+        waits_for: a condition that it waits for first, without the mutex; named like a mutex.
+        signals: a condition that it signals after the last publication; named like a mutex.
     """
 
     typical_ns: int = 20 * MICROSECOND

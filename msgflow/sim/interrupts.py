@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _UNTIL_WAKING_NS = {INTERRUPT: 3_000, SOFTIRQ: 5_000}
 _SINCE_WAKING_NS = 1_500
 # What an interrupt leaves for later is done so long after its begin, of which it has a part.
-_UNTIL_SOFTIRQ_NS, _CARD_NS = 2_200, 2_000
+_UNTIL_SOFTIRQ_NS, _NETWORK_CARD_NS = 2_200, 2_000
 _NEVER = 1 << 62
 
 
@@ -68,7 +68,7 @@ def interrupts(runs: Sequence[Sequence[Run]]) -> Iterator[Interrupt]:
             if latest.kind:
                 yield latest
             if waking.kind == SOFTIRQ and time - start > _UNTIL_SOFTIRQ_NS:
-                yield Interrupt(INTERRUPT, cpu, start, start + _CARD_NS)
+                yield Interrupt(INTERRUPT, cpu, start, start + _NETWORK_CARD_NS)
                 start += _UNTIL_SOFTIRQ_NS
             latest = Interrupt(waking.kind, cpu, start, end)
         if latest.kind:

@@ -197,7 +197,7 @@ class Watcher:
         traces = self.history.traces(window)
         links, learned = self._ingest(traces)
         # What is to blame takes as long to find out as all that a window shows.
-        with ThreadPoolExecutor(1) as pool, beside(self._con) as con:
+        with beside(self._con) as con, ThreadPoolExecutor(1) as pool:
             shown = pool.submit(report_of, con, window, is_final=is_final)
             found, verdicts = self._judge(window)
             report = replace(shown.result(), violations=found, verdicts=verdicts)

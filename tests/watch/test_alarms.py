@@ -14,6 +14,7 @@ from typer.testing import CliRunner, Result
 
 from msgflow.cli.app import app
 from msgflow.database import Database
+from msgflow.errors import UsageError
 from msgflow.sim import Recording, simulate
 from msgflow.trace import Continuation
 from msgflow.watch import FlightRecorder
@@ -165,6 +166,18 @@ def test_sessions_of_one_name_on_two_hosts_are_kept(tmp_path: Path) -> None:
     recorder.keep(SECOND, traces, [chunk.path for chunk in chunks], None, None)
     assert notes[0].startswith("kept: ")
     assert len(list((tmp_path / "kept").glob("*/archives/*/drive/chunk-0"))) == 2
+
+
+def test_an_error_of_the_targets_is_told_while_the_window_is_asked_for(
+    watched, monkeypatch
+) -> None:
+    def judge(*_: object) -> None:
+        raise UsageError("no such thing", "choose another")
+
+    monkeypatch.setattr("msgflow.watch.alarm.Alarm.judge", judge)
+    result = watched(TARGETS)
+    assert result.exit_code == 2
+    assert "no such thing" in result.stderr
 
 
 def test_without_a_window_nothing_is_measured(watched, monkeypatch) -> None:
