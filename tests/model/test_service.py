@@ -410,6 +410,41 @@ def test_services_of_a_managed_node_that_were_lost(system: RosSystem, analyse: A
     ]
 
 
+def test_services_of_managed_nodes_that_begin_together(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    """Two processes with equal addresses, and a thread that makes services meanwhile."""
+    hosts(system)
+    other = Thread(200, 201, trace=1)
+    nodes = ((SERVER, "one", 0xA0), (Thread(300, trace=1), "two", 0xB0))
+    for thread, name, _ in nodes:
+        system.node(thread, 0x1000, name)
+    for number, service in enumerate(LIFECYCLE, start=1):
+        for thread, name, _ in nodes:
+            system.service(
+                thread, 0x1000 + number, f"/{name}/{service}", callback=None, node=0x1000
+            )
+    for thread, _, _ in nodes:
+        system.add(
+            "ros2:rcl_lifecycle_state_machine_init", thread, node_handle=0x1000, state_machine=0x5
+        )
+    for number in range(1, 6):
+        for thread, _, callback in nodes:
+            system.add(
+                "ros2:rclcpp_service_callback_added",
+                thread,
+                service_handle=0x2000 + number,
+                callback=callback + number,
+            )
+        system.service(other, 0x3000 + number, "/else", callback=0x10 + number, node=0x1000)
+    rows = analyse(system).rows(SERVICES_OF_CALLBACKS)
+    assert [row for row in rows if row[2] in range(0xA0, 0xC0)] == [
+        (f"/{name}", f"/{name}/{service}", callback + number)
+        for number, service in enumerate(LIFECYCLE, start=1)
+        for _, name, callback in nodes
+    ]
+
+
 RUNS = (
     "SELECT start_ns, end_ns, is_end_inferred FROM callback_instance ORDER BY callback_instance_id"
 )

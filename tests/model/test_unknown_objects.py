@@ -93,6 +93,27 @@ def test_a_handle_used_before_its_initialisation_is_another_timer(
     ) == [(0xCB, None), (0xCC, 5_000_000)]
 
 
+def test_timers_of_equal_handles_in_two_processes(system: RosSystem, analyse: Analyse) -> None:
+    """Of one process, the timers lost their initialisation; each is one, whatever names it."""
+    system.node(SOURCE, 0x1, "source")
+    system.timer(MAIN, 0x20, 0xCB)
+    system.timer(MAIN, 0x21, 0xCC, period=7_000_000)
+    for handle, callback in ((0x20, 0xCD), (0x21, 0xCE)):
+        system.add(
+            "ros2:rclcpp_timer_callback_added", SOURCE, timer_handle=handle, callback=callback
+        )
+        system.add("ros2:rclcpp_timer_link_node", SOURCE, timer_handle=handle, node_handle=0x1)
+    assert analyse(system).rows(
+        "SELECT c.callback_handle, t.timer_handle, t.period_ns, n.full_name FROM callback AS c "
+        "JOIN timer AS t USING (timer_id) LEFT JOIN node AS n ON t.node_id = n.node_id ORDER BY 1"
+    ) == [
+        (0xCB, 0x20, 5_000_000, None),
+        (0xCC, 0x21, 7_000_000, None),
+        (0xCD, 0x20, None, "/source"),
+        (0xCE, 0x21, None, "/source"),
+    ]
+
+
 def test_an_executor_names_the_handle(system: RosSystem, analyse: Analyse) -> None:
     """It was initialised, though the callback was not seen to be attached."""
     system.add("ros2:rcl_timer_init", MAIN, timer_handle=0x20, period=7)

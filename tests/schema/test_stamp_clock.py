@@ -284,13 +284,14 @@ def test_a_step_in_a_stretch_that_a_drift_explains_better(
     assert abs(next(row[0] for row in rows if row[4] == 1) - at) < 20_000_000
 
 
-def test_a_jump_is_no_step(rules: duckdb.DuckDBPyConnection) -> None:
-    """It counts once, though messages from before and behind it share a stretch."""
+@pytest.mark.parametrize(("at", "count"), [(4.0, 4), (4.5, 5)])
+def test_a_jump_is_no_step(rules: duckdb.DuckDBPyConnection, at: float, count: int) -> None:
+    """It counts once, even if messages from before and behind it share a stretch."""
     record(rules, width_ns=2_000, delay_ns=1_000, ppm=0)
-    rows = step(rules, round(4.5 * STRETCH_NS), -1_000_000)
+    rows = step(rules, round(at * STRETCH_NS), -1_000_000)
     assert [(round(difference, -3), segment) for _, _, difference, _, segment in rows] == [
         (0, 0)
-    ] * 5 + [(-1_000_000, 1)] * 3
+    ] * count + [(-1_000_000, 1)] * (8 - count)
 
 
 def test_one_step_after_another(rules: duckdb.DuckDBPyConnection) -> None:
