@@ -410,9 +410,7 @@ def test_services_of_a_managed_node_that_were_lost(system: RosSystem, analyse: A
     ]
 
 
-def test_services_of_managed_nodes_that_begin_together(
-    system: RosSystem, analyse: Analyse
-) -> None:
+def test_services_of_managed_nodes_that_begin_together(system: RosSystem, analyse: Analyse) -> None:
     """Two processes with equal addresses, and a thread that makes services meanwhile."""
     hosts(system)
     other = Thread(200, 201, trace=1)
