@@ -411,8 +411,9 @@ def test_services_of_a_managed_node_that_were_lost(system: RosSystem, analyse: A
 
 
 def test_services_of_managed_nodes_that_begin_together(system: RosSystem, analyse: Analyse) -> None:
-    """Two processes with equal addresses, and a thread that makes services meanwhile."""
+    """Two processes with equal addresses, a thread that makes services, and a lost callback."""
     hosts(system)
+    system.service(SERVER, 0x4000, "/lost", callback=None, node=0x9)
     other = Thread(200, 201, trace=1)
     nodes = ((SERVER, "one", 0xA0), (Thread(300, trace=1), "two", 0xB0))
     for thread, name, _ in nodes:
