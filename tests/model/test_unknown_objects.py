@@ -281,6 +281,7 @@ def test_a_service_that_lost_its_initialisation(system: RosSystem, analyse: Anal
         "SELECT s.service_handle, s.rmw_handle, s.is_inferred, c.callback_handle "
         "FROM service AS s JOIN callback AS c USING (service_id) ORDER BY 1"
     ) == [(0x40, 0x1040, True, 0xC1), (0x41, None, True, 0xC2)]
+    assert analysis.rows(TIMERS) == []
     assert uncertain(analysis) == []
 
 
