@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from analysis import Analyse, Analysis
 from ros_system import RosSystem
 from staged_events import Thread
@@ -358,18 +359,26 @@ def test_a_service_without_callbacks(system: RosSystem, analyse: Analyse) -> Non
 LIFECYCLE = ("change_state", "get_state", "states", "transitions", "graph")
 
 
-def managed_node(system: RosSystem, node: int, name: str, callback: int, *, lost: int = 0) -> None:
+def managed_node(
+    system: RosSystem,
+    node: int,
+    name: str,
+    callback: int,
+    *,
+    lost_services: int = 0,
+    lost_callbacks: int = 0,
+) -> None:
     """A node with a service of its own, and the services of its lifecycle, without some events."""
     system.node(SERVER, node, name)
     system.service(SERVER, node + 0x100, f"/{name}/parameters", node=node, callback=callback)
-    for number, service in enumerate(LIFECYCLE[lost:], start=1):
+    for number, service in enumerate(LIFECYCLE[lost_services:], start=1):
         system.service(
             SERVER, node + 0x100 + number, f"/{name}/{service}", callback=None, node=node
         )
     system.add(
         "ros2:rcl_lifecycle_state_machine_init", SERVER, node_handle=node, state_machine=node + 5
     )
-    for number in range(1, 6 - lost):
+    for number in range(1, 6 - lost_callbacks):
         system.add(
             "ros2:rclcpp_service_callback_added",
             SERVER,
@@ -399,14 +408,17 @@ def test_services_of_managed_nodes(system: RosSystem, analyse: Analyse) -> None:
     assert analysis.rows("SELECT count(*) FROM service WHERE is_inferred") == [(0,)]
 
 
-def test_services_of_a_managed_node_that_were_lost(system: RosSystem, analyse: Analyse) -> None:
+@pytest.mark.parametrize(("services", "callbacks"), [(1, 1), (1, 0), (0, 1)])
+def test_services_of_a_managed_node_that_were_lost(
+    system: RosSystem, analyse: Analyse, services: int, callbacks: int
+) -> None:
     """The order of what is left tells nothing."""
     hosts(system)
-    managed_node(system, 0x1000, "one", 0xA0, lost=1)
+    managed_node(system, 0x1000, "one", 0xA0, lost_services=services, lost_callbacks=callbacks)
     rows = analyse(system).rows(SERVICES_OF_CALLBACKS)[1:]
     assert rows == [
         ("/one", "/one/parameters", 0xA0),
-        *[(None, None, 0xA0 + number) for number in range(1, 5)],
+        *[(None, None, 0xA0 + number) for number in range(1, 6 - callbacks)],
     ]
 
 

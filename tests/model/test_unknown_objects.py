@@ -96,8 +96,10 @@ def test_a_handle_used_before_its_initialisation_is_another_timer(
 def test_timers_of_equal_handles_in_two_processes(system: RosSystem, analyse: Analyse) -> None:
     """Of one process, the timers lost their initialisation; each is one, whatever names it."""
     system.node(SOURCE, 0x1, "source")
-    system.timer(MAIN, 0x20, 0xCB)
-    system.timer(MAIN, 0x21, 0xCC, period=7_000_000)
+    for handle, period in ((0x20, 5), (0x21, 7)):
+        system.add("ros2:rcl_timer_init", MAIN, timer_handle=handle, period=period)
+    for handle, callback in ((0x20, 0xCB), (0x21, 0xCC)):
+        system.add("ros2:rclcpp_timer_callback_added", MAIN, timer_handle=handle, callback=callback)
     for handle, callback in ((0x20, 0xCD), (0x21, 0xCE)):
         system.add(
             "ros2:rclcpp_timer_callback_added", SOURCE, timer_handle=handle, callback=callback
@@ -107,8 +109,8 @@ def test_timers_of_equal_handles_in_two_processes(system: RosSystem, analyse: An
         "SELECT c.callback_handle, t.timer_handle, t.period_ns, n.full_name FROM callback AS c "
         "JOIN timer AS t USING (timer_id) LEFT JOIN node AS n ON t.node_id = n.node_id ORDER BY 1"
     ) == [
-        (0xCB, 0x20, 5_000_000, None),
-        (0xCC, 0x21, 7_000_000, None),
+        (0xCB, 0x20, 5, None),
+        (0xCC, 0x21, 7, None),
         (0xCD, 0x20, None, "/source"),
         (0xCE, 0x21, None, "/source"),
     ]
