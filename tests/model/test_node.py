@@ -175,3 +175,34 @@ def test_lifecycle_transitions(system: RosSystem, analyse: Analyse) -> None:
         (times[0], "/first", "unconfigured", "configuring"),
         (times[1], "/second", "unconfigured", "configuring"),
     ]
+
+
+def test_each_state_machine_has_a_node_of_its_own(system: RosSystem, analyse: Analyse) -> None:
+    """Another process has one at the same address, and one that began before the trace."""
+    other = Thread(200)
+    for thread, node, name, machine in (
+        (MAIN, 0x1, "first", 0x5),
+        (MAIN, 0x2, "second", 0x6),
+        (other, 0x1, "third", 0x5),
+    ):
+        system.node(thread, node, name)
+        system.add(
+            "ros2:rcl_lifecycle_state_machine_init", thread, node_handle=node, state_machine=machine
+        )
+    for thread, machine, goal in (
+        (other, 0x6, "a"),
+        (MAIN, 0x6, "b"),
+        (MAIN, 0x5, "c"),
+        (other, 0x5, "d"),
+    ):
+        system.add(
+            "ros2:rcl_lifecycle_transition",
+            thread,
+            state_machine=machine,
+            start_label="inactive",
+            goal_label=goal,
+        )
+    assert analyse(system).rows(
+        "SELECT goal_state, full_name FROM lifecycle_transition LEFT JOIN node USING (node_id) "
+        "ORDER BY goal_state"
+    ) == [("a", None), ("b", "/second"), ("c", "/first"), ("d", "/third")]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from analysis import Analyse, Analysis
 from ros_system import RosSystem
 from staged_events import Thread
@@ -358,18 +359,26 @@ def test_a_service_without_callbacks(system: RosSystem, analyse: Analyse) -> Non
 LIFECYCLE = ("change_state", "get_state", "states", "transitions", "graph")
 
 
-def managed_node(system: RosSystem, node: int, name: str, callback: int, *, lost: int = 0) -> None:
+def managed_node(
+    system: RosSystem,
+    node: int,
+    name: str,
+    callback: int,
+    *,
+    lost_services: int = 0,
+    lost_callbacks: int = 0,
+) -> None:
     """A node with a service of its own, and the services of its lifecycle, without some events."""
     system.node(SERVER, node, name)
     system.service(SERVER, node + 0x100, f"/{name}/parameters", node=node, callback=callback)
-    for number, service in enumerate(LIFECYCLE[lost:], start=1):
+    for number, service in enumerate(LIFECYCLE[lost_services:], start=1):
         system.service(
             SERVER, node + 0x100 + number, f"/{name}/{service}", callback=None, node=node
         )
     system.add(
         "ros2:rcl_lifecycle_state_machine_init", SERVER, node_handle=node, state_machine=node + 5
     )
-    for number in range(1, 6 - lost):
+    for number in range(1, 6 - lost_callbacks):
         system.add(
             "ros2:rclcpp_service_callback_added",
             SERVER,
@@ -399,14 +408,51 @@ def test_services_of_managed_nodes(system: RosSystem, analyse: Analyse) -> None:
     assert analysis.rows("SELECT count(*) FROM service WHERE is_inferred") == [(0,)]
 
 
-def test_services_of_a_managed_node_that_were_lost(system: RosSystem, analyse: Analyse) -> None:
+@pytest.mark.parametrize(("services", "callbacks"), [(1, 1), (1, 0), (0, 1)])
+def test_services_of_a_managed_node_that_were_lost(
+    system: RosSystem, analyse: Analyse, services: int, callbacks: int
+) -> None:
     """The order of what is left tells nothing."""
     hosts(system)
-    managed_node(system, 0x1000, "one", 0xA0, lost=1)
+    managed_node(system, 0x1000, "one", 0xA0, lost_services=services, lost_callbacks=callbacks)
     rows = analyse(system).rows(SERVICES_OF_CALLBACKS)[1:]
     assert rows == [
         ("/one", "/one/parameters", 0xA0),
-        *[(None, None, 0xA0 + number) for number in range(1, 5)],
+        *[(None, None, 0xA0 + number) for number in range(1, 6 - callbacks)],
+    ]
+
+
+def test_services_of_managed_nodes_that_begin_together(system: RosSystem, analyse: Analyse) -> None:
+    """Two processes with equal addresses, a thread that makes services, and a lost callback."""
+    hosts(system)
+    system.service(SERVER, 0x4000, "/lost", callback=None, node=0x9)
+    other = Thread(200, 201, trace=1)
+    nodes = ((SERVER, "one", 0xA0), (Thread(300, trace=1), "two", 0xB0))
+    for thread, name, _ in nodes:
+        system.node(thread, 0x1000, name)
+    for number, service in enumerate(LIFECYCLE, start=1):
+        for thread, name, _ in nodes:
+            system.service(
+                thread, 0x1000 + number, f"/{name}/{service}", callback=None, node=0x1000
+            )
+    for thread, _, _ in nodes:
+        system.add(
+            "ros2:rcl_lifecycle_state_machine_init", thread, node_handle=0x1000, state_machine=0x5
+        )
+    for number in range(1, 6):
+        for thread, _, callback in nodes:
+            system.add(
+                "ros2:rclcpp_service_callback_added",
+                thread,
+                service_handle=0x2000 + number,
+                callback=callback + number,
+            )
+        system.service(other, 0x3000 + number, "/else", callback=0x10 + number, node=0x1000)
+    rows = analyse(system).rows(SERVICES_OF_CALLBACKS)
+    assert [row for row in rows if row[2] in range(0xA0, 0xC0)] == [
+        (f"/{name}", f"/{name}/{service}", callback + number)
+        for number, service in enumerate(LIFECYCLE, start=1)
+        for _, name, callback in nodes
     ]
 
 

@@ -93,6 +93,29 @@ def test_a_handle_used_before_its_initialisation_is_another_timer(
     ) == [(0xCB, None), (0xCC, 5_000_000)]
 
 
+def test_timers_of_equal_handles_in_two_processes(system: RosSystem, analyse: Analyse) -> None:
+    """Of one process, the timers lost their initialisation; each is one, whatever names it."""
+    system.node(SOURCE, 0x1, "source")
+    for handle, period in ((0x20, 5), (0x21, 7)):
+        system.add("ros2:rcl_timer_init", MAIN, timer_handle=handle, period=period)
+    for handle, callback in ((0x20, 0xCB), (0x21, 0xCC)):
+        system.add("ros2:rclcpp_timer_callback_added", MAIN, timer_handle=handle, callback=callback)
+    for handle, callback in ((0x20, 0xCD), (0x21, 0xCE)):
+        system.add(
+            "ros2:rclcpp_timer_callback_added", SOURCE, timer_handle=handle, callback=callback
+        )
+        system.add("ros2:rclcpp_timer_link_node", SOURCE, timer_handle=handle, node_handle=0x1)
+    assert analyse(system).rows(
+        "SELECT c.callback_handle, t.timer_handle, t.period_ns, n.full_name FROM callback AS c "
+        "JOIN timer AS t USING (timer_id) LEFT JOIN node AS n ON t.node_id = n.node_id ORDER BY 1"
+    ) == [
+        (0xCB, 0x20, 5, None),
+        (0xCC, 0x21, 7, None),
+        (0xCD, 0x20, None, "/source"),
+        (0xCE, 0x21, None, "/source"),
+    ]
+
+
 def test_an_executor_names_the_handle(system: RosSystem, analyse: Analyse) -> None:
     """It was initialised, though the callback was not seen to be attached."""
     system.add("ros2:rcl_timer_init", MAIN, timer_handle=0x20, period=7)
@@ -260,6 +283,7 @@ def test_a_service_that_lost_its_initialisation(system: RosSystem, analyse: Anal
         "SELECT s.service_handle, s.rmw_handle, s.is_inferred, c.callback_handle "
         "FROM service AS s JOIN callback AS c USING (service_id) ORDER BY 1"
     ) == [(0x40, 0x1040, True, 0xC1), (0x41, None, True, 0xC2)]
+    assert analysis.rows(TIMERS) == []
     assert uncertain(analysis) == []
 
 

@@ -21,6 +21,7 @@ def record(
     ppm: int,
     count: int = COUNT,
     per_burst: int = 1,
+    period_ns: int = PERIOD_NS,
 ) -> list[tuple[Any, ...]]:
     """Clock of stamps where each write takes `width_ns` and is stamped up to `delay_ns` later."""
     con.execute(
@@ -28,7 +29,7 @@ def record(
         "written_ns + $width FROM (SELECT n, n // $burst * $period + n % $burst * $width "
         "+ CASE WHEN n // $burst IN (0, $count - 1) THEN 0 ELSE hash(n // $burst) % 80000 END "
         "AS written_ns FROM range($count * $burst) AS r(n))",
-        {"width": width_ns, "burst": per_burst, "period": PERIOD_NS, "count": count},
+        {"width": width_ns, "burst": per_burst, "period": period_ns, "count": count},
     )
     con.execute(
         "INSERT INTO message (source_timestamp_ns, taken_ns) "
@@ -259,6 +260,128 @@ def test_a_step_is_no_drift(rules: duckdb.DuckDBPyConnection, by_ns: int, part: 
     assert rows[first - 1][0] < at <= rows[first][1]
     assert rows[first][1] - rows[first - 1][0] < 100_000_000
     assert len(rows) == 10
+    assert [row[4] for row in rows] == [0] * first + [1] * (10 - first)
+
+
+@pytest.mark.parametrize("by_ns", [50_000, -50_000])
+def test_a_step_in_a_stretch_that_a_drift_explains_better(
+    rules: duckdb.DuckDBPyConnection, by_ns: int
+) -> None:
+    """Most messages are stamped in the middle of their write, which takes longer than the step."""
+    record(rules, width_ns=60_000, delay_ns=1, ppm=0)
+    rules.execute(
+        "UPDATE message SET source_timestamp_ns = source_timestamp_ns "
+        "+ CASE taken_ns // $period % 10 WHEN 0 THEN 5000 WHEN 5 THEN 55000 ELSE 30000 END",
+        {"period": PERIOD_NS},
+    )
+    at = round(4.4 * STRETCH_NS)
+    rows = step(rules, at, by_ns)
+    assert {drift for *_, drift, _ in rows} == {0}
+    assert {(round(difference, -4), segment) for *_, difference, _, segment in rows} == {
+        (0, 0),
+        (by_ns, 1),
+    }
+    assert abs(next(row[0] for row in rows if row[4] == 1) - at) < 20_000_000
+
+
+@pytest.mark.parametrize(("at", "count"), [(4.0, 4), (4.5, 5)])
+def test_a_jump_is_no_step(rules: duckdb.DuckDBPyConnection, at: float, count: int) -> None:
+    """It counts once, even if messages from before and behind it share a stretch."""
+    record(rules, width_ns=2_000, delay_ns=1_000, ppm=0)
+    rows = step(rules, round(at * STRETCH_NS), -1_000_000)
+    assert [(round(difference, -3), segment) for _, _, difference, _, segment in rows] == [
+        (0, 0)
+    ] * count + [(-1_000_000, 1)] * (8 - count)
+
+
+def test_one_step_after_another(rules: duckdb.DuckDBPyConnection) -> None:
+    record(rules, width_ns=2_000, delay_ns=1_000, ppm=0, count=600, per_burst=6)
+    step(rules, 2 * SECOND, 7_000)
+    rows = step(rules, 4 * SECOND, 7_000)
+    assert [row[0] for row in rows[1:]] == [row[1] for row in rows[:-1]]
+    assert [row[4] for row in rows] == sorted(row[4] for row in rows)
+    for segment in (1, 2):
+        begin = next(row[0] for row in rows if row[4] == segment)
+        assert abs(begin - segment * 2 * SECOND) < 50_000_000
+    for *_, difference, _, segment in rows:
+        assert abs(difference - segment * 7_000) < 1_000
+    assert rules.execute(
+        "SELECT DISTINCT at_ns = start_ns + (end_ns - start_ns) // 2, is_sharp "
+        "FROM derive.stamp_clock(1)"
+    ).fetchall() == [(True, True)]
+
+
+def test_a_step_behind_a_pause(rules: duckdb.DuckDBPyConnection) -> None:
+    """The first messages behind it still show how the clock stood before."""
+    record(rules, width_ns=2_000, delay_ns=1_000, ppm=0, per_burst=6)
+    rules.execute(
+        "DELETE FROM message WHERE source_timestamp_ns BETWEEN $first AND $last",
+        {"first": 4 * STRETCH_NS, "last": 5 * STRETCH_NS},
+    )
+    at = round(5.3 * STRETCH_NS)
+    rows = step(rules, at, 7_000)
+    assert [row[0] for row in rows[1:]] == [row[1] for row in rows[:-1]]
+    assert abs(next(row[0] for row in rows if row[4] == 1) - at) < 50_000_000
+
+
+def test_a_step_between_two_bursts(rules: duckdb.DuckDBPyConnection) -> None:
+    """No message shows that the clock stood before it for any part of the stretch."""
+    record(
+        rules, width_ns=2_000, delay_ns=1_000, ppm=0, count=9, per_burst=15, period_ns=SECOND // 2
+    )
+    rows = step(rules, round(3.5 * SECOND / 2), 7_000)
+    assert [row[0] for row in rows[1:]] == [row[1] for row in rows[:-1]]
+    assert all(start < end for start, end, *_ in rows)
+    assert [row[4] for row in rows] == [0] * 4 + [1] * 5
+
+
+@pytest.mark.parametrize(("stretch", "count"), [(4, 8), (6, 10)])
+def test_a_message_that_denies_the_moment_of_a_step(
+    rules: duckdb.DuckDBPyConnection, stretch: int, count: int
+) -> None:
+    """Right behind the step it looks like one from before; later it is a mistake."""
+    record(rules, width_ns=2_000, delay_ns=1_000, ppm=0)
+    step(rules, 4 * STRETCH_NS, 7_000)
+    rules.execute(
+        "UPDATE message SET source_timestamp_ns = source_timestamp_ns - 7000 "
+        "WHERE taken_ns = (SELECT min(taken_ns) FROM message WHERE taken_ns >= ?)",
+        [round((stretch + 0.3) * STRETCH_NS)],
+    )
+    rows = step(rules, 8 * STRETCH_NS, 0)
+    assert [row[0] for row in rows[1:]] == [row[1] for row in rows[:-1]]
+    assert [row[4] for row in rows] == [0] * (count // 2) + [1] * (count // 2)
+
+
+@pytest.mark.parametrize(
+    ("at_ns", "by_ns"),
+    [
+        pytest.param(0, 0, id="stands_as_before"),
+        pytest.param(0, 7_000, id="stands_as_behind"),
+        pytest.param(round(4.3 * STRETCH_NS), 12_000, id="steps_soon_after"),
+    ],
+)
+def test_another_clock_that_stands_changes_nothing(
+    rules: duckdb.DuckDBPyConnection, at_ns: int, by_ns: int
+) -> None:
+    record(rules, width_ns=2_000, delay_ns=1_000, ppm=0, per_burst=6)
+    alone = step(rules, 4 * STRETCH_NS, 7_000)
+    rules.execute(
+        "INSERT INTO published SELECT * REPLACE (2 AS clock_id, '/b' AS topic_name, "
+        "2 AS publisher_id) FROM published"
+    )
+    rules.execute(
+        "INSERT INTO message SELECT * EXCLUDE (stamp) REPLACE (2 AS clock_id, '/b' AS topic_name, "
+        "stamp + CASE WHEN stamp >= $at THEN $by ELSE 0 END AS source_timestamp_ns) "
+        "FROM (SELECT *, taken_ns - 200000 AS stamp FROM message)",
+        {"at": at_ns, "by": by_ns},
+    )
+    rows = rules.execute(
+        "SELECT clock_id, start_ns, end_ns, difference_ns, drift_ppb, segment "
+        "FROM derive.stamp_clock(1) ORDER BY clock_id, start_ns"
+    ).fetchall()
+    assert [row[1:] for row in rows if row[0] == 1] == alone
+    expected = {(0, 0), (by_ns, 1)} if at_ns else {(by_ns, 0)}
+    assert {(round(row[3], -3), row[5]) for row in rows if row[0] == 2} == expected
 
 
 def test_the_clock_of_another_host_changes_nothing(rules: duckdb.DuckDBPyConnection) -> None:

@@ -108,19 +108,13 @@ standing AS MATERIALIZED (
 placed AS (
     SELECT
         clock_id, stretch, difference_ns, message_count, segment,
-        CASE
-            WHEN standing_ns IS NOT NULL OR before_span = after_span OR is_alone THEN later_ns
-        END AS standing_ns,
-        CASE WHEN standing_ns IS NOT NULL OR is_alone THEN after_span END AS span
+        CASE WHEN before_span = after_span OR is_alone THEN later_ns END AS standing_ns,
+        CASE WHEN before_span = after_span OR is_alone THEN after_span END AS span
     FROM (
         SELECT
             f.clock_id, f.stretch, f.difference_ns, f.message_count, f.segment,
-            t.difference_ns AS standing_ns,
-            coalesce(
-                lag(t.span) OVER on_clock < lead(t.span) OVER on_clock
-                AND lag(f.segment) OVER on_clock = lead(f.segment) OVER on_clock,
-                false
-            ) AS is_alone,
+            lag(t.span) OVER on_clock < lead(t.span) OVER on_clock
+            AND lag(f.segment) OVER on_clock = lead(f.segment) OVER on_clock AS is_alone,
             last_value(t.span IGNORE NULLS) OVER on_clock AS before_span,
             first_value(t.span IGNORE NULLS) OVER behind AS after_span,
             first_value(t.difference_ns IGNORE NULLS) OVER behind AS later_ns
@@ -145,9 +139,7 @@ stepped AS (
     FROM (
         SELECT
             *,
-            coalesce(
-                span > lag(span) OVER on_clock AND segment = lag(segment) OVER on_clock, false
-            ) AS is_step
+            span > lag(span) OVER on_clock AND segment = lag(segment) OVER on_clock AS is_step
         FROM placed
         WINDOW on_clock AS (PARTITION BY clock_id ORDER BY stretch)
     )
@@ -156,19 +148,13 @@ stepped AS (
 -- since when behind it.
 step AS MATERIALIZED (
     SELECT
-        f.clock_id, f.stretch, f.before_ns, f.standing_ns, f.message_count, f.segment, x.run_id,
+        f.clock_id, f.stretch, f.standing_ns, f.message_count, f.segment, x.run_id,
+        lag(f.standing_ns) OVER (PARTITION BY f.clock_id ORDER BY f.stretch) AS before_ns,
         x.start_ns + (f.stretch - 1) * x.stretch_ns AS start_ns,
         x.start_ns + (f.stretch + 1) * x.stretch_ns AS end_ns
-    FROM (
-        SELECT
-            clock_id, stretch, standing_ns, message_count, segment,
-            lag(standing_ns) OVER on_clock AS before_ns,
-            is_step AND stretch = lag(stretch) OVER on_clock + 1 AS is_step
-        FROM stepped
-        WINDOW on_clock AS (PARTITION BY clock_id ORDER BY stretch)
-    ) AS f
+    FROM stepped AS f
     JOIN extent AS x ON f.clock_id = x.clock_id
-    WHERE f.is_step AND f.before_ns <> f.standing_ns
+    QUALIFY f.is_step
 ),
 turn AS MATERIALIZED (
     SELECT

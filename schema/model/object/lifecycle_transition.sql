@@ -5,7 +5,7 @@
 WITH machine AS (
     SELECT m.event_id, m.process_id, m.state_machine, n.node_id
     FROM staging.located('ros2_rcl_lifecycle_state_machine_init') AS m
-    LEFT JOIN staging.object_node AS n ON m.event_id = n.event_id
+    JOIN staging.object_node AS n ON m.event_id = n.event_id
 )
 SELECT
     m.node_id,

@@ -21,7 +21,7 @@ added AS (
         a.event_id, a.thread_id, i.event_id AS init_event_id,
         a.service_handle = i.service_handle AS is_own
     FROM staging.located('ros2_rclcpp_service_callback_added') AS a
-    ASOF LEFT JOIN initialised AS i ON a.thread_id = i.thread_id AND a.event_id >= i.event_id
+    ASOF JOIN initialised AS i ON a.thread_id = i.thread_id AND a.event_id >= i.event_id
 ),
 service AS (
     SELECT m.event_id AS machine_event_id, i.event_id

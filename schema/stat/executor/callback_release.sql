@@ -21,11 +21,7 @@ WITH every_run AS (
             AS earlier_start_ns
     FROM store.callback_instance
     -- A plain comparison DuckDB expects to leave few rows, and so compares each with all waits.
-    WHERE (
-        start_ns > (
-            SELECT coalesce(max(until_ns), 9223372036854775807) FROM query_table(executors)
-        )
-    ) IS DISTINCT FROM true
+    WHERE (start_ns > (SELECT max(until_ns) FROM query_table(executors))) IS DISTINCT FROM true
     WINDOW in_time AS (
         PARTITION BY run_id, callback_id ORDER BY start_ns, callback_instance_id
     )
