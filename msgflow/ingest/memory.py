@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tempfile
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,8 +20,6 @@ from msgflow.sql.interrupt import noted_interrupts
 from msgflow.sql.quoting import literal
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     import duckdb
 
     from msgflow.clocks import ClockSync
@@ -33,8 +30,8 @@ if TYPE_CHECKING:
 def database_in_memory() -> duckdb.DuckDBPyConnection:
     """Make an empty database in memory, for `ingest_again`.
 
-    A query works with one thread: to share few rows costs more than it saves, and the system that
-    is watched needs the other CPUs.
+    It works with one thread: to share few rows costs more than it saves, and the system that is
+    watched needs the other CPUs.
     """
     con = open_memory()
     with tempfile.TemporaryDirectory(prefix="msgflow-") as directory:
@@ -49,14 +46,6 @@ def database_in_memory() -> duckdb.DuckDBPyConnection:
     con.execute("SET threads = 1")
     shut_in(con, lock=False)
     return con
-
-
-@contextmanager
-def beside(con: duckdb.DuckDBPyConnection) -> Iterator[duckdb.DuckDBPyConnection]:
-    """Open a further connection to such a database, for another thread."""
-    with con.cursor() as other:
-        other.execute("USE target")
-        yield other
 
 
 def ingest_again(

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import time
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError, UsageError
-from msgflow.ingest.memory import beside, database_in_memory, ingest_again, link_again
+from msgflow.ingest.memory import database_in_memory, ingest_again, link_again
 from msgflow.run.window import Window
 from msgflow.trace import Continuation
 from msgflow.watch.history import History
@@ -17,7 +16,7 @@ from msgflow.watch.learned_answers import LearnedAnswers, with_learned
 from msgflow.watch.window_report import report_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable
     from pathlib import Path
 
     from msgflow.clocks import ClockSync
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
     from msgflow.watch.kept_traces import KeptTraces
     from msgflow.watch.prometheus import Exporter
     from msgflow.watch.window_database import WindowDatabase
-    from msgflow.watch.window_report import Row, WindowReport
+    from msgflow.watch.window_report import WindowReport
 
 _RUN = "watch"
 _SECOND_NS = 1_000_000_000
@@ -196,11 +195,12 @@ class Watcher:
     def _report(self, window: Window, *, is_final: bool, is_live: bool) -> WindowReport:
         traces = self.history.traces(window)
         links, learned = self._ingest(traces)
-        # What is to blame takes as long to find out as all that a window shows.
-        with beside(self._con) as con, ThreadPoolExecutor(1) as pool:
-            shown = pool.submit(report_of, con, window, is_final=is_final)
-            found, verdicts = self._judge(window)
-            report = replace(shown.result(), violations=found, verdicts=verdicts)
+        report = report_of(self._con, window, is_final=is_final)
+        if self._alarm is not None:
+            # What came after the window counts, too: an alarm must be early.
+            whole = Window(window.start_ns, self.history.border_ns)
+            found, verdicts = self._alarm.judge(self._con, whole, window.end_ns)
+            report = replace(report, violations=found, verdicts=verdicts)
         if self._exporter is not None:
             since_ns = self.history.final_ns
             start_ns = window.start_ns if since_ns is None else since_ns
@@ -216,13 +216,6 @@ class Watcher:
         if self._exporter is not None:
             self._exporter.show(report)
         return report
-
-    def _judge(self, window: Window) -> tuple[Sequence[Row], Mapping[str, int]]:
-        if self._alarm is None:
-            return (), {}
-        # What came after the window counts, too: an alarm must be early.
-        whole = Window(window.start_ns, self.history.border_ns)
-        return self._alarm.judge(self._con, whole, window.end_ns)
 
 
 def _clock_offset_ns() -> int:

@@ -168,9 +168,7 @@ def test_sessions_of_one_name_on_two_hosts_are_kept(tmp_path: Path) -> None:
     assert len(list((tmp_path / "kept").glob("*/archives/*/drive/chunk-0"))) == 2
 
 
-def test_an_error_of_the_targets_is_told_while_the_window_is_asked_for(
-    watched, monkeypatch
-) -> None:
+def test_an_error_of_the_targets_is_told_as_it_is(watched, monkeypatch) -> None:
     def judge(*_: object) -> None:
         raise UsageError("no such thing", "choose another")
 
