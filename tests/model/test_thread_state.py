@@ -554,15 +554,15 @@ def test_a_thread_is_not_the_idle_one(system: RosSystem, analyse: Analyse) -> No
     assert analyse(system).rows(IS_JOINED) == [(False, 2, 0)]
 
 
-@pytest.mark.parametrize("pid_ns", [None, 9])
+@pytest.mark.parametrize("pids", [(100, 200), (200, 100)])
 def test_the_kernel_gives_a_number_again(
-    system: RosSystem, analyse: Analyse, pid_ns: int | None
+    system: RosSystem, analyse: Analyse, pids: tuple[int, int]
 ) -> None:
     """The thread that had it before has ended then."""
     kernel = Kernel(system)
-    for begin, pid in ((1000, 100), (5000, 200)):
+    for begin, pid in zip((1000, 5000), pids, strict=True):
         kernel.switch(begin - 100, 0, 41)
-        call(system, begin, begin + 200, Thread(pid, pid_ns=pid_ns))
+        call(system, begin, begin + 200, Thread(pid))
         kernel.switch(begin + 400, 41, 0, 0x10)
     assert analyse(system).rows(IS_JOINED) == [(True, 4, 4)]
 
@@ -603,7 +603,8 @@ def test_the_clock_of_most_events_counts(system: RosSystem, analyse: Analyse) ->
         kernel.switch(30_000, tid, 0, BLOCKED, cpu=cpu)
     assert analyse(system).rows(
         "SELECT k.is_joined, k.event_count, k.agreeing_count, s.hostname "
-        "FROM staging.schedule AS k JOIN staging.source AS s ON k.clock_key = s.clock_key AND s.domain = 'ust'"
+        "FROM staging.schedule AS k JOIN staging.source AS s ON k.clock_key = s.clock_key "
+        "AND s.domain = 'ust'"
     ) == [(True, 41, 40, "alpha")]
 
 
