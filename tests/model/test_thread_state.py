@@ -589,6 +589,33 @@ def test_containers_have_the_same_ids_and_not_the_same_number(
     assert analyse(system).rows(IS_JOINED) == [(False, 16, 4)]
 
 
+def test_a_thread_does_not_contradict_itself(system: RosSystem, analyse: Analyse) -> None:
+    """Its process initialises ROS again at the very time of its last event."""
+    kernel = Kernel(system)
+    kernel.switch(900, 0, 41)
+    call(system, 1000, 1100)
+    system.add("ros2:rcl_init", MAIN, ts=1100, context_handle=1, version="8.4.0")
+    call(system, 1200, 1300)
+    kernel.switch(3000, 41, 0, BLOCKED)
+    assert analyse(system).rows(IS_JOINED) == [(True, 5, 5)]
+
+
+def test_a_clock_that_events_contradict_does_not_count(system: RosSystem, analyse: Analyse) -> None:
+    """More of its events agree, but not nearly all."""
+    system.add_source(2, "beta", "another")
+    kernel = Kernel(system, clock="perf", tracer="perf")
+    kernel.switch(900, 0, 41)
+    kernel.switch(900, 0, 51, cpu=1)
+    call(system, 1000, 1100)
+    for begin in range(1000, 9000, 1000):
+        call(system, begin, begin + 100, Thread(300, cpu=1, trace=2))
+        kernel.switch(begin + 900, 50 + begin // 5000, 50 + (begin + 1000) // 5000, cpu=1)
+    kernel.switch(9500, 41, 0, BLOCKED)
+    assert analyse(system).rows(
+        "SELECT is_joined, event_count, agreeing_count FROM staging.schedule"
+    ) == [(True, 2, 2)]
+
+
 def test_the_clock_of_most_events_counts(system: RosSystem, analyse: Analyse) -> None:
     """Two events of another host agree by chance, and all of them."""
     system.add_source(2, "beta", "another")
