@@ -178,15 +178,10 @@ def _kernel_threads(switches: pa.RecordBatch) -> list[tuple[str, pa.RecordBatch]
     ids = ["trace_index", "prev_tid", "vpid", "vtid", "pid_ns"]
     known = pa.Table.from_batches([switches.select([*ids, "ts_ns"])]).filter(pa.array(is_known))
     found = known.group_by(ids, use_threads=False).aggregate([("ts_ns", "min"), ("ts_ns", "max")])
-    named = found.select([*ids, "ts_ns_min", "ts_ns_max"]).cast(
-        pa.schema(
-            field.with_name(name)
-            for field, name in zip(
-                KERNEL_THREAD_SCHEMA, [*ids, "ts_ns_min", "ts_ns_max"], strict=True
-            )
-        )
+    named = found.select([*ids, "ts_ns_min", "ts_ns_max"]).rename_columns(
+        KERNEL_THREAD_SCHEMA.names
     )
-    rows = named.rename_columns(KERNEL_THREAD_SCHEMA.names).combine_chunks()
+    rows = named.cast(KERNEL_THREAD_SCHEMA).combine_chunks()
     return [(KERNEL_THREAD, batch) for batch in rows.to_batches()]
 
 

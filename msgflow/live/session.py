@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
 CONTEXTS = ("vpid", "vtid", "procname")
-KERNEL_CONTEXTS = ("pid", "vpid", "vtid", "procname")
+KERNEL_CONTEXTS = ("pid", "vpid", "vtid", "pid_ns", "procname")
 _CHANNEL = "ros2"
 # In the directory of a recording while it is made.
 _OWNER = "msgflow-record.json"

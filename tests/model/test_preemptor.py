@@ -202,6 +202,25 @@ def test_a_second_has_the_mean_frequency_of_its_cpu(system: RosSystem, analyse: 
     ]
 
 
+def test_a_kernel_trace_that_is_not_joined_tells_no_frequency(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    """Nor does it tell until when the last frequency holds."""
+    second = 1_000_000_000
+    kernel = Kernel(system)
+    foreign = Kernel(system, trace=2)
+    kernel.switch(900, 0, 41)
+    kernel.add("power_cpu_frequency", 1000, 1, of_cpu=0, frequency_khz=3000)
+    kernel.add("power_cpu_frequency", second // 4, 1, of_cpu=0, frequency_khz=4000)
+    kernel.switch(second // 2, 41, 0, BLOCKED)
+    foreign.switch(900, 0, HOG)
+    foreign.switch(1050, HOG, OTHER)
+    foreign.add("power_cpu_frequency", second // 8, 1, of_cpu=0, frequency_khz=9000)
+    foreign.switch(3 * second, OTHER, 0)
+    call(system, 1000, 1100)
+    assert analyse(system).rows("SELECT start_ns, frequency_hz FROM cpu_usage") == [(0, 3_500_001)]
+
+
 def test_what_two_kernel_traces_show_counts_once(system: RosSystem, analyse: Analyse) -> None:
     """The second one has the end of the first, too. A second of both is one row."""
     kernel = Kernel(system)

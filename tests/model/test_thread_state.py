@@ -463,20 +463,20 @@ def test_what_wakes_is_known_where_it_is_seen(system: RosSystem, analyse: Analys
     kernel.switch(0, HOG, 42)
     call(system, 10, 20, Thread(100, 101))
     kernel.switch(30, 42, 41, BLOCKED)
-    for begin in (1000, 2000):
+    for begin in (1000, 2000, 3000):
         kernel.switch(begin, 41, 0, BLOCKED)
-        kernel.wake(begin + (100 if begin == 1000 else 300), 41, cpu=1)
+        kernel.wake(begin + (300 if begin == 2000 else 100), 41, cpu=1)
         call(system, begin + 200, begin + 250, other)
         kernel.switch(begin + 400, 0, 41)
         kernel.switch(begin + 500, 42, 0, BLOCKED, cpu=1)
         call(system, begin + 600, begin + 700)
-    kernel.switch(3000, 41, HOG)
+    kernel.switch(4000, 41, HOG)
     model = analyse(system)
     assert model.rows(
         "SELECT s.end_ns, s.waker_kind, t.tid, s.waker_other_thread_id FROM thread_state AS s "
         "LEFT JOIN thread AS t ON s.waker_thread_id = t.thread_id WHERE state = 'sleeping' "
         "AND s.thread_id = (SELECT thread_id FROM thread WHERE tid = 100) ORDER BY s.start_ns"
-    ) == [(1100, None, None, None), (2300, "thread", 101, None)]
+    ) == [(1100, None, None, None), (2300, "thread", 101, None), (3100, None, None, None)]
 
 
 def test_a_wrong_clock_is_found_where_most_of_the_schedule_is_unknown(
@@ -508,3 +508,172 @@ def test_two_threads_are_not_one_to_the_kernel(system: RosSystem, analyse: Analy
     model = analyse(system)
     assert model.rows(STATES) == []
     assert model.rows("SELECT count FROM finding WHERE name = 'kernel_trace_not_joined'") == [(60,)]
+
+
+NOT_JOINED = "SELECT detail FROM finding WHERE name = 'kernel_trace_not_joined'"
+IS_JOINED = "SELECT is_joined, event_count, agreeing_count FROM staging.schedule"
+
+
+def test_a_few_agreeing_events_among_contradictions_do_not_join(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    kernel = Kernel(system, clock="perf", tracer="perf")
+    kernel.switch(0, 0, 0)
+    for begin in range(1000, 21_000, 1000):
+        call(system, begin, begin + 100)
+        kernel.switch(begin + 500, HOG + begin // 1000 % 2, 0, BLOCKED)
+    kernel.switch(30_000, 0, HOG)
+    system.add("ros2:callback_start", MAIN, ts=30_100, callback=0xC1, is_intra_process=0)
+    kernel.switch(30_200, HOG, 0, BLOCKED)
+    model = analyse(system)
+    assert model.rows(STATES) == []
+    assert model.rows(NOT_JOINED) == [
+        ("the kernel trace contradicts itself at 40 of 41 events of ROS processes: not joined",)
+    ]
+
+
+def test_a_kernel_trace_that_contradicts_itself_at_all_events_is_not_joined(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    kernel = Kernel(system)
+    kernel.switch(900, HOG, 0)
+    kernel.switch(2100, 41, 0, BLOCKED)
+    call(system, 1000, 2000)
+    model = analyse(system)
+    assert model.rows(IS_JOINED) == [(False, 0, 0)]
+    assert model.rows(NOT_JOINED) == [
+        ("the kernel trace contradicts itself at 2 of 2 events of ROS processes: not joined",)
+    ]
+
+
+def test_a_thread_is_not_the_idle_one(system: RosSystem, analyse: Analyse) -> None:
+    kernel = Kernel(system)
+    kernel.switch(900, HOG, 0)
+    kernel.switch(2100, 0, HOG)
+    call(system, 1000, 2000)
+    assert analyse(system).rows(IS_JOINED) == [(False, 2, 0)]
+
+
+@pytest.mark.parametrize("pids", [(100, 200), (200, 100)])
+def test_the_kernel_gives_a_number_again(
+    system: RosSystem, analyse: Analyse, pids: tuple[int, int]
+) -> None:
+    """The thread that had it before has ended then."""
+    kernel = Kernel(system)
+    for begin, pid in zip((1000, 5000), pids, strict=True):
+        kernel.switch(begin - 100, 0, 41)
+        call(system, begin, begin + 200, Thread(pid))
+        kernel.switch(begin + 400, 41, 0, 0x10)
+    assert analyse(system).rows(IS_JOINED) == [(True, 4, 4)]
+
+
+def test_two_threads_do_not_have_a_number_at_once(system: RosSystem, analyse: Analyse) -> None:
+    kernel = Kernel(system)
+    kernel.switch(900, 0, 41)
+    for begin in (1000, 2000):
+        call(system, begin, begin + 100, Thread(100))
+        call(system, begin + 200, begin + 300, Thread(200))
+    kernel.switch(3000, 41, 0, BLOCKED)
+    assert analyse(system).rows(IS_JOINED) == [(False, 8, 4)]
+
+
+def test_containers_have_the_same_ids_and_not_the_same_number(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    kernel = Kernel(system)
+    kernel.switch(900, 0, 41)
+    for begin in (1000, 2000):
+        for pid_ns in (1, 2, 3, 4):
+            call(system, begin + pid_ns, begin + 10, Thread(100, pid_ns=pid_ns))
+    kernel.switch(3000, 41, 0, BLOCKED)
+    assert analyse(system).rows(IS_JOINED) == [(False, 16, 4)]
+
+
+def test_a_thread_does_not_contradict_itself(system: RosSystem, analyse: Analyse) -> None:
+    """Its process initialises ROS again at the very time of its last event."""
+    kernel = Kernel(system)
+    kernel.switch(900, 0, 41)
+    call(system, 1000, 1100)
+    system.add("ros2:rcl_init", MAIN, ts=1100, context_handle=1, version="8.4.0")
+    call(system, 1200, 1300)
+    kernel.switch(3000, 41, 0, BLOCKED)
+    assert analyse(system).rows(IS_JOINED) == [(True, 5, 5)]
+
+
+def test_a_clock_that_events_contradict_does_not_count(system: RosSystem, analyse: Analyse) -> None:
+    """More of its events agree, but not nearly all."""
+    system.add_source(2, "beta", "another")
+    kernel = Kernel(system, clock="perf", tracer="perf")
+    kernel.switch(900, 0, 41)
+    kernel.switch(900, 0, 51, cpu=1)
+    call(system, 1000, 1100)
+    for begin in range(1000, 9000, 1000):
+        call(system, begin, begin + 100, Thread(300, cpu=1, trace=2))
+        kernel.switch(begin + 900, 50 + begin // 5000, 50 + (begin + 1000) // 5000, cpu=1)
+    kernel.switch(9500, 41, 0, BLOCKED)
+    assert analyse(system).rows(
+        "SELECT is_joined, event_count, agreeing_count FROM staging.schedule"
+    ) == [(True, 2, 2)]
+
+
+def test_the_clock_of_most_events_counts(system: RosSystem, analyse: Analyse) -> None:
+    """Two events of another host agree by chance, and all of them."""
+    system.add_source(2, "beta", "another")
+    kernel = Kernel(system, clock="perf", tracer="perf")
+    kernel.switch(900, 0, 41)
+    kernel.switch(900, 0, HOG, cpu=1)
+    for begin in range(1000, 21_000, 1000):
+        call(system, begin, begin + 100)
+    system.add("ros2:callback_start", Thread(100, cpu=1), ts=22_000, callback=0xC1)
+    call(system, 10_050, 10_070, Thread(300, cpu=1, trace=2))
+    for cpu, tid in enumerate((41, HOG)):
+        kernel.switch(30_000, tid, 0, BLOCKED, cpu=cpu)
+    assert analyse(system).rows(
+        "SELECT k.is_joined, k.event_count, k.agreeing_count, s.hostname "
+        "FROM staging.schedule AS k JOIN staging.source AS s ON k.clock_key = s.clock_key "
+        "AND s.domain = 'ust'"
+    ) == [(True, 41, 40, "alpha")]
+
+
+def test_after_a_preemption_it_is_not_known_when_the_thread_goes_on_unseen(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    """It may have slept before it is seen on another CPU."""
+    kernel = Kernel(system)
+    kernel.switch(0, HOG, 0, cpu=1)
+    kernel.switch(900, 0, 41)
+    kernel.switch(1200, 41, HOG)
+    kernel.switch(1800, 41, 0, BLOCKED, cpu=1)
+    kernel.switch(2000, HOG, 0, BLOCKED)
+    call(system, 1000, 1100)
+    call(system, 1500, 1600, Thread(100, cpu=1))
+    assert analyse(system).rows(STATES) == [
+        (900, 1200, "running", 0),
+        (1200, 1500, "unknown", 0),
+        (1500, 1800, "running", 1),
+        (1800, 2000, "sleeping", 1),
+    ]
+
+
+def test_an_event_of_another_thread_does_not_tell_that_a_thread_has_the_cpu(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    """Both ran on CPU 1, one after the other, and only the second one is seen to leave it."""
+    other = Thread(100, 101)
+    kernel = Kernel(system)
+    kernel.switch(0, HOG, 0, cpu=1)
+    kernel.switch(400, 0, 42)
+    call(system, 500, 600, other)
+    kernel.switch(700, 42, 0, BLOCKED)
+    call(system, 1000, 1050, Thread(100, 101, cpu=1))
+    call(system, 1200, 1250, Thread(100, cpu=1))
+    kernel.switch(1400, 41, 0, BLOCKED, cpu=1)
+    kernel.switch(1900, 0, 42)
+    call(system, 2000, 2100, other)
+    kernel.switch(2200, 42, 41, BLOCKED)
+    call(system, 2300, 2400)
+    kernel.switch(2500, 41, 0, BLOCKED)
+    assert analyse(system).rows(
+        "SELECT start_ns, end_ns FROM thread_state WHERE state = 'running' "
+        "AND thread_id = (SELECT thread_id FROM thread WHERE tid = 100) ORDER BY start_ns"
+    ) == [(1200, 1400), (2200, 2500)]

@@ -1,8 +1,8 @@
 -- name: finding.kernel_switches_missing
 -- title: The kernel trace lacks switches
--- description: Switches contradict the ones before on their CPU, so that it is not known what ran in
---     between. A thread that left the CPU then is known to have had it from its first event of ROS
---     there on. Before that it is 'unknown', since its waking.
+-- description: Switches contradict the ones before on their CPU, so that it is not known what ran
+--     in between. A thread that left the CPU then is known to have had it from its first event of
+--     ROS there on. Before that it is 'unknown', since its waking.
 -- cause: In some virtual machines, perf has no switches away from idle, on some CPUs. Or kernel
 --     events were lost (kernel_events_lost).
 -- cure: Record with LTTng's kernel modules, or outside of the virtual machine (docs/scheduling.md).
@@ -12,11 +12,13 @@ SELECT
     s.trace_index + 1 AS trace_id,
     s.unknown_count AS count,
     printf(
-        'what ran is not known for %s, at %d of %d events of ROS processes',
-        string_agg(
-            printf('%.1f %% of the time of CPU %d', 100 - 100 * c.known_ns / c.length_ns, c.cpu),
-            ', ' ORDER BY c.cpu
-        ),
+        'what ran is not known for %s%s, at %d of %d events of ROS processes',
+        array_to_string(list(
+            printf('%.1f %% of the time of CPU %d', 100 - 100 * c.known_ns / c.length_ns, c.cpu)
+            ORDER BY c.known_ns / c.length_ns, c.cpu
+        )[:3], ', '),
+        CASE WHEN count(*) > 3
+            THEN printf(', and part of the time of %d more CPUs', count(*) - 3) ELSE '' END,
         s.unknown_count, s.event_count + s.unknown_count
     ) AS detail
 FROM staging.schedule AS s

@@ -13,9 +13,9 @@ SELECT
     CASE
         WHEN NOT has_cpus
             THEN 'the kernel trace does not say on which CPUs its events happened: not joined'
-        WHEN event_count = 0 AND unknown_count > 0 THEN printf(
-            'the kernel trace contradicts itself at all %d events of ROS processes: not joined',
-            unknown_count
+        WHEN event_count < 0.05 * (event_count + unknown_count) THEN printf(
+            'the kernel trace contradicts itself at %d of %d events of ROS processes: not joined',
+            unknown_count, event_count + unknown_count
         )
         WHEN event_count = 0
             THEN 'the kernel trace covers no event of a ROS process: not joined'

@@ -75,6 +75,7 @@ speed AS (
         SELECT s.clock_key, max(w.ts_ns + s.shift_ns) AS last_ns
         FROM raw.sched_switch AS w
         JOIN staging.schedule AS s ON w.trace_index = s.trace_index
+        WHERE s.is_joined
         GROUP BY s.clock_key
     ) USING (clock_key)
 ),

@@ -1,9 +1,10 @@
 -- name: staging.schedule
 -- description: The clock of each kernel trace: the one by which most events of ROS processes
 --     happened while the kernel says that their thread ran on their CPU. A thread has one number
---     until its process initialises ROS again, and no other thread has that: any other one counts
---     as contradiction. Where the kernel trace contradicts itself, events do not count. With the
---     right clock all events agree; 5 us beside it 2 to 47 % do not.
+--     until its process initialises ROS again, and no other thread has that meanwhile: any other
+--     one counts as contradiction. Where the kernel trace contradicts itself, events do not count;
+--     where it does so at nearly all, the few others may agree by chance. With the right clock all
+--     events agree. 5 us beside it 2 to 47 % do not, but candidates are much further apart.
 -- grain: one row per kernel trace with switches
 -- when: staging.schedule_candidate
 -- column: trace_index INTEGER  The kernel trace
@@ -15,7 +16,7 @@
 -- column: is_joined BOOLEAN  It is of that clock
 -- column: has_cpus BOOLEAN  It says on which CPU a switch was
 WITH initialisation AS (
-    SELECT t.trace_index, t.pid_ns, t.vpid, i.event_id
+    SELECT t.trace_index, coalesce(t.pid_ns, 0) AS pid_ns, t.vpid, i.event_id
     FROM raw.ros2_rcl_init AS i
     JOIN raw.thread AS t ON i.thread_index = t.thread_index
 ),
@@ -24,39 +25,60 @@ thread AS (
 ),
 ran AS (
     SELECT
-        m.trace_index, m.clock_key, m.shift_ns, m.thread_index, t.vpid, t.vtid,
-        i.event_id AS life, m.tid,
+        m.trace_index, m.clock_key, m.shift_ns, m.thread_index,
+        (t.pid_ns, t.vpid, t.vtid) AS ids, i.event_id AS life, m.tid,
         count(*) FILTER (WHERE m.contradiction_id IS NULL) AS event_count,
-        count(m.contradiction_id) AS unknown_count
+        count(m.contradiction_id) AS unknown_count,
+        min(m.at_ns) FILTER (WHERE m.contradiction_id IS NULL) AS first_ns,
+        max(m.at_ns) FILTER (WHERE m.contradiction_id IS NULL) AS last_ns
     FROM staging.schedule_moment AS m
     JOIN thread AS t ON m.thread_index = t.thread_index
     ASOF LEFT JOIN initialisation AS i
         ON t.vpid = i.vpid
         AND t.trace_index = i.trace_index
-        AND t.pid_ns = coalesce(i.pid_ns, 0)
+        AND t.pid_ns = i.pid_ns
         AND m.event_id >= i.event_id
     GROUP BY ALL
 ),
--- The thread of each number: a trace of a process has an index of its own for the same thread.
-owner AS (
+-- A trace of a process has an index of its own for the same thread.
+held AS (
     SELECT
-        trace_index, clock_key, shift_ns, tid, arg_max((vpid, vtid), event_count) AS ids
-    FROM (
-        SELECT
-            trace_index, clock_key, shift_ns, tid, vpid, vtid, sum(event_count) AS event_count
-        FROM ran
-        WHERE tid <> 0
-        GROUP BY ALL
-    )
+        trace_index, clock_key, shift_ns, ids, life, tid,
+        sum(event_count) AS event_count, min(first_ns) AS first_ns, max(last_ns) AS last_ns
+    FROM ran
+    WHERE tid <> 0
     GROUP BY ALL
+),
+-- The kernel gives a number again when its thread has ended.
+owner AS (
+    SELECT h.*
+    FROM held AS h
+    WHERE NOT EXISTS (
+        SELECT 1
+        FROM held AS o
+        WHERE o.trace_index = h.trace_index
+            AND o.clock_key = h.clock_key
+            AND o.shift_ns = h.shift_ns
+            AND o.tid = h.tid
+            AND o.ids <> h.ids
+            AND (o.event_count, o.ids) > (h.event_count, h.ids)
+            AND o.first_ns <= h.last_ns
+            AND o.last_ns >= h.first_ns
+    )
 ),
 most AS (
     SELECT
         r.trace_index, r.clock_key, r.shift_ns, sum(r.event_count) AS event_count,
-        coalesce(max(r.event_count) FILTER (WHERE o.ids = (r.vpid, r.vtid)), 0) AS agreeing_count,
+        coalesce(max(r.event_count) FILTER (WHERE o.tid IS NOT NULL), 0) AS agreeing_count,
         sum(r.unknown_count) AS unknown_count
     FROM ran AS r
-    LEFT JOIN owner AS o USING (trace_index, clock_key, shift_ns, tid)
+    LEFT JOIN owner AS o
+        ON r.trace_index = o.trace_index
+        AND r.clock_key = o.clock_key
+        AND r.shift_ns = o.shift_ns
+        AND r.tid = o.tid
+        AND r.ids = o.ids
+        AND r.life IS NOT DISTINCT FROM o.life
     GROUP BY r.trace_index, r.clock_key, r.shift_ns, r.thread_index, r.life
 ),
 agreement AS (
@@ -74,11 +96,16 @@ SELECT
     coalesce(a.event_count, 0) AS event_count,
     coalesce(a.agreeing_count, 0) AS agreeing_count,
     coalesce(a.unknown_count, 0) AS unknown_count,
-    coalesce(a.event_count > 0 AND a.agreeing_count >= 0.95 * a.event_count, false) AS is_joined,
+    coalesce(
+        a.event_count >= 0.05 * (a.event_count + a.unknown_count)
+        AND a.agreeing_count >= 0.95 * a.event_count,
+        false
+    ) AS is_joined,
     c.has_cpus
 FROM staging.schedule_candidate AS c
 LEFT JOIN agreement AS a USING (trace_index, clock_key, shift_ns)
+-- A few events agree with a wrong clock, too.
 QUALIFY row_number() OVER (
     PARTITION BY c.trace_index
-    ORDER BY a.agreeing_count / nullif(a.event_count, 0) DESC NULLS LAST, c.clock_key, abs(c.shift_ns)
+    ORDER BY is_joined DESC, a.agreeing_count DESC NULLS LAST, c.clock_key, abs(c.shift_ns)
 ) = 1
