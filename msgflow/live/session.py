@@ -18,7 +18,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
 CONTEXTS = ("vpid", "vtid", "procname")
-KERNEL_CONTEXTS = ("pid", "vpid", "vtid", "pid_ns", "procname")
+KERNEL_CONTEXTS = ("pid", "vpid", "vtid", "procname")
+# LTTng has it since 2.12.
+_LATER_CONTEXT = "pid_ns"
 _CHANNEL = "ros2"
 # In the directory of a recording while it is made.
 _OWNER = "msgflow-record.json"
@@ -170,6 +172,8 @@ def _set_up_kernel(name: str, channel: Channel) -> None:
     _enable_channel("--kernel", name, channel)
     lttng("enable-event", *to_channel, ",".join(KERNEL_EVENTS))
     lttng("add-context", *to_channel, *(f"--type={context}" for context in KERNEL_CONTEXTS))
+    with suppress(RecordingError):
+        lttng("add-context", *to_channel, f"--type={_LATER_CONTEXT}")
 
 
 def _rotate(name: str, length_ns: int) -> None:
