@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 # From the begin until a thread is woken, and from there until the end.
 _UNTIL_WAKING_NS = {INTERRUPT: 3_000, SOFTIRQ: 5_000}
 _SINCE_WAKING_NS = 1_500
-# What an interrupt leaves for later is done so long after its begin, of which it has a part.
+# The network card's interrupt takes less time than passes until the softirq that it leaves behind.
 _UNTIL_SOFTIRQ_NS, _NETWORK_CARD_NS = 2_200, 2_000
 _NEVER = 1 << 62
 

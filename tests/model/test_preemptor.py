@@ -180,7 +180,7 @@ def test_cpu_time_of_all_threads_by_second(system: RosSystem, analyse: Analyse) 
 
 
 def test_a_second_has_the_mean_frequency_of_its_cpu(system: RosSystem, analyse: Analyse) -> None:
-    """Before its first event the frequency is not known; of CPU 1 there is none."""
+    """CPU 0 has no frequency before its first event, CPU 1 has no such event."""
     second = 1_000_000_000
     kernel = Kernel(system)
     kernel.switch(900, 0, 41)

@@ -203,7 +203,7 @@ def test_or_for_twice_what_is_usual_on_its_host(
 ) -> None:
     """Its own thread was never seen to go on; those of another topic's publisher were.
 
-    A second message of a publication is none, and on another host something else is usual.
+    A publication counts once. On another host other delays are usual.
     """
     clock(rules, (0, 100, 0))
     time = 0

@@ -352,6 +352,23 @@ def test_a_message_that_denies_the_moment_of_a_step(
     assert [row[4] for row in rows] == [0] * (count // 2) + [1] * (count // 2)
 
 
+def with_second_clock(rules: duckdb.DuckDBPyConnection, stamp: str) -> list[tuple[int, ...]]:
+    """Return the pieces of two clocks: the second one makes other stamps of the same messages."""
+    rules.execute(
+        "INSERT INTO published SELECT * REPLACE (2 AS clock_id, '/b' AS topic_name, "
+        "2 AS publisher_id) FROM published"
+    )
+    rules.execute(
+        "INSERT INTO message SELECT * EXCLUDE (stamp) REPLACE (2 AS clock_id, '/b' AS topic_name, "
+        f"{stamp} AS source_timestamp_ns) "
+        "FROM (SELECT *, taken_ns - 200000 AS stamp FROM message)"
+    )
+    return rules.execute(
+        "SELECT clock_id, start_ns, end_ns, difference_ns, drift_ppb, segment "
+        "FROM derive.stamp_clock(1) ORDER BY clock_id, start_ns"
+    ).fetchall()
+
+
 @pytest.mark.parametrize(
     ("at_ns", "by_ns"),
     [
@@ -365,20 +382,7 @@ def test_another_clock_that_stands_changes_nothing(
 ) -> None:
     record(rules, width_ns=2_000, delay_ns=1_000, ppm=0, per_burst=6)
     alone = step(rules, 4 * STRETCH_NS, 7_000)
-    rules.execute(
-        "INSERT INTO published SELECT * REPLACE (2 AS clock_id, '/b' AS topic_name, "
-        "2 AS publisher_id) FROM published"
-    )
-    rules.execute(
-        "INSERT INTO message SELECT * EXCLUDE (stamp) REPLACE (2 AS clock_id, '/b' AS topic_name, "
-        "stamp + CASE WHEN stamp >= $at THEN $by ELSE 0 END AS source_timestamp_ns) "
-        "FROM (SELECT *, taken_ns - 200000 AS stamp FROM message)",
-        {"at": at_ns, "by": by_ns},
-    )
-    rows = rules.execute(
-        "SELECT clock_id, start_ns, end_ns, difference_ns, drift_ppb, segment "
-        "FROM derive.stamp_clock(1) ORDER BY clock_id, start_ns"
-    ).fetchall()
+    rows = with_second_clock(rules, f"stamp + CASE WHEN stamp >= {at_ns} THEN {by_ns} ELSE 0 END")
     assert [row[1:] for row in rows if row[0] == 1] == alone
     expected = {(0, 0), (by_ns, 1)} if at_ns else {(by_ns, 0)}
     assert {(round(row[3], -3), row[5]) for row in rows if row[0] == 2} == expected
@@ -388,19 +392,7 @@ def test_the_clock_of_another_host_changes_nothing(rules: duckdb.DuckDBPyConnect
     """One steps, the other drifts."""
     record(rules, width_ns=2_000, delay_ns=1_000, ppm=0, per_burst=6)
     alone = step(rules, 4 * STRETCH_NS, 7_000)
-    rules.execute(
-        "INSERT INTO published SELECT * REPLACE (2 AS clock_id, '/b' AS topic_name, "
-        "2 AS publisher_id) FROM published"
-    )
-    rules.execute(
-        "INSERT INTO message SELECT * EXCLUDE (stamp) REPLACE (2 AS clock_id, '/b' AS topic_name, "
-        "stamp + stamp * 100 // 1000000 AS source_timestamp_ns) "
-        "FROM (SELECT *, taken_ns - 200000 AS stamp FROM message)"
-    )
-    rows = rules.execute(
-        "SELECT clock_id, start_ns, end_ns, difference_ns, drift_ppb, segment "
-        "FROM derive.stamp_clock(1) ORDER BY clock_id, start_ns"
-    ).fetchall()
+    rows = with_second_clock(rules, "stamp + stamp * 100 // 1000000")
     assert [row[1:] for row in rows if row[0] == 1] == alone
     assert [(round(row[4] / 1_000), row[5]) for row in rows if row[0] == 2] == [(100, 0)] * 8
 

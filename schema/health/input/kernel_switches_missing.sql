@@ -1,12 +1,12 @@
 -- name: finding.kernel_switches_missing
 -- title: The kernel trace lacks switches
--- description: Switches contradict the ones before on their CPU, so that it is not known what ran
---     in between. A thread that left the CPU then is known to have had it from its first event of
---     ROS there on. Before that it is 'unknown', since its waking.
+-- description: A switch names another thread than the switch before it put on the CPU. What ran in
+--     between is not known. A thread that leaves the CPU then had it at least since its first
+--     event of ROS there. From its waking until that event it is 'unknown'.
 -- cause: In some virtual machines, perf has no switches away from idle, on some CPUs. Or kernel
 --     events were lost (kernel_events_lost).
 -- cure: Record with LTTng's kernel modules, or outside of the virtual machine (docs/scheduling.md).
--- grain: one row per kernel trace with a CPU of which a twentieth of the time or more is not known
+-- grain: one row per kernel trace in which a twentieth of the time of a CPU, or more, is not known
 -- severity: warning
 SELECT
     s.trace_index + 1 AS trace_id,
