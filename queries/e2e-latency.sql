@@ -45,6 +45,8 @@
 -- column: p95_ns BIGINT [ns]       95 % of the latencies are at most this
 -- column: p99_ns BIGINT [ns]       99 % of the latencies are at most this
 -- column: max_ns BIGINT [ns]       Longest latency
+-- column: max_root_ns BIGINT [epoch ns]  When the flow with the longest latency began
+-- column: max_take_id BIGINT       Take at its end: msgflow flow --take
 -- column: sink_event VARCHAR       Event that stopped the clock: to_event, or 'take' where the
 --     sink never shows a callback
 -- column: is_cut BOOLEAN           The path goes on or has siblings beyond max_depth or max_paths
@@ -56,8 +58,8 @@
 -- note: clocks
 WITH flow AS (
     SELECT
-        run_id, path_id, root_kind, root_id, take_id, sink_event, latency_ns, status, reason,
-        is_first, is_loss_affected,
+        run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, latency_ns, status,
+        reason, is_first, is_loss_affected,
         CASE $case
             WHEN 'first' THEN is_first
             WHEN 'last' THEN is_last
@@ -119,7 +121,9 @@ latency AS (
         min(latency_ns) AS min_ns,
         quantile_disc(latency_ns, [0.5, 0.95, 0.99]) AS quantiles,
         round(avg(latency_ns))::BIGINT AS mean_ns,
-        max(latency_ns) AS max_ns
+        -- Of equally long ones the first.
+        max(struct_pack(latency_ns, before_ns := -root_ns, take_id))
+            FILTER (WHERE latency_ns IS NOT NULL) AS longest
     FROM flow
     WHERE status = 'reached' AND is_counted
     GROUP BY run_id, path_id
@@ -172,7 +176,9 @@ SELECT
     l.mean_ns,
     l.quantiles[2] AS p95_ns,
     l.quantiles[3] AS p99_ns,
-    l.max_ns,
+    l.longest.latency_ns AS max_ns,
+    -l.longest.before_ns AS max_root_ns,
+    l.longest.take_id AS max_take_id,
     l.sink_event,
     p.is_cut,
     r.reasons,

@@ -19,7 +19,7 @@ from msgflow.run.slice import Slice
 from msgflow.sql.header import Column, Header, Param
 from msgflow.verify.condition import format_value
 from msgflow.verify.metrics import PATH, SUBJECTS
-from msgflow.verify.worst_case import FLOWS, KEYS, WorstCase, find_worst_case, worst_case_of
+from msgflow.verify.worst_case import KEYS, LOST_FLOW, WorstCase, find_worst_case, worst_case_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -335,10 +335,12 @@ class _Work:
         }
 
     def _worst(self, target: Target, kind: str, subject: str, key: Any) -> WorstCase | None:
-        if kind not in FLOWS:
-            return find_worst_case(self._connection, kind, key, self._window)
-        rows = self._ask("flows", FLOWS[kind], target, {"subject": subject})
-        return worst_case_of(list(rows[0].values())) if rows else None
+        if kind == "flow":
+            return worst_case_of([*key, "take"])
+        if kind == "lost_flow":
+            rows = self._ask("flows", LOST_FLOW, target, {"subject": subject})
+            return worst_case_of(list(rows[0].values())) if rows else None
+        return find_worst_case(self._connection, kind, key, self._window)
 
 
 def _without_value(metric: Metric) -> Verdict:

@@ -31,10 +31,11 @@ class WorstCase:
     command: str
 
 
-# The key of a row of the measuring query, by kind of worst case. The statement `worst_…` returns
-# duration, begin, id and kind of the worst case; for flows, the statements below do.
+# The key of a row of the measuring query, by kind of worst case. The longest flow is in that row
+# itself. For others the statement `worst_…` returns duration, begin, id and kind; for lost flows,
+# the one below does.
 KEYS = {
-    "flow": "path",
+    "flow": "[max_ns, max_root_ns, max_take_id]",
     "lost_flow": "path",
     "callback": "callback_id",
     "late_call": "callback_id",
@@ -43,18 +44,11 @@ KEYS = {
     "request": "[service_id, client_id]",
     "goal": "[action_server_id, action_client_id]",
 }
-FLOWS = {
-    "flow": """
-SELECT latency_ns, root_ns, take_id, 'take' AS kind
-FROM ({}) WHERE path = $subject AND latency_ns IS NOT NULL
-ORDER BY latency_ns DESC, root_ns, take_id LIMIT 1
-""",
-    "lost_flow": """
+LOST_FLOW = """
 SELECT NULL::BIGINT AS latency_ns, root_ns, root_id, root_kind
 FROM ({}) WHERE path = $subject AND status IN ('dropped', 'lost')
 ORDER BY root_ns, root_id LIMIT 1
-""",
-}
+"""
 
 
 def find_worst_case(
@@ -64,7 +58,7 @@ def find_worst_case(
 
     Args:
         connection: to a database with the public views.
-        kind: a key of KEYS, but not of FLOWS.
+        kind: a key of KEYS, but no flow.
         key: of the row that failed.
         window: the time window.
     """
