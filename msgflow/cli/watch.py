@@ -133,20 +133,21 @@ def command(
     step_ns = duration_ns(step, "--step")
     window_ns = duration_ns(window, "--window")
     alarm = None if targets is None else _alarm(targets, paths)
-    recorder = None
-    if keep is not None:
-        recorder = FlightRecorder(
-            keep.absolute(),
-            most=most_kept,
-            window_ns=window_ns,
-            clock_sync=clock_sync,
-            note=print_note,
-        )
     exporter = None
     if prometheus is not None:
         exporter = Exporter()
         exporter.serve(prometheus)
     with _pages(ui, clock_sync) as database, ExitStack() as stack:
+        recorder = None
+        if keep is not None:
+            recorder = FlightRecorder(
+                keep.absolute(),
+                most=most_kept,
+                window_ns=window_ns,
+                clock_sync=clock_sync,
+                note=print_note,
+            )
+            stack.callback(recorder.close)
         watcher = Watcher(
             window_ns=window_ns,
             step_ns=step_ns,

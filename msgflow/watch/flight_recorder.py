@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import time
+from concurrent.futures import ThreadPoolExecutor
 from itertools import count
 from typing import TYPE_CHECKING
 
@@ -14,6 +15,7 @@ from msgflow.watch.learned_answers import LEARNED_FILE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
+    from concurrent.futures import Future
     from pathlib import Path
 
     from msgflow.links import LinksFile
@@ -25,7 +27,8 @@ _DATABASE = "msgflow.duckdb"
 class FlightRecorder:
     """Directories of violations, also of earlier watchers; the oldest are removed.
 
-    A violation that goes on is kept once per window.
+    A violation that goes on is kept once per window. Its database is written beside the view, which
+    goes on meanwhile.
     """
 
     def __init__(
@@ -52,6 +55,8 @@ class FlightRecorder:
         self._clock_sync = clock_sync
         self._note = note
         self._until_ns = 0
+        self._beside = ThreadPoolExecutor(1)
+        self._writing: Future[None] | None = None
 
     def keep(
         self,
@@ -73,6 +78,8 @@ class FlightRecorder:
         if end_ns < self._until_ns:
             return
         self._until_ns = end_ns + self._window_ns
+        # Several at once would take the memory of the system that is watched.
+        self._finish()
         moment = time.strftime("%Y%m%d-%H%M%S", time.gmtime(end_ns // 1_000_000_000))
         names = (f"violation-{moment}" + (f"-{n}" if n > 1 else "") for n in count(1))
         target = next(path for path in map(self._directory.joinpath, names) if not path.exists())
@@ -86,6 +93,24 @@ class FlightRecorder:
                     shutil.copytree(chunk, target / "archives" / session / chunk.name)
             if learned is not None:
                 (target / LEARNED_FILE).write_text(learned, encoding="utf-8")
+        except OSError as error:
+            self._give_up(target, error)
+            return
+        self._writing = self._beside.submit(self._write, target, traces, links)
+
+    def close(self) -> None:
+        """Wait for the last database."""
+        with self._beside:
+            self._finish()
+
+    def _finish(self) -> None:
+        if self._writing is not None:
+            self._writing.result()
+        self._writing = None
+
+    def _write(self, target: Path, traces: KeptTraces, links: LinksFile | None) -> None:
+        """Write the database of a violation, and remove the oldest ones."""
+        try:
             ingest(
                 [target],
                 target / _DATABASE,
@@ -95,17 +120,20 @@ class FlightRecorder:
                 traces=traces,
             )
         except (OSError, MsgflowError) as error:
-            # A disk that is full must not end the view.
-            shutil.rmtree(target, ignore_errors=True)
-            self._note(
-                f"the violation is not kept in {target}: {_reason(error)}; remove files, or name"
-                " another directory with --keep-on-violation"
-            )
+            self._give_up(target, error)
             return
         others = sorted(set(self._directory.glob("violation-*")) - {target})
         for oldest in others[: max(len(others) + 1 - self._most, 0)]:
             shutil.rmtree(oldest, ignore_errors=True)
         self._note(f"kept: msgflow why --db {target / _DATABASE}")
+
+    def _give_up(self, target: Path, error: OSError | MsgflowError) -> None:
+        """Remove what was kept: a disk that is full must not end the view."""
+        shutil.rmtree(target, ignore_errors=True)
+        self._note(
+            f"the violation is not kept in {target}: {_reason(error)}; remove files, or name"
+            " another directory with --keep-on-violation"
+        )
 
 
 def _reason(error: OSError | MsgflowError) -> str:

@@ -164,6 +164,7 @@ def test_sessions_of_one_name_on_two_hosts_are_kept(tmp_path: Path) -> None:
     )  # fmt: skip
     traces = KeptTraces([], [chunk for chunk in read if chunk is not None])
     recorder.keep(SECOND, traces, [chunk.path for chunk in chunks], None, None)
+    recorder.close()
     assert notes[0].startswith("kept: ")
     assert len(list((tmp_path / "kept").glob("*/archives/*/drive/chunk-0"))) == 2
 
