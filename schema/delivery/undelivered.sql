@@ -1,14 +1,14 @@
 -- name: derive.undelivered
 -- kind: macro
--- description: Why a subscription did not take a message of its topic; the first reason that
---     holds. Everything is compared on the clock of the receiver. `not_delivered` rests on a
---     wait: a message in the queue would have ended it. A wait tells this only where a single
---     thread reads, and only if it lasted ten times as long as messages usually need, at least a
---     millisecond. A reader that gets no CPU seems to wait, too, but takes the message when it
---     wakes up. Only the depth of the queue tells `overwritten` from `lost_in_transport`. The
---     reason is unknown if the subscription took a message in that time that could not be
---     identified. A message is not `overwritten` if the subscription took none of the publisher,
---     and no later one.
+-- description: Why a subscription did not take a message of its topic; the first reason that holds.
+--     Everything is compared on the clock of the receiver. `not_delivered` rests on a wait: a
+--     message in the queue would have ended it. A wait tells this only where a single thread reads,
+--     and only if it lasted ten times as long as messages usually need, at least a millisecond. A
+--     reader that gets no CPU seems to wait, too, but takes the message when it wakes up. Only the
+--     depth of the queue tells `overwritten` from `lost_in_transport`. The reason is unknown if the
+--     subscription took a message in that time that could not be identified, or as soon as messages
+--     usually are taken. A message is not `overwritten` if the subscription took none of the
+--     publisher, and no later one.
 -- grain: one row per publication and subscription of its topic that is not known to have taken it
 CREATE OR REPLACE MACRO derive.undelivered(only_run) AS TABLE
 WITH arrival AS MATERIALIZED (
@@ -261,7 +261,8 @@ facts AS (
         g.covered_until_ns >= b.arrival_ns AS has_gap,
         i.covered_until_ns >= b.introduced_ns AS has_earlier_gap,
         f.failed_ns <= b.until_ns AS has_failed_take,
-        u.taken_ns <= coalesce(b.waited_ns, b.gone_ns) AS has_unidentified_take,
+        -- A later message may have overtaken it.
+        u.taken_ns <= coalesce(b.waited_ns, greatest(b.gone_ns, b.due_ns)) AS has_unidentified_take,
         q.count_so_far - o.position AS newer_count
     FROM bounded AS b
     JOIN ordered AS o ON b.publication_id = o.publication_id AND b.clock_id = o.clock_id

@@ -391,6 +391,20 @@ def test_a_take_without_a_message_was_before_a_later_one(
 
 
 @pytest.mark.parametrize(
+    ("taken", "reason"), [(303 * MS, "unknown"), (303 * MS + 1, "lost_in_transport")]
+)
+def test_a_later_message_may_have_overtaken_one(
+    delivery: Delivery, taken: int, reason: str
+) -> None:
+    """A take without a message is of one that arrived less than ten usual times before."""
+    delivery.lives()
+    missing = delivery.miss()
+    delivery.publish(300 * MS + 1, 301 * MS)
+    delivery.takes_without_message(taken)
+    assert delivery.reason(missing) == reason
+
+
+@pytest.mark.parametrize(
     ("first", "reason"), [(300 * MS, "lost_in_transport"), (300 * MS + 1, "before_discovery")]
 )
 def test_nothing_earlier_of_the_publisher_was_taken(
