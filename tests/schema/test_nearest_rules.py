@@ -822,3 +822,60 @@ def test_bursts_are_not_told_where_no_drift_is_known(
     take(rules, 1, apart + 1)
     told = {1: (first, 1), apart + 1: (3 - first, 1)}
     assert nearest(rules) == (told if is_told else dict.fromkeys(told, (None, 1)))
+
+
+@pytest.mark.parametrize(
+    ("apart", "is_sharp", "is_told"),
+    [(420, False, True), (380, False, False), (380, True, True)],
+)
+@pytest.mark.parametrize("sign", [1, -1])
+def test_nor_are_bursts_of_messages(
+    rules: duckdb.DuckDBPyConnection, apart: int, sign: int, *, is_sharp: bool, is_told: bool
+) -> None:
+    """The other one is of somebody who is not traced."""
+    clock(rules, (0, 100, 0))
+    rules.execute("UPDATE store.stamp_clock SET is_sharp = ?", [is_sharp])
+    publish(rules, 1, 0, 10 * MICROSECOND)
+    publish(rules, 2, SECOND // 2, SECOND // 2 + 10 * MICROSECOND)
+    stamp = 1 if sign > 0 else SECOND // 2 + 1
+    other = stamp + apart * MICROSECOND // (1 if sign > 0 else 2)
+    take(rules, stamp, other)
+    assert nearest(rules)[stamp] == (((1 if sign > 0 else 2), 1) if is_told else (None, 1))
+
+
+@pytest.mark.parametrize(
+    ("missed", "is_sharp", "is_told"),
+    [
+        (195, False, False),
+        (197, False, True),
+        (-195, False, False),
+        (-197, False, True),
+        (195, True, True),
+    ],
+)
+def test_where_no_drift_is_known_before_a_jump_what_was_just_missed_counts(
+    rules: duckdb.DuckDBPyConnection, missed: int, *, is_sharp: bool, is_told: bool
+) -> None:
+    """20 ms before the end of a second, 480 ms from its middle, 200 ppm are 196 µs."""
+    back = 40 * MILLISECOND
+    clock(rules, (0, 100, 0), (-back, 100, 1))
+    rules.execute("UPDATE store.stamp_clock SET is_sharp = ? WHERE segment = 0", [is_sharp])
+    early = SECOND - 20 * MILLISECOND
+    stamp = early + missed * MICROSECOND + (10 * MICROSECOND if missed > 0 else 0) - (missed > 0)
+    publish(rules, 1, early - 5 * MILLISECOND, early - 5 * MILLISECOND + 10 * MICROSECOND)
+    publish(rules, 2, early, early + 10 * MICROSECOND)
+    publish(rules, 3, stamp + back - 1, stamp + back + 10 * MICROSECOND)
+    take(rules, stamp)
+    assert nearest(rules)[stamp] == ((3, 1) if is_told else (None, 1))
+
+
+def test_what_a_message_missed_before_a_jump_may_be_its_own_behind(
+    rules: duckdb.DuckDBPyConnection,
+) -> None:
+    clock(rules, (0, 100, 0), (50 * MICROSECOND, 100, 1))
+    rules.execute("UPDATE store.stamp_clock SET is_sharp = false WHERE segment = 0")
+    written = SECOND - 20 * MILLISECOND
+    publish(rules, 1, written, written + 10 * MICROSECOND)
+    stamp = written + 51 * MICROSECOND
+    take(rules, stamp)
+    assert nearest(rules) == {stamp: (1, 1)}

@@ -91,6 +91,21 @@ def test_a_clock_that_is_set_by_hours(tmp_path: Path) -> None:
     assert transport.recall >= 0.99
 
 
+@pytest.mark.parametrize("by_ns", [-41_370_000, 41_370_000, -1_041_370_000])
+def test_a_clock_that_is_set_where_messages_are_many(tmp_path: Path, by_ns: int) -> None:
+    """A hundred messages of a burst come in the time of the step; another host takes them."""
+    recording = Recording(realtime_steps=((SECOND * 7 // 10, by_ns),))
+    simulation = simulate(
+        "bursts_two_hosts", tmp_path / "trace", factor=0.5, layout="humble", recording=recording
+    )
+    path = tmp_path / "run.duckdb"
+    ingest_one(simulation.directory, path).connection.close()
+    score = {score.kind: score for score in compare_simulated(path, simulation.truth)[0]}
+    transport = score["transport"]
+    assert transport.wrong == 0
+    assert transport.recall >= 0.99
+
+
 @pytest.mark.parametrize("layout", few(["rolling", "kilted"], "rolling"))
 def test_messages_that_are_written_for_each_subscription_on_its_own(
     tmp_path: Path, layout: str

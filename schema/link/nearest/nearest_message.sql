@@ -96,6 +96,9 @@ published AS MATERIALIZED (
         written_ns + then_ns AS opens_ns,
         next_event_ns + then_ns AS closes_ns,
         next_event_ns IS NOT NULL AND NOT has_break AS goes_on,
+        wander_ns,
+        lead(publication_id) OVER of_thread AS next_publication_id,
+        lead(written_ns + then_ns) OVER of_thread AS next_opens_ns,
         wander_ns > 0 AND coalesce(
             least(
                 written_ns - lag(written_ns) OVER on_topic,
@@ -104,7 +107,11 @@ published AS MATERIALIZED (
             false
         ) AS is_crowded
     FROM sided
-    WINDOW on_topic AS (PARTITION BY side, topic_name ORDER BY written_ns, publication_id)
+    WINDOW
+        on_topic AS (PARTITION BY side, topic_name ORDER BY written_ns, publication_id),
+        of_thread AS (
+            PARTITION BY side, publisher_id, thread_id ORDER BY written_ns, publication_id
+        )
 ),
 -- The times in which the clocks stood in one relation: from one jump to the next.
 segment AS (
@@ -142,23 +149,53 @@ looked_for AS (
     JOIN (SELECT DISTINCT publisher_id, thread_id, side FROM published) AS p
         ON m.publisher_id = p.publisher_id
 ),
-within AS MATERIALIZED (
+-- Where the clock is not known sharply, also what a message just missed.
+looked_up AS MATERIALIZED (
     SELECT
         m.topic_name, m.publisher_id, m.source_timestamp_ns, m.only_subscription_id,
-        p.publication_id, p.clock_id, p.goes_on, p.is_crowded,
+        p.publication_id, p.clock_id, p.goes_on, p.side,
+        p.is_crowded OR p.wander_ns > 0 AND coalesce(
+            least(
+                m.source_timestamp_ns - lag(m.source_timestamp_ns) OVER of_publication,
+                lead(m.source_timestamp_ns) OVER of_publication - m.source_timestamp_ns
+            ) <= 2 * p.wander_ns,
+            false
+        ) AS is_crowded,
         m.source_timestamp_ns - p.opens_ns AS delay_ns,
-        row_number() OVER (
-            PARTITION BY p.publication_id, p.side, m.only_subscription_id
-            ORDER BY m.source_timestamp_ns
-        ) AS place
+        coalesce(m.source_timestamp_ns < p.closes_ns, true) AS is_within,
+        CASE
+            WHEN m.source_timestamp_ns < p.closes_ns + p.wander_ns THEN p.publication_id
+            WHEN m.source_timestamp_ns >= p.next_opens_ns - p.wander_ns THEN p.next_publication_id
+        END AS missed_publication_id
     FROM looked_for AS m
     ASOF JOIN published AS p
         ON m.publisher_id = p.publisher_id
         AND m.thread_id = p.thread_id
         AND m.side = p.side
         AND m.source_timestamp_ns >= p.opens_ns
-    WHERE coalesce(m.source_timestamp_ns < p.closes_ns, true)
+    WHERE (coalesce(m.source_timestamp_ns < p.closes_ns, true) OR p.wander_ns > 0)
         AND coalesce(p.written_ns < m.taken_ns, true)
+    WINDOW of_publication AS (
+        PARTITION BY p.publication_id, p.side, m.only_subscription_id
+        ORDER BY m.source_timestamp_ns
+    )
+),
+within AS MATERIALIZED (
+    SELECT
+        topic_name, publisher_id, source_timestamp_ns, only_subscription_id, publication_id,
+        clock_id, goes_on, is_crowded, delay_ns,
+        row_number() OVER (
+            PARTITION BY publication_id, side, only_subscription_id ORDER BY source_timestamp_ns
+        ) AS place
+    FROM looked_up
+    WHERE is_within
+),
+missed AS MATERIALIZED (
+    SELECT DISTINCT
+        topic_name, source_timestamp_ns, only_subscription_id,
+        missed_publication_id AS publication_id
+    FROM looked_up
+    WHERE NOT is_within AND missed_publication_id IS NOT NULL
 ),
 -- A message that came while none of the known publishers wrote is of another one, or its
 -- publication was lost. Where nothing is lost, there is another one.
@@ -310,7 +347,14 @@ matched AS (
         is_crowded
         OR NOT is_usual
         OR count(*) OVER (PARTITION BY publication_id, only_subscription_id, candidate_count) > 1
-        OR (is_hasty AND publication_id IN (FROM doubtful)) AS is_rivalled
+        OR (is_hasty AND publication_id IN (FROM doubtful))
+        OR EXISTS (
+            FROM missed AS m
+            WHERE m.topic_name = left_over.topic_name
+                AND m.source_timestamp_ns = left_over.source_timestamp_ns
+                AND m.only_subscription_id IS NOT DISTINCT FROM left_over.only_subscription_id
+                AND m.publication_id <> left_over.publication_id
+        ) AS is_rivalled
     FROM left_over
 ),
 placed AS (

@@ -58,31 +58,38 @@ publisher AS (
 heard AS (
     SELECT
         m.run_id, p.clock_id, p.publisher_id, p.publisher_count, m.source_timestamp_ns,
-        m.clock_id AS taken_clock_id, m.taken_ns,
+        m.clock_id AS taken_clock_id, m.taken_ns, x.stretch_ns,
         m.source_timestamp_ns BETWEEN x.start_ns AND x.end_ns AS is_in_time
     FROM message AS m
     JOIN publisher AS p ON m.run_id = p.run_id AND m.topic_name = p.topic_name
     JOIN extent AS x ON p.clock_id = x.clock_id
 ),
 -- How far another clock is from this one, but for the drift: the least time from stamp to take
--- while the clock of stamps was right.
+-- in the beginning, when the clock of stamps was right.
 apart AS (
     SELECT clock_id, taken_clock_id, min(taken_ns - source_timestamp_ns) AS apart_ns
-    FROM heard
-    WHERE is_in_time
+    FROM (
+        SELECT
+            clock_id, taken_clock_id, taken_ns, source_timestamp_ns,
+            min(taken_ns) OVER (PARTITION BY clock_id, taken_clock_id) + stretch_ns AS until_ns
+        FROM heard
+        WHERE is_in_time
+    )
+    WHERE taken_ns < until_ns
     GROUP BY clock_id, taken_clock_id
 ),
--- A stamp at which nothing was recorded says little of when the message was published: the clock of
--- stamps was set. When it was taken does, on whatever clock.
+-- Where a clock was set, its stamps say little of when messages were published. When they were
+-- taken does, on whatever clock.
 placed AS (
     SELECT
         h.run_id, h.clock_id, h.publisher_id, h.publisher_count, h.source_timestamp_ns,
         bool_or(h.taken_clock_id = h.clock_id) AS is_taken_here,
         coalesce(
             min(CASE WHEN h.taken_clock_id = h.clock_id THEN h.taken_ns END),
-            min(CASE WHEN NOT h.is_in_time THEN h.taken_ns - a.apart_ns END),
+            min(h.taken_ns - a.apart_ns),
             h.source_timestamp_ns
-        ) AS near_ns
+        ) AS near_ns,
+        any_value(h.is_in_time) AS is_in_time
     FROM heard AS h
     LEFT JOIN apart AS a ON h.clock_id = a.clock_id AND h.taken_clock_id = a.taken_clock_id
     GROUP BY h.run_id, h.clock_id, h.publisher_id, h.publisher_count, h.source_timestamp_ns
@@ -90,7 +97,7 @@ placed AS (
 turn AS (
     SELECT
         q.run_id, q.clock_id, q.publisher_id, q.publisher_count, q.source_timestamp_ns,
-        q.is_taken_here, q.near_ns, x.start_ns, x.stretch_ns,
+        q.is_taken_here, q.near_ns, q.is_in_time, x.start_ns, x.stretch_ns,
         (q.near_ns - x.start_ns) // x.stretch_ns AS stretch,
         row_number() OVER (
             PARTITION BY q.publisher_id, (q.near_ns - x.start_ns) // x.stretch_ns
@@ -101,8 +108,8 @@ turn AS (
 ),
 sampled AS (
     SELECT
-        run_id, clock_id, publisher_id, source_timestamp_ns, is_taken_here, near_ns, start_ns,
-        stretch_ns
+        run_id, clock_id, publisher_id, source_timestamp_ns, is_taken_here, near_ns, is_in_time,
+        start_ns, stretch_ns
     FROM turn
     QUALIFY row_number() OVER (
         PARTITION BY clock_id, stretch
@@ -113,36 +120,39 @@ sampled AS (
 -- machine are close, so its publication is then among those around its stamp.
 wanted AS (
     SELECT
-        l.run_id, l.clock_id, l.publisher_id, l.source_timestamp_ns, l.is_taken_here, l.start_ns,
-        l.stretch_ns, coalesce(p.position, l.latest_position) AS latest_position,
+        run_id, clock_id, publisher_id, source_timestamp_ns, is_taken_here, start_ns, stretch_ns,
+        stamp_position AS latest_position,
         unnest(
-            CASE
-                WHEN l.is_taken_here THEN
+            list_filter(
+                list_distinct(
                     range(
-                        p.position - derive.clock_limit().reach,
-                        least(
-                            p.position + derive.clock_limit().reach + 1,
-                            l.latest_position - derive.clock_limit().reach
-                        )
+                        stamp_position - derive.clock_limit().reach,
+                        stamp_position + derive.clock_limit().reach + 1
                     )
                     || range(
-                        l.latest_position - derive.clock_limit().reach, l.latest_position + 1
+                        near_position - derive.clock_limit().reach,
+                        near_position + derive.clock_limit().reach + 1
                     )
-                ELSE range(
-                    l.latest_position - derive.clock_limit().reach,
-                    l.latest_position + derive.clock_limit().reach + 1
-                )
-            END
+                ),
+                lambda each: NOT is_taken_here OR each <= near_position
+            )
         ) AS position
     FROM (
         SELECT
-            s.run_id, s.clock_id, s.publisher_id, s.source_timestamp_ns, s.is_taken_here,
-            s.start_ns, s.stretch_ns, p.position AS latest_position
-        FROM sampled AS s
-        ASOF JOIN published AS p ON s.publisher_id = p.publisher_id AND s.near_ns >= p.written_ns
-    ) AS l
-    ASOF LEFT JOIN published AS p
-        ON l.publisher_id = p.publisher_id AND l.source_timestamp_ns >= p.written_ns
+            n.run_id, n.clock_id, n.publisher_id, n.source_timestamp_ns, n.is_taken_here,
+            n.start_ns, n.stretch_ns, n.near_position,
+            CASE WHEN n.is_in_time THEN p.position ELSE n.near_position END AS stamp_position
+        FROM (
+            SELECT
+                s.run_id, s.clock_id, s.publisher_id, s.source_timestamp_ns, s.is_taken_here,
+                s.is_in_time, s.start_ns, s.stretch_ns, p.position AS near_position
+            FROM sampled AS s
+            ASOF JOIN published AS p
+                ON s.publisher_id = p.publisher_id AND s.near_ns >= p.written_ns
+        ) AS n
+        ASOF LEFT JOIN published AS p
+            ON n.publisher_id = p.publisher_id AND n.source_timestamp_ns >= p.written_ns
+    )
 ),
 paired AS (
     SELECT
