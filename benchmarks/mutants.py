@@ -131,6 +131,10 @@ RULES = (
     ("public/action_client.sql", ("schema/cases/main.action_client",)),
     ("public/action_server.sql", ("schema/cases/main.action_server",)),
     ("stat/action", ("schema/cases/main.goal", "schema/cases/main.action_server")),
+    (
+        "stat/executor/callback_release.sql",
+        ("schema/cases/main.executor_wait", "schema/cases/derive.callback_release"),
+    ),
     *((f"health/recording/{each}.sql", (f"schema/cases/finding.{each}",)) for each in FINDINGS),
     *(
         (f"health/input/{each.stem}.sql", (f"schema/cases/finding.{each.stem}", NOTHING_FOUND))

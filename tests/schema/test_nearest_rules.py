@@ -721,6 +721,33 @@ def test_and_comes_too_soon_if_it_does_on_one_side(
     assert nearest(rules)[9 * PERIOD + soon] == (9 if is_told else None, 1)
 
 
+def test_and_a_second_message_comes_as_soon_if_it_does_on_one_side(
+    rules: duckdb.DuckDBPyConnection,
+) -> None:
+    """Before the jump it comes later than is usual."""
+    clock(rules, (0, 100, 0), (500_000, 100, 1))
+    time = periodic(rules, [500_000] * 10, MILLISECOND) + PERIOD
+    publish(rules, 999, time, time + MILLISECOND)
+    stamps = (time + 600_000, time + 700_000)
+    take(rules, *stamps)
+    found = nearest(rules)
+    assert [found.get(stamp) for stamp in stamps] == [(None, 1)] * 2
+
+
+def test_and_a_publication_is_in_a_burst_if_it_is_on_one_side(
+    rules: duckdb.DuckDBPyConnection,
+) -> None:
+    """The one that follows soon is in the next stretch, and so behind the jump alone."""
+    clock(rules, (0, 100, 0), (MILLISECOND, 100, 1), (MILLISECOND, 100, 1))
+    rules.execute("UPDATE store.stamp_clock SET is_sharp = false")
+    written = 2 * SECOND - 100_000
+    publish(rules, 1, written, written + 2 * MILLISECOND)
+    publish(rules, 2, written + 300_000, written + 400_000, publisher=2)
+    stamp = written + MILLISECOND + 100_000
+    take(rules, stamp)
+    assert nearest(rules) == {stamp: (None, 1)}
+
+
 @pytest.mark.parametrize("segments", [(2, 3), (3, 4)])
 @pytest.mark.parametrize("early", [SECOND - 60 * MILLISECOND, SECOND + 20 * MILLISECOND])
 def test_nor_do_later_ones_of_the_same_side(

@@ -231,6 +231,19 @@ def test_three_stretches_on_either_side_vote_together(rules: duckdb.DuckDBPyConn
     assert [abs(value) < 1_500 for (value,) in rows.fetchall()] == [True] * 4 + [False] * 4
 
 
+def test_a_stretch_that_is_not_sharp_spoils_three_on_either_side(
+    rules: duckdb.DuckDBPyConnection,
+) -> None:
+    """And it is not, if so many of the publications that it votes with are lost."""
+    record(rules, width_ns=2_000, delay_ns=1_000, ppm=150, count=600, per_burst=12)
+    rules.execute(
+        "DELETE FROM published WHERE written_ns >= ? AND hash(publication_id) % 2 = 0",
+        [8 * STRETCH_NS],
+    )
+    rows = rules.execute("SELECT is_sharp FROM derive.stamp_clock(1) ORDER BY start_ns").fetchall()
+    assert [is_sharp for (is_sharp,) in rows] == [True] * (8 - 3 - 3) + [False] * 9
+
+
 def step(con: duckdb.DuckDBPyConnection, at_ns: int, by_ns: int) -> list[tuple[Any, ...]]:
     """Begin, end, difference, drift and segment over time once the clock of stamps was set."""
     con.execute(

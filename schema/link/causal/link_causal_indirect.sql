@@ -129,12 +129,7 @@ ended_on_thread AS (
 ),
 nested AS (
     SELECT d.annotation_id, d.publication_id, d.subscription_id, e.callback_instance_id
-    FROM (
-        SELECT * FROM demand
-        WHERE publishing_id IN (
-            SELECT parent_id FROM nesting
-        )
-    ) AS d
+    FROM demand AS d
     ASOF JOIN ended_on_thread AS e
         ON d.annotation_id = e.annotation_id
         AND d.thread_id = e.thread_id
@@ -144,13 +139,12 @@ nested AS (
 ),
 -- Publications of one callback instance share their cut.
 cut AS (
-    SELECT DISTINCT
-        annotation_id, subscription_id, thread_id, cut_event_id, emptied_event_id
+    SELECT DISTINCT annotation_id, subscription_id, cut_event_id, emptied_event_id
     FROM demand
 ),
 at_cut AS MATERIALIZED (
     SELECT
-        c.annotation_id, c.subscription_id, c.thread_id, c.cut_event_id, e.callback_instance_id,
+        c.annotation_id, c.subscription_id, c.cut_event_id, e.callback_instance_id,
         e.start_event_id
     FROM cut AS c
     ASOF JOIN ended AS e
@@ -159,36 +153,13 @@ at_cut AS MATERIALIZED (
         AND c.cut_event_id >= e.effective_end_event_id
     WHERE e.effective_end_event_id > c.emptied_event_id
 ),
--- If all instances of an input ran on the publishing thread, one after the other, only one of them
--- can have been in the cache at the cut.
-alone AS (
-    SELECT run.annotation_id, run.subscription_id, min(run.thread_id) AS thread_id
-    FROM run
-    JOIN store.callback_instance AS i
-        ON run.callback_instance_id = i.callback_instance_id AND i.run_id = only_run
-    GROUP BY run.annotation_id, run.subscription_id
-    HAVING min(run.thread_id) = max(run.thread_id)
-        AND NOT bool_or(
-            i.parent_id IS NOT NULL
-            OR run.callback_instance_id IN (
-                SELECT parent_id FROM nesting
-            )
-        )
-),
 there AS MATERIALIZED (
-    SELECT
-        d.*, c.callback_instance_id, c.start_event_id AS input_start_event_id,
-        a.thread_id IS NOT NULL AND c.callback_instance_id IS NOT NULL AS is_certain
+    SELECT d.*, c.callback_instance_id, c.start_event_id AS input_start_event_id
     FROM demand AS d
     LEFT JOIN at_cut AS c
         ON d.annotation_id = c.annotation_id
         AND d.subscription_id = c.subscription_id
-        AND d.thread_id = c.thread_id
         AND d.cut_event_id = c.cut_event_id
-    LEFT JOIN alone AS a
-        ON d.annotation_id = a.annotation_id
-        AND d.subscription_id = a.subscription_id
-        AND d.thread_id = a.thread_id
 ),
 -- Instances in the order in which they began. Each has the instance that ends last among itself and
 -- those before it.
@@ -199,9 +170,6 @@ begun AS (
         arg_max(callback_instance_id, effective_end_event_id) OVER so_far AS last_id,
         max(effective_end_event_id) OVER so_far AS last_event_id
     FROM free
-    WHERE (annotation_id, subscription_id) IN (
-        SELECT (annotation_id, subscription_id) FROM there WHERE NOT is_certain
-    )
     WINDOW so_far AS (
         PARTITION BY annotation_id, subscription_id
         ORDER BY start_event_id ROWS UNBOUNDED PRECEDING
@@ -223,7 +191,7 @@ possible AS (
             greatest(t.input_start_event_id, t.kept_event_id) AS since_event_id,
             b.run_count AS begun_count,
             b.last_id
-        FROM (SELECT * FROM there WHERE NOT is_certain) AS t
+        FROM there AS t
         ASOF JOIN begun AS b
             ON t.annotation_id = b.annotation_id
             AND t.subscription_id = b.subscription_id

@@ -216,9 +216,8 @@ SELECT
     f.message_count,
     f.segment,
     -- A drift needs two stretches to show. A stretch that is not sharp spoils those nearby.
-    f.standing_ns IS NOT NULL OR coalesce(
-        min(s.is_sharp) OVER nearby AND count_if(f.message_count > 0) OVER nearby > 1, false
-    ) AS is_sharp
+    f.standing_ns IS NOT NULL
+    OR min(s.is_sharp) OVER nearby AND count_if(f.message_count > 0) OVER nearby > 1 AS is_sharp
 FROM stepped AS f
 JOIN extent AS x ON f.clock_id = x.clock_id
 LEFT JOIN sharp AS s ON f.clock_id = s.clock_id AND f.stretch = s.stretch

@@ -36,7 +36,7 @@ slotted AS (
         (i.earlier_start_ns + t.period_ns // 100 - t.created_ns) // t.period_ns AS earlier_slot
     FROM every_run AS i
     JOIN store.executor_thread AS x ON i.thread_id = x.thread_id
-    LEFT JOIN store.callback AS c ON i.callback_id = c.callback_id
+    JOIN store.callback AS c ON i.callback_id = c.callback_id
     LEFT JOIN store.timer AS t ON c.timer_id = t.timer_id AND t.period_ns > 0
     WHERE i.depth = 1
         AND x.executor_id IN (SELECT executor_id FROM query_table(executors))
@@ -102,11 +102,11 @@ request AS (
         q.taken_ns
     FROM store.request AS q
     LEFT JOIN store.thread AS sender ON q.sender_thread_id = sender.thread_id
-    LEFT JOIN store.thread AS receiver ON q.receiver_thread_id = receiver.thread_id
+    JOIN store.thread AS receiver ON q.receiver_thread_id = receiver.thread_id
     LEFT JOIN derive.clock_comparable AS p
         ON sender.process_id = p.process_id AND receiver.process_id = p.other_process_id
     LEFT JOIN derive.process_clock AS sc ON sender.process_id = sc.process_id
-    LEFT JOIN derive.process_clock AS rc ON receiver.process_id = rc.process_id
+    JOIN derive.process_clock AS rc ON receiver.process_id = rc.process_id
 )
 SELECT
     i.run_id,
