@@ -5,7 +5,8 @@
 Simulates a pipeline of nodes with so many events, and a kernel trace of its schedule with
 `--per-event` times as many (benchmarks/kernel_trace.py). Then measures the ingest of both together
 and of the ROS events alone, in turn with `babeltrace2 -o dummy`. The budget: 10 million kernel
-events beside one million ROS events cost at most 2.5 times Babeltrace's decoding of both.
+events beside one million ROS events cost at most 2.5 times Babeltrace's decoding of both, and need
+no more memory than an ingest of 10 million ROS events (benchmarks/run.py).
 """
 
 from __future__ import annotations

@@ -42,7 +42,8 @@
 -- column: state VARCHAR            What the thread did, as in thread_state, where the kernel was
 --     traced
 -- column: who VARCHAR              What took the CPU, or ended the sleep: thread or interrupt;
---     where another thread ran that was waited for, that one
+--     where another thread was waited for, that one, with what took its CPU, or ended its sleep,
+--     in brackets
 -- column: node VARCHAR [node]      Node that did it, or that waited; 'between nodes' where neither
 --     worked: network_or_idle, unless its thread is known to have run or waited for a CPU
 -- column: what VARCHAR             The callback, or the topic of the message
@@ -51,6 +52,7 @@
 -- column: is_certain BOOLEAN       For 'executor_busy', 'all_threads_busy' and 'blocked': what
 --     waited was ready by then; no: it may have arrived during this piece
 -- column: thread VARCHAR           Thread in that state
+-- column: wakers BIGINT            How many wakers lead to that thread: 0 for the one that waited
 -- column: priority INTEGER         Its priority to the kernel; below 100 real-time
 -- column: who_priority INTEGER     Priority of what took the CPU
 -- column: from_ns BIGINT [epoch ns]  Begin
@@ -61,7 +63,7 @@
 -- column: path VARCHAR [path]      Nodes and topics of the flow; only in its first row
 -- heading: rank, latency_ns, take_id, path
 -- brief: rank, at_ns, duration_ns, share, activity, state, who, node, what, is_certain, pieces,
---     hop, part, thread, priority, who_priority
+--     hop, part, thread, wakers, priority, who_priority
 -- note: clocks
 CREATE OR REPLACE TEMP TABLE named_path AS
 SELECT path_id, path, subscriptions
@@ -166,9 +168,14 @@ piece AS (
         CASE
             WHEN bt.thread_id IS NOT NULL THEN printf('%s %d', bl.label, bt.tid)
             WHEN c.by_kind = 'thread' THEN bo.name
-            WHEN c.by_kind IS NULL AND c.wakers > 0 AND c.state = 'running'
-                THEN printf('%s %d', tl.label, t.tid)
             ELSE c.by_kind
+        END AS by_whom,
+        CASE
+            WHEN c.wakers > 0
+                THEN printf('%s %d', tl.label, t.tid)
+                || CASE WHEN c.state = 'running' THEN ''
+                    ELSE printf(' (%s)', coalesce(by_whom, '?')) END
+            ELSE by_whom
         END AS who,
         c.by_priority AS who_priority,
         $detail = 'short' AND c.activity IN ('intra', 'rclcpp', 'rcl', 'rmw', 'dds')
@@ -251,6 +258,7 @@ summed AS MATERIALIZED (
         END AS state,
         CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(who) END AS who,
         CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(thread) END AS thread,
+        CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(wakers) END AS wakers,
         CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(priority) END AS priority,
         CASE
             WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(who_priority)
@@ -302,6 +310,7 @@ SELECT
     s.pieces,
     s.is_certain,
     s.thread,
+    s.wakers,
     s.priority,
     s.who_priority,
     s.from_ns,

@@ -10,6 +10,7 @@
 -- grain: one row per executor thread
 -- column: run_id BIGINT             Run
 -- column: host VARCHAR [host]  Host
+-- column: nodes VARCHAR             Nodes of its process; without nodes its name and id
 -- column: process VARCHAR           Process name
 -- column: pid INTEGER               Process id
 -- column: tid INTEGER               Thread id
@@ -29,12 +30,12 @@
 -- column: callback_share DOUBLE [share] Callback time divided by time seen, 0 to 1
 -- column: executor_id BIGINT        Identity of the executor
 -- column: thread_id BIGINT          Identity of the thread
--- brief: process, tid, callback_share, callback_ns, blocked_ns, wait_ns, callbacks, select_ns,
---     take_ns, host, seen_ns, unknown_ns, executor_kind, pid
+-- brief: nodes, tid, callback_share, callback_ns, blocked_ns, wait_ns, callbacks, select_ns,
+--     take_ns, process, pid, host, seen_ns, unknown_ns, executor_kind
 -- note: callbacks
 WITH member AS (
     SELECT
-        x.run_id, x.executor_id, x.thread_id, e.kind, t.tid, p.pid, p.name, h.hostname,
+        x.run_id, x.executor_id, x.thread_id, e.kind, t.tid, l.nodes, p.pid, p.name, h.hostname,
         greatest(t.first_seen_ns, $start_ns) AS first_ns,
         least(t.last_seen_ns, $end_ns) AS last_ns,
         x.thread_id IN (
@@ -44,6 +45,7 @@ WITH member AS (
     JOIN main.executor AS e ON x.executor_id = e.executor_id
     JOIN main.thread AS t ON x.thread_id = t.thread_id
     JOIN main.process AS p ON t.process_id = p.process_id
+    JOIN main.process_label AS l ON p.process_id = l.process_id
     JOIN main.host AS h ON p.host_id = h.host_id
     WHERE list_contains($runs, x.run_id)
 ),
@@ -96,6 +98,7 @@ callback AS (
 SELECT
     m.run_id,
     m.hostname AS host,
+    m.nodes,
     m.name AS process,
     m.pid,
     m.tid,

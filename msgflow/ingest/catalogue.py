@@ -67,12 +67,9 @@ class CpuRole(Enum):
     END = "end"
 
 
-_OF_CPU = {
-    CpuRole.SWITCH: (("run_start_ns", "BIGINT"), ("switch_number", "BIGINT")),
-    CpuRole.WAKING: (("switch_event_id", "BIGINT"), ("interrupt", "VARCHAR")),
-}
-"""Columns about what ran on the CPU: since when the thread had it that leaves it (NULL: not known)
-and the number of the switch there; the latest switch, and the interrupt that is handled."""
+def enum_type(values: Iterable[str]) -> str:
+    """Return DuckDB's type of a column that holds some of these texts: a byte each, not a text."""
+    return f"ENUM({', '.join(repr(value) for value in values)})"
 
 
 @dataclass(frozen=True)
@@ -166,28 +163,40 @@ class Tracepoint:
             ]
         )
 
-    def columns(self, labels: Iterable[str]) -> tuple[tuple[str, str], ...]:
+    def columns(
+        self, labels: Iterable[str], interrupts: Iterable[str]
+    ) -> tuple[tuple[str, str], ...]:
         """Return (name, DuckDB's type) of the columns of the staging table."""
         types = {
             Origin.EVENT_ID: "BIGINT",
             Origin.TS_NS: "BIGINT",
-            Origin.LABEL: f"ENUM({', '.join(repr(label) for label in labels)})",
+            Origin.LABEL: enum_type(labels),
+        }
+        # Since when the thread had the CPU that leaves it (NULL: not known), and the number of the
+        # switch there; the latest switch, and the interrupt that is handled.
+        of_cpu = {
+            CpuRole.SWITCH: (("run_start_ns", "BIGINT"), ("switch_number", "BIGINT")),
+            CpuRole.WAKING: (("switch_event_id", "BIGINT"), ("interrupt", enum_type(interrupts))),
         }
         return (
             *self.common_columns,
             *((before.column, types[before.origin]) for before in self.predecessors),
-            *(_OF_CPU.get(self.role, ()) if self.role else ()),
+            *(of_cpu.get(self.role, ()) if self.role else ()),
             *((field.name, field.type) for field in self.fields),
         )
 
-    def create_table_sql(self, catalog: str, labels: Iterable[str]) -> str:
+    def create_table_sql(
+        self, catalog: str, labels: Iterable[str], interrupts: Iterable[str]
+    ) -> str:
         """Return the statement that creates the staging table in this catalog or schema.
 
         Args:
             catalog: where it is made.
             labels: all labels of the catalogue.
+            interrupts: all kinds of interrupts of the catalogue.
         """
-        body = ",\n".join(f'    "{column}" {sql_type}' for column, sql_type in self.columns(labels))
+        columns = self.columns(labels, interrupts)
+        body = ",\n".join(f'    "{column}" {sql_type}' for column, sql_type in columns)
         return f'CREATE TABLE "{catalog}"."{self.table}" (\n{body}\n)'
 
 

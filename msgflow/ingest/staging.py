@@ -23,7 +23,14 @@ import contextlib
 from typing import TYPE_CHECKING
 
 from msgflow.atomic_directory import replacing_entries
-from msgflow.ingest.catalogue import COMMON_COLUMNS, Origin, Predecessor, Tracepoint, load
+from msgflow.ingest.catalogue import (
+    COMMON_COLUMNS,
+    Origin,
+    Predecessor,
+    Tracepoint,
+    enum_type,
+    load,
+)
 from msgflow.sql.quoting import literal
 
 if TYPE_CHECKING:
@@ -54,7 +61,7 @@ CREATE TABLE raw.cpu_return (thread_index INTEGER, event_id BIGINT)
 
 _INTERRUPT_TABLE = """
 CREATE TABLE raw.interrupt (
-    trace_index INTEGER, kind VARCHAR, start_ns BIGINT, end_ns BIGINT, tid INTEGER
+    trace_index INTEGER, kind {kind}, start_ns BIGINT, end_ns BIGINT, tid INTEGER
 )
 """
 
@@ -135,11 +142,12 @@ def attach(con: duckdb.DuckDBPyConnection, directory: Path | None) -> None:
 
 def _tables() -> tuple[str, ...]:
     catalogue = load()
+    labels, interrupts = catalogue.labels, catalogue.interrupts
     return (
-        *(each.create_table_sql("raw", catalogue.labels) for each in catalogue.staged.values()),
+        *(each.create_table_sql("raw", labels, interrupts) for each in catalogue.staged.values()),
         _PACKET_TABLE,
         _THREAD_TABLES,
-        _INTERRUPT_TABLE,
+        _INTERRUPT_TABLE.format(kind=enum_type(interrupts)),
         _KERNEL_THREAD_TABLE,
         _SOURCE_TABLE,
         _EVENT_COUNT_TABLE,

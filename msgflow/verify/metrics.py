@@ -254,12 +254,15 @@ SUBJECTS: dict[str, Subject] = {
             ),
         },
         {
-            "executor-usage": "printf('%s, thread %d', process, tid)",
+            "executor-usage": "printf('%s, thread %d', nodes, tid)",
             "wakeup-latency": "printf('%s, thread %d', nodes, tid)",
         },
         {
             "process": Filter(
-                {"executor-usage": ("process",), "wakeup-latency": ("process", "nodes")},
+                {
+                    "executor-usage": ("process", "nodes"),
+                    "wakeup-latency": ("process", "nodes"),
+                },
                 _PROCESSES, "process",
             ),
         },

@@ -35,7 +35,6 @@ _BLAME = {
 }
 # What a callback did, by the state of its thread where the kernel was traced; else it ran.
 _BLAME_OF_STATE = {
-    "running": "{node} waited {time} for {who}",
     "preempted": "{node} waited {time} for a CPU that {who} had",
     "runnable": "{node} waited {time} for a CPU",
     "sleeping": "{node} slept {time}",
@@ -182,9 +181,10 @@ def blamed(pieces: Sequence[Row], path: str | None) -> Iterator[str]:
     for piece in slowest[:_MOST_PIECES]:
         if piece["activity"] != "rest" and (piece["share"] or 0) >= _LEAST_SHARE:
             words = _BLAME.get(piece["activity"], _OTHER)
-            # What ran is named only if it was not the callback's own thread.
-            if piece["activity"] == "callback" and (piece["who"] or piece["state"] != "running"):
+            if piece["activity"] == "callback":
                 words = _BLAME_OF_STATE.get(piece["state"] or "", words)
+                if piece["wakers"]:
+                    words = "{node} waited {time} for {who}"
             yield words.format(
                 node=piece["node"] or _sender(piece["hop"], path) or "an unknown node",
                 what=piece["what"] or "a message",

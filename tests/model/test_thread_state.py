@@ -113,6 +113,30 @@ def test_a_waker_that_the_next_switch_contradicts_is_not_known(
     ) == [(kind, waker)]
 
 
+def test_of_two_kernel_traces_of_a_schedule_the_one_that_knows_the_waker_counts(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    """The first one contradicts itself on the CPU of the waker."""
+    for trace, left in ((KERNEL, TIMER), (KERNEL + 1, HOG)):
+        kernel = Kernel(system, trace)
+        kernel.switch(900, 0, 41)
+        kernel.switch(900, 0, HOG, cpu=1)
+        kernel.switch(1200, 41, 0, BLOCKED)
+        kernel.wake(1400, 41, cpu=1)
+        kernel.switch(1500, 0, 41)
+        kernel.switch(1600, left, 0, BLOCKED, cpu=1)
+        kernel.switch(2000, 41, 0, BLOCKED)
+    call(system, 1000, 1800)
+    assert analyse(system).rows(
+        "SELECT start_ns, end_ns, state, waker_kind, o.tid FROM thread_state AS s "
+        "LEFT JOIN other_thread AS o ON s.waker_other_thread_id = o.other_thread_id "
+        "WHERE state IN ('sleeping', 'runnable') ORDER BY start_ns"
+    ) == [
+        (1200, 1400, "sleeping", "thread", HOG),
+        (1400, 1500, "runnable", "thread", HOG),
+    ]
+
+
 def test_a_waking_may_come_before_the_switch_that_it_undoes(
     system: RosSystem, analyse: Analyse
 ) -> None:

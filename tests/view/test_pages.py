@@ -174,8 +174,8 @@ def test_executors(way: str, demo: Path, serve: Serve, report: Report, page: Pag
     durations = (
         "seen_ns", "wait_ns", "select_ns", "take_ns", "callback_ns", "blocked_ns", "unknown_ns",
     )  # fmt: skip
-    assert [row[1:2] + row[5:12] for row in cells(page, "executor threads")] == [
-        [row["process"], *(shown(row[name]) for name in durations)] for row in usage
+    assert [row[1:3] + row[6:13] for row in cells(page, "executor threads")] == [
+        [row["nodes"], row["process"], *(shown(row[name]) for name in durations)] for row in usage
     ]
     found = {(row[0], row[1], row[2], row[3], row[7]) for row in cells(page, "interference")}
     assert found <= {

@@ -185,21 +185,23 @@ def test_without_a_window_nothing_is_measured(watched, monkeypatch) -> None:
 
 
 @pytest.mark.parametrize(
-    ("state", "who", "words"),
+    ("wakers", "state", "who", "words"),
     [
-        (None, None, "/filter ran 30.000 ms"),
-        ("running", None, "/filter ran 30.000 ms"),
-        ("running", "/driver 12", "/filter waited 30.000 ms for /driver 12"),
-        ("preempted", "logger", "/filter waited 30.000 ms for a CPU that logger had"),
-        ("runnable", "softirq", "/filter waited 30.000 ms for a CPU"),
-        ("sleeping", "timer", "/filter slept 30.000 ms"),
-        ("uninterruptible", "interrupt", "/filter waited 30.000 ms for a page or a disk"),
+        (None, None, None, "/filter ran 30.000 ms"),
+        (0, "running", None, "/filter ran 30.000 ms"),
+        (1, "running", "/driver 12", "/filter waited 30.000 ms for /driver 12"),
+        (1, "sleeping", "/driver 12 (timer)", "/filter waited 30.000 ms for /driver 12 (timer)"),
+        (0, "preempted", "logger", "/filter waited 30.000 ms for a CPU that logger had"),
+        (0, "runnable", "softirq", "/filter waited 30.000 ms for a CPU"),
+        (0, "sleeping", "timer", "/filter slept 30.000 ms"),
+        (0, "uninterruptible", "interrupt", "/filter waited 30.000 ms for a page or a disk"),
     ],
 )
 def test_a_callback_that_had_no_cpu_did_not_run(
-    state: str | None, who: str | None, words: str
+    wakers: int | None, state: str | None, who: str | None, words: str
 ) -> None:
     """Where the kernel is traced, pieces of a callback have the state of its thread."""
     piece = {"activity": "callback", "node": "/filter", "what": "Subscription(/scan)", "hop": 1}
-    rest = {"state": state, "who": who, "share": 0.6, "duration_ns": 30_000_000}
-    assert list(blamed([piece | rest], None)) == [words]
+    thread = {"wakers": wakers, "state": state, "who": who}
+    rest = {"share": 0.6, "duration_ns": 30_000_000}
+    assert list(blamed([piece | thread | rest], None)) == [words]

@@ -41,7 +41,7 @@ export class ExecutorsPage {
           this.strips.places.push({ canvas, thread: usage.thread_id[row] });
           const busy = usage.seen_ns[row] ? usage.callback_ns[row] / usage.seen_ns[row] : NaN;
           list.append(h("div", { className: "strip-row" },
-            h("div", {}, h("b", {}, `${usage.process[row] ?? "?"} ${usage.tid[row]}`), h("div", { className: "soft" }, `${usage.host[row]} · ${String(usage.executor_kind[row]).replace("_", "-")} · ${percent(busy)} in callbacks`)), canvas));
+            h("div", {}, h("b", {}, `${usage.nodes[row]} ${usage.tid[row]}`), h("div", { className: "soft" }, `${usage.host[row]} · ${String(usage.executor_kind[row]).replace("_", "-")} · ${percent(busy)} in callbacks`)), canvas));
         }
         requestAnimationFrame(() => this.drawStrips());
         return [h("p", { className: "soft" }, "Each column is a piece of the run, filled with the share of time that went to each: a full column is 100 %. Click to see it in the timeline."),
@@ -50,7 +50,7 @@ export class ExecutorsPage {
           list,
           downloads({ name: "what executor threads did", canvases: () => this.strips.places.map(({ canvas }) => canvas),
             columns: () => [["thread_id", shares.thread_id], ["start_at [ns since begin of run]", shares.start_at], ["length [ns]", shares.length], ["activity", shares.activity], ["busy [ns]", shares.busy]] }),
-          besides("as a table", dataTable(usage, { label: "executor threads", columns: ["host", "process", "pid", "tid", "executor_kind", "seen_ns", "wait_ns", "select_ns", "take_ns", "callback_ns", "blocked_ns", "unknown_ns", "callbacks", "callback_share"] })),
+          besides("as a table", dataTable(usage, { label: "executor threads", columns: ["host", "nodes", "process", "pid", "tid", "executor_kind", "seen_ns", "wait_ns", "select_ns", "take_ns", "callback_ns", "blocked_ns", "unknown_ns", "callbacks", "callback_share"] })),
           notes(usage.meta.notes), command(usage.meta.command)];
       }),
       fill(blame, async () => {

@@ -19,7 +19,8 @@ const WAKERS = ["", "a timer", "an interrupt", "a softirq"];
 export const wakerName = (flags, name) => WAKERS[(flags >> 4) & 3] || name;
 
 // What a thread did in a piece of the critical path.
-export function stateText(state, who) {
+export function stateText(state, who, wakers) {
+  if (wakers) return `waits for ${who}, which is ${state}`;
   switch (state) {
     case "preempted": return `preempted by ${who ?? "?"}`;
     case "runnable": return `waits for a CPU${who ? `, woken by ${who}` : ""}`;

@@ -397,7 +397,7 @@ export class Renderer {
   // One piece of the critical path after the other, with a line below that makes them one.
   drawPieces(lane) {
     const { context: c, colors } = this;
-    const { rows, from_ns: froms, duration_ns: lengths, activity, state, who } = this.flow.pieces;
+    const { rows, from_ns: froms, duration_ns: lengths, activity, state, who, wakers } = this.flow.pieces;
     const y = AXIS + lane.y - this.scroll + 4;
     const high = lane.height - 10;
     for (let row = 0; row < rows; row++) {
@@ -420,7 +420,7 @@ export class Renderer {
       c.textBaseline = "middle";
       c.fillStyle = PALE.has(name) ? colors.ink : colors.page;
       const took = duration(lengths[row]);
-      for (const said of [...(isStill ? [`${stateText(state[row], who[row])} ${took}`, stateText(state[row], who[row])] : []), `${partTitle(activity[row])} ${took}`, `${activity[row].replaceAll("_", " ")} ${took}`, took]) {
+      for (const said of [...(isStill ? [`${stateText(state[row], who[row], wakers?.[row])} ${took}`, stateText(state[row], who[row], wakers?.[row])] : []), `${partTitle(activity[row])} ${took}`, `${activity[row].replaceAll("_", " ")} ${took}`, took]) {
         if (c.measureText(said).width < width - 8) { c.fillText(said, left + 4, y + high / 2 + 0.5); break; }
       }
     }

@@ -516,7 +516,7 @@ export class TimelinePage {
   describePiece(row) {
     const { pieces } = this.renderer.flow;
     const state = pieces.state?.[row];
-    return [h("strong", {}, partTitle(pieces.activity[row])), state && h("span", {}, `${pieces.thread[row] ?? "its thread"}: ${stateText(state, pieces.who[row])}`), h("span", {}, `${pieces.what[row] ?? ""} · ${pieces.node[row] ?? ""}`),
+    return [h("strong", {}, partTitle(pieces.activity[row])), state && h("span", {}, `${pieces.wakers?.[row] ? "" : `${pieces.thread[row] ?? "its thread"}: `}${stateText(state, pieces.who[row], pieces.wakers?.[row])}`), h("span", {}, `${pieces.what[row] ?? ""} · ${pieces.node[row] ?? ""}`),
       h("span", {}, `${duration(pieces.duration_ns[row])}, ${percent(pieces.share[row])} of the latency`), h("span", {}, `begins at ${moment(pieces.from_ns[row])}`),
       pieces.is_certain[row] === false && h("span", { className: "soft" }, "what waited may have come during it")].filter(Boolean);
   }
@@ -648,7 +648,7 @@ export class TimelinePage {
     if (!pieces.rows) return h("p", { className: "soft" }, "No path leads to where this flow ends: there is no critical path.");
     const rows = Array.from({ length: pieces.rows }, (_, row) => h("tr", { className: "can-pick", on: { click: () => this.centerAt(pieces.from_ns[row], pieces.duration_ns[row]) } },
       h("td", { className: "number" }, `+${duration(pieces.at_ns[row])}`),
-      h("td", {}, h("button", { type: "button", className: "pick" }, partTitle(pieces.activity[row])), pieces.state?.[row] && h("div", {}, stateText(pieces.state[row], pieces.who[row])), h("div", { className: "soft" }, `${pieces.what[row] ?? ""} · ${pieces.node[row] ?? ""}`)),
+      h("td", {}, h("button", { type: "button", className: "pick" }, partTitle(pieces.activity[row])), pieces.state?.[row] && h("div", {}, stateText(pieces.state[row], pieces.who[row], pieces.wakers?.[row])), h("div", { className: "soft" }, `${pieces.what[row] ?? ""} · ${pieces.node[row] ?? ""}`)),
       h("td", { className: "number" }, duration(pieces.duration_ns[row]))));
     return [
       h("p", {}, `${duration(pieces.latency_ns[0])} from ${pieces.meta.from} to ${pieces.meta.to}, take ${pieces.meta.take_id}: the longest flow that ends with it, and what it waited for.`),

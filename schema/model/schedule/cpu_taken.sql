@@ -20,22 +20,22 @@ WITH wait AS (
     FROM staging.cpu_wait AS w
     JOIN staging.schedule AS s ON w.trace_index = s.trace_index
 ),
-first_run AS (
-    SELECT w.*, r.switch_number AS first_number
-    FROM wait AS w
-    ASOF JOIN raw.sched_switch AS r
-        ON w.trace_index = r.trace_index
-        AND w.cpu = r.cpu_id
-        AND w.start_ns - w.shift_ns >= r.ts_ns
+-- All switches are sorted, with few and narrow columns, once for both ends of the waits.
+extent AS (
+    SELECT w.number, min(r.switch_number) AS first_number, max(r.switch_number) AS last_number
+    FROM (
+        SELECT
+            number, trace_index, cpu,
+            unnest([start_ns - shift_ns, end_ns - shift_ns - 1]) AS at_ns
+        FROM wait
+    ) AS w
+    ASOF JOIN (SELECT trace_index, cpu_id, ts_ns, switch_number FROM raw.sched_switch) AS r
+        ON w.trace_index = r.trace_index AND w.cpu = r.cpu_id AND w.at_ns >= r.ts_ns
+    GROUP BY w.number
+    HAVING count(*) = 2
 ),
 run AS (
-    SELECT
-        w.* EXCLUDE (first_number), unnest(range(w.first_number, r.switch_number + 1)) AS number
-    FROM first_run AS w
-    ASOF JOIN raw.sched_switch AS r
-        ON w.trace_index = r.trace_index
-        AND w.cpu = r.cpu_id
-        AND w.end_ns - w.shift_ns > r.ts_ns
+    SELECT number, unnest(range(first_number, last_number + 1)) AS switch_number FROM extent
 )
 SELECT
     w.thread_id,
@@ -50,10 +50,11 @@ SELECT
     r.next_comm AS name,
     r.next_prio + CASE WHEN o.tracer LIKE 'perf%' THEN 0 ELSE 100 END AS priority,
     w.priority AS thread_priority
-FROM run AS w
+FROM run AS n
+JOIN wait AS w ON n.number = w.number
 JOIN raw.sched_switch AS r
-    ON w.trace_index = r.trace_index AND w.cpu = r.cpu_id AND w.number = r.switch_number
+    ON w.trace_index = r.trace_index AND w.cpu = r.cpu_id AND n.switch_number = r.switch_number
 JOIN staging.source AS o ON w.trace_index = o.trace_index
 LEFT JOIN raw.sched_switch AS e
-    ON w.trace_index = e.trace_index AND w.cpu = e.cpu_id AND w.number + 1 = e.switch_number
+    ON w.trace_index = e.trace_index AND w.cpu = e.cpu_id AND n.switch_number + 1 = e.switch_number
 WHERE r.next_tid <> w.tid AND (e.event_id IS NULL OR e.run_start_ns IS NOT NULL)

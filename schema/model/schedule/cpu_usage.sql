@@ -10,37 +10,32 @@
 -- column: name VARCHAR  Its name, the latest one
 -- column: running_ns BIGINT [ns]  How long it ran
 -- column: frequency_hz BIGINT [Hz]  Mean frequency of the CPU in the second, as far as it is known
-WITH run AS (
+WITH extent AS (
+    -- Several traces of a host may overlap: what an earlier one shows counts.
     SELECT
-        s.clock_key, w.trace_index, w.cpu_id AS cpu, w.prev_tid AS tid,
-        w.run_start_ns + s.shift_ns AS start_ns, w.ts_ns + s.shift_ns AS end_ns
-    FROM raw.sched_switch AS w
-    JOIN staging.schedule AS s ON w.trace_index = s.trace_index
-    WHERE s.is_joined AND w.run_start_ns < w.ts_ns
-),
--- Several traces of a host may overlap: what an earlier one shows counts.
-extent AS (
-    SELECT
-        trace_index, cpu,
-        coalesce(max(max(end_ns)) OVER (
-            PARTITION BY clock_key, cpu ORDER BY min(start_ns), trace_index
+        c.trace_index, c.cpu, s.clock_key, s.shift_ns,
+        coalesce(max(c.end_ns + s.shift_ns) OVER (
+            PARTITION BY s.clock_key, c.cpu ORDER BY c.start_ns + s.shift_ns, c.trace_index
             ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING
-        ), min(start_ns)) AS from_ns
-    FROM run
-    GROUP BY clock_key, trace_index, cpu
+        ), c.start_ns + s.shift_ns) AS from_ns
+    FROM staging.cpu_schedule AS c
+    JOIN staging.schedule AS s ON c.trace_index = s.trace_index
+    WHERE s.is_joined
 ),
-own AS (
+run AS (
     SELECT
-        r.clock_key, r.cpu, r.tid, greatest(r.start_ns, e.from_ns) AS start_ns, r.end_ns
-    FROM run AS r
-    JOIN extent AS e ON r.trace_index = e.trace_index AND r.cpu = e.cpu
-    WHERE r.end_ns > e.from_ns
+        e.clock_key, e.cpu, w.prev_tid AS tid,
+        greatest(w.run_start_ns + e.shift_ns, e.from_ns) AS start_ns,
+        w.ts_ns + e.shift_ns AS end_ns
+    FROM raw.sched_switch AS w
+    JOIN extent AS e ON w.trace_index = e.trace_index AND w.cpu_id = e.cpu
+    WHERE w.run_start_ns < w.ts_ns AND w.ts_ns + e.shift_ns > e.from_ns
 ),
 part AS (
     SELECT
         clock_key, cpu, tid, start_ns, end_ns,
         unnest(range(start_ns // 1_000_000_000, (end_ns - 1) // 1_000_000_000 + 1)) AS second
-    FROM own
+    FROM run
 ),
 usage AS (
     SELECT

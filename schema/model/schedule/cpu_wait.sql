@@ -4,6 +4,7 @@
 --     the CPU on which it goes on.
 -- grain: one row per wait and CPU
 -- when: staging.schedule_interval
+-- column: number BIGINT  Number of the row
 -- column: thread_id BIGINT  The thread
 -- column: tid INTEGER  Its number
 -- column: state_start_ns BIGINT [epoch ns]  Begin of the wait
@@ -59,6 +60,7 @@ part AS (
     SELECT * FROM cut
 )
 SELECT
+    row_number() OVER () AS number,
     p.thread_id,
     p.tid,
     p.state_start_ns,

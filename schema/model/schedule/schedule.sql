@@ -7,6 +7,7 @@
 --     events agree. 5 us beside it 2 to 47 % do not, but candidates are much further apart.
 -- grain: one row per kernel trace with switches
 -- when: staging.schedule_candidate
+-- column: candidate_number BIGINT  Its candidate that counts
 -- column: trace_index INTEGER  The kernel trace
 -- column: clock_key VARCHAR  Its clock, or the best of those it may be of
 -- column: shift_ns BIGINT [ns]  What has to be added to its times
@@ -15,35 +16,43 @@
 -- column: unknown_count BIGINT  Events at which it contradicts itself
 -- column: is_joined BOOLEAN  It is of that clock
 -- column: has_cpus BOOLEAN  It says on which CPU a switch was
-WITH initialisation AS (
-    SELECT t.trace_index, coalesce(t.pid_ns, 0) AS pid_ns, t.vpid, i.event_id
-    FROM raw.ros2_rcl_init AS i
-    JOIN raw.thread AS t ON i.thread_index = t.thread_index
-),
-thread AS (
+WITH thread AS (
     SELECT thread_index, trace_index, coalesce(pid_ns, 0) AS pid_ns, vpid, vtid FROM raw.thread
 ),
-ran AS (
+life AS (
     SELECT
-        m.trace_index, m.clock_key, m.shift_ns, m.thread_index,
-        (t.pid_ns, t.vpid, t.vtid) AS ids, i.event_id AS life, m.tid,
+        t.thread_index,
+        i.event_id AS from_event_id,
+        lead(i.event_id, 1, 9223372036854775807) OVER (
+            PARTITION BY t.thread_index ORDER BY i.event_id
+        ) AS until_event_id
+    FROM raw.ros2_rcl_init AS i
+    JOIN thread AS o ON i.thread_index = o.thread_index
+    JOIN thread AS t ON o.trace_index = t.trace_index AND o.pid_ns = t.pid_ns AND o.vpid = t.vpid
+),
+moment AS (
+    SELECT
+        m.candidate_number, m.thread_index, l.from_event_id AS life, m.tid,
         count(*) FILTER (WHERE m.contradiction_id IS NULL) AS event_count,
         count(m.contradiction_id) AS unknown_count,
         min(m.at_ns) FILTER (WHERE m.contradiction_id IS NULL) AS first_ns,
         max(m.at_ns) FILTER (WHERE m.contradiction_id IS NULL) AS last_ns
     FROM staging.schedule_moment AS m
-    JOIN thread AS t ON m.thread_index = t.thread_index
-    ASOF LEFT JOIN initialisation AS i
-        ON t.vpid = i.vpid
-        AND t.trace_index = i.trace_index
-        AND t.pid_ns = i.pid_ns
-        AND m.event_id >= i.event_id
+    LEFT JOIN life AS l
+        ON m.thread_index = l.thread_index
+        AND m.event_id >= l.from_event_id
+        AND m.event_id < l.until_event_id
     GROUP BY ALL
+),
+ran AS (
+    SELECT m.*, (t.pid_ns, t.vpid, t.vtid) AS ids
+    FROM moment AS m
+    JOIN thread AS t ON m.thread_index = t.thread_index
 ),
 -- A trace of a process has an index of its own for the same thread.
 held AS (
     SELECT
-        trace_index, clock_key, shift_ns, ids, life, tid,
+        candidate_number, ids, life, tid,
         sum(event_count) AS event_count, min(first_ns) AS first_ns, max(last_ns) AS last_ns
     FROM ran
     WHERE tid <> 0
@@ -56,9 +65,7 @@ owner AS (
     WHERE NOT EXISTS (
         SELECT 1
         FROM held AS o
-        WHERE o.trace_index = h.trace_index
-            AND o.clock_key = h.clock_key
-            AND o.shift_ns = h.shift_ns
+        WHERE o.candidate_number = h.candidate_number
             AND o.tid = h.tid
             AND o.ids <> h.ids
             AND (o.event_count, o.ids) > (h.event_count, h.ids)
@@ -68,28 +75,27 @@ owner AS (
 ),
 most AS (
     SELECT
-        r.trace_index, r.clock_key, r.shift_ns, sum(r.event_count) AS event_count,
+        r.candidate_number, sum(r.event_count) AS event_count,
         coalesce(max(r.event_count) FILTER (WHERE o.tid IS NOT NULL), 0) AS agreeing_count,
         sum(r.unknown_count) AS unknown_count
     FROM ran AS r
     LEFT JOIN owner AS o
-        ON r.trace_index = o.trace_index
-        AND r.clock_key = o.clock_key
-        AND r.shift_ns = o.shift_ns
+        ON r.candidate_number = o.candidate_number
         AND r.tid = o.tid
         AND r.ids = o.ids
         AND r.life IS NOT DISTINCT FROM o.life
-    GROUP BY r.trace_index, r.clock_key, r.shift_ns, r.thread_index, r.life
+    GROUP BY r.candidate_number, r.thread_index, r.life
 ),
 agreement AS (
     SELECT
-        trace_index, clock_key, shift_ns,
+        candidate_number,
         sum(event_count)::BIGINT AS event_count, sum(agreeing_count)::BIGINT AS agreeing_count,
         sum(unknown_count)::BIGINT AS unknown_count
     FROM most
     GROUP BY ALL
 )
 SELECT
+    c.candidate_number,
     c.trace_index,
     c.clock_key,
     c.shift_ns,
@@ -103,7 +109,7 @@ SELECT
     ) AS is_joined,
     c.has_cpus
 FROM staging.schedule_candidate AS c
-LEFT JOIN agreement AS a USING (trace_index, clock_key, shift_ns)
+LEFT JOIN agreement AS a ON c.candidate_number = a.candidate_number
 -- A few events agree with a wrong clock, too.
 QUALIFY row_number() OVER (
     PARTITION BY c.trace_index

@@ -4,6 +4,7 @@
 --     from the epoch.
 -- grain: one row per kernel trace, clock of a ROS process, and shift
 -- when: raw.sched_switch
+-- column: candidate_number BIGINT  Number of the row
 -- column: trace_index INTEGER  The kernel trace
 -- column: clock_key VARCHAR  The clock
 -- column: shift_ns BIGINT [ns]  What has to be added to its times
@@ -20,12 +21,20 @@ ros AS (
     WHERE domain IS DISTINCT FROM 'kernel'
     GROUP BY clock_key
 )
-SELECT DISTINCT
-    k.trace_index,
-    r.clock_key,
-    CASE WHEN k.clock_key = r.clock_key OR s.is_of_epoch THEN 0
-        ELSE r.clock_origin_ns - k.clock_origin_ns END AS shift_ns,
-    k.has_cpus
-FROM kernel AS k
-JOIN ros AS r ON k.clock_key = r.clock_key OR k.clock_key NOT IN (SELECT clock_key FROM ros)
-CROSS JOIN (VALUES (false), (true)) AS s (is_of_epoch)
+SELECT
+    row_number() OVER (ORDER BY trace_index, clock_key, shift_ns) AS candidate_number,
+    trace_index,
+    clock_key,
+    shift_ns,
+    has_cpus
+FROM (
+    SELECT DISTINCT
+        k.trace_index,
+        r.clock_key,
+        CASE WHEN k.clock_key = r.clock_key OR s.is_of_epoch THEN 0
+            ELSE r.clock_origin_ns - k.clock_origin_ns END AS shift_ns,
+        k.has_cpus
+    FROM kernel AS k
+    JOIN ros AS r ON k.clock_key = r.clock_key OR k.clock_key NOT IN (SELECT clock_key FROM ros)
+    CROSS JOIN (VALUES (false), (true)) AS s (is_of_epoch)
+)

@@ -42,16 +42,17 @@ step AS (
     FROM staging.thread_switch
     WINDOW thread AS (PARTITION BY thread_id, tid ORDER BY at_ns, event_id)
 ),
--- A waking while the thread runs is of the switch that follows.
+-- A waking while the thread runs is of the switch that follows. Two kernel traces of a host have
+-- the same wakings and switches: the waking counts whose waker is known, after the last switch.
 waking AS (
     SELECT
         k.thread_id,
         k.tid,
         w.number + CASE WHEN w.is_on THEN 1 ELSE 0 END AS number,
-        min_by(k.event_id, k.at_ns) AS event_id,
+        min_by(k.event_id, (k.at_ns, k.waker_tid IS NULL, k.event_id)) AS event_id,
         min(k.at_ns) AS at_ns
     FROM staging.thread_waking AS k
-    ASOF LEFT JOIN step AS w
+    ASOF LEFT JOIN (SELECT * FROM step WHERE next_ns IS DISTINCT FROM at_ns) AS w
         ON k.thread_id = w.thread_id AND k.tid = w.tid AND k.at_ns >= w.at_ns
     GROUP BY ALL
 ),

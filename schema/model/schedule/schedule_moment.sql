@@ -4,32 +4,31 @@
 --     was not recorded, and what ran is not known.
 -- grain: one row per event and candidate that covers it
 -- when: staging.schedule_candidate
--- column: trace_index INTEGER  The kernel trace
--- column: clock_key VARCHAR  The clock that it may be of
--- column: shift_ns BIGINT [ns]  What is added to its times then
+-- column: candidate_number BIGINT  The candidate
 -- column: event_id BIGINT  The event
 -- column: thread_index INTEGER  Its thread
 -- column: at_ns BIGINT [epoch ns]  When, as the kernel trace would have it
 -- column: tid INTEGER  What left its CPU at the next switch
 -- column: contradiction_id BIGINT [event order]  The next switch, if it contradicts the one before
 SELECT
-    e.trace_index, e.clock_key, e.shift_ns, e.event_id, e.thread_index, e.at_ns, w.tid,
-    w.contradiction_id
+    e.candidate_number, e.event_id, e.thread_index, e.at_ns, w.tid, w.contradiction_id
 FROM (
+    -- Few and narrow columns here and below: all events and all switches are sorted.
     SELECT
-        c.trace_index, c.clock_key, c.shift_ns, v.event_id, v.thread_index, v.cpu_id,
+        c.candidate_number, p.number AS cpu_number, v.event_id, v.thread_index,
         v.ts_ns - c.shift_ns AS at_ns
     FROM staging.event AS v
     JOIN staging.source AS s ON v.trace_index = s.trace_index
     JOIN staging.schedule_candidate AS c ON s.clock_key = c.clock_key
+    JOIN staging.cpu_schedule AS p ON c.trace_index = p.trace_index AND v.cpu_id = p.cpu
 ) AS e
 ASOF JOIN (
-    -- Few and narrow columns: all switches are sorted.
     SELECT
-        trace_index, cpu_id, ts_ns,
-        CASE WHEN switch_number > 0 THEN prev_tid END AS tid,
-        CASE WHEN run_start_ns IS NULL THEN event_id END AS contradiction_id
-    FROM raw.sched_switch
+        p.number AS cpu_number, w.ts_ns,
+        CASE WHEN w.switch_number > 0 THEN w.prev_tid END AS tid,
+        CASE WHEN w.run_start_ns IS NULL THEN w.event_id END AS contradiction_id
+    FROM raw.sched_switch AS w
+    JOIN staging.cpu_schedule AS p ON w.trace_index = p.trace_index AND w.cpu_id = p.cpu
 ) AS w
-    ON e.trace_index = w.trace_index AND e.cpu_id = w.cpu_id AND e.at_ns < w.ts_ns
+    ON e.cpu_number = w.cpu_number AND e.at_ns < w.ts_ns
 WHERE w.tid IS NOT NULL

@@ -7,7 +7,7 @@
 -- column: start_ns BIGINT [epoch ns]  Begin
 -- column: end_ns BIGINT [epoch ns]  End
 SELECT
-    r.number AS state_number, i.kind, i.start_ns + s.shift_ns AS start_ns,
+    r.number AS state_number, i.kind::VARCHAR AS kind, i.start_ns + s.shift_ns AS start_ns,
     i.end_ns + s.shift_ns AS end_ns
 FROM raw.interrupt AS i
 JOIN staging.schedule AS s ON i.trace_index = s.trace_index

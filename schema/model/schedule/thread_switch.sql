@@ -15,7 +15,7 @@
 --     at this time
 -- column: priority INTEGER  Its priority
 -- column: prev_state BIGINT  State in which it left the CPU, as the kernel has it
-WITH switch AS (
+WITH switch AS NOT MATERIALIZED (
     SELECT
         w.trace_index, w.event_id, w.ts_ns + s.shift_ns AS at_ns, s.clock_key, w.cpu_id AS cpu,
         w.prev_tid, w.prev_state, w.next_tid, s.shift_ns,
@@ -57,10 +57,10 @@ JOIN staging.thread_tid AS t
     AND w.at_ns < t.until_ns
 UNION ALL
 SELECT
-    t.thread_id, t.tid, m.trace_index, min(m.event_id), min(m.at_ns) + m.shift_ns, w.cpu, true,
-    u.since_ns + m.shift_ns, w.prev_priority, NULL
+    t.thread_id, t.tid, s.trace_index, min(m.event_id), min(m.at_ns) + s.shift_ns, w.cpu, true,
+    u.since_ns + s.shift_ns, w.prev_priority, NULL
 FROM staging.schedule_moment AS m
-JOIN staging.schedule AS s USING (trace_index, clock_key, shift_ns)
+JOIN staging.schedule AS s ON m.candidate_number = s.candidate_number
 JOIN switch AS w ON m.contradiction_id = w.event_id
 JOIN unseen AS u ON m.contradiction_id = u.event_id
 JOIN staging.context AS x
@@ -68,11 +68,11 @@ JOIN staging.context AS x
     AND m.event_id >= x.from_event_id
     AND m.event_id < x.until_event_id
 JOIN staging.thread_tid AS t
-    ON m.clock_key = t.clock_key
+    ON s.clock_key = t.clock_key
     AND m.tid = t.tid
     AND x.thread_id = t.thread_id
     AND w.at_ns >= t.from_ns
     AND w.at_ns < t.until_ns
 GROUP BY
-    t.thread_id, t.tid, m.trace_index, m.contradiction_id, m.shift_ns, w.cpu, u.since_ns,
+    t.thread_id, t.tid, s.trace_index, m.contradiction_id, s.shift_ns, w.cpu, u.since_ns,
     w.prev_priority

@@ -14,9 +14,9 @@
 WITH ran AS (
     SELECT
         x.thread_id, m.tid, count(*) AS event_count,
-        min(m.at_ns + m.shift_ns) AS first_ns, max(m.at_ns + m.shift_ns) AS last_ns
+        min(m.at_ns + s.shift_ns) AS first_ns, max(m.at_ns + s.shift_ns) AS last_ns
     FROM staging.schedule_moment AS m
-    JOIN staging.schedule AS s USING (trace_index, clock_key, shift_ns)
+    JOIN staging.schedule AS s ON m.candidate_number = s.candidate_number
     JOIN staging.context AS x
         ON m.thread_index = x.thread_index
         AND m.event_id >= x.from_event_id
