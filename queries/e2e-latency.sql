@@ -55,6 +55,7 @@
 -- brief: path, median_ns, p99_ns, max_ns, reached, lost, loss_affected, dropped, roots, p95_ns,
 --     superseded, no_output, reasons, not_connected, unknown, cut_by_recording, mean_ns, min_ns,
 --     pairs, stored
+-- answer: roots
 -- note: clocks
 WITH flow AS (
     SELECT
