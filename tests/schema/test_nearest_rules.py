@@ -892,8 +892,17 @@ def test_where_no_drift_is_known_before_a_jump_what_was_just_missed_counts(
     publish(rules, 1, early - 5 * MILLISECOND, early - 5 * MILLISECOND + 10 * MICROSECOND)
     publish(rules, 2, early, early + 10 * MICROSECOND)
     publish(rules, 3, stamp + back - 1, stamp + back + 10 * MICROSECOND)
-    take(rules, stamp)
-    assert nearest(rules)[stamp] == ((3, 1) if is_told else (None, 1))
+    # Of another message, and of another topic, nothing was missed.
+    publish(rules, 4, SECOND + SECOND // 2, SECOND + SECOND // 2 + 10 * MICROSECOND)
+    other = SECOND + SECOND // 2 - back + 1
+    publish(rules, 5, stamp + back - 1, stamp + back + 10 * MICROSECOND, "/b")
+    take(rules, stamp, other)
+    take(rules, stamp, topic="/b")
+    rows = rules.execute(
+        "SELECT topic_name, source_timestamp_ns, publication_id FROM derive.nearest_message(1)"
+    ).fetchall()
+    expected = {("/a", stamp, 3 if is_told else None), ("/a", other, 4), ("/b", stamp, 5)}
+    assert set(rows) == expected
 
 
 def test_what_a_message_missed_before_a_jump_may_be_its_own_behind(

@@ -154,11 +154,9 @@ looked_up AS MATERIALIZED (
     SELECT
         m.topic_name, m.publisher_id, m.source_timestamp_ns, m.only_subscription_id,
         p.publication_id, p.clock_id, p.goes_on, p.side,
-        p.is_crowded OR p.wander_ns > 0 AND coalesce(
-            least(
-                m.source_timestamp_ns - lag(m.source_timestamp_ns) OVER of_publication,
-                lead(m.source_timestamp_ns) OVER of_publication - m.source_timestamp_ns
-            ) <= 2 * p.wander_ns,
+        p.is_crowded OR coalesce(
+            lead(m.source_timestamp_ns) OVER of_publication - m.source_timestamp_ns
+            <= 2 * p.wander_ns,
             false
         ) AS is_crowded,
         m.source_timestamp_ns - p.opens_ns AS delay_ns,
@@ -191,9 +189,7 @@ within AS MATERIALIZED (
     WHERE is_within
 ),
 missed AS MATERIALIZED (
-    SELECT DISTINCT
-        topic_name, source_timestamp_ns, only_subscription_id,
-        missed_publication_id AS publication_id
+    SELECT DISTINCT topic_name, source_timestamp_ns, missed_publication_id AS publication_id
     FROM looked_up
     WHERE NOT is_within AND missed_publication_id IS NOT NULL
 ),
@@ -352,7 +348,6 @@ matched AS (
             FROM missed AS m
             WHERE m.topic_name = left_over.topic_name
                 AND m.source_timestamp_ns = left_over.source_timestamp_ns
-                AND m.only_subscription_id IS NOT DISTINCT FROM left_over.only_subscription_id
                 AND m.publication_id <> left_over.publication_id
         ) AS is_rivalled
     FROM left_over
