@@ -870,6 +870,15 @@ def test_nor_are_bursts_of_messages(
     assert nearest(rules)[stamp] == (((1 if sign > 0 else 2), 1) if is_told else (None, 1))
 
 
+def test_but_those_of_two_subscriptions_are_no_burst(rules: duckdb.DuckDBPyConnection) -> None:
+    clock(rules, (0, 100, 0))
+    rules.execute("UPDATE store.stamp_clock SET is_sharp = false")
+    publish(rules, 1, 0, MILLISECOND)
+    take_alone(rules, 5, 10_000)
+    take_alone(rules, 6, 20_000)
+    assert nearest(rules) == {10_000: (1, 1), 20_000: (1, 1)}
+
+
 @pytest.mark.parametrize(
     ("missed", "is_sharp", "is_told"),
     [

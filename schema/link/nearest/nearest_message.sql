@@ -97,8 +97,8 @@ published AS MATERIALIZED (
         next_event_ns + then_ns AS closes_ns,
         next_event_ns IS NOT NULL AND NOT has_break AS goes_on,
         wander_ns,
-        lead(publication_id) OVER of_thread AS next_publication_id,
-        lead(written_ns + then_ns) OVER of_thread AS next_opens_ns,
+        lead(publication_id) OVER of_publisher AS next_publication_id,
+        lead(written_ns + then_ns) OVER of_publisher AS next_opens_ns,
         wander_ns > 0 AND coalesce(
             least(
                 written_ns - lag(written_ns) OVER on_topic,
@@ -109,8 +109,8 @@ published AS MATERIALIZED (
     FROM sided
     WINDOW
         on_topic AS (PARTITION BY side, topic_name ORDER BY written_ns, publication_id),
-        of_thread AS (
-            PARTITION BY side, publisher_id, thread_id ORDER BY written_ns, publication_id
+        of_publisher AS (
+            PARTITION BY side, publisher_id ORDER BY written_ns, publication_id
         )
 ),
 -- The times in which the clocks stood in one relation: from one jump to the next.
