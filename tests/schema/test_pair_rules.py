@@ -130,7 +130,7 @@ def test_each_clock_has_its_own_time(rules: duckdb.DuckDBPyConnection) -> None:
         "INSERT INTO message (topic_name, source_timestamp_ns, clock_id, taken_ns) VALUES "
         "('/a', 500, 3, 200500), ('/a', 100000500, 3, 180200500), ('/a', 600, 4, $later), "
         "('/b', $earlier, 3, 200500), ('/a', $strange, 3, 50200500), "
-        "('/a', $strange, 3, 150200500)",
+        "('/a', $strange, 3, 150200500), ('/a', $strange + 7, 4, $later + 50000000)",
         {"later": HOUR_NS, "earlier": 500 - HOUR_NS, "strange": strange},
     )
     found = pairs(rules, "written_ns + greatest_ns AS stamp_ns, written_ns, clock_id")
@@ -143,6 +143,7 @@ def test_each_clock_has_its_own_time(rules: duckdb.DuckDBPyConnection) -> None:
         (600, 1): [*range(25)],
         (100_000_500, 1): [*range(76, 125), *range(156, 200)],
         (strange, 1): [*range(26, 75)],
+        (strange + 7, 1): [*range(26, 75)],
     }
 
 
