@@ -1,10 +1,10 @@
 -- name: critical-path
 -- title: What the slowest flows waited for
--- description: The slowest flows, piece by piece; msgflow flow --why shows that of one message.
---     Waits are replaced by what they waited for, as far as the trace shows; where the kernel was
---     traced, what a thread did by its states (docs/scheduling.md). The pieces add up to the
---     latency. Unless detail is full, pieces below 1 % of it are summed up as 'rest'. Flows with a
---     message that was stored until its subscription existed come last.
+-- description: The slowest flows, piece by piece; of one message: msgflow flow --why. Waits are
+--     replaced by what they waited for, as far as the trace shows; where the kernel was traced,
+--     what a thread did by its states (docs/scheduling.md). The pieces add up to the latency.
+--     Unless detail is full, those below 1 % are summed up as 'rest'. Flows with a stored message
+--     come last.
 -- grain: one row per flow and piece, node or activity
 -- param: from VARCHAR = NULL  Topics or nodes where flows start
 -- param: to VARCHAR = NULL  Topics or nodes where flows end, likewise

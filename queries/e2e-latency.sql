@@ -2,10 +2,10 @@
 -- title: End-to-end latency by path
 -- description: How long it took from the start of a flow (the callback of the timer that published,
 --     or the publication itself) to its end (the end of the callback at the end of the path), for
---     every path of the computation graph. Every root is counted once: reached the end of the path,
---     superseded by a newer input before it was used, dropped (a queue was full), lost on the way,
---     no output (a node did not publish), not connected, cut by the recording (too close to its
---     start or end to know), or unknown.
+--     every path of the computation graph. Every root is counted once: reached the end,
+--     superseded by a newer input, dropped (a queue was full), lost on the way, no output (a node
+--     did not publish), not connected, cut by the recording (too close to its start or end to
+--     know), or unknown.
 -- grain: one row per path
 -- variant: measure VARCHAR {latency|age|reaction|response} = 'latency'  What is measured: from
 --     the start of a flow to its end, how old the data behind an output are, how long at most
@@ -18,7 +18,7 @@
 --     stops it
 -- param: case VARCHAR {first|last|newest|every_pair} = 'first'  Arrivals that count: the
 --     first or last of each root, that of the newest root, or all
--- param: max_depth BIGINT {1..} = 32     Longest path, in topics
+-- param: max_depth BIGINT {1..} = 32     Longest path
 -- param: max_paths BIGINT {1..} = 1000   Most paths, shortest first, and chains of a length
 -- column: run_id BIGINT            Run
 -- column: roots BIGINT             Flows that began in the time window
