@@ -92,12 +92,8 @@ def test_a_switch_ends_an_interrupt(system: RosSystem, analyse: Analyse) -> None
     ) == [("thread", HOG)]
 
 
-@pytest.mark.parametrize(("left", "waker"), [(HOG, HOG), (TIMER, None)])
-def test_a_waker_that_the_next_switch_contradicts_is_not_known(
-    system: RosSystem, analyse: Analyse, left: int, waker: int | None
-) -> None:
-    """Another thread than the one that got the CPU leaves it: either woke the thread."""
-    kernel = Kernel(system)
+def wake_from_the_cpu_of_the_hog(kernel: Kernel, left: int) -> None:
+    """Thread 41 is woken there; `left` leaves that CPU next."""
     kernel.switch(900, 0, 41)
     kernel.switch(900, 0, HOG, cpu=1)
     kernel.switch(1200, 41, 0, BLOCKED)
@@ -105,6 +101,14 @@ def test_a_waker_that_the_next_switch_contradicts_is_not_known(
     kernel.switch(1500, 0, 41)
     kernel.switch(1600, left, 0, BLOCKED, cpu=1)
     kernel.switch(2000, 41, 0, BLOCKED)
+
+
+@pytest.mark.parametrize(("left", "waker"), [(HOG, HOG), (TIMER, None)])
+def test_a_waker_that_the_next_switch_contradicts_is_not_known(
+    system: RosSystem, analyse: Analyse, left: int, waker: int | None
+) -> None:
+    """Another thread than the one that got the CPU leaves it: either woke the thread."""
+    wake_from_the_cpu_of_the_hog(Kernel(system), left)
     call(system, 1000, 1800)
     kind = None if waker is None else "thread"
     assert analyse(system).rows(
@@ -118,14 +122,7 @@ def test_of_two_kernel_traces_of_a_schedule_the_one_that_knows_the_waker_counts(
 ) -> None:
     """The first one contradicts itself on the CPU of the waker."""
     for trace, left in ((KERNEL, TIMER), (KERNEL + 1, HOG)):
-        kernel = Kernel(system, trace)
-        kernel.switch(900, 0, 41)
-        kernel.switch(900, 0, HOG, cpu=1)
-        kernel.switch(1200, 41, 0, BLOCKED)
-        kernel.wake(1400, 41, cpu=1)
-        kernel.switch(1500, 0, 41)
-        kernel.switch(1600, left, 0, BLOCKED, cpu=1)
-        kernel.switch(2000, 41, 0, BLOCKED)
+        wake_from_the_cpu_of_the_hog(Kernel(system, trace), left)
     call(system, 1000, 1800)
     assert analyse(system).rows(
         "SELECT start_ns, end_ns, state, waker_kind, o.tid FROM thread_state AS s "

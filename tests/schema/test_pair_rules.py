@@ -147,6 +147,22 @@ def test_each_clock_has_its_own_time(rules: duckdb.DuckDBPyConnection) -> None:
     }
 
 
+def test_a_stamp_from_before_the_first_publication(rules: duckdb.DuckDBPyConnection) -> None:
+    """The clock was set back, but other topics of it were published by then."""
+    for number, (topic, since) in enumerate((("/a", 0), ("/b", 100)), 1):
+        rules.execute(
+            "INSERT INTO published (topic_name, publisher_id, publication_id, written_ns) "
+            "SELECT $topic, $number, n, n * 1000000 FROM range($since, 200) AS r(n)",
+            {"number": number, "topic": topic, "since": since},
+        )
+    rules.execute(
+        "INSERT INTO message (topic_name, source_timestamp_ns, taken_ns) "
+        "VALUES ('/b', 50000000, 150200000)"
+    )
+    found = pairs(rules, "written_ns // 1000000")
+    assert [place for (place,) in found] == [*range(126, 151)]
+
+
 def test_the_time_that_a_publication_has(rules: duckdb.DuckDBPyConnection) -> None:
     """Until its thread goes on, or the next one is written; 5 ms where neither is known."""
     publish(

@@ -1,15 +1,15 @@
 -- name: derive.nearest_message
 -- kind: macro
--- description: Messages matched with publications that carry no stamp. A message was stamped
---     after its publication was written, and before the publishing thread went on; all writes on
---     the topic that go on at that moment come into question. A message has one publication and a
+-- description: Messages matched with publications that carry no stamp. A message was stamped after
+--     its publication was written, and before the publishing thread went on; all writes on the
+--     topic that go on at that moment come into question. A message has one publication and a
 --     publication one message, the first. Where a publisher writes for much of the time, or what
 --     the thread did next is not known, or publishers are not traced, the delays that are usual
 --     bound the search. A message has no publication where that would be a guess: where several
---     come into question; where two messages may both be of one publication; in a burst, if the
---     clock is not known sharply; if it was stamped sooner after a publication than is usual, and
---     another publication may be lost. Nor has it one where the difference of the clocks is not
---     known, or explains less than half of the messages.
+--     come into question; where two messages may both be of one publication; in a burst, or where
+--     it just missed another publication, if the clock is not known sharply; if it was stamped
+--     sooner after a publication than is usual, and another publication may be lost. Nor has it one
+--     where the difference of the clocks is not known, or explains less than half of the messages.
 -- grain: one row per message that has, or might have, a publication
 -- param: only_run BIGINT  Run to look at
 -- when: store.stamp_clock

@@ -121,7 +121,7 @@ sampled AS (
 wanted AS (
     SELECT
         run_id, clock_id, publisher_id, source_timestamp_ns, is_taken_here, start_ns, stretch_ns,
-        stamp_position AS latest_position,
+        stamp_position,
         unnest(
             list_filter(
                 list_distinct(
@@ -141,7 +141,8 @@ wanted AS (
         SELECT
             n.run_id, n.clock_id, n.publisher_id, n.source_timestamp_ns, n.is_taken_here,
             n.start_ns, n.stretch_ns, n.near_position,
-            CASE WHEN n.is_in_time THEN p.position ELSE n.near_position END AS stamp_position
+            coalesce(CASE WHEN n.is_in_time THEN p.position END, n.near_position)
+                AS stamp_position
         FROM (
             SELECT
                 s.run_id, s.clock_id, s.publisher_id, s.source_timestamp_ns, s.is_taken_here,
@@ -157,7 +158,7 @@ wanted AS (
 paired AS (
     SELECT
         w.run_id, w.clock_id, w.publisher_id, w.start_ns, w.stretch_ns, w.is_taken_here,
-        w.position = w.latest_position AS is_latest,
+        w.position = w.stamp_position AS is_latest,
         p.written_ns,
         (p.written_ns - w.start_ns) // w.stretch_ns AS stretch,
         w.source_timestamp_ns - p.written_ns AS greatest_ns,
