@@ -112,7 +112,12 @@ def compare_simulated(
         for name in ("drops", "orphans"):
             rows += connection.execute((_SQL / f"{name}.sql").read_text()).fetchall()
         drops = [Drop(*row) for row in rows]
-        excused = sum(drop.messages for drop in drops if drop.undecided == EXCUSE)
+        # What waits to the end meets every hole behind it, however many there are.
+        excused = sum(
+            drop.messages
+            for drop in drops
+            if drop.undecided == EXCUSE and drop.truth != "pending_at_end"
+        )
         return [*scores, _excused(connection, excused)], drops
 
 

@@ -20,10 +20,13 @@ from msgflow.sql.interrupt import noted_interrupts
 from msgflow.sql.quoting import literal
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import duckdb
 
     from msgflow.clocks import ClockSync
-    from msgflow.links import LinksFile
+    from msgflow.errors import UsageError
+    from msgflow.links import DeclaredLink, LinksFile
     from msgflow.trace import TraceSet
 
 
@@ -55,6 +58,7 @@ def ingest_again(
     *,
     links: LinksFile | None,
     clocks: ClockSync,
+    leave_out: Callable[[DeclaredLink, UsageError], None],
 ) -> None:
     """Put the traces in place of all runs, made by the SQL of every ingest.
 
@@ -67,9 +71,10 @@ def ingest_again(
         name: of the run.
         links: indirect links to declare.
         clocks: how clocks of several hosts are brought together.
+        leave_out: gets links that do not fit the traces, with what is wrong.
 
     Raises:
-        UsageError: the links or clocks do not fit the traces.
+        UsageError: the topics of the links, or the clocks, do not fit the traces.
         KeyboardInterrupt: Ctrl-C came.
     """
     with noted_interrupts() as interrupts:
@@ -88,30 +93,41 @@ def ingest_again(
             model.build(con, keep=True, findings=False)
             with transaction(con):
                 run_id, _ = store_run(con, name, name, loaded)
-                _derive(con, run_id, links, clocks)
+                _derive(con, run_id, links, clocks, leave_out)
         finally:
             empty(con, "raw", "staging")
 
 
-def link_again(con: duckdb.DuckDBPyConnection, *, links: LinksFile, clocks: ClockSync) -> None:
+def link_again(
+    con: duckdb.DuckDBPyConnection,
+    *,
+    links: LinksFile,
+    clocks: ClockSync,
+    leave_out: Callable[[DeclaredLink, UsageError], None],
+) -> None:
     """Derive the links of the run anew, with other declared ones.
 
     Args:
         con: from `database_in_memory`, with a run.
         links: indirect links to declare, in place of those before.
         clocks: how clocks of several hosts are brought together.
+        leave_out: gets links that do not fit the run, with what is wrong.
 
     Raises:
-        UsageError: the links do not fit the run.
+        UsageError: the topics of the links, or the clocks, do not fit the run.
     """
     with transaction(con):
         ((run_id,),) = con.execute("SELECT run_id FROM store.run").fetchall()
-        _derive(con, run_id, links, clocks)
+        _derive(con, run_id, links, clocks, leave_out)
 
 
 def _derive(
-    con: duckdb.DuckDBPyConnection, run_id: int, links: LinksFile | None, clocks: ClockSync
+    con: duckdb.DuckDBPyConnection,
+    run_id: int,
+    links: LinksFile | None,
+    clocks: ClockSync,
+    leave_out: Callable[[DeclaredLink, UsageError], None],
 ) -> None:
     if links is not None:
-        declare_links(con, run_id, links)
+        declare_links(con, run_id, links, leave_out)
     derive(con, run_id, synchronise=lambda: set_clocks(con, run_id, clocks), findings=False)

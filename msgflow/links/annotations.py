@@ -12,11 +12,13 @@ from msgflow.links.topics import declare_topics
 from msgflow.sql.statement import internal_sql
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
     import duckdb
 
-    from msgflow.links.file import LinksFile
+    from msgflow.errors import UsageError
+    from msgflow.links.file import DeclaredLink, LinksFile
     from msgflow.links.matching import MatchedLink
     from msgflow.run.choice import Run
 
@@ -73,11 +75,20 @@ def apply_links(
 
 
 def declare_links(
-    con: duckdb.DuckDBPyConnection, run_id: int, file: LinksFile
+    con: duckdb.DuckDBPyConnection,
+    run_id: int,
+    file: LinksFile,
+    leave_out: Callable[[DeclaredLink, UsageError], None] | None = None,
 ) -> tuple[int, int, int]:
     """Name topics, and store links as the annotations of a run, inside the open transaction.
 
     The caller derives the links between messages afterwards.
+
+    Args:
+        con: to the database.
+        run_id: the run.
+        file: the links.
+        leave_out: gets links that do not fit the run, with the error; None: that is raised.
 
     Returns:
         The number of annotations, of those that the trace declares, too, and of named topics.
@@ -86,7 +97,7 @@ def declare_links(
         UsageError: a link that does not fit the run.
     """
     topic_count = declare_topics(con, run_id, file)
-    matched = match_links(con, run_id, file)
+    matched = match_links(con, run_id, file, leave_out)
     # Before we delete any: one transaction cannot use a key twice.
     first = int(
         con.execute("SELECT coalesce(max(annotation_id), 0) + 1 FROM store.annotation").fetchall()[

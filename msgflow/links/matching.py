@@ -8,11 +8,12 @@ from graphlib import CycleError, TopologicalSorter
 from itertools import pairwise
 from typing import TYPE_CHECKING, NoReturn
 
+from msgflow.errors import UsageError
 from msgflow.links.file import INDIRECT_KINDS, SYNCHRONOUS_KINDS
 from msgflow.name_suggestions import meant_or, nearest
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     import duckdb
 
@@ -78,9 +79,18 @@ class MatchedLink:
 
 
 def match_links(
-    con: duckdb.DuckDBPyConnection, run_id: int, file: LinksFile
+    con: duckdb.DuckDBPyConnection,
+    run_id: int,
+    file: LinksFile,
+    leave_out: Callable[[DeclaredLink, UsageError], None] | None = None,
 ) -> tuple[MatchedLink, ...]:
     """Return the links of a file with the nodes and topics of a run.
+
+    Args:
+        con: to the database.
+        run_id: the run.
+        file: the links.
+        leave_out: gets links that do not fit the run, with the error; None: that is raised.
 
     Raises:
         UsageError: a node or topic that the run does not have, a name that means several nodes, an
@@ -88,9 +98,16 @@ def match_links(
             that form a cycle.
     """
     nodes = _read_nodes(con, run_id)
-    matched = tuple(found for link in file.links for found in _match(file, link, nodes))
+    matched: list[MatchedLink] = []
+    for link in file.links:
+        try:
+            matched += _match(file, link, nodes)
+        except UsageError as error:
+            if leave_out is None:
+                raise
+            leave_out(link, error)
     _refuse_cycles(file, matched)
-    return matched
+    return tuple(matched)
 
 
 def _read_nodes(con: duckdb.DuckDBPyConnection, run_id: int) -> tuple[Node, ...]:

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 # A woken thread sometimes finds itself on another CPU.
 _MIGRATION = 1 / 128
+# No thread changes its CPU and changes back faster than that.
+_LEAST_STAY_NS = 20_000
 _ALIGNMENT = 16
 # From the moment in which a thread gives a mutex away until it sleeps, and from that in which it
 # goes on until it asks for the mutex again.
@@ -202,6 +204,7 @@ class Thread:
         self.description = process.description
         self.priority = process.description.priority
         self.computing = (0, 0)
+        self._moved_ns = -_LEAST_STAY_NS
         self._steps: Steps | None = None
         # A step that was planned before another one replaced it is recognised by this.
         self._plan = 0
@@ -220,10 +223,16 @@ class Thread:
         cpu = self.cpu
         if self.scheduler.random() < _MIGRATION:
             cpu = (cpu + 1) % len(free_at)
+        if time < self._moved_ns + _LEAST_STAY_NS:
+            if free_at[self.cpu] > time:
+                return free_at[self.cpu]
+            cpu = self.cpu
         if free_at[cpu] > time:
             cpu = min(range(len(free_at)), key=free_at.__getitem__)
             if free_at[cpu] > time:
                 return free_at[cpu]
+        if cpu != self.cpu:
+            self._moved_ns = time
         self.move(cpu)
         return 0
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from msgflow.query.catalogue import load_query
@@ -48,6 +49,26 @@ _LEAST_SHARE = 0.2
 _MOST_PIECES = 2
 
 
+@dataclass(frozen=True)
+class _Told:
+    """What has been told of a requirement that is not met: the worst case, of the time until when.
+
+    A window has its worst case for as long as it is in it. Those that are the worst when it has
+    passed are no news: only one that begins later, or is worse, is.
+    """
+
+    worst_ns: int
+    until_ns: int
+
+    @classmethod
+    def of(cls, worst_ns: int | None, until_ns: int, before: _Told | None) -> _Told:
+        return cls(max(worst_ns or 0, 0 if before is None else before.worst_ns), until_ns)
+
+    def is_surpassed(self, worst_ns: int | None, at_ns: int | None) -> bool:
+        is_later = at_ns is not None and at_ns >= self.until_ns
+        return is_later or (worst_ns or 0) > self.worst_ns
+
+
 class Alarm:
     """The targets, and which of them were met since the begin."""
 
@@ -69,7 +90,7 @@ class Alarm:
         self._say = note
         # By (target, metric, condition).
         self._verdicts: dict[tuple[str, str, str], Verdict] = {}
-        self._failing: set[tuple[Any, ...]] = set()
+        self._failing: dict[tuple[Any, ...], _Told] = {}
         self._silent: set[tuple[str, str, str]] = set()
 
     def count(self, verdict: Verdict) -> int:
@@ -98,17 +119,16 @@ class Alarm:
         part = Slice(start=window.start_ns, end=window.end_ns)
         rows = verify(con, self._targets, part, paths=self._paths).result.table.to_pylist()
         found = []
-        failing = set()
+        failing = {}
         for row in rows:
             self._note(row)
             if row["verdict"] != Verdict.FAILED:
                 continue
-            # The first window that shows a worst case says so; later ones stay silent.
-            names = ("target", "metric", "condition", "subject", "worst_at_ns")
-            key = tuple(row[name] for name in names)
-            failing.add(key)
-            if key not in self._failing:
+            key = tuple(row[name] for name in ("target", "metric", "condition", "subject", "path"))
+            told = self._failing.get(key)
+            if told is None or told.is_surpassed(row["worst_ns"], row["worst_at_ns"]):
                 found.append(self._violation(con, row, part, final_ns))
+            failing[key] = _Told.of(row["worst_ns"], window.end_ns, told)
         self._failing = failing
         self._note_silence(rows)
         return found, Counter(row["verdict"] for row in rows)

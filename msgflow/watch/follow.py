@@ -43,7 +43,7 @@ def watch_finished(directory: Path, watcher: Watcher) -> Iterator[WindowReport]:
         if chunk.source not in left:
             watcher.history.go_on_without(chunk.source)
         watcher.go_on()
-        if (report := watcher.final_report(is_live=False)) is not None:
+        if (report := watcher.report(is_live=False)) is not None:
             yield report
             watcher.keep_violation()
     yield from _last(watcher)
@@ -83,7 +83,7 @@ def watch_live(
         if is_last:
             yield from _last(watcher)
             return
-        if (report := watcher.final_report(is_live=True)) is None:
+        if (report := watcher.report(is_live=True)) is None:
             time.sleep(_BETWEEN_LOOKS)
             continue
         lag_s = report.lag_s or 0
@@ -106,6 +106,6 @@ def _last(watcher: Watcher) -> Iterator[WindowReport]:
     if watcher.history.is_empty:
         return
     watcher.history.add_border(is_last=True)
-    if (report := watcher.final_report(is_live=False, is_last=True)) is not None:
+    if (report := watcher.report(is_live=False, is_last=True)) is not None:
         yield report
         watcher.keep_violation()

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 # A window may be so much longer, and chunks so much shorter than a step: rotations are never on
 # time. Parts of the whole.
 _SLACK = 0.1
+# No message is waited for longer than so many windows: what is kept has an end.
+_MOST_WINDOWS = 2
 
 
 class History:
@@ -25,9 +27,12 @@ class History:
     reach from border to border, so that each moment belongs to a window once its last message can
     have arrived: at the next border, or later if messages have taken longer.
 
+    Where messages take longer than a step, the window up to the last border is shown meanwhile, and
+    a final one once in the length of a window.
+
     Attributes:
-        longest_ns: how long a message, or data that a node kept, was on the way at most; no longer
-            than a window.
+        behind_ns: how long something may come that belongs to a window, after its end.
+        before_ns: how much earlier something may have begun that belongs to a window.
         final_ns: the end of the last final window; None before the first.
     """
 
@@ -45,8 +50,10 @@ class History:
         self._borders: list[int] = []
         self._ends: dict[Path, int] = {}
         self._last_end_ns = 0
-        self.longest_ns = 0
+        self.behind_ns = 0
+        self.before_ns = 0
         self.final_ns: int | None = None
+        self._shown_ns = 0
 
     @property
     def is_empty(self) -> bool:
@@ -62,6 +69,11 @@ class History:
     def border_ns(self) -> int:
         """The last border."""
         return self._borders[-1]
+
+    @property
+    def last_step(self) -> Window:
+        """The time between the last two borders."""
+        return Window(self._borders[-2], self._borders[-1])
 
     @property
     def last_event_ns(self) -> int:
@@ -95,9 +107,16 @@ class History:
             # One whose chunks cannot be read has no end.
             self._ends.pop(source, None)
 
-    def note_longest(self, longest_ns: int) -> None:
-        """Note how long a message was on the way, which windows wait for: a window at the most."""
-        self.longest_ns = max(self.longest_ns, min(longest_ns, self._window_ns))
+    def note_longest(self, flow_ns: int, wait_ns: int) -> None:
+        """Note what the last report has shown; a longer time counts as two windows.
+
+        Args:
+            flow_ns: how long a message or a flow was on the way at most.
+            wait_ns: how long a node kept data at most.
+        """
+        most_ns = _MOST_WINDOWS * self._window_ns
+        self.behind_ns = min(flow_ns, most_ns)
+        self.before_ns = min(max(flow_ns, wait_ns), most_ns)
 
     def add_border(self, *, is_last: bool = False) -> None:
         """Make a border of the time that all hosts have reached, or of the end of all if it is."""
@@ -107,7 +126,21 @@ class History:
 
     def newest_window(self) -> Window:
         """Return the window up to the last border, whose last messages may be on the way."""
-        return self._window_to(self._borders[-1])
+        return Window(self._start_of(self._borders[-1]), self._borders[-1])
+
+    def next_window(self, *, is_last: bool = False) -> tuple[Window, bool] | None:
+        """Return the next window to show, and whether it is final; None if there is none yet.
+
+        Args:
+            is_last: nothing more comes.
+        """
+        final = self.final_window(is_last=is_last)
+        if final is not None and (is_last or self._is_timely(final)):
+            return final, True
+        # The window up to the border before the last could be final, but messages take longer.
+        if is_last or len(self._borders) < 3 or self._borders[-1] <= self._shown_ns:
+            return None
+        return self.newest_window(), False
 
     def final_window(self, *, is_last: bool = False) -> Window | None:
         """Return the window of which all is known; None if there is no further one.
@@ -117,12 +150,28 @@ class History:
         """
         if not self._borders:
             return None
-        complete_ns = self._borders[-1]
         ends = self._borders[1:] if is_last else self._borders[1:-1]
-        known = [end for end in ends if is_last or end <= complete_ns - self.longest_ns]
+        known = [end for end in ends if is_last or self._is_over(end)]
         if not known or (self.final_ns is not None and known[-1] <= self.final_ns):
             return None
         return self._window_to(known[-1])
+
+    def is_over(self, window: Window) -> bool:
+        """Whether nothing more can come of a window."""
+        return self._is_over(window.end_ns)
+
+    def note_shown(self, window: Window, *, is_final: bool) -> None:
+        """Note that a window has been shown: until the next border, no other one is."""
+        self._shown_ns = self._borders[-1]
+        if is_final:
+            self.final_ns = window.end_ns
+
+    def judged_window(self, window: Window) -> Window:
+        """Return a window to show with all that is not final behind and before it."""
+        start_ns = window.start_ns
+        if self.final_ns is not None:
+            start_ns = min(start_ns, self.final_ns)
+        return Window(start_ns, self._borders[-1])
 
     def traces(self, window: Window) -> KeptTraces:
         """Return what a window needs: itself, and what comes before and after."""
@@ -147,11 +196,23 @@ class History:
         self._borders = [border for border in self._borders if border >= reach]
         return passed
 
-    def _window_to(self, end_ns: int) -> Window:
-        """Return the window that ends at a border, and leaves out nothing since the last one."""
+    def _is_over(self, end_ns: int) -> bool:
+        return end_ns <= self._borders[-1] - self.behind_ns
+
+    def _is_timely(self, final: Window) -> bool:
+        if final.end_ns == self._borders[-2] or self.final_ns is None:
+            return True
+        return final.end_ns - self.final_ns >= self._window_ns * (1 - _SLACK)
+
+    def _start_of(self, end_ns: int) -> int:
+        """Return where the window that ends at a border begins: at a border, too."""
         before = [border for border in self._borders if border < end_ns]
         reached = [b for b in before if b >= end_ns - self._window_ns * (1 + _SLACK)]
-        start_ns = reached[0] if reached else before[-1]
+        return reached[0] if reached else before[-1]
+
+    def _window_to(self, end_ns: int) -> Window:
+        """Return the window that ends at a border, and leaves out nothing since the last one."""
+        start_ns = self._start_of(end_ns)
         # Windows as short as steps overlap in nothing.
         if self.final_ns is not None and (
             start_ns > self.final_ns or self._window_ns <= self._step_ns
@@ -162,7 +223,7 @@ class History:
     def _reach(self, window: Window) -> int:
         """Return the last border that is long enough before a window."""
         before = [b for b in self._borders if b < window.start_ns]
-        known = [b for b in before if b <= window.start_ns - self.longest_ns]
+        known = [b for b in before if b <= window.start_ns - self.before_ns]
         return max(known, default=0)
 
     def _needed(self, window: Window) -> list[KeptChunk]:

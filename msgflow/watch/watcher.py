@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
+from msgflow.clocks import ClockSync
 from msgflow.errors import TraceError, UsageError
 from msgflow.ingest.memory import database_in_memory, ingest_again, link_again
 from msgflow.run.window import Window
@@ -19,8 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from msgflow.clocks import ClockSync
-    from msgflow.links import LinksFile
+    from msgflow.links import DeclaredLink, LinksFile
     from msgflow.watch.alarm import Alarm
     from msgflow.watch.chunk import Chunk
     from msgflow.watch.flight_recorder import FlightRecorder
@@ -79,7 +80,7 @@ class Watcher:
         self._exporter = exporter
         self._database = database
         self.on_passed: Callable[[Path], None] | None = None
-        self._lacks_links = False
+        self._said: set[str] = set()
         self._clock_offset_ns = self._last_clock_offset_ns = _clock_offset_ns()
         self._answers = LearnedAnswers()
         self._violated: tuple[int, KeptTraces, list[Path], LinksFile | None, str | None] | None = (
@@ -119,20 +120,21 @@ class Watcher:
             # So much has been recorded before we came.
             self._forget(self.history.newest_window())
 
-    def final_report(self, *, is_live: bool, is_last: bool = False) -> WindowReport | None:
-        """Return the next window of which all is known; None if there is none yet.
+    def report(self, *, is_live: bool, is_last: bool = False) -> WindowReport | None:
+        """Return the next window; None if there is none yet.
 
         Args:
-            is_live: the recording goes on at this moment.
+            is_live: the recording goes on at this moment: where messages take longer than a step,
+                what is known so far is reported meanwhile.
             is_last: nothing more comes.
         """
-        window = self.history.final_window(is_last=is_last)
-        if window is None:
+        found = self.history.next_window(is_last=is_last)
+        if found is None:
             return None
-        report = self._report(window, is_final=True, is_live=is_live)
-        self.history.final_ns = window.end_ns
-        self._forget(window)
-        return report
+        window, may_be_final = found
+        if not may_be_final and not is_live:
+            return None
+        return self._report(window, may_be_final=may_be_final, is_live=is_live, is_last=is_last)
 
     def keep_violation(self) -> None:
         """Keep the chunks of the last report if it has a violation, once it has been told."""
@@ -150,33 +152,49 @@ class Watcher:
                 self.on_passed(path)
 
     def _ingest(self, traces: KeptTraces) -> tuple[LinksFile | None, str | None]:
-        """Ingest what a window needs; links of nodes that are not there yet are left out.
+        """Ingest what a window needs, without the links of nodes that are not there yet.
 
         Returns:
             The links that are declared in it, and a file of those of them that were learned from
             earlier windows; None if there are none.
         """
+        left: list[DeclaredLink] = []
+
+        def leave_out(link: DeclaredLink, error: UsageError) -> None:
+            left.append(link)
+            self._note_once(f"a link is left out for now: {error.message}")
+
+        ingest = partial(
+            ingest_again, self._con, traces, _RUN, links=self._links, leave_out=leave_out
+        )
+        clocks = self._clocks
         try:
-            ingest_again(self._con, traces, _RUN, links=self._links, clocks=self._clocks)
+            ingest(clocks=clocks)
         except UsageError as error:
-            if self._links is None:
+            if clocks.method != "file":
                 raise
-            if not self._lacks_links:
-                self._note(f"the declared links are left out for now: {error.message}")
-            self._lacks_links = True
-            ingest_again(self._con, traces, _RUN, links=None, clocks=self._clocks)
-        else:
-            self._lacks_links = False
-        links = None if self._lacks_links else self._links
+            # A host may come later.
+            self._note_once(f"clocks are not corrected for now: {error.message}")
+            clocks = ClockSync("none")
+            ingest(clocks=clocks)
         learned = self._answers.doubted(self._con)
-        if learned is None:
-            return links, None
-        try:
-            link_again(self._con, links=with_learned(links, learned), clocks=self._clocks)
-        except UsageError as error:
-            self._note(f"what earlier windows have shown is left out: {error.message}")
-            return links, None
-        return with_learned(links, learned), learned
+        links = self._links
+        if learned is not None:
+            both = with_learned(links, learned)
+            try:
+                link_again(self._con, links=both, clocks=clocks, leave_out=leave_out)
+                links = both
+            except UsageError as error:
+                self._note_once(f"what earlier windows have shown is left out: {error.message}")
+                learned = None
+        if links is not None:
+            links = replace(links, links=tuple(each for each in links.links if each not in left))
+        return links, learned
+
+    def _note_once(self, said: str) -> None:
+        if said not in self._said:
+            self._note(said)
+        self._said.add(said)
 
     def _lag_s(self) -> float:
         """Return how old the last event is; the tracer knows nothing of a clock that was set."""
@@ -192,29 +210,40 @@ class Watcher:
         now_ns = time.monotonic_ns() + self._clock_offset_ns
         return (now_ns - self.history.last_event_ns) / _SECOND_NS
 
-    def _report(self, window: Window, *, is_final: bool, is_live: bool) -> WindowReport:
-        traces = self.history.traces(window)
+    def _report(
+        self, window: Window, *, may_be_final: bool, is_live: bool, is_last: bool
+    ) -> WindowReport | None:
+        history = self.history
+        # What came after the window counts, too: an alarm must be early. So does what is not final
+        # before it: an alarm must miss nothing.
+        judged = history.judged_window(window)
+        traces = history.traces(judged)
         links, learned = self._ingest(traces)
-        report = report_of(self._con, window, is_final=is_final)
+        report = report_of(self._con, window, history.last_step)
+        history.note_longest(report.longest_flow_ns, report.longest_wait_ns)
+        is_final = may_be_final and (is_last or history.is_over(window))
+        if not is_final and not is_live:
+            return None
+        report = replace(report, is_final=is_final)
         if self._alarm is not None:
-            # What came after the window counts, too: an alarm must be early.
-            whole = Window(window.start_ns, self.history.border_ns)
-            found, verdicts = self._alarm.judge(self._con, whole, window.end_ns)
+            final_ns = window.end_ns if is_final else history.final_ns or 0
+            found, verdicts = self._alarm.judge(self._con, judged, final_ns)
             report = replace(report, violations=found, verdicts=verdicts)
-        if self._exporter is not None:
-            since_ns = self.history.final_ns
-            start_ns = window.start_ns if since_ns is None else since_ns
+        if self._exporter is not None and is_final:
+            start_ns = window.start_ns if history.final_ns is None else history.final_ns
             self._exporter.count(self._con, Window(start_ns, window.end_ns))
         if self._database is not None:
             self._database.offer(window.end_ns, traces, links)
         if report.violations:
-            paths = self.history.paths(window)
-            self._violated = (self.history.border_ns, traces, paths, links, learned)
-        self.history.note_longest(report.longest_ns)
+            paths = history.paths(judged)
+            self._violated = (history.border_ns, traces, paths, links, learned)
         if is_live:
             report = replace(report, lag_s=self._lag_s())
         if self._exporter is not None:
             self._exporter.show(report)
+        history.note_shown(window, is_final=is_final)
+        if is_final:
+            self._forget(window)
         return report
 
 

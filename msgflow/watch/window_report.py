@@ -34,12 +34,33 @@ SELECT coalesce(sum(event_count), 0)::BIGINT
 FROM main.gap
 WHERE kind = 'loss' AND start_ns >= $start_ns AND start_ns < $end_ns
 """
-# How long messages were on the way, and data that nodes kept.
+# How long messages were on the way, and data that nodes kept. A subscription that takes nothing
+# though messages wait holds up the one that it took last, too: how long ago that was published.
 _LONGEST = """
-SELECT greatest(
-    (SELECT coalesce(max(latency_ns), 0) FROM main.link_transport),
-    (SELECT coalesce(max(wait_ns), 0) FROM main.link_causal)
+WITH message AS (
+    SELECT d.subscription_id, d.reason, b.start_ns
+    FROM main.stat_delivery AS d
+    JOIN main.publication AS b ON d.publication_id = b.publication_id
+),
+taken AS (
+    SELECT subscription_id, max(start_ns) AS start_ns
+    FROM message
+    WHERE reason IS NULL
+    GROUP BY subscription_id
 )
+SELECT
+    coalesce((SELECT max(latency_ns) FROM main.link_transport), 0),
+    coalesce(
+        (
+            SELECT max($end_ns - t.start_ns)
+            FROM message AS m
+            JOIN taken AS t ON m.subscription_id = t.subscription_id
+            WHERE m.reason IN ('pending_at_end', 'subscription_ended', 'unknown')
+                AND m.start_ns > t.start_ns AND m.start_ns < $start_ns
+        ),
+        0
+    ),
+    coalesce((SELECT max(wait_ns) FROM main.link_causal), 0)
 """
 
 
@@ -57,7 +78,8 @@ class WindowReport:
         discarded_events: events that the tracer lost.
         violations: what is not as the targets demand.
         verdicts: how many verdicts on the targets there are of each kind, as `verify` names them.
-        longest_ns: how long a message or data that a node kept was on the way at most.
+        longest_flow_ns: how long a message or a flow was on the way at most, or has been so far.
+        longest_wait_ns: how long a node kept data at most.
     """
 
     window: Window
@@ -66,7 +88,8 @@ class WindowReport:
     executors: Sequence[Row]
     losses: Sequence[Row]
     discarded_events: int
-    longest_ns: int
+    longest_flow_ns: int
+    longest_wait_ns: int
     violations: Sequence[Row] = field(default=())
     verdicts: Mapping[str, int] = field(default_factory=dict)
     lag_s: float | None = None
@@ -87,13 +110,13 @@ class WindowReport:
         return json.dumps(shown, ensure_ascii=False, default=json_value)
 
 
-def report_of(con: duckdb.DuckDBPyConnection, window: Window, *, is_final: bool) -> WindowReport:
+def report_of(con: duckdb.DuckDBPyConnection, window: Window, last_step: Window) -> WindowReport:
     """Ask a database in memory what happened in a window.
 
     Args:
         con: with one run.
         window: which part of it counts.
-        is_final: see `WindowReport`.
+        last_step: what came last: messages from before should have been taken by its end.
     """
 
     def ask(name: str, columns: Sequence[str]) -> list[Row]:
@@ -108,13 +131,16 @@ def report_of(con: duckdb.DuckDBPyConnection, window: Window, *, is_final: bool)
     executors = ask("executor-usage", _EXECUTOR)
     losses = ask("topics-delivery", _LOSS)
     ((discarded,),) = con.execute(_DISCARDED, window.bindings).fetchall()
-    ((longest,),) = con.execute(_LONGEST).fetchall()
+    ((transport, waiting, wait),) = con.execute(_LONGEST, last_step.bindings).fetchall()
+    longest = max(transport, *(row["max_ns"] or 0 for row in paths), 0)
     return WindowReport(
         window=window,
-        is_final=is_final,
+        is_final=False,
         paths=paths,
         executors=sorted(executors, key=lambda row: -(row["callback_share"] or 0)),
         losses=[row for row in losses if row["dropped"] or row["lost"]],
         discarded_events=discarded,
-        longest_ns=max(longest, *(row["max_ns"] or 0 for row in paths), 0),
+        # What waits still has the rest of its path before it.
+        longest_flow_ns=waiting + longest,
+        longest_wait_ns=wait,
     )

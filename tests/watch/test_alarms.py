@@ -8,17 +8,22 @@ import shutil
 import subprocess
 from contextlib import chdir
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
+import pyarrow as pa
 import pytest
 from typer.testing import CliRunner, Result
 
 from msgflow.cli.app import app
 from msgflow.database import Database
 from msgflow.errors import UsageError
+from msgflow.run.window import Window
 from msgflow.sim import Recording, simulate
 from msgflow.trace import Continuation
+from msgflow.verify import TargetsFile, Verdict
 from msgflow.watch import FlightRecorder
-from msgflow.watch.alarm import blamed
+from msgflow.watch.alarm import Alarm, blamed
 from msgflow.watch.chunk import Chunk
 from msgflow.watch.kept_chunk import read_chunk
 from msgflow.watch.kept_traces import KeptTraces
@@ -205,3 +210,58 @@ def test_a_callback_that_had_no_cpu_did_not_run(
     thread = {"wakers": wakers, "state": state, "who": who}
     rest = {"share": 0.6, "duration_ns": 30_000_000}
     assert list(blamed([piece | thread | rest], None)) == [words]
+
+
+def told(monkeypatch: pytest.MonkeyPatch, *windows: list[dict[str, Any]]) -> list[list[str]]:
+    """Return the subjects that an alarm tells of in windows of ten seconds, one second apart.
+
+    Args:
+        windows: for each, `subject`, `worst_ns` and `worst_at_ns` of the requirements that failed.
+    """
+    alarm = Alarm(TargetsFile((), None), {}, print)
+    found = []
+    for number, failed in enumerate(windows):
+        rows = [
+            {
+                "target": "drive", "metric": "latency", "condition": "max < 80 ms",
+                "verdict": Verdict.FAILED, "value": 1.0, "measured": "", "see": None, "path": None,
+            } | row
+            for row in failed
+        ]  # fmt: skip
+        verified = SimpleNamespace(result=SimpleNamespace(table=pa.Table.from_pylist(rows)))
+        monkeypatch.setattr("msgflow.watch.alarm.verify", lambda *_, v=verified, **__: v)
+        window = Window((number - 10) * SECOND, number * SECOND)
+        violations, _ = alarm.judge(None, window, window.end_ns)
+        found.append([each["subject"] for each in violations])
+    return found
+
+
+def test_what_becomes_the_worst_when_the_worst_has_passed_is_no_news(monkeypatch) -> None:
+    """Messages of 200, 180, 220 and 190 ms, at 1, 3, 14 and 16 s."""
+
+    def row(worst_ms: int, at: int) -> dict[str, Any]:
+        return {"subject": "a", "worst_ns": worst_ms * 10**6, "worst_at_ns": at * SECOND}
+
+    windows = [[row(200, 1)]] * 10 + [[row(180, 3)]] * 3 + [[row(220, 14)]] * 2 + [[row(190, 16)]]
+    windows = [[], [], *windows, [], [row(180, 17)]]
+    found = [number for number, each in enumerate(told(monkeypatch, *windows)) if each]
+    assert found == [2, 15, 17, 19]
+
+
+def test_a_case_that_gets_worse_is_told_again(monkeypatch) -> None:
+    def row(worst_ms: int) -> dict[str, Any]:
+        return {"subject": "a", "worst_ns": worst_ms * 10**6, "worst_at_ns": -SECOND}
+
+    assert told(monkeypatch, [row(90)], [row(90)], [row(95)]) == [["a"], [], ["a"]]
+
+
+def test_paths_of_one_target_are_told_apart(monkeypatch) -> None:
+    """Completeness has no worst case."""
+
+    def row(path: str) -> dict[str, Any]:
+        return {"subject": None, "path": path, "worst_ns": None, "worst_at_ns": None}
+
+    first, second = row("/a → /x → /b"), row("/c → /x → /b")
+    assert told(monkeypatch, [first], [first, second], [first, second]) == [
+        ["drive"], ["drive"], [],
+    ]  # fmt: skip

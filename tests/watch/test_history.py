@@ -50,12 +50,60 @@ def test_a_window_is_final_once_the_next_border_has_come() -> None:
 
 def test_messages_that_take_longer_make_windows_wait() -> None:
     history = filled(100, 200, 300, 400)
-    history.note_longest(150)
+    history.note_longest(150, 0)
     assert history.final_window() == Window(0, 200)
     assert [path.name for path in history.paths(Window(300, 400))] == ["100", "200", "300"]
-    # No message is waited for longer than a window.
-    history.note_longest(10_000)
-    assert history.longest_ns == WINDOW
+    # No message is waited for longer than two windows, and none for which the last report waited.
+    history.note_longest(10_000, 0)
+    assert history.behind_ns == history.before_ns == 2 * WINDOW
+    history.note_longest(50, 0)
+    assert history.final_window() == Window(0, 300)
+
+
+def test_data_that_nodes_keep_make_no_window_wait() -> None:
+    history = filled(100, 200, 300, 400)
+    history.note_longest(50, 250)
+    assert history.final_window() == Window(0, 300)
+    assert [path.name for path in history.paths(Window(300, 400))] == ["0", "100", "200", "300"]
+    history.note_longest(50, 10_000)
+    assert history.before_ns == 2 * WINDOW
+
+
+def shown(history: History, *, is_last: bool = False) -> tuple[Window, bool] | None:
+    """Return the next window as a view shows it."""
+    found = history.next_window(is_last=is_last)
+    if found is not None:
+        history.note_shown(found[0], is_final=found[1])
+    return found
+
+
+def test_what_is_known_is_shown_while_messages_take_longer() -> None:
+    history = filled(100, 200)
+    assert shown(history) == (Window(0, 100), True)
+    history.note_longest(350, 0)
+    found = []
+    for begin in range(200, 1_000, 100):
+        history.add(chunk(begin, begin + 100))
+        history.add_border()
+        found.append(shown(history))
+        assert shown(history) is None
+    # A final one comes once in the length of a window, and begins where the last one ended.
+    assert found == [
+        (Window(0, 300), False),
+        (Window(100, 400), False),
+        (Window(200, 500), False),
+        (Window(300, 600), False),
+        (Window(400, 700), False),
+        (Window(100, 400), True),
+        (Window(600, 900), False),
+        (Window(700, 1_000), False),
+    ]
+    assert history.judged_window(Window(700, 1_000)) == Window(400, 1_000)
+    history.note_longest(0, 0)
+    assert shown(history) == (Window(400, 900), True)
+    assert history.judged_window(Window(400, 900)) == Window(400, 1_000)
+    assert shown(history, is_last=True) == (Window(700, 1_000), True)
+    assert shown(history, is_last=True) is None
 
 
 def test_windows_as_short_as_steps_meet() -> None:
@@ -68,7 +116,7 @@ def test_windows_as_short_as_steps_meet() -> None:
         history.add_border()
         if (window := history.final_window()) is not None:
             windows.append(window)
-            history.final_ns = window.end_ns
+            history.note_shown(window, is_final=True)
             history.forget(window)
         begin = end
     assert windows == [Window(0, 97), Window(97, 203), Window(203, 295), Window(295, 412)]

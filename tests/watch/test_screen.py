@@ -35,7 +35,8 @@ def test_names_are_text_and_all_fits() -> None:
         executors=[{**thread, "blocked_ns": 0, "callbacks": 3}],
         losses=[loss],
         discarded_events=0,
-        longest_ns=0,
+        longest_flow_ns=0,
+        longest_wait_ns=0,
     )
     text = shown(report)
     assert all(name in text for name in ("[/x]", "[/y]", "[/z]"))
@@ -56,7 +57,8 @@ def test_latencies_may_be_negative() -> None:
             executors=(),
             losses=(),
             discarded_events=0,
-            longest_ns=0,
+            longest_flow_ns=0,
+            longest_wait_ns=0,
         )
         for most in (-7_000_000, 3_000_000, -2_000_000)
     ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import time
 from collections import Counter
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +15,22 @@ from msgflow.clocks import read_clock_sync
 from msgflow.database import Database
 from msgflow.errors import TraceError
 from msgflow.links import LinksFile, read_links
-from msgflow.sim import Recording, simulate
+from msgflow.sim import (
+    Host,
+    Node,
+    Process,
+    Publisher,
+    Recording,
+    Scenario,
+    Subscription,
+    Timer,
+    Work,
+    simulate,
+)
 from msgflow.watch import Watcher, WindowReport, finished_chunks, watch_finished, watch_live
 from msgflow.watch.learned_answers import LearnedAnswers
 
+MS = 1_000_000
 SECOND = 1_000_000_000
 Row = dict[str, Any]
 
@@ -159,7 +172,7 @@ def test_a_clock_that_is_set_is_said_and_is_no_lag(
         monkeypatch.setattr(time, "time_ns", lambda past=past: now() - past)
         watcher.read(chunk)
         watcher.go_on()
-        if (report := watcher.final_report(is_live=True)) is not None:
+        if (report := watcher.report(is_live=True)) is not None:
             lags.append(report.lag_s)
     watcher.close()
     assert len(lags) > 1
@@ -169,13 +182,23 @@ def test_a_clock_that_is_set_is_said_and_is_no_lag(
 
 
 def test_links_of_a_node_that_is_not_there_are_said(simulated: Path, tmp_path: Path) -> None:
-    """It may start later: the view goes on."""
+    """It may start later: the view goes on, with the other links."""
     file = tmp_path / "links.yaml"
-    file.write_text("links: [{kind: direct, node: /later, inputs: [/a], outputs: [/b]}]")
+    file.write_text(
+        "links:\n"
+        "- {kind: direct, node: /later, inputs: [/a], outputs: [/b]}\n"
+        "- {kind: independent, node: /relay, inputs: [/topic_a], outputs: [/topic_b]}\n"
+    )
     notes: list[str] = []
-    (report,) = watch_finished(simulated, watching(notes, 9, 9, read_links(file)))
-    assert sum(path["reached"] for path in report.paths) > 0
-    assert [note for note in notes if "left out for now" in note and "/later" in note]
+    found = list(watch_finished(simulated, watching(notes, 0.5, 0.5, read_links(file))))
+    assert len(found) > 2
+    # The link of the relay is forbidden.
+    paths = {row["path"] for report in found for row in report.paths if row["reached"]}
+    assert paths
+    assert not any("/topic_a → /relay → /topic_b" in path for path in paths)
+    (said,) = notes
+    assert said.startswith("a link is left out for now: ")
+    assert "/later" in said
 
 
 def test_what_was_learned_may_not_fit_a_window(
@@ -188,8 +211,26 @@ def test_what_was_learned_may_not_fit_a_window(
     (report,) = reports(simulated, window=9, step=9, notes=notes)
     assert sum(path["reached"] for path in report.paths) > 0
     (said,) = notes
-    assert said.startswith("what earlier windows have shown is left out: ")
+    assert said.startswith("a link is left out for now: ")
     assert "/later" in said
+
+
+def test_clocks_of_a_host_that_is_not_there_are_said(simulated: Path, tmp_path: Path) -> None:
+    file = tmp_path / "clocks.yaml"
+    file.write_text("later: {offset_ns: 1000}")
+    notes: list[str] = []
+    watcher = Watcher(
+        window_ns=SECOND // 2,
+        step_ns=SECOND // 2,
+        links=None,
+        clocks=read_clock_sync(file),
+        note=notes.append,
+    )
+    found = list(watch_finished(simulated, watcher))
+    assert sum(path["reached"] for report in found for path in report.paths) > 0
+    (said,) = notes
+    assert said.startswith("clocks are not corrected for now: ")
+    assert "later" in said
 
 
 def test_a_recording_that_ended_long_ago_is_no_lag(simulated: Path) -> None:
@@ -211,3 +252,76 @@ def test_a_recording_that_ended_long_ago_is_no_lag(simulated: Path) -> None:
 def test_a_recording_without_chunks(tmp_path: Path) -> None:
     with pytest.raises(TraceError, match="no chunks of a rotated recording"):
         reports(tmp_path, window=1, step=1)
+
+
+@pytest.fixture(scope="module")
+def hang(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A detector that reads its calibration for 700 ms, once; in chunks of 200 ms."""
+    camera = Node(
+        "camera",
+        publishers=(Publisher("/image"),),
+        timers=(Timer(20 * MS, publishes=("/image",)),),
+    )
+    detector = Node(
+        "detector",
+        publishers=(Publisher("/objects"),),
+        subscriptions=(Subscription("/image", ("/objects",)),),
+        timers=(Timer(1_300 * MS, work=Work(typical_ns=700 * MS)),),
+    )
+    sink = Node("sink", subscriptions=(Subscription("/objects"),))
+    robot = Scenario(
+        name="hang",
+        description="A detector that is busy with one callback for 700 ms.",
+        hosts=(Host("alpha"),),
+        processes=(
+            Process("camera", "alpha", 1101, (camera,)),
+            Process("detector", "alpha", 1201, (detector,), start_ns=3 * MS),
+            Process("sink", "alpha", 1301, (sink,), start_ns=7 * MS),
+        ),
+        duration_ns=2_600 * MS,
+    )
+    directory = tmp_path_factory.mktemp("hang") / "trace"
+    rotations = tuple(200 * MS * number for number in range(1, 13))
+    simulate(robot, directory, recording=Recording(rotations=rotations))
+    return directory
+
+
+def live(directory: Path, watcher: Watcher) -> list[WindowReport]:
+    """Return what a view shows that gets one chunk after the other."""
+    found = []
+    for chunk in finished_chunks(directory):
+        watcher.read(chunk)
+        watcher.go_on()
+        if (report := watcher.report(is_live=True)) is not None:
+            found.append(report)
+    return found
+
+
+def test_a_node_that_hangs_for_longer_than_a_window(hang: Path, tmp_path: Path) -> None:
+    """What waits for it is counted once it is known."""
+    found = reports(hang, window=0.4, step=0.2)
+    with Database(tmp_path / "whole.duckdb") as whole:
+        whole.ingest([hang])
+        for report in found:
+            require_equal(whole, report)
+    slowest = max(row["max_ns"] or 0 for report in found for row in report.paths)
+    assert slowest > 650 * MS
+
+
+def test_the_view_goes_on_while_a_node_hangs(hang: Path) -> None:
+    """Each step shows a window of the usual length; final ones leave out nothing."""
+    watcher = watching([], 0.4, 0.2)
+    shown = live(hang, watcher)
+    watcher.close()
+    steps = len({chunk.number for chunk in finished_chunks(hang)}) - 1
+    assert len(shown) == steps
+    provisional = [report for report in shown if not report.is_final]
+    assert len(provisional) > 2
+    assert all(
+        0.35 < (report.window.end_ns - report.window.start_ns) / SECOND < 0.5
+        for report in provisional
+    )
+    final = [report.window for report in shown if report.is_final]
+    assert final[-1].start_ns > provisional[0].window.start_ns
+    for before, after in pairwise(final):
+        assert after.start_ns <= before.end_ns < after.end_ns

@@ -162,6 +162,8 @@ def missing(path: Row) -> int:
 def _heading(report: WindowReport) -> Text:
     start, end = (format_epoch(at)[_TIME] for at in report.window.bindings.values())
     text = Text(f"{start} to {end}", style="bold")
+    if not report.is_final:
+        text.append(" (provisional)", style="not bold")
     text.append(f"   {count(len(report.paths), 'path')}", style="not bold")
     if report.lag_s is not None:
         text.append(f"   lag {report.lag_s:.1f} s", style="not bold")

@@ -32,7 +32,8 @@ def window_line(report: WindowReport) -> str:
         words.append(f"targets: {verdict_words(report)}")
     if report.lag_s is not None:
         words.append(f"lag {report.lag_s:.1f} s")
-    return f"{start} to {end}: {', '.join(words)}"
+    known = "" if report.is_final else " (provisional)"
+    return f"{start} to {end}{known}: {', '.join(words)}"
 
 
 def verdict_words(report: WindowReport) -> str:

@@ -33,7 +33,13 @@ def report(*paths: dict[str, Any], **more: Any) -> WindowReport:
     executor = {"process": "detector", "tid": 77, "callback_share": 0.5, "callbacks": 100}
     executor |= {"callback_ns": 5_000 * MS, "blocked_ns": 0}
     window = Window(START_NS, START_NS + 10_000 * MS)
-    given = {"losses": (), "discarded_events": 0, "longest_ns": 0, "lag_s": 1.25} | more
+    given = {
+        "losses": (),
+        "discarded_events": 0,
+        "longest_flow_ns": 0,
+        "longest_wait_ns": 0,
+        "lag_s": 1.25,
+    } | more
     return WindowReport(window, True, paths, [executor], **given)
 
 
