@@ -31,8 +31,6 @@ class History:
     a final one once in the length of a window.
 
     Attributes:
-        behind_ns: how long something may come that belongs to a window, after its end.
-        before_ns: how much earlier something may have begun that belongs to a window.
         final_ns: the end of the last final window; None before the first.
     """
 
@@ -50,8 +48,8 @@ class History:
         self._borders: list[int] = []
         self._ends: dict[Path, int] = {}
         self._last_end_ns = 0
-        self.behind_ns = 0
-        self.before_ns = 0
+        # Borders, with what the report at that time has shown.
+        self._longest: list[tuple[int, int, int]] = []
         self.final_ns: int | None = None
         self._shown_ns = 0
 
@@ -107,16 +105,27 @@ class History:
             # One whose chunks cannot be read has no end.
             self._ends.pop(source, None)
 
+    @property
+    def behind_ns(self) -> int:
+        """How long something may come that belongs to a window, after its end."""
+        return max((flow_ns for _, flow_ns, _ in self._longest), default=0)
+
+    @property
+    def before_ns(self) -> int:
+        """How much earlier something may have begun that belongs to a window."""
+        return max((max(flow_ns, wait_ns) for _, flow_ns, wait_ns in self._longest), default=0)
+
     def note_longest(self, flow_ns: int, wait_ns: int) -> None:
-        """Note what the last report has shown; a longer time counts as two windows.
+        """Note what a report has shown: it counts for the time of two windows, and as no more.
 
         Args:
             flow_ns: how long a message or a flow was on the way at most.
             wait_ns: how long a node kept data at most.
         """
         most_ns = _MOST_WINDOWS * self._window_ns
-        self.behind_ns = min(flow_ns, most_ns)
-        self.before_ns = min(max(flow_ns, wait_ns), most_ns)
+        border_ns = self._borders[-1]
+        self._longest = [each for each in self._longest if each[0] > border_ns - most_ns]
+        self._longest.append((border_ns, min(flow_ns, most_ns), min(wait_ns, most_ns)))
 
     def add_border(self, *, is_last: bool = False) -> None:
         """Make a border of the time that all hosts have reached, or of the end of all if it is."""
