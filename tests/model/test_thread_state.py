@@ -310,11 +310,12 @@ def test_it_is_woken_before_its_first_switch(system: RosSystem, analyse: Analyse
     ]  # fmt: skip
 
 
+@pytest.mark.parametrize("other", [Thread(200, cpu=1), Thread(100, cpu=1, trace=3)])
 def test_another_process_that_begins_changes_no_numbers(
-    system: RosSystem, analyse: Analyse
+    system: RosSystem, analyse: Analyse, other: Thread
 ) -> None:
-    """So a kernel trace that says so is of another clock."""
-    other = Thread(200, cpu=1)
+    """So a kernel trace that says so is of another clock. One of another host has the same ids."""
+    system.add_source(3, hostname="beta", clock="other")
     kernel = Kernel(system)
     kernel.switch(1900, 0, 61, cpu=1)
     system.add("ros2:rcl_init", other, ts=2000, context_handle=1, version="8.4.0")
