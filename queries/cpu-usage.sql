@@ -7,8 +7,8 @@
 -- grain: one row per host and thread
 -- column: run_id BIGINT             Run
 -- column: host VARCHAR [host]  Host
--- column: nodes VARCHAR             Nodes of its process, without nodes its name and id; NULL: a
---     process without ROS
+-- column: nodes VARCHAR             First two nodes of its process, and how many more; without
+--     nodes its name and id; NULL: a process without ROS
 -- column: process VARCHAR           Process name; NULL: a process without ROS
 -- column: pid INTEGER               Process id
 -- column: thread VARCHAR            Thread name

@@ -18,7 +18,7 @@
 --     stops it
 -- param: case VARCHAR {first|last|newest|every_pair} = 'first'  Arrivals that count: the
 --     first or last of each root, that of the newest root, or all
--- param: max_depth BIGINT {1..} = 32     Longest path
+-- param: max_depth BIGINT {1..} = 32     Longest path, in topics
 -- param: max_paths BIGINT {1..} = 1000   Most paths, shortest first, and chains of a length
 -- column: run_id BIGINT            Run
 -- column: roots BIGINT             Flows that began in the time window
@@ -122,8 +122,8 @@ latency AS (
         min(latency_ns) AS min_ns,
         quantile_disc(latency_ns, [0.5, 0.95, 0.99]) AS quantiles,
         round(avg(latency_ns))::BIGINT AS mean_ns,
-        -- Of equally long ones the first.
-        max(struct_pack(latency_ns, before_ns := -root_ns, take_id))
+        -- Of equally long ones the first, and of its arrivals the first.
+        max(struct_pack(latency_ns, before_ns := -root_ns, before_take := -take_id))
             FILTER (WHERE latency_ns IS NOT NULL) AS longest
     FROM flow
     WHERE status = 'reached' AND is_counted
@@ -179,7 +179,7 @@ SELECT
     l.quantiles[3] AS p99_ns,
     l.longest.latency_ns AS max_ns,
     -l.longest.before_ns AS max_root_ns,
-    l.longest.take_id AS max_take_id,
+    -l.longest.before_take AS max_take_id,
     l.sink_event,
     p.is_cut,
     r.reasons,

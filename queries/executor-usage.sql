@@ -10,7 +10,8 @@
 -- grain: one row per executor thread
 -- column: run_id BIGINT             Run
 -- column: host VARCHAR [host]  Host
--- column: nodes VARCHAR             Nodes of its process; without nodes its name and id
+-- column: nodes VARCHAR             First two nodes of its process, and how many more; without
+--     nodes its name and id
 -- column: process VARCHAR           Process name
 -- column: pid INTEGER               Process id
 -- column: tid INTEGER               Thread id

@@ -6,7 +6,8 @@
 --     first.
 -- grain: one row per thread, priority, and thread that took the CPU from it, with its priority
 -- column: run_id BIGINT             Run
--- column: nodes VARCHAR             Nodes of its process; without nodes its name and id
+-- column: nodes VARCHAR             First two nodes of its process, and how many more; without
+--     nodes its name and id
 -- column: process VARCHAR           Process name
 -- column: thread VARCHAR            Thread that lost the CPU
 -- column: tid INTEGER               Its thread id

@@ -6,7 +6,8 @@
 -- grain: one row per thread and priority
 -- column: run_id BIGINT             Run
 -- column: host VARCHAR [host]  Host
--- column: nodes VARCHAR             Nodes of its process; without nodes its name and id
+-- column: nodes VARCHAR             First two nodes of its process, and how many more; without
+--     nodes its name and id
 -- column: process VARCHAR           Process name
 -- column: thread VARCHAR            Thread name
 -- column: tid INTEGER               Thread id

@@ -62,12 +62,12 @@ _TITLES = {
 }
 _COLUMNS = {
     "callbacks": ("node", "callback", "count", "total_ns", "median_ns", "max_ns"),
-    "usage": ("process", "tid", "callback_share", "callback_ns", "take_ns", "select_ns", "wait_ns",
+    "usage": ("nodes", "tid", "callback_share", "callback_ns", "take_ns", "select_ns", "wait_ns",
               "blocked_ns", "unknown_ns"),
     "paths": ("path", "median_ns", "p99_ns", "max_ns", "reached", "roots"),
     "blame": ("path", "latency_ns", "node", "duration_ns", "share"),
     "drops": ("topic_name", "subscriber", "published", "delivered", "dropped", "lost", "reasons"),
-    "threads": ("process", "tid", "callback_share", "callback_ns", "callbacks"),
+    "threads": ("nodes", "tid", "callback_share", "callback_ns", "callbacks"),
     "verdicts": ("verdict", "target", "subject", "metric", "condition", "measured", "reason",
                  "worst_ns"),
     "change": ("path", "change", "a_median_ns", "b_median_ns", "median_percent", "p95_percent",

@@ -5,10 +5,10 @@
 --     message in the queue would have ended it. A wait tells this only where a single thread reads,
 --     and only if it lasted ten times as long as messages usually need, at least a millisecond. A
 --     reader that gets no CPU seems to wait, too, but takes the message when it wakes up. Only the
---     depth of the queue tells `overwritten` from `lost_in_transport`. The reason is unknown if the
---     subscription took a message in that time that could not be identified, or as soon as messages
---     usually are taken. A message is not `overwritten` if the subscription took none of the
---     publisher, and no later one.
+--     depth of the queue tells `overwritten` from `lost_in_transport`. A take that cannot be
+--     identified may have been of the message. Then the reason is unknown: if it came before the
+--     subscription is known not to have the message, or within ten times the usual time. A message
+--     is not `overwritten` if the subscription took none of the publisher, and no later one.
 -- grain: one row per publication and subscription of its topic that is not known to have taken it
 CREATE OR REPLACE MACRO derive.undelivered(only_run) AS TABLE
 WITH arrival AS MATERIALIZED (

@@ -134,17 +134,54 @@ def test_of_two_kernel_traces_of_a_schedule_the_one_that_knows_the_waker_counts(
     ]
 
 
+@pytest.mark.parametrize("traces", [1, 2])
 def test_a_waking_may_come_before_the_switch_that_it_undoes(
+    system: RosSystem, analyse: Analyse, traces: int
+) -> None:
+    """Two kernel traces have the same wakings and switches."""
+    for trace in range(traces):
+        kernel = Kernel(system, KERNEL + trace)
+        kernel.switch(900, 0, 41)
+        kernel.wake(1190, 41, cpu=1)
+        kernel.switch(1200, 41, 0, BLOCKED)
+        kernel.switch(1300, 0, 41)
+        kernel.switch(2000, 41, 0, BLOCKED)
+    call(system, 1000, 1600)
+    assert schedules(analyse(system)) == [(500, 0, 100, 0, 0, 0)]
+
+
+def test_a_thread_that_is_woken_twice_waits_from_the_first_time(
     system: RosSystem, analyse: Analyse
 ) -> None:
     kernel = Kernel(system)
     kernel.switch(900, 0, 41)
-    kernel.wake(1190, 41, cpu=1)
     kernel.switch(1200, 41, 0, BLOCKED)
+    kernel.wake(1220, 41)
+    kernel.wake(1250, 41)
     kernel.switch(1300, 0, 41)
     kernel.switch(2000, 41, 0, BLOCKED)
     call(system, 1000, 1600)
-    assert schedules(analyse(system)) == [(500, 0, 100, 0, 0, 0)]
+    assert schedules(analyse(system)) == [(500, 0, 80, 20, 0, 0)]
+
+
+def test_each_thread_has_its_own_wakings(system: RosSystem, analyse: Analyse) -> None:
+    """What is seen first of the second one is that it is woken."""
+    kernel = Kernel(system)
+    kernel.switch(900, 0, 41)
+    kernel.switch(1100, 41, 0, BLOCKED)
+    kernel.wake(1150, 42, cpu=1)
+    kernel.switch(1200, 0, 42, cpu=1)
+    kernel.switch(1300, 0, 41)
+    kernel.switch(1400, 42, 0, BLOCKED, cpu=1)
+    kernel.switch(2000, 41, 0, BLOCKED)
+    call(system, 1000, 1600)
+    call(system, 1210, 1350, Thread(100, 101, cpu=1))
+    rows = analyse(system).rows(
+        "SELECT t.tid, s.start_ns, s.end_ns, s.state FROM thread_state AS s "
+        "JOIN thread AS t USING (thread_id) WHERE s.state IN ('runnable', 'sleeping') "
+        "AND s.end_ns < 2000 ORDER BY t.tid, s.start_ns"
+    )
+    assert rows == [(100, 1100, 1300, "sleeping"), (101, 1150, 1200, "runnable")]
 
 
 def test_without_wakings_a_sleep_lasts_until_the_thread_runs(
@@ -253,6 +290,41 @@ def test_a_process_that_was_started_again_has_other_numbers(
         kernel.switch(begin + 200, tid, 0, 0x10)
     kernel.switch(9000, 0, HOG)
     assert schedules(analyse(system)) == [(100, 0, 0, 0, 0, 0), (100, 0, 0, 0, 0, 0)]
+
+
+def test_it_is_woken_before_its_first_switch(system: RosSystem, analyse: Analyse) -> None:
+    """Its number was another one before."""
+    kernel = Kernel(system)
+    for begin, tid in ((1000, 41), (3000, 52)):
+        kernel.wake(begin - 130, tid)
+        kernel.switch(begin - 100, 0, tid)
+        system.add("ros2:rcl_init", MAIN, ts=begin - 50, context_handle=begin, version="8.4.0")
+        call(system, begin, begin + 100)
+        kernel.switch(begin + 200, tid, 0, 0x10)
+    kernel.switch(9000, 0, HOG)
+    assert analyse(system).rows(
+        "SELECT start_ns, end_ns, state FROM thread_state ORDER BY start_ns"
+    ) == [
+        (870, 900, "runnable"), (900, 1200, "running"),
+        (2870, 2900, "runnable"), (2900, 3200, "running"),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("other", [Thread(200, cpu=1), Thread(100, cpu=1, trace=3)])
+def test_another_process_that_begins_changes_no_numbers(
+    system: RosSystem, analyse: Analyse, other: Thread
+) -> None:
+    """So a kernel trace that says so is of another clock. One of another host has the same ids."""
+    system.add_source(3, hostname="beta", clock="other")
+    kernel = Kernel(system)
+    kernel.switch(1900, 0, 61, cpu=1)
+    system.add("ros2:rcl_init", other, ts=2000, context_handle=1, version="8.4.0")
+    kernel.switch(2100, 61, 0, BLOCKED, cpu=1)
+    for begin, tid in ((1000, 41), (3000, 52)):
+        kernel.switch(begin - 100, 0, tid)
+        call(system, begin, begin + 100)
+        kernel.switch(begin + 200, tid, 0, BLOCKED)
+    assert analyse(system).rows("SELECT is_joined FROM staging.schedule") == [(False,)]
 
 
 @pytest.mark.parametrize("source", ["dump", "fork"])

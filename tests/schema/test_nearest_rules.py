@@ -870,6 +870,54 @@ def test_nor_are_bursts_of_messages(
     assert nearest(rules)[stamp] == (((1 if sign > 0 else 2), 1) if is_told else (None, 1))
 
 
+@pytest.mark.parametrize(
+    ("before", "delay", "is_sharp", "is_told"),
+    [
+        pytest.param(95, 10, False, False, id="may_both_be_of_it"),
+        pytest.param(105, 10, False, True, id="too_early"),
+        pytest.param(95, 900, False, False, id="however_long_it_is_written"),
+        pytest.param(95, 10, True, True, id="the_drift_is_known"),
+    ],
+)
+def test_nor_is_what_comes_right_before_a_publication(
+    rules: duckdb.DuckDBPyConnection, before: int, delay: int, *, is_sharp: bool, is_told: bool
+) -> None:
+    """In the middle of a second, half a second after its begin, 200 ppm are 100 µs."""
+    clock(rules, (0, 100, 0))
+    rules.execute("UPDATE store.stamp_clock SET is_sharp = ?", [is_sharp])
+    publish(rules, 1, 0, 10 * MICROSECOND)
+    publish(rules, 2, SECOND // 2, SECOND // 2 + MILLISECOND)
+    stamp = SECOND // 2 + delay * MICROSECOND
+    take(rules, 5, SECOND // 2 - before * MICROSECOND, stamp)
+    assert nearest(rules) == {5: (1, 1), stamp: (2, 1) if is_told else (None, 1)}
+
+
+def test_but_what_is_taken_before_a_publication_is_never_of_it(
+    rules: duckdb.DuckDBPyConnection,
+) -> None:
+    clock(rules, (0, 100, 0))
+    rules.execute("UPDATE store.stamp_clock SET is_sharp = false")
+    publish(rules, 1, SECOND // 2, SECOND // 2 + MILLISECOND)
+    early = SECOND // 2 - 50 * MICROSECOND
+    take(rules, early, taken=SECOND // 2)
+    take(rules, SECOND // 2 + 1)
+    assert nearest(rules) == {SECOND // 2 + 1: (1, 1)}
+
+
+@pytest.mark.parametrize("threads", [(1, 1, 1), (1, 2, 2), (1, 1, 2), (1, 2, 1)])
+def test_no_publication_of_a_second_ago_was_just_missed(
+    rules: duckdb.DuckDBPyConnection, threads: tuple[int, ...]
+) -> None:
+    """Whichever threads share the publisher."""
+    clock(rules, (0, 100, 0), (0, 100, 0), (0, 100, 0))
+    rules.execute("UPDATE store.stamp_clock SET is_sharp = false")
+    for number, thread in enumerate(threads):
+        written = number * SECOND
+        publish(rules, number, written, written + 10 * MICROSECOND, thread=thread)
+    take(rules, *(number * SECOND + 5 for number in range(3)))
+    assert nearest(rules) == {number * SECOND + 5: (number, 1) for number in range(3)}
+
+
 def test_but_those_of_two_subscriptions_are_no_burst(rules: duckdb.DuckDBPyConnection) -> None:
     clock(rules, (0, 100, 0))
     rules.execute("UPDATE store.stamp_clock SET is_sharp = false")
@@ -887,10 +935,12 @@ def test_but_those_of_two_subscriptions_are_no_burst(rules: duckdb.DuckDBPyConne
         (-195, False, False),
         (-197, False, True),
         (195, True, True),
+        (-195, True, True),
     ],
 )
+@pytest.mark.parametrize("is_first", [True, False])
 def test_where_no_drift_is_known_before_a_jump_what_was_just_missed_counts(
-    rules: duckdb.DuckDBPyConnection, missed: int, *, is_sharp: bool, is_told: bool
+    rules: duckdb.DuckDBPyConnection, missed: int, *, is_first: bool, is_sharp: bool, is_told: bool
 ) -> None:
     """20 ms before the end of a second, 480 ms from its middle, 200 ppm are 196 µs."""
     back = 40 * MILLISECOND
@@ -898,9 +948,12 @@ def test_where_no_drift_is_known_before_a_jump_what_was_just_missed_counts(
     rules.execute("UPDATE store.stamp_clock SET is_sharp = ? WHERE segment = 0", [is_sharp])
     early = SECOND - 20 * MILLISECOND
     stamp = early + missed * MICROSECOND + (10 * MICROSECOND if missed > 0 else 0) - (missed > 0)
-    publish(rules, 1, early - 5 * MILLISECOND, early - 5 * MILLISECOND + 10 * MICROSECOND)
+    if not is_first:
+        publish(rules, 1, early - 5 * MILLISECOND, early - 5 * MILLISECOND + 10 * MICROSECOND)
     publish(rules, 2, early, early + 10 * MICROSECOND)
     publish(rules, 3, stamp + back - 1, stamp + back + 10 * MICROSECOND)
+    # The next one behind the jump hides none from before it.
+    publish(rules, 6, stamp + back + 100 * MICROSECOND, stamp + back + 110 * MICROSECOND)
     # Of another message, and of another topic, nothing was missed.
     publish(rules, 4, SECOND + SECOND // 2, SECOND + SECOND // 2 + 10 * MICROSECOND)
     other = SECOND + SECOND // 2 - back + 1
@@ -924,3 +977,34 @@ def test_what_a_message_missed_before_a_jump_may_be_its_own_behind(
     stamp = written + 51 * MICROSECOND
     take(rules, stamp)
     assert nearest(rules) == {stamp: (1, 1)}
+
+
+@pytest.mark.parametrize(("missed", "is_told"), [(195, False), (197, True)])
+def test_a_publication_that_is_not_seen_to_end_may_be_missed_as_well(
+    rules: duckdb.DuckDBPyConnection, missed: int, *, is_told: bool
+) -> None:
+    back = 40 * MILLISECOND
+    clock(rules, (0, 100, 0), (-back, 100, 1))
+    rules.execute("UPDATE store.stamp_clock SET is_sharp = false WHERE segment = 0")
+    early = SECOND - 20 * MILLISECOND
+    stamp = early - missed * MICROSECOND
+    publish(rules, 1, early, None)
+    publish(rules, 2, stamp + back - 1, stamp + back + 10 * MICROSECOND)
+    take(rules, stamp)
+    assert nearest(rules) == {stamp: (2, 1) if is_told else (None, 1)}
+
+
+@pytest.mark.parametrize(("missed", "is_told"), [(195, False), (197, True)])
+def test_nor_is_it_told_if_it_missed_the_next_one_as_well(
+    rules: duckdb.DuckDBPyConnection, missed: int, *, is_told: bool
+) -> None:
+    """Too far from its own one to be a burst."""
+    clock(rules, (0, 100, 0), (200 * MICROSECOND, 100, 1))
+    rules.execute("UPDATE store.stamp_clock SET is_sharp = false WHERE segment = 0")
+    written = SECOND - 20 * MILLISECOND
+    stamp = written + 290 * MICROSECOND
+    following = stamp + missed * MICROSECOND
+    publish(rules, 1, written, written + 100 * MICROSECOND)
+    publish(rules, 2, following, following + 10 * MICROSECOND)
+    take(rules, stamp)
+    assert nearest(rules) == {stamp: (1, 1) if is_told else (None, 1)}

@@ -544,6 +544,32 @@ def test_a_clock_that_is_set_by_hours_while_only_others_take_its_messages(
     assert next(row[0] for row in rows if row[4] == 1) <= 4 * STRETCH_NS
 
 
+@pytest.mark.parametrize("by_ns", [3 * SECOND, -3 * SECOND])
+@pytest.mark.parametrize("is_wrong", ["before", "behind"])
+@pytest.mark.parametrize("apart_ns", [0, HOURS_NS])
+def test_a_clock_that_is_right_in_the_beginning_or_in_the_end(
+    rules: duckdb.DuckDBPyConnection, is_wrong: str, by_ns: int, apart_ns: int
+) -> None:
+    """Only another host takes its messages: a robot may also boot with a clock that is wrong."""
+    record(rules, width_ns=2_000, delay_ns=1_000, ppm=0, count=1_600)
+    rules.execute("UPDATE message SET clock_id = 2, taken_ns = taken_ns + ?", [apart_ns])
+    at = 8 * SECOND
+    comparison = "<" if is_wrong == "before" else ">="
+    rules.execute(
+        "UPDATE message SET source_timestamp_ns = source_timestamp_ns + $by "
+        f"WHERE source_timestamp_ns {comparison} $at",
+        {"at": at, "by": by_ns},
+    )
+    rows = rules.execute(
+        "SELECT end_ns, round(difference_ns / 1e9), message_count > 0 "
+        "FROM derive.stamp_clock(1) ORDER BY start_ns"
+    ).fetchall()
+    assert {is_known for *_, is_known in rows} == {True}
+    before, behind = (by_ns, 0) if is_wrong == "before" else (0, by_ns)
+    assert {seconds for end, seconds, _ in rows if end < at} == {before // SECOND}
+    assert {seconds for end, seconds, _ in rows if end > at + SECOND} == {behind // SECOND}
+
+
 @pytest.mark.parametrize(("here", "is_known"), [(10, True), (7, True), (6, False), (0, False)])
 def test_messages_of_a_stretch_are_taken_where_half_of_them_are(
     rules: duckdb.DuckDBPyConnection, here: int, *, is_known: bool

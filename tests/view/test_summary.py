@@ -112,6 +112,16 @@ def test_markdown_has_verdicts_findings_paths_and_drops(dropping: Path, tmp_path
     assert "the run has no such topic — /nowhere" in text
 
 
+def test_threads_are_named_by_their_nodes(dropping: Path, tmp_path: Path) -> None:
+    """Each process of rclpy is python3."""
+    output = tmp_path / "summary.md"
+    with open_db(dropping) as opened:
+        opened.report(output)
+        busiest = opened.query("executor-usage", sort=["callback_share:desc"]).to_arrow()
+    lines = output.read_text("utf-8").splitlines()
+    assert any(f"`{busiest['nodes'][0]}` | {busiest['tid'][0]}" in line for line in lines)
+
+
 def test_markdown_of_some_paths_is_about_these(dropping: Path, tmp_path: Path) -> None:
     output = tmp_path / "summary.md"
     with open_db(dropping) as opened:

@@ -6,10 +6,11 @@
 --     publication one message, the first. Where a publisher writes for much of the time, or what
 --     the thread did next is not known, or publishers are not traced, the delays that are usual
 --     bound the search. A message has no publication where that would be a guess: where several
---     come into question; where two messages may both be of one publication; in a burst, or where
---     it just missed another publication, if the clock is not known sharply; if it was stamped
---     sooner after a publication than is usual, and another publication may be lost. Nor has it one
---     where the difference of the clocks is not known, or explains less than half of the messages.
+--     come into question; where two messages may both be of one publication; where another
+--     publication or message is within what a drift could move it, if the drift is not known; if it
+--     was stamped sooner after a publication than is usual, and another publication may be lost.
+--     Nor has it one where the difference of the clocks is not known, or explains less than half of
+--     the messages.
 -- grain: one row per message that has, or might have, a publication
 -- param: only_run BIGINT  Run to look at
 -- when: store.stamp_clock
@@ -97,8 +98,6 @@ published AS MATERIALIZED (
         next_event_ns + then_ns AS closes_ns,
         next_event_ns IS NOT NULL AND NOT has_break AS goes_on,
         wander_ns,
-        lead(publication_id) OVER of_publisher AS next_publication_id,
-        lead(written_ns + then_ns) OVER of_publisher AS next_opens_ns,
         wander_ns > 0 AND coalesce(
             least(
                 written_ns - lag(written_ns) OVER on_topic,
@@ -107,11 +106,7 @@ published AS MATERIALIZED (
             false
         ) AS is_crowded
     FROM sided
-    WINDOW
-        on_topic AS (PARTITION BY side, topic_name ORDER BY written_ns, publication_id),
-        of_publisher AS (
-            PARTITION BY side, publisher_id ORDER BY written_ns, publication_id
-        )
+    WINDOW on_topic AS (PARTITION BY side, topic_name ORDER BY written_ns, publication_id)
 ),
 -- The times in which the clocks stood in one relation: from one jump to the next.
 segment AS (
@@ -149,33 +144,44 @@ looked_for AS (
     JOIN (SELECT DISTINCT publisher_id, thread_id, side FROM published) AS p
         ON m.publisher_id = p.publisher_id
 ),
--- Where the clock is not known sharply, also what a message just missed.
-looked_up AS MATERIALIZED (
-    SELECT
-        m.topic_name, m.publisher_id, m.source_timestamp_ns, m.only_subscription_id,
-        p.publication_id, p.clock_id, p.goes_on, p.side,
-        p.is_crowded OR coalesce(
-            lead(m.source_timestamp_ns) OVER of_publication - m.source_timestamp_ns
-            <= 2 * p.wander_ns,
-            false
-        ) AS is_crowded,
-        m.source_timestamp_ns - p.opens_ns AS delay_ns,
-        coalesce(m.source_timestamp_ns < p.closes_ns, true) AS is_within,
-        CASE
-            WHEN m.source_timestamp_ns < p.closes_ns + p.wander_ns THEN p.publication_id
-            WHEN m.source_timestamp_ns >= p.next_opens_ns - p.wander_ns THEN p.next_publication_id
-        END AS missed_publication_id
+-- Where the clock is not known sharply, also what a message just missed: the publication before it,
+-- or the next one.
+beside AS (
+    SELECT m.topic_name, m.source_timestamp_ns, m.only_subscription_id, m.taken_ns, p.*
     FROM looked_for AS m
     ASOF JOIN published AS p
         ON m.publisher_id = p.publisher_id
         AND m.thread_id = p.thread_id
         AND m.side = p.side
         AND m.source_timestamp_ns >= p.opens_ns
-    WHERE (coalesce(m.source_timestamp_ns < p.closes_ns, true) OR p.wander_ns > 0)
-        AND coalesce(p.written_ns < m.taken_ns, true)
+    UNION ALL
+    SELECT m.topic_name, m.source_timestamp_ns, m.only_subscription_id, m.taken_ns, p.*
+    FROM looked_for AS m
+    ASOF JOIN published AS p
+        ON m.publisher_id = p.publisher_id
+        AND m.thread_id = p.thread_id
+        AND m.side = p.side
+        AND m.source_timestamp_ns < p.opens_ns
+    WHERE m.source_timestamp_ns >= p.opens_ns - p.wander_ns
+),
+looked_up AS MATERIALIZED (
+    SELECT
+        topic_name, publisher_id, source_timestamp_ns, only_subscription_id, publication_id,
+        clock_id, goes_on, side,
+        is_crowded
+        OR first_value(source_timestamp_ns) OVER of_publication < opens_ns
+        OR coalesce(
+            lead(source_timestamp_ns) OVER of_publication - source_timestamp_ns <= 2 * wander_ns,
+            false
+        ) AS is_crowded,
+        source_timestamp_ns - opens_ns AS delay_ns,
+        source_timestamp_ns >= opens_ns AND coalesce(source_timestamp_ns < closes_ns, true)
+            AS is_within,
+        coalesce(source_timestamp_ns < closes_ns + wander_ns, true) AS is_near
+    FROM beside
+    WHERE coalesce(written_ns < taken_ns, true)
     WINDOW of_publication AS (
-        PARTITION BY p.publication_id, p.side, m.only_subscription_id
-        ORDER BY m.source_timestamp_ns
+        PARTITION BY publication_id, side, only_subscription_id ORDER BY source_timestamp_ns
     )
 ),
 within AS MATERIALIZED (
@@ -189,9 +195,9 @@ within AS MATERIALIZED (
     WHERE is_within
 ),
 missed AS MATERIALIZED (
-    SELECT DISTINCT topic_name, source_timestamp_ns, missed_publication_id AS publication_id
+    SELECT DISTINCT topic_name, source_timestamp_ns, publication_id
     FROM looked_up
-    WHERE NOT is_within AND missed_publication_id IS NOT NULL
+    WHERE is_near AND NOT is_within
 ),
 -- A message that came while none of the known publishers wrote is of another one, or its
 -- publication was lost. Where nothing is lost, there is another one.

@@ -64,18 +64,25 @@ heard AS (
     JOIN publisher AS p ON m.run_id = p.run_id AND m.topic_name = p.topic_name
     JOIN extent AS x ON p.clock_id = x.clock_id
 ),
--- How far another clock is from this one, but for the drift: the least time from stamp to take
--- in the beginning, when the clock of stamps was right.
+-- How far another clock is from this one, but for the drift: the least time from stamp to take, in
+-- the beginning and in the end. If a clock was set meanwhile, the clock of stamps is right before
+-- that or behind it: it was set wrong, or a robot set right the clock that it had started with.
 apart AS (
-    SELECT clock_id, taken_clock_id, min(taken_ns - source_timestamp_ns) AS apart_ns
+    SELECT
+        clock_id, taken_clock_id,
+        min(taken_ns - source_timestamp_ns) FILTER (taken_ns < first_ns + stretch_ns)
+            AS first_apart_ns,
+        min(taken_ns - source_timestamp_ns) FILTER (taken_ns > last_ns - stretch_ns)
+            AS last_apart_ns
     FROM (
         SELECT
-            clock_id, taken_clock_id, taken_ns, source_timestamp_ns,
-            min(taken_ns) OVER (PARTITION BY clock_id, taken_clock_id) + stretch_ns AS until_ns
+            clock_id, taken_clock_id, taken_ns, source_timestamp_ns, stretch_ns,
+            min(taken_ns) OVER between_clocks AS first_ns,
+            max(taken_ns) OVER between_clocks AS last_ns
         FROM heard
         WHERE is_in_time
+        WINDOW between_clocks AS (PARTITION BY clock_id, taken_clock_id)
     )
-    WHERE taken_ns < until_ns
     GROUP BY clock_id, taken_clock_id
 ),
 -- Where a clock was set, its stamps say little of when messages were published. When they were
@@ -86,10 +93,11 @@ placed AS (
         bool_or(h.taken_clock_id = h.clock_id) AS is_taken_here,
         coalesce(
             min(CASE WHEN h.taken_clock_id = h.clock_id THEN h.taken_ns END),
-            min(h.taken_ns - a.apart_ns),
+            min(h.taken_ns - a.first_apart_ns),
             h.source_timestamp_ns
         ) AS near_ns,
-        any_value(h.is_in_time) AS is_in_time
+        min(h.taken_ns - a.last_apart_ns) AS also_near_ns,
+        CASE WHEN any_value(h.is_in_time) THEN h.source_timestamp_ns END AS stamped_ns
     FROM heard AS h
     LEFT JOIN apart AS a ON h.clock_id = a.clock_id AND h.taken_clock_id = a.taken_clock_id
     GROUP BY h.run_id, h.clock_id, h.publisher_id, h.publisher_count, h.source_timestamp_ns
@@ -97,7 +105,7 @@ placed AS (
 turn AS (
     SELECT
         q.run_id, q.clock_id, q.publisher_id, q.publisher_count, q.source_timestamp_ns,
-        q.is_taken_here, q.near_ns, q.is_in_time, x.start_ns, x.stretch_ns,
+        q.is_taken_here, q.near_ns, q.also_near_ns, q.stamped_ns, x.start_ns, x.stretch_ns,
         (q.near_ns - x.start_ns) // x.stretch_ns AS stretch,
         row_number() OVER (
             PARTITION BY q.publisher_id, (q.near_ns - x.start_ns) // x.stretch_ns
@@ -108,8 +116,8 @@ turn AS (
 ),
 sampled AS (
     SELECT
-        run_id, clock_id, publisher_id, source_timestamp_ns, is_taken_here, near_ns, is_in_time,
-        start_ns, stretch_ns
+        run_id, clock_id, publisher_id, source_timestamp_ns, is_taken_here, near_ns, also_near_ns,
+        stamped_ns, start_ns, stretch_ns
     FROM turn
     QUALIFY row_number() OVER (
         PARTITION BY clock_id, stretch
@@ -117,48 +125,48 @@ sampled AS (
     ) <= derive.clock_limit().sampled_messages
 ),
 -- A message may have waited in a queue while more than `reach` others were published. Clocks of one
--- machine are close, so its publication is then among those around its stamp.
-wanted AS (
+-- machine are close, so its publication is then among those around its stamp. A moment before the
+-- first publication tells nothing.
+moment AS (
     SELECT
-        run_id, clock_id, publisher_id, source_timestamp_ns, is_taken_here, start_ns, stretch_ns,
-        stamp_position,
-        unnest(
-            list_filter(
-                list_distinct(
-                    range(
-                        stamp_position - derive.clock_limit().reach,
-                        stamp_position + derive.clock_limit().reach + 1
-                    )
-                    || range(
-                        near_position - derive.clock_limit().reach,
-                        near_position + derive.clock_limit().reach + 1
-                    )
-                ),
-                lambda each: NOT is_taken_here OR each <= near_position
-            )
-        ) AS position
+        s.run_id, s.clock_id, s.publisher_id, s.source_timestamp_ns, s.start_ns, s.stretch_ns,
+        CASE WHEN s.is_taken_here THEN s.near_ns END AS taken_ns,
+        s.place, p.position
     FROM (
         SELECT
-            n.run_id, n.clock_id, n.publisher_id, n.source_timestamp_ns, n.is_taken_here,
-            n.start_ns, n.stretch_ns, n.near_position,
-            coalesce(CASE WHEN n.is_in_time THEN p.position END, n.near_position)
-                AS stamp_position
-        FROM (
-            SELECT
-                s.run_id, s.clock_id, s.publisher_id, s.source_timestamp_ns, s.is_taken_here,
-                s.is_in_time, s.start_ns, s.stretch_ns, p.position AS near_position
-            FROM sampled AS s
-            ASOF JOIN published AS p
-                ON s.publisher_id = p.publisher_id AND s.near_ns >= p.written_ns
-        ) AS n
-        ASOF LEFT JOIN published AS p
-            ON n.publisher_id = p.publisher_id AND n.source_timestamp_ns >= p.written_ns
-    )
+            *,
+            unnest([
+                stamped_ns, near_ns, CASE WHEN NOT is_taken_here THEN also_near_ns END
+            ]) AS at_ns,
+            unnest([1, 2, 3]) AS place
+        FROM sampled
+    ) AS s
+    ASOF JOIN published AS p ON s.publisher_id = p.publisher_id AND s.at_ns >= p.written_ns
+),
+wanted AS (
+    SELECT
+        run_id, clock_id, publisher_id, source_timestamp_ns, start_ns, stretch_ns, taken_ns,
+        arg_min(position, place) AS latest_position,
+        unnest(
+            list_distinct(
+                flatten(
+                    list(
+                        range(
+                            position - derive.clock_limit().reach,
+                            position + derive.clock_limit().reach + 1
+                        )
+                    )
+                )
+            )
+        ) AS position
+    FROM moment
+    GROUP BY run_id, clock_id, publisher_id, source_timestamp_ns, start_ns, stretch_ns, taken_ns
 ),
 paired AS (
     SELECT
-        w.run_id, w.clock_id, w.publisher_id, w.start_ns, w.stretch_ns, w.is_taken_here,
-        w.position = w.stamp_position AS is_latest,
+        w.run_id, w.clock_id, w.publisher_id, w.start_ns, w.stretch_ns,
+        w.taken_ns IS NOT NULL AS is_taken_here,
+        w.position = w.latest_position AS is_latest,
         p.written_ns,
         (p.written_ns - w.start_ns) // w.stretch_ns AS stretch,
         w.source_timestamp_ns - p.written_ns AS greatest_ns,
@@ -168,7 +176,10 @@ paired AS (
             PARTITION BY w.publisher_id, w.position ORDER BY w.source_timestamp_ns
         ) - p.written_ns AS earlier_ns
     FROM wanted AS w
-    JOIN published AS p ON w.publisher_id = p.publisher_id AND w.position = p.position
+    JOIN published AS p
+        ON w.publisher_id = p.publisher_id
+        AND w.position = p.position
+        AND p.written_ns <= coalesce(w.taken_ns, p.written_ns)
 )
 SELECT
     run_id,

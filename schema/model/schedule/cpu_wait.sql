@@ -60,7 +60,7 @@ part AS (
     SELECT * FROM cut
 )
 SELECT
-    row_number() OVER () AS number,
+    row_number() OVER (ORDER BY p.thread_id, p.tid, p.start_ns) AS number,
     p.thread_id,
     p.tid,
     p.state_start_ns,

@@ -20,28 +20,31 @@ WITH thread AS (
     SELECT thread_index, trace_index, coalesce(pid_ns, 0) AS pid_ns, vpid, vtid FROM raw.thread
 ),
 life AS (
-    SELECT
-        t.thread_index,
-        i.event_id AS from_event_id,
-        lead(i.event_id, 1, 9223372036854775807) OVER (
-            PARTITION BY t.thread_index ORDER BY i.event_id
-        ) AS until_event_id
+    SELECT t.thread_index, i.event_id AS from_event_id
     FROM raw.ros2_rcl_init AS i
     JOIN thread AS o ON i.thread_index = o.thread_index
     JOIN thread AS t ON o.trace_index = t.trace_index AND o.pid_ns = t.pid_ns AND o.vpid = t.vpid
 ),
+-- Few and narrow columns: all moments are sorted.
+lived AS (
+    SELECT m.candidate_number, m.thread_index, l.from_event_id AS life, m.tid, m.is_known, m.at_ns
+    FROM (
+        SELECT
+            candidate_number, thread_index, event_id, tid, at_ns,
+            contradiction_id IS NULL AS is_known
+        FROM staging.schedule_moment
+    ) AS m
+    ASOF LEFT JOIN life AS l
+        ON m.thread_index = l.thread_index AND m.event_id >= l.from_event_id
+),
 moment AS (
     SELECT
-        m.candidate_number, m.thread_index, l.from_event_id AS life, m.tid,
-        count(*) FILTER (WHERE m.contradiction_id IS NULL) AS event_count,
-        count(m.contradiction_id) AS unknown_count,
-        min(m.at_ns) FILTER (WHERE m.contradiction_id IS NULL) AS first_ns,
-        max(m.at_ns) FILTER (WHERE m.contradiction_id IS NULL) AS last_ns
-    FROM staging.schedule_moment AS m
-    LEFT JOIN life AS l
-        ON m.thread_index = l.thread_index
-        AND m.event_id >= l.from_event_id
-        AND m.event_id < l.until_event_id
+        candidate_number, thread_index, life, tid,
+        count(*) FILTER (is_known) AS event_count,
+        count(*) FILTER (NOT is_known) AS unknown_count,
+        min(at_ns) FILTER (is_known) AS first_ns,
+        max(at_ns) FILTER (is_known) AS last_ns
+    FROM lived
     GROUP BY ALL
 ),
 ran AS (

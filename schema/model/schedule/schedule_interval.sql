@@ -31,6 +31,12 @@ life AS (
     FROM staging.thread_tid AS t
     JOIN extent AS e ON t.clock_key = e.clock_key
 ),
+-- Two kernel traces of a host have the same switches.
+switch AS (
+    SELECT *
+    FROM staging.thread_switch
+    QUALIFY row_number() OVER (PARTITION BY thread_id, tid, at_ns, is_on ORDER BY event_id) = 1
+),
 step AS (
     SELECT
         *,
@@ -39,11 +45,11 @@ step AS (
         lead(is_on) OVER thread AS is_next_on,
         lead(unseen_since_ns) OVER thread AS next_unseen_since_ns,
         lead(cpu) OVER thread AS next_cpu
-    FROM staging.thread_switch
+    FROM switch
     WINDOW thread AS (PARTITION BY thread_id, tid ORDER BY at_ns, event_id)
 ),
--- A waking while the thread runs is of the switch that follows. Two kernel traces of a host have
--- the same wakings and switches: the waking counts whose waker is known, after the last switch.
+-- A waking while the thread runs is of the switch that follows. Of the same waking in two kernel
+-- traces, the one counts whose waker is known.
 waking AS (
     SELECT
         k.thread_id,
@@ -52,7 +58,7 @@ waking AS (
         min_by(k.event_id, (k.at_ns, k.waker_tid IS NULL, k.event_id)) AS event_id,
         min(k.at_ns) AS at_ns
     FROM staging.thread_waking AS k
-    ASOF LEFT JOIN (SELECT * FROM step WHERE next_ns IS DISTINCT FROM at_ns) AS w
+    ASOF LEFT JOIN step AS w
         ON k.thread_id = w.thread_id AND k.tid = w.tid AND k.at_ns >= w.at_ns
     GROUP BY ALL
 ),

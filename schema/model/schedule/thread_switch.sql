@@ -15,6 +15,8 @@
 --     at this time
 -- column: priority INTEGER  Its priority
 -- column: prev_state BIGINT  State in which it left the CPU, as the kernel has it
+
+-- Each reader joins a part of them: a copy of all switches would take much memory.
 WITH switch AS NOT MATERIALIZED (
     SELECT
         w.trace_index, w.event_id, w.ts_ns + s.shift_ns AS at_ns, s.clock_key, w.cpu_id AS cpu,
