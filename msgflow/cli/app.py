@@ -52,8 +52,8 @@ COMMANDS = {
 }
 """The commands in the order in which a user needs them, with their summaries in the help.
 
-Each is a module of `msgflow.cli` with a function `command`, or a group `app`. Its class `Command`, if
-it has one, reads the words of the function.
+Each is a module of `msgflow.cli` with a function `command`, or a group `app`. Its class `Command`,
+if it has one, reads the words of the function.
 """
 
 
