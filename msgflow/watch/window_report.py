@@ -107,7 +107,6 @@ def report_of(con: duckdb.DuckDBPyConnection, window: Window, *, is_final: bool)
     paths = ask("e2e-latency", _PATH)
     executors = ask("executor-usage", _EXECUTOR)
     losses = ask("topics-delivery", _LOSS)
-    ((discarded,),) = con.execute(_DISCARDED, window.bindings).fetchall()
     ((longest,),) = con.execute(_LONGEST).fetchall()
     return WindowReport(
         window=window,
@@ -115,6 +114,17 @@ def report_of(con: duckdb.DuckDBPyConnection, window: Window, *, is_final: bool)
         paths=paths,
         executors=sorted(executors, key=lambda row: -(row["callback_share"] or 0)),
         losses=[row for row in losses if row["dropped"] or row["lost"]],
-        discarded_events=discarded,
+        discarded_events=discarded_events(con, window),
         longest_ns=max(longest, *(row["max_ns"] or 0 for row in paths), 0),
     )
+
+
+def discarded_events(con: duckdb.DuckDBPyConnection, window: Window) -> int:
+    """Return how many events the tracer lost in a window.
+
+    Args:
+        con: with one run.
+        window: which part of it counts.
+    """
+    ((discarded,),) = con.execute(_DISCARDED, window.bindings).fetchall()
+    return int(discarded)
