@@ -79,12 +79,16 @@ class Arrivals:
             source.live_chunks += 1
             source.ahead_ns = max(ahead_ns, source.ahead_ns or ahead_ns)
 
-    def vanished(self) -> list[Path]:
-        """Return the sources whose next chunk is overdue, each once until a chunk comes again."""
+    def vanished(self, looked_s: float) -> list[Path]:
+        """Return the sources whose next chunk is overdue, each once until a chunk comes again.
+
+        Args:
+            looked_s: when we looked for chunks [s, monotonic]: to read them takes time.
+        """
         found = []
         for path, source in self._sources.items():
             usual_s = max(self._step_ns / _SECOND_NS, source.length_s)
-            is_late = time.monotonic() - source.came_s > PATIENCE * usual_s
+            is_late = looked_s - source.came_s > PATIENCE * usual_s
             if is_late and not (source.has_vanished or source.is_left_out):
                 source.has_vanished = True
                 found.append(path)

@@ -76,6 +76,7 @@ def watch_live(
     while True:
         # Asked first: what came until then is read.
         is_last = is_over()
+        looked_s = time.monotonic()
         for chunk in finder.further():
             if not arrivals.is_left_out(chunk):
                 watcher.read(chunk)
@@ -83,7 +84,7 @@ def watch_live(
                 arrivals.add(chunk, end_ns, is_live=not is_first)
                 watcher.go_on()
         is_first = False
-        for source in arrivals.vanished():
+        for source in arrivals.vanished(looked_s):
             goes_on = watcher.history.go_on_without(source)
             end = "going on without it" if goes_on else "waiting for it"
             note(f"no chunk comes any more from {source}: {end}")

@@ -51,20 +51,27 @@ def test_a_host_that_vanishes_is_told_once(robots: Robots) -> None:
     robots.come("alpha", "beta")
     for _ in range(4):
         robots.come("alpha")
-        assert robots.arrivals.vanished() == []
+        assert robots.arrivals.vanished(robots.now) == []
     robots.come("alpha")
     robots.now += 0.1
-    assert robots.arrivals.vanished() == [Path("beta")]
-    assert robots.arrivals.vanished() == []
+    assert robots.arrivals.vanished(robots.now) == [Path("beta")]
+    assert robots.arrivals.vanished(robots.now) == []
     robots.come("beta")
     robots.now += 20
-    assert set(robots.arrivals.vanished()) == {Path("alpha"), Path("beta")}
+    assert set(robots.arrivals.vanished(robots.now)) == {Path("alpha"), Path("beta")}
 
 
 def test_clocks_do_not_make_a_host_vanish(robots: Robots) -> None:
     for _ in range(20):
         robots.come("alpha", "beta", alpha=-60)
-        assert robots.arrivals.vanished() == []
+        assert robots.arrivals.vanished(robots.now) == []
+
+
+def test_to_read_slowly_makes_nobody_vanish(robots: Robots) -> None:
+    robots.come("alpha")
+    looked_s = robots.now
+    robots.now += 60
+    assert robots.arrivals.vanished(looked_s) == []
 
 
 def test_chunks_longer_than_a_step_are_waited_for(robots: Robots) -> None:
@@ -72,9 +79,9 @@ def test_chunks_longer_than_a_step_are_waited_for(robots: Robots) -> None:
     name = "20260314T092600+0100-20260314T092700+0100-0"
     robots.arrivals.add(Chunk(0, Path("a"), Path("a/archives") / name), None, is_live=True)
     robots.now += 299
-    assert robots.arrivals.vanished() == []
+    assert robots.arrivals.vanished(robots.now) == []
     robots.now += 2
-    assert robots.arrivals.vanished() == [Path("a")]
+    assert robots.arrivals.vanished(robots.now) == [Path("a")]
 
 
 def test_a_clock_that_errs_among_others(robots: Robots) -> None:
@@ -109,7 +116,7 @@ def test_a_session_created_anew_is_taken_in_again(robots: Robots) -> None:
     robots.come()
     robots.arrivals.leave_out(Path("beta"))
     robots.now += 60
-    assert Path("beta") not in robots.arrivals.vanished()
+    assert Path("beta") not in robots.arrivals.vanished(robots.now)
     assert robots.arrivals.is_left_out(Chunk(2, Path("beta"), Path("x")))
     assert not robots.arrivals.is_left_out(Chunk(2, Path("alpha"), Path("x")))
     assert not robots.arrivals.is_left_out(Chunk(0, Path("beta"), Path("x")))

@@ -279,7 +279,7 @@ def test_the_only_host_that_vanishes_and_a_clock_apart_are_said_once(
     watcher = watching(notes, 0.5, 0.5)
     host = sorted(simulated.glob("*/archives"))[0]
     vanished = iter([[], [tmp_path / host.parent.name], []])
-    monkeypatch.setattr(Arrivals, "vanished", lambda self: next(vanished, []))
+    monkeypatch.setattr(Arrivals, "vanished", lambda self, looked_s: next(vanished, []))
     monkeypatch.setattr(Arrivals, "clocks_ahead_s", lambda self: {Path("robot"): -1.2})
     looks = fed([[path] for path in sorted(host.iterdir())], tmp_path, monkeypatch)
     found = list(
