@@ -52,7 +52,8 @@ COMMANDS = {
 }
 """The commands in the order in which a user needs them, with their summaries in the help.
 
-Each is a module of `msgflow.cli` with a function `command`, or a group `app`.
+Each is a module of `msgflow.cli` with a function `command`, or a group `app`. Its class `Command`,
+if it has one, reads the words of the function.
 """
 
 
@@ -115,7 +116,7 @@ def _imported(name: str) -> Any:
     if hasattr(module, "app"):
         around.add_typer(module.app, name=name, help=COMMANDS[name])
     else:
-        around.command(name)(module.command)
+        around.command(name, cls=getattr(module, "Command", None))(module.command)
     return typer.main.get_group(around).commands[name]
 
 

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import shlex
 import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import AbstractContextManager, ExitStack, closing, contextmanager, nullcontext
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from threading import Event
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer.core import TyperCommand
 
 from msgflow.cli.options import (
     OUTPUT,
@@ -23,7 +25,7 @@ from msgflow.cli.options import (
 )
 from msgflow.cli.record import EVENTS
 from msgflow.default_files import DEFAULT_PATHS
-from msgflow.errors import ExitCode, RecordingError
+from msgflow.errors import ExitCode, TraceError, UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -32,19 +34,34 @@ if TYPE_CHECKING:
     from msgflow.sql.interrupt import Interrupts
     from msgflow.watch import Alarm, WindowDatabase, WindowReport
 
-# Seconds between two looks whether a session is still there.
-_BETWEEN_LOOKS = 1.0
+_START = "starts, records and watches a program"
+
+
+class Command(TyperCommand):
+    """The command, which keeps the words behind `--` apart from its own: as `args`."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Read the words before `--`."""
+        own, program = args, []
+        if "--" in args:
+            place = args.index("--")
+            own, program = args[:place], args[place + 1 :]
+        super().parse_args(ctx, own)
+        ctx.args = program
+        return program
 
 
 def command(
+    context: typer.Context,
     words: Annotated[
-        list[str],
+        list[str] | None,
         typer.Argument(
             metavar="SESSION|DIR|-- COMMAND...",
             help="An LTTng session, a directory into which rotated recordings come, or what to"
             " start, record and watch",
+            show_default="the only session",
         ),
-    ],
+    ] = None,
     window: Annotated[
         str, typer.Option("--window", metavar="TIME", help="Length of a window")
     ] = "10s",
@@ -123,13 +140,17 @@ def command(
     from msgflow.watch import (
         Exporter,
         FlightRecorder,
+        WatchedSessions,
         Watcher,
         remove_chunk,
         violation_line,
         watch_finished,
         watch_live,
+        watched_place,
     )
 
+    program = context.args
+    word = _only_word(words or [], program, once=once, directory=directory)
     step_ns = duration_ns(step, "--step")
     window_ns = duration_ns(window, "--window")
     alarm = None if targets is None else _alarm(targets, paths)
@@ -178,29 +199,77 @@ def command(
         def live(place: Path, is_over: Callable[[], bool]) -> None:
             show(watch_live(place, watcher, step_ns=step_ns, is_over=is_over, note=print_note))
 
-        place = path_of(words[0]).absolute()
-        if once:
-            show(watch_finished(place, watcher))
-        elif len(words) == 1 and (source := _source(words[0], place)) is not None:
-            found, session = source
-            with _rotated(session, step_ns) as go_on, _until_interrupted() as interrupts:
-                is_over = _session_is_over(session, go_on)
-
-                def ends() -> bool:
-                    interrupts.check()
-                    return is_over()
-
-                live(found, ends)
-        else:
+        if program:
             if directory is None:
                 # The recording is ours alone: it need not grow.
                 watcher.on_passed = remove_chunk
-            _record(words, directory, step_ns, live)
+            _record(program, directory, step_ns, live)
+        elif once:
+            show(watch_finished(_finished(word), watcher))
+        else:
+            place = watched_place(word)
+            with (
+                WatchedSessions(place, step_ns, print_note) as sessions,
+                _until_interrupted() as interrupts,
+            ):
+
+                def is_over() -> bool:
+                    interrupts.check()
+                    return sessions.are_over()
+
+                live(place, is_over)
     if alarm is not None and alarm.count(Verdict.FAILED):
         raise typer.Exit(ExitCode.FAILED)
     # Without a window, nothing was measured.
     if alarm is not None and not alarm.is_measured:
         raise typer.Exit(ExitCode.NOT_MEASURED)
+
+
+def _only_word(
+    words: list[str], program: list[str], *, once: bool, directory: Path | None
+) -> str | None:
+    """Return the session or directory that is named, if any.
+
+    Raises:
+        UsageError: there are more words than one, or other options than those fit.
+    """
+    if program:
+        alone = f"msgflow watch -- {shlex.join(program)} {_START}"
+        if words:
+            raise UsageError(f"a program is watched alone — {shlex.join(words)}", alone)
+        if once:
+            raise UsageError("--once reads a finished recording, not a program", alone)
+        return None
+    if directory is not None:
+        raise UsageError(
+            "-o is where a program is recorded, and there is none",
+            f"msgflow watch -o {shlex.quote(str(directory))} -- COMMAND",
+        )
+    if len(words) > 1:
+        raise UsageError(
+            f"one session or directory is watched, not {len(words)} — {shlex.join(words)}",
+            "name a directory above them"
+            if once
+            else f"name a directory above them; msgflow watch -- {shlex.join(words)} {_START}",
+        )
+    if once and not words:
+        raise UsageError("--once needs a directory", "msgflow watch --once DIR")
+    return words[0] if words else None
+
+
+def _finished(word: str | None) -> Path:
+    """Return the directory of a finished recording.
+
+    Raises:
+        TraceError: there is none.
+    """
+    assert word is not None
+    place = path_of(word).absolute()
+    if not place.is_dir():
+        raise TraceError(
+            f"no such directory — {word}", "--once reads the directory of a rotated recording"
+        )
+    return place
 
 
 @contextmanager
@@ -286,13 +355,6 @@ def _record(
         print_note(f"{words[0]} ended with exit code {recorded.exit_code}")
 
 
-def _rotated(session: str | None, step_ns: int) -> AbstractContextManager[Callable[[], None]]:
-    """Let a session rotate during a block, if there is one, as `rotated` does."""
-    from msgflow.live import rotated
-
-    return nullcontext(lambda: None) if session is None else rotated(session, step_ns)
-
-
 @contextmanager
 def _until_interrupted() -> Iterator[Interrupts]:
     """Do what is in the block until Ctrl-C, which is how a view ends."""
@@ -305,57 +367,3 @@ def _until_interrupted() -> Iterator[Interrupts]:
             raise
         except KeyboardInterrupt:
             interrupts.answer()
-
-
-def _source(word: str, place: Path) -> tuple[Path, str | None] | None:
-    """Return a directory to watch, and the LTTng session that writes there, if one does.
-
-    Args:
-        word: the name of a session, or a directory.
-        place: the word as a path.
-
-    Returns:
-        None if it is neither.
-    """
-    from msgflow.live import sessions
-
-    try:
-        found = [(each.directory, each.name) for each in sessions() if each.directory is not None]
-    except RecordingError:
-        # LTTng is elsewhere.
-        found = []
-    by_name = next(((path, name) for path, name in found if name == word), None)
-    if by_name is not None or not place.is_dir():
-        return by_name
-    below = (name for path, name in found if path.is_relative_to(place))
-    return place, next(below, None)
-
-
-def _session_is_over(name: str | None, go_on: Callable[[], None]) -> Callable[[], bool]:
-    """Return a function that tells whether a session has ended; without one, nothing tells.
-
-    Args:
-        name: of the session.
-        go_on: keeps it rotating, while it is there.
-    """
-    from msgflow.live import sessions
-
-    last = time.monotonic()
-    absences = 0
-
-    def is_over() -> bool:
-        nonlocal last, absences
-        if name is None or time.monotonic() - last < _BETWEEN_LOOKS:
-            return False
-        last = time.monotonic()
-        try:
-            is_there = any(each.name == name for each in sessions())
-        except RecordingError:
-            is_there = False
-        absences = 0 if is_there else absences + 1
-        if is_there:
-            go_on()
-        # The last chunk may come half a second after its session has gone.
-        return absences > 1
-
-    return is_over

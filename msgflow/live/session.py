@@ -102,7 +102,7 @@ def rotated(name: str, length_ns: int) -> Iterator[Callable[[], None]]:
         nonlocal is_ours
         # It may have ended.
         with suppress(RecordingError):
-            is_ours = is_ours or _is_first_to_rotate(name, length_ns)
+            is_ours = _is_first_to_rotate(name, length_ns) or is_ours
 
     try:
         yield go_on

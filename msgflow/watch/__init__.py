@@ -7,6 +7,7 @@ from msgflow.watch.chunk import finished_chunks, remove_chunk
 from msgflow.watch.flight_recorder import FlightRecorder
 from msgflow.watch.follow import watch_finished, watch_live
 from msgflow.watch.prometheus import Exporter
+from msgflow.watch.watched_sessions import WatchedSessions, watched_place
 from msgflow.watch.watcher import Watcher
 from msgflow.watch.window_database import WindowDatabase
 from msgflow.watch.window_report import WindowReport
@@ -15,6 +16,7 @@ __all__ = [
     "Alarm",
     "Exporter",
     "FlightRecorder",
+    "WatchedSessions",
     "Watcher",
     "WindowDatabase",
     "WindowReport",
@@ -23,4 +25,5 @@ __all__ = [
     "violation_line",
     "watch_finished",
     "watch_live",
+    "watched_place",
 ]

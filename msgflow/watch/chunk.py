@@ -5,16 +5,25 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import time
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from msgflow.errors import TraceError
+
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Iterator
 
 _ARCHIVES = "archives"
 # Begin, end, number; see "Session rotation" of lttng-rotate(1).
-_NAME = re.compile(r"\d{8}T\d{6}[+-]\d{4}-(?P<end>\d{8}T\d{6})[+-]\d{4}-(?P<number>\d+)")
+_NAME = re.compile(r"(?P<begin>\d{8}T\d{6}[+-]\d{4})-(?P<end>\d{8}T\d{6}[+-]\d{4})-(?P<number>\d+)")
+_TIME = "%Y%m%dT%H%M%S%z"
+# Seconds from one search for further recordings to the next, or more: a search is no longer part
+# of the time than this.
+_BETWEEN_SEARCHES = 1.0
+_MOST_OF_TIME = 0.05
 
 
 @dataclass(frozen=True, order=True)
@@ -31,20 +40,110 @@ class Chunk:
     source: Path
     path: Path
 
+    @property
+    def length_s(self) -> float:
+        """From its begin to its end, in whole seconds; 0 if its name does not say it."""
+        match = _NAME.fullmatch(self.path.name)
+        return (_time(match["end"]) - _time(match["begin"])).total_seconds() if match else 0
 
-def finished_chunks(directory: Path, after: Mapping[Path, int] | None = None) -> list[Chunk]:
-    """Return the finished chunks below a directory, of all hosts, by number.
 
-    Args:
-        directory: of a session, or above several, such as that of lttng-relayd.
-        after: source -> number of the last chunk that is left out, with all before it.
+class ChunkFinder:
+    """Finds the finished chunks below a directory, of all hosts, each once."""
+
+    def __init__(self, directory: Path, refuse: Callable[[TraceError], None]) -> None:
+        """Find nothing yet.
+
+        Args:
+            directory: of a session, or above several, such as that of lttng-relayd.
+            refuse: gets an error for each directory that cannot be read, once.
+        """
+        self._directory = directory
+        self._refuse = refuse
+        self._refused: set[Path] = set()
+        # The names that each `archives` had at the last look.
+        self._names: dict[Path, set[str]] = {}
+        # Of each source, which recording its last chunk belongs to, and the number of the chunk.
+        self._last: dict[Path, tuple[int, int]] = {}
+        self._next_search = 0.0
+
+    def further(self) -> list[Chunk]:
+        """Return the chunks that have come since the last call, by number.
+
+        Where a session was created anew in the directory of an earlier one, numbers begin again:
+        all chunks of the earlier recording come first.
+        """
+        if time.monotonic() >= self._next_search:
+            self._search()
+        found = [pair for archives in list(self._names) for pair in self._of(archives)]
+        return [chunk for _, chunk in sorted(found)]
+
+    def _search(self) -> None:
+        """Look for further recordings: there may be many old ones, so this is done seldom."""
+        begin = time.monotonic()
+        for folder, below, _ in os.walk(self._directory, onerror=self._fail):
+            if os.path.basename(folder) == _ARCHIVES:
+                self._names.setdefault(Path(folder), set())
+                below.clear()
+        end = time.monotonic()
+        self._next_search = end + max(_BETWEEN_SEARCHES, (end - begin) / _MOST_OF_TIME)
+
+    def _of(self, archives: Path) -> Iterator[tuple[int, Chunk]]:
+        """Yield the further chunks of a source, each with the number of its recording."""
+        try:
+            names = set(os.listdir(archives))
+        except OSError as error:
+            self._fail(error)
+            # It may come back, with other chunks.
+            del self._names[archives]
+            return
+        matches = [
+            match for name in names - self._names[archives] if (match := _NAME.fullmatch(name))
+        ]
+        self._names[archives] = names
+        source = archives.parent
+        recording, last = self._last.get(source, (0, -1))
+        numbers = [int(match["number"]) for match in matches]
+        if len(set(numbers)) == len(numbers) and all(number > last for number in numbers):
+            # A clock that is set does not mix them up.
+            matches.sort(key=lambda match: int(match["number"]))
+        else:
+            matches.sort(key=lambda match: (_time(match["begin"]), int(match["number"])))
+        for match in matches:
+            number = int(match["number"])
+            recording += number <= last
+            last = number
+            path = archives / match.string
+            if os.access(path, os.R_OK | os.X_OK):
+                yield recording, Chunk(number, source, path)
+            else:
+                self._fail(PermissionError(0, "permission denied", str(archives)))
+        self._last[source] = (recording, last)
+
+    def _fail(self, error: OSError) -> None:
+        # What has gone meanwhile is no fault.
+        place = Path(error.filename)
+        if isinstance(error, FileNotFoundError) or place in self._refused:
+            return
+        self._refused.add(place)
+        self._refuse(
+            TraceError(
+                f"cannot read {place}: {(error.strerror or str(error)).lower()}",
+                "run msgflow watch as the user that records, such as that of lttng-relayd",
+            )
+        )
+
+
+def finished_chunks(directory: Path) -> list[Chunk]:
+    """Return all finished chunks below a directory, of all hosts, by number.
+
+    Raises:
+        TraceError: a directory cannot be read.
     """
-    last = after or {}
-    return sorted(
-        chunk
-        for chunk in _chunks(directory)
-        if chunk.source not in last or chunk.number > last[chunk.source]
-    )
+
+    def refuse(error: TraceError) -> None:
+        raise error
+
+    return ChunkFinder(directory, refuse).further()
 
 
 def remove_chunk(path: Path) -> None:
@@ -52,11 +151,5 @@ def remove_chunk(path: Path) -> None:
     shutil.rmtree(path, ignore_errors=True)
 
 
-def _chunks(directory: Path) -> Iterator[Chunk]:
-    for folder, below, _ in os.walk(directory):
-        if os.path.basename(folder) == _ARCHIVES:
-            for name in below:
-                if match := _NAME.fullmatch(name):
-                    path = Path(folder)
-                    yield Chunk(int(match["number"]), path.parent, path / name)
-            below.clear()
+def _time(text: str) -> datetime:
+    return datetime.strptime(text, _TIME)

@@ -6,7 +6,8 @@ import time
 from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
-from msgflow.watch.chunk import finished_chunks
+from msgflow.watch.arrivals import PATIENCE, Arrivals
+from msgflow.watch.chunk import ChunkFinder, finished_chunks
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -18,17 +19,16 @@ if TYPE_CHECKING:
 # Seconds.
 _BETWEEN_LOOKS = 0.1
 _SECOND_NS = 1_000_000_000
-# A host without a chunk for so many steps is not waited for any more.
-_PATIENCE = 5
 # The view lags if its last event is older than so many steps.
 _MOST_LAG = 4
+_REMEDY = "clocks are in step (chrony) and its session is created anew"
 
 
 def watch_finished(directory: Path, watcher: Watcher) -> Iterator[WindowReport]:
     """Watch a recording that has ended, from its first to its last chunk.
 
     Raises:
-        TraceError: there is no chunk.
+        TraceError: there is no chunk, or a directory cannot be read.
     """
     chunks = finished_chunks(directory)
     if not chunks:
@@ -69,17 +69,36 @@ def watch_live(
         note: gets sentences about what goes wrong.
     """
     begin = time.monotonic()
-    lags = False
+    finder = ChunkFinder(directory, lambda error: note(f"{error.message}: {error.hint}"))
+    arrivals = Arrivals(step_ns)
+    is_first = True
+    are_apart = lags = False
     while True:
         # Asked first: what came until then is read.
         is_last = is_over()
-        for chunk in finished_chunks(directory, watcher.numbers):
-            watcher.read(chunk)
+        looked_s = time.monotonic()
+        for chunk in finder.further():
+            if not arrivals.is_left_out(chunk):
+                watcher.read(chunk)
+                end_ns = watcher.history.ends_ns.get(chunk.source)
+                arrivals.add(chunk, end_ns, is_live=not is_first)
+                watcher.go_on()
+        is_first = False
+        for source in arrivals.vanished(looked_s):
+            goes_on = watcher.history.go_on_without(source)
+            end = "going on without it" if goes_on else "waiting for it"
+            note(f"no chunk comes any more from {source}: {end}")
             watcher.go_on()
-        for source in watcher.history.behind(_PATIENCE * step_ns):
-            note(f"no chunk comes any more from {source}: going on without it")
-            watcher.history.go_on_without(source)
-            watcher.go_on()
+        ahead_s = arrivals.clocks_ahead_s()
+        for source, seconds in ahead_s.items():
+            if abs(seconds) * _SECOND_NS > PATIENCE * step_ns:
+                arrivals.leave_out(source)
+                watcher.history.leave_out(source)
+                note(f"{_wrong(source, seconds)}: going on without it, until {_REMEDY}")
+                watcher.go_on()
+            elif abs(seconds) * _SECOND_NS > step_ns and not are_apart:
+                are_apart = True
+                note(f"{_wrong(source, seconds)}: windows wait for the slowest, until {_REMEDY}")
         if is_last:
             yield from _last(watcher)
             return
@@ -89,7 +108,7 @@ def watch_live(
         lag_s = report.lag_s or 0
         is_late = lag_s * _SECOND_NS > _MOST_LAG * step_ns
         if is_late and not lags:
-            # What is older than the view itself has another cause.
+            # A recording that was old when the view began does not mean that we are slow.
             said = (
                 f"the view lags by {lag_s:.0f} s: steps are longer until it has caught up"
                 if (lag_s - time.monotonic() + begin) * _SECOND_NS < _MOST_LAG * step_ns
@@ -100,6 +119,11 @@ def watch_live(
         lags = is_late
         yield report
         watcher.keep_violation()
+
+
+def _wrong(source: Path, ahead_s: float) -> str:
+    direction = "ahead of" if ahead_s > 0 else "behind"
+    return f"the clock of {source} is {abs(ahead_s):.0f} s {direction} the others"
 
 
 def _last(watcher: Watcher) -> Iterator[WindowReport]:

@@ -8,7 +8,7 @@ from msgflow.run.window import Window
 from msgflow.watch.kept_traces import KeptTraces
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
     from msgflow.watch.kept_chunk import KeptChunk
@@ -64,6 +64,11 @@ class History:
         return min(self._ends.values())
 
     @property
+    def ends_ns(self) -> Mapping[Path, int]:
+        """Up to when each source has recorded that is waited for."""
+        return self._ends
+
+    @property
     def border_ns(self) -> int:
         """The last border."""
         return self._borders[-1]
@@ -94,16 +99,30 @@ class History:
         self._ends[chunk.source] = max(chunk.end_ns, self._ends.get(chunk.source, chunk.end_ns))
         self._last_end_ns = max(self._last_end_ns, chunk.end_ns)
 
-    def behind(self, patience_ns: int) -> list[Path]:
-        """Return the sources that end so much earlier than the one that has come furthest."""
-        latest = max(self._ends.values(), default=0)
-        return [source for source, end in self._ends.items() if latest - end > patience_ns]
+    def go_on_without(self, source: Path) -> bool:
+        """Wait for no more chunks of a source; a later chunk of it counts again.
 
-    def go_on_without(self, source: Path) -> None:
-        """Wait for no more chunks of a source; a later chunk of it counts again."""
-        if len(self._ends) > 1:
-            # One whose chunks cannot be read has no end.
-            self._ends.pop(source, None)
+        Returns:
+            False if it is the only one.
+        """
+        # One whose chunks cannot be read has no end.
+        if not self._ends.keys() - {source}:
+            return False
+        self._ends.pop(source, None)
+        return True
+
+    def leave_out(self, source: Path) -> None:
+        """Forget all of a source whose clock errs, as if it had never recorded."""
+        if not self.go_on_without(source):
+            return
+        self._chunks = [chunk for chunk in self._chunks if chunk.source != source]
+        self._last_end_ns = max(self._ends.values())
+        begin_ns = min((chunk.begin_ns for chunk in self._chunks), default=self._last_end_ns)
+        if len(self._borders) < 2 or self._borders[-1] < begin_ns:
+            # Borders and windows so far had its time.
+            self._borders = [begin_ns]
+            self.final_ns = None
+            self._shown_ns = 0
 
     @property
     def behind_ns(self) -> int:

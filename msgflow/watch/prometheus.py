@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections import Counter
 from threading import Lock
 from typing import TYPE_CHECKING
@@ -10,6 +11,7 @@ from msgflow.errors import UsageError
 from msgflow.query.catalogue import load_query
 from msgflow.query.runner import run_query
 from msgflow.run.slice import Slice
+from msgflow.watch.window_report import discarded_events
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -25,8 +27,9 @@ BOUNDS_S = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
 
 _SECOND_NS = 1_000_000_000
 _STATUSES = "SELECT path, status, count(*) FROM watched_flow GROUP BY ALL"
+# Where clocks are apart, latencies may be negative: a sum that falls would be no counter.
 _SUMS = """
-SELECT path, sum(latency_ns)::BIGINT
+SELECT path, sum(greatest(latency_ns, 0))::BIGINT
 FROM watched_flow
 WHERE latency_ns IS NOT NULL
 GROUP BY ALL
@@ -38,10 +41,15 @@ WHERE f.latency_ns IS NOT NULL
 GROUP BY ALL
 """
 _COUNTS = "SELECT path, count(latency_ns) FROM watched_flow GROUP BY ALL"
-_DISCARDED = """
-SELECT coalesce(sum(event_count), 0)::BIGINT
-FROM main.gap
-WHERE kind = 'loss' AND start_ns >= $start_ns AND start_ns < $end_ns
+_LOSSES = """
+SELECT s.topic_name, main.node_label(n.full_name, p.name, p.pid), d.status, d.reason, count(*)
+FROM main.stat_delivery AS d
+JOIN main.publication AS b ON d.publication_id = b.publication_id
+JOIN main.subscription AS s ON d.subscription_id = s.subscription_id
+JOIN main.process AS p ON s.process_id = p.process_id
+LEFT JOIN main.node AS n ON s.node_id = n.node_id
+WHERE d.status IN ('dropped', 'lost') AND b.start_ns >= $start_ns AND b.start_ns < $end_ns
+GROUP BY ALL
 """
 
 
@@ -56,10 +64,11 @@ class Exporter:
         self._buckets: Counter[tuple[str, float]] = Counter()
         self._counts: Counter[str] = Counter()
         self._sums_ns: Counter[str] = Counter()
-        self._losses: Counter[tuple[str, str, str]] = Counter()
+        self._losses: Counter[tuple[str, ...]] = Counter()
         self._violations: Counter[tuple[str, str]] = Counter()
         self._discarded = 0
         self._last: WindowReport | None = None
+        self._shown_s = 0.0
 
     def serve(self, place: str) -> None:
         """Serve /metrics in a thread, until the process ends.
@@ -95,7 +104,7 @@ class Exporter:
         """
         times = Slice(start=part.start_ns, end=part.end_ns)
         flows = run_query(con, load_query("flows"), {}, times).table
-        losses = run_query(con, load_query("topics-delivery"), {}, times).table.to_pylist()
+        losses = con.execute(_LOSSES, part.bindings).fetchall()
         con.register("watched_flow", flows)
         try:
             statuses = con.execute(_STATUSES).fetchall()
@@ -104,22 +113,20 @@ class Exporter:
             buckets = con.execute(_BUCKETS, {"bounds": list(BOUNDS_S)}).fetchall()
         finally:
             con.unregister("watched_flow")
-        ((discarded,),) = con.execute(_DISCARDED, part.bindings).fetchall()
+        discarded = discarded_events(con, part)
         with self._lock:
             self._statuses.update({(path, status): number for path, status, number in statuses})
             self._sums_ns.update(dict(sums))
             self._counts.update(dict(counts))
             self._buckets.update({(path, bound): number for path, bound, number in buckets})
-            for row in losses:
-                topic = row["topic_name"] or "?"
-                for kind in ("dropped", "lost"):
-                    self._losses[topic, row["subscriber"], kind] += row[kind]
+            self._losses.update({tuple(labels): number for *labels, number in losses})
             self._discarded += discarded
 
     def show(self, report: WindowReport) -> None:
         """Take over how it is now."""
         with self._lock:
             self._last = report
+            self._shown_s = time.monotonic()
             self._violations.update((each["subject"], each["metric"]) for each in report.violations)
 
     def collect(self) -> Iterator[Metric]:
@@ -152,7 +159,7 @@ class Exporter:
 
         messages = CounterMetricFamily(
             "msgflow_messages_undelivered", "Messages that a subscription did not get",
-            labels=["topic", "subscriber", "kind"],
+            labels=["topic", "subscriber", "kind", "reason"],
         )  # fmt: skip
         for labels, number in self._losses.items():
             messages.add_metric(list(labels), number)
@@ -175,12 +182,13 @@ class Exporter:
             labels=["host", "process", "tid"],
         )  # fmt: skip
         lag = GaugeMetricFamily(
-            "msgflow_watch_lag_seconds", "Age of the last event when a window was ready"
+            "msgflow_watch_lag_seconds", "Age of the last event that a window had"
         )
         for row in self._last.executors if self._last is not None else ():
             labels = [row["host"] or "", row["process"] or "", str(row["tid"])]
             busy.add_metric(labels, row["callback_share"] or 0)
         if self._last is not None and self._last.lag_s is not None:
-            lag.add_metric([], self._last.lag_s)
+            # It grows where no window comes any more.
+            lag.add_metric([], self._last.lag_s + time.monotonic() - self._shown_s)
         yield busy
         yield lag

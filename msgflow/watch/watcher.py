@@ -41,7 +41,6 @@ class Watcher:
 
     Attributes:
         history: the last chunks.
-        numbers: of the last chunk of each source.
         on_passed: gets the directory of each chunk that no window needs any more.
     """
 
@@ -88,13 +87,16 @@ class Watcher:
         )
         self._after = Continuation()
         self._con = database_in_memory()
-        self.numbers: dict[Path, int] = {}
+        # Of the last chunk of each source.
+        self._numbers: dict[Path, int] = {}
 
     def read(self, chunk: Chunk) -> None:
         """Read the next chunk of a host; what is wrong with it is noted, and the others go on."""
-        before = self.numbers.get(chunk.source)
-        self.numbers[chunk.source] = chunk.number
-        if before is not None and chunk.number > before + 1:
+        before = self._numbers.get(chunk.source)
+        self._numbers[chunk.source] = chunk.number
+        if before is not None and chunk.number <= before:
+            self._note(f"a new recording has begun in {chunk.source}: the view goes on with it")
+        elif before is not None and chunk.number > before + 1:
             self._note(
                 f"chunks are missing before number {chunk.number} of {chunk.source}:"
                 f" {chunk.number - before - 1}"

@@ -130,7 +130,6 @@ def report_of(con: duckdb.DuckDBPyConnection, window: Window, last_step: Window)
     paths = ask("e2e-latency", _PATH)
     executors = ask("executor-usage", _EXECUTOR)
     losses = ask("topics-delivery", _LOSS)
-    ((discarded,),) = con.execute(_DISCARDED, window.bindings).fetchall()
     ((transport, waiting, wait),) = con.execute(_LONGEST, last_step.bindings).fetchall()
     longest = max(transport, *(row["max_ns"] or 0 for row in paths), 0)
     return WindowReport(
@@ -139,8 +138,19 @@ def report_of(con: duckdb.DuckDBPyConnection, window: Window, last_step: Window)
         paths=paths,
         executors=sorted(executors, key=lambda row: -(row["callback_share"] or 0)),
         losses=[row for row in losses if row["dropped"] or row["lost"]],
-        discarded_events=discarded,
+        discarded_events=discarded_events(con, window),
         # What waits still has the rest of its path before it.
         longest_flow_ns=waiting + longest,
         longest_wait_ns=wait,
     )
+
+
+def discarded_events(con: duckdb.DuckDBPyConnection, window: Window) -> int:
+    """Return how many events the tracer lost in a window.
+
+    Args:
+        con: with one run.
+        window: which part of it counts.
+    """
+    ((discarded,),) = con.execute(_DISCARDED, window.bindings).fetchall()
+    return int(discarded)

@@ -30,3 +30,20 @@ def test_a_context_that_an_old_lttng_lacks_is_left_out(
     assert of_kernel[:4] == ["--type=pid", "--type=vpid", "--type=vtid", "--type=procname"]
     assert of_kernel[4:] == ([] if refused else ["--type=pid_ns"])
     assert [words[0] for words in said][-2:] == ["start", "destroy"]
+
+
+def test_a_session_created_anew_rotates_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """LTTng refuses only what is set already."""
+    asked = 0
+
+    def lttng(*words: str) -> None:
+        nonlocal asked
+        asked += words[0] == "enable-rotation"
+        if asked == 2:
+            raise RecordingError("lttng enable-rotation failed: already set", "another")
+
+    monkeypatch.setattr(session, "lttng", lttng)
+    with session.rotated("drive", 1) as go_on:
+        go_on()
+        go_on()
+    assert asked == 3

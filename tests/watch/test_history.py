@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from msgflow.run.window import Window
 from msgflow.watch.history import History
@@ -145,18 +146,45 @@ def test_chunks_that_are_forgotten_are_named_once() -> None:
     assert history.forget(Window(400, 500)) == []
 
 
-def test_a_host_is_waited_for_until_patience_ends() -> None:
+def test_a_host_is_waited_for_until_the_view_goes_on_without_it() -> None:
     history = filled(100)
     history.add(chunk(0, 100, LAPTOP))
     for begin in (100, 200, 300):
         history.add(chunk(begin, begin + 100))
     assert not history.is_due
-    assert history.behind(400) == []
-    assert history.behind(200) == [LAPTOP]
-    history.go_on_without(Path("one of which nothing could be read"))
-    history.go_on_without(LAPTOP)
+    assert history.go_on_without(Path("one of which nothing could be read"))
+    assert history.go_on_without(LAPTOP)
     assert history.is_due
     assert history.complete_ns == 400
     # Of the last host, the view does not go on alone.
-    history.go_on_without(ROBOT)
+    assert not history.go_on_without(ROBOT)
     assert history.complete_ns == 400
+
+
+@pytest.mark.parametrize("ahead", [-100_000, 100_000])
+def test_a_host_whose_clock_errs_leaves_nothing_behind(ahead: int) -> None:
+    """Windows go on in the time of the others, none of them is longer than it should be."""
+    history = History(WINDOW, STEP)
+    for begin in (0, 100, 200, 300):
+        history.add(chunk(begin + 100_000 + ahead, begin + 100_100 + ahead, LAPTOP))
+        history.add(chunk(begin + 100_000, begin + 100_100))
+        if history.is_due:
+            history.add_border()
+        if (window := history.final_window()) is not None:
+            history.final_ns = window.end_ns
+    history.leave_out(LAPTOP)
+    windows = []
+    for begin in (400, 500, 600):
+        history.add(chunk(begin + 100_000, begin + 100_100))
+        history.add_border()
+        if (window := history.final_window()) is not None:
+            windows.append(window)
+            history.final_ns = window.end_ns
+    assert [window.end_ns for window in windows][-2:] == [100_500, 100_600]
+    assert windows[-1] == Window(100_300, 100_600) or ahead < 0
+    assert history.last_event_ns == 100_700
+    assert history.complete_ns == 100_700
+    history.add_border(is_last=True)
+    last = history.final_window(is_last=True)
+    assert last is not None
+    assert last.end_ns == 100_701

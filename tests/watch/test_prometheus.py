@@ -6,14 +6,20 @@ import json
 import re
 import urllib.request
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import pyarrow.compute as pc
 import pytest
 
 from msgflow.clocks import read_clock_sync
 from msgflow.database import Database
 from msgflow.errors import UsageError
-from msgflow.watch import Exporter, Watcher, kept_chunk, watch_finished
+from msgflow.query.runner import run_query
+from msgflow.run.window import Window
+from msgflow.sim import Recording, simulate
+from msgflow.watch import Exporter, Watcher, WindowReport, watch_finished
 
 prometheus = pytest.importorskip("prometheus_client")
 DASHBOARD = Path(__file__).resolve().parents[2] / "docs" / "grafana-dashboard.json"
@@ -86,24 +92,90 @@ def test_the_dashboard_asks_for_what_is_served(exporter: Exporter) -> None:
     assert len(asked) == len(panels) - 1
 
 
-def test_a_topic_may_have_no_name(recording: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its publishers and subscriptions were created before the recording."""
+def metrics(exporter: Exporter, family: str) -> dict[tuple[str, ...], float]:
+    """Return the samples of a family, by the values of their labels."""
+    (found,) = [each for each in exporter.collect() if each.name == family]
+    return {tuple(sample.labels.values()): sample.value for sample in found.samples}
+
+
+def test_the_sum_of_latencies_does_not_fall_and_losses_have_reasons(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Clocks that are apart make latencies negative."""
+    apart_ns = 2_000_000
+
+    def with_clocks_apart(*words: Any) -> Any:
+        result = run_query(*words)
+        place = result.table.schema.get_field_index("latency_ns")
+        apart = pc.subtract(result.table["latency_ns"], apart_ns)
+        return replace(result, table=result.table.set_column(place, "latency_ns", apart))
+
+    monkeypatch.setattr("msgflow.watch.prometheus.run_query", with_clocks_apart)
+    directory = tmp_path / "trace"
+    simulate("losses", directory, factor=0.3, recording=Recording(rotations=(SECOND // 2, SECOND)))
     exporter = Exporter()
     watcher = Watcher(
-        window_ns=8 * SECOND,
-        step_ns=8 * SECOND,
+        window_ns=SECOND,
+        step_ns=SECOND // 2,
         links=None,
         clocks=read_clock_sync("none"),
         note=lambda text: None,
         exporter=exporter,
     )
-    wanted = kept_chunk.wanted_events
-    monkeypatch.setattr(kept_chunk, "wanted_events", lambda: wanted(["*:rcl_*_init", "dds:*"]))
-    for _ in watch_finished(recording, watcher):
-        pass
-    registry = prometheus.CollectorRegistry()
-    registry.register(exporter)
-    assert b'topic="?"' in prometheus.generate_latest(registry)
+    assert list(watch_finished(directory, watcher))
+    watcher.close()
+    with Database(tmp_path / "whole.duckdb") as whole:
+        whole.ingest([directory])
+        flows = whole.query("flows").to_arrow().to_pylist()
+        delivery = whole.query("topics-delivery").to_arrow().to_pylist()
+    known = [row["latency_ns"] for row in flows if row["latency_ns"] is not None]
+    latencies = [latency - apart_ns for latency in known]
+    assert min(latencies) < 0 < max(latencies)
+    (family,) = [each for each in exporter.collect() if each.name.endswith("path_latency_seconds")]
+    sums = [sample.value for sample in family.samples if sample.name.endswith("_sum")]
+    assert sum(sums) == pytest.approx(sum(max(each, 0) for each in latencies) / SECOND)
+    found = metrics(exporter, "msgflow_messages_undelivered")
+    assert found
+    for kind in ("dropped", "lost"):
+        counts = sum(value for labels, value in found.items() if labels[2] == kind)
+        assert counts == sum(row[kind] for row in delivery)
+    reasons = " ".join(row["reasons"] for row in delivery if row["reasons"])
+    assert all(labels[3] in reasons for labels in found)
+
+
+def shown(*violations: dict[str, str], lag_s: float | None = None) -> WindowReport:
+    return WindowReport(
+        window=Window(0, SECOND), is_final=True, paths=(), executors=(), losses=(),
+        discarded_events=0, longest_flow_ns=0, longest_wait_ns=0, violations=violations, lag_s=lag_s,
+    )  # fmt: skip
+
+
+def test_violations_are_counted() -> None:
+    exporter = Exporter()
+    late, rare = {"subject": "/a", "metric": "latency"}, {"subject": "/b", "metric": "rate"}
+    for report in (shown(late, rare), shown(), shown(late)):
+        exporter.show(report)
+    assert metrics(exporter, "msgflow_violations") == {
+        ("/a", "latency"): 2,
+        ("/b", "rate"): 1,
+    }
+
+
+def test_the_lag_grows_where_nothing_comes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A robot that is dead has no windows."""
+    now = 50.0
+    monkeypatch.setattr("msgflow.watch.prometheus.time.monotonic", lambda: now)
+    exporter = Exporter()
+    assert metrics(exporter, "msgflow_watch_lag_seconds") == {}
+    exporter.show(shown(lag_s=1.5))
+    assert metrics(exporter, "msgflow_watch_lag_seconds") == {(): 1.5}
+    now = 110.0
+    assert metrics(exporter, "msgflow_watch_lag_seconds") == {(): 61.5}
+    exporter.show(shown(lag_s=2.0))
+    assert metrics(exporter, "msgflow_watch_lag_seconds") == {(): 2.0}
+    # A finished recording has none.
+    exporter.show(shown())
+    assert metrics(exporter, "msgflow_watch_lag_seconds") == {}
 
 
 def test_metrics_are_served(exporter: Exporter, unused_port: int) -> None:

@@ -15,12 +15,13 @@ FATES = {"dropped": 0, "lost": 0, "no_output": 0, "unknown": 3}
 
 def shown(*reports: WindowReport) -> str:
     """Return the screen after these windows."""
-    screen = WatchScreen()
+    console = Console(file=io.StringIO(), width=80, height=40)
+    screen = WatchScreen(console)
     for report in reports:
         last = screen.of(report)
-    out = io.StringIO()
-    Console(file=out, width=80).print(last)
-    return out.getvalue()
+    with console.capture() as capture:
+        console.print(last)
+    return capture.get()
 
 
 def test_names_are_text_and_all_fits() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import time
 from collections import Counter
+from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,8 @@ from msgflow.sim import (
     simulate,
 )
 from msgflow.watch import Watcher, WindowReport, finished_chunks, watch_finished, watch_live
+from msgflow.watch import chunk as chunk_module
+from msgflow.watch.arrivals import Arrivals
 from msgflow.watch.learned_answers import LearnedAnswers
 
 MS = 1_000_000
@@ -42,13 +45,17 @@ def reports(
 
 
 def watching(
-    notes: list[str], window: float, step: float, links: LinksFile | None = None
+    notes: list[str],
+    window: float,
+    step: float,
+    links: LinksFile | None = None,
+    clocks: str = "none",
 ) -> Watcher:
     return Watcher(
         window_ns=round(window * SECOND),
         step_ns=round(step * SECOND),
         links=links,
-        clocks=read_clock_sync("none"),
+        clocks=read_clock_sync(clocks),
         note=notes.append,
     )
 
@@ -244,9 +251,112 @@ def test_a_recording_that_ended_long_ago_is_no_lag(simulated: Path) -> None:
     )
     watcher.close()
     assert found
-    (said,) = notes
+    (said,) = [note for note in notes if "no chunk comes any more" not in note]
     assert said.startswith("the last event is ")
     assert "--once" in said
+
+
+def fed(
+    chunks: list[list[Path]], directory: Path, monkeypatch: pytest.MonkeyPatch
+) -> Callable[[], bool]:
+    """Return a function that lets the next chunks come, and tells whether these were the last.
+
+    Args:
+        chunks: those that come at one time; each is `…/host/archives/name`.
+        directory: into which they come.
+        monkeypatch: has recordings searched at each look.
+    """
+    monkeypatch.setattr(chunk_module, "_BETWEEN_SEARCHES", 0)
+    monkeypatch.setattr(chunk_module, "_MOST_OF_TIME", float("inf"))
+    left = iter([[], *chunks])
+
+    def is_over() -> bool:
+        coming = next(left, None)
+        for path in coming or ():
+            shutil.copytree(path, directory.joinpath(*path.parts[-3:]))
+        return coming is None
+
+    return is_over
+
+
+@pytest.mark.parametrize("sync", ["none", "messages"])
+def test_a_clock_that_errs_is_said_and_its_host_left_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, sync: str
+) -> None:
+    """Windows of the other one are as long as they should be, and full."""
+    rotations = tuple(SECOND // 4 * number for number in range(1, 8))
+    recording = Recording(rotations=rotations)
+    source = tmp_path / "whole"
+    simulate("two_hosts", source, factor=0.2, recording=recording, clock_offset_ns=60 * SECOND)
+    hosts = [sorted(host.iterdir()) for host in sorted(source.glob("*/archives"))]
+    notes: list[str] = []
+    watcher = watching(notes, 0.25, 0.25, clocks=sync)
+    found = list(
+        watch_live(
+            tmp_path / "live",
+            watcher,
+            # Chunks come as fast as they are read: none is missed.
+            step_ns=10 * SECOND,
+            is_over=fed(
+                [list(pair) for pair in zip(*hosts, strict=True)], tmp_path / "live", monkeypatch
+            ),
+            note=notes.append,
+        )
+    )
+    watcher.close()
+    (said,) = [note for note in notes if "the clock of" in note]
+    assert "is 60 s behind the others: going on without it" in said
+    assert "chrony" in said
+    assert not any("no chunk comes any more" in note for note in notes)
+    lengths = [report.window.end_ns - report.window.start_ns for report in found]
+    assert max(lengths[-3:]) < SECOND // 2
+    assert all(any(row["callbacks"] for row in report.executors) for report in found[-3:])
+
+
+def test_the_only_host_that_vanishes_and_a_clock_apart_are_said_once(
+    simulated: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    notes: list[str] = []
+    watcher = watching(notes, 0.5, 0.5)
+    host = sorted(simulated.glob("*/archives"))[0]
+    vanished = iter([[], [tmp_path / host.parent.name], []])
+    monkeypatch.setattr(Arrivals, "vanished", lambda self, looked_s: next(vanished, []))
+    monkeypatch.setattr(Arrivals, "clocks_ahead_s", lambda self: {Path("robot"): -1.2})
+    looks = fed([[path] for path in sorted(host.iterdir())], tmp_path, monkeypatch)
+    found = list(
+        watch_live(tmp_path, watcher, step_ns=SECOND // 2, is_over=looks, note=notes.append)
+    )
+    watcher.close()
+    assert found
+    assert [note for note in notes if "no chunk comes any more" in note] == [
+        f"no chunk comes any more from {tmp_path / host.parent.name}: waiting for it"
+    ]
+    (said,) = [note for note in notes if "the clock of" in note]
+    assert said.startswith("the clock of robot is 1 s behind the others: windows wait for the slow")
+
+
+def test_a_session_created_anew_is_said_and_gone_on_with(
+    simulated: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Numbers of its chunks begin again."""
+    first, second, third, fourth = sorted(sorted(simulated.glob("*/archives"))[0].iterdir())
+    later = tmp_path / "renamed" / third.parts[-3] / "archives"
+    later.mkdir(parents=True)
+    anew = [
+        Path(shutil.copytree(path, later / f"{path.name.rpartition('-')[0]}-{number}"))
+        for number, path in enumerate((third, fourth))
+    ]
+    notes: list[str] = []
+    watcher = watching(notes, 0.5, 0.5)
+    looks = fed([[first], [second], [anew[0]], [anew[1]]], tmp_path / "live", monkeypatch)
+    found = list(
+        watch_live(tmp_path / "live", watcher, step_ns=SECOND, is_over=looks, note=notes.append)
+    )
+    watcher.close()
+    assert len(found) == 4
+    assert all(any(row["callbacks"] for row in report.executors) for report in found)
+    (said,) = [note for note in notes if "last event" not in note]
+    assert said.startswith(f"a new recording has begun in {tmp_path / 'live' / third.parts[-3]}: ")
 
 
 def test_a_recording_without_chunks(tmp_path: Path) -> None:

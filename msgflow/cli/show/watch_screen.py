@@ -20,7 +20,7 @@ from msgflow.watch import violation_line
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from rich.console import RenderableType
+    from rich.console import Console, RenderableType
 
     from msgflow.watch import WindowReport
 
@@ -30,7 +30,9 @@ Row = dict[str, Any]
 _TIME = slice(11, 19)
 _SPARKS = "▁▂▃▄▅▆▇█"
 _STEPS = 10
-_PATHS, _THREADS, _LOSSES, _VIOLATIONS = 12, 5, 5, 5
+_THREADS, _LOSSES, _VIOLATIONS = 5, 5, 5
+# Violations before the last one have no more than this part of the screen.
+_PART_OF_VIOLATIONS = 3
 _PATH_WIDTH, _NAME_WIDTH = 26, 40
 _MISSING = ("dropped", "lost", "no_output", "unknown")
 _FATES = ("reached", "superseded", *_MISSING, "not_connected", "cut_by_recording")
@@ -47,10 +49,18 @@ _KEYS = "s: sort by another column   ↑ ↓: pick a path   Ctrl-C: end"
 
 
 class WatchScreen:
-    """The last window, with what came before as sparklines."""
+    """The last window, with what came before as sparklines.
 
-    def __init__(self) -> None:
-        """Start before the first window."""
+    It is as high as the terminal at most: violations come first, and tables share what is left.
+    """
+
+    def __init__(self, console: Console) -> None:
+        """Start before the first window.
+
+        Args:
+            console: the terminal, whose size may change.
+        """
+        self._console = console
         self._slowest: dict[str, deque[int]] = {}
         self._violations: deque[str] = deque(maxlen=_VIOLATIONS)
         self._order = "missing"
@@ -106,26 +116,48 @@ class WatchScreen:
         self._violations += [f"{at} {violation_line(each)}" for each in report.violations]
 
     def _shown(self, report: WindowReport) -> RenderableType:
-        parts: list[RenderableType] = [_heading(report), self._paths(report)]
-        parts += [_fates(path) for path in report.paths if path["path"] == self._picked]
-        parts.append(_threads(report))
+        fates = [_fates(path) for path in report.paths if path["path"] == self._picked]
+        above = [_heading(report), *self._shown_violations(), *fates]
+        keys = Text(_KEYS, style="dim")
+        room = self._console.height - sum(self._height(part) for part in (*above, keys))
+        # Each table has a line of titles.
+        room -= 3 if report.losses else 2
+        threads, losses = min(len(report.executors), _THREADS), min(len(report.losses), _LOSSES)
+        paths = _share(room, len(report.paths), threads + losses)
+        losses = _share(room - paths, losses, threads)
+        threads = _share(room - paths - losses, threads, 0)
+        tables = [self._paths(report, paths), _threads(report, threads)]
         if report.losses:
-            parts.append(_losses(report))
-        if self._violations:
-            parts.append(Text("violations", style="bold red"))
-            parts += [Text(printable(line), style="red") for line in self._violations]
-        parts.append(Text(_KEYS, style="dim"))
-        return Group(*parts)
+            tables.append(_losses(report, losses))
+        return Group(*above, *tables, keys)
 
-    def _paths(self, report: WindowReport) -> Table:
+    def _height(self, text: Text) -> int:
+        return len(text.wrap(self._console, self._console.width))
+
+    def _shown_violations(self) -> list[Text]:
+        """Return the last violation, and those before it that there is room for."""
+        lines = [Text(printable(line), style="red") for line in self._violations]
+        room = self._console.height // _PART_OF_VIOLATIONS
+        shown: list[Text] = []
+        for line in reversed(lines):
+            room -= self._height(line)
+            if shown and room < 0:
+                break
+            shown.append(line)
+        return [Text("violations", style="bold red"), *reversed(shown)] if shown else []
+
+    def _paths(self, report: WindowReport, rows: int) -> Table:
         seconds = (report.window.end_ns - report.window.start_ns) / 1_000_000_000
         titles = ("path", "/s", "median", "p99", "max", "missing", "steps")
         table = _table(*(f"{name}▾" if name == self._order else name for name in titles))
         ordered = self._sorted(report)
+        if len(ordered) > rows:
+            # The last row tells how many there are besides.
+            rows = max(rows - 1, 0)
         places = [place for place, path in enumerate(ordered) if path["path"] == self._picked]
         # The one that is picked is seen.
-        first = max([0, *(place - _PATHS + 1 for place in places)])
-        for path in ordered[first : first + _PATHS]:
+        first = max([0, *(place - rows + 1 for place in places)])
+        for path in ordered[first : first + rows]:
             lost = missing(path)
             table.add_row(
                 _short(path["path"], _PATH_WIDTH),
@@ -135,15 +167,15 @@ class WatchScreen:
                 _sparkline(self._slowest[path["path"]]),
                 style="reverse" if path["path"] == self._picked else "",
             )
-        if (more := len(ordered) - _PATHS) > 0:
+        if (more := len(ordered) - rows) > 0:
             table.add_row(f"and {more} more")
         return table
 
 
 def show_screen(reports: Iterable[WindowReport]) -> None:
     """Show window after window on the terminal; the last one stays."""
-    screen = WatchScreen()
     with Live(Text("waiting for the first window"), auto_refresh=False) as live:
+        screen = WatchScreen(live.console)
 
         def pressed(key: str) -> None:
             if (shown := screen.after_key(key)) is not None:
@@ -186,9 +218,14 @@ def _fates(path: Row) -> Text:
     return text
 
 
-def _threads(report: WindowReport) -> Table:
+def _share(room: int, wanted: int, others: int) -> int:
+    """Return how many rows a table has: half of the room at least, more if others need less."""
+    return max(min(wanted, max(room - others, room // 2)), 0)
+
+
+def _threads(report: WindowReport, rows: int) -> Table:
     table = _table("thread", "busy", "in callbacks", "blocked", "callbacks")
-    for row in report.executors[:_THREADS]:
+    for row in report.executors[:rows]:
         table.add_row(
             _short(f"{row['process']} {row['tid']}", _NAME_WIDTH),
             f"{100 * (row['callback_share'] or 0):.0f} %",
@@ -199,10 +236,10 @@ def _threads(report: WindowReport) -> Table:
     return table
 
 
-def _losses(report: WindowReport) -> Table:
+def _losses(report: WindowReport, most: int) -> Table:
     table = _table("topic", "dropped", "lost", "why")
     rows = sorted(report.losses, key=lambda row: -(row["dropped"] + row["lost"]))
-    for row in rows[:_LOSSES]:
+    for row in rows[:most]:
         place = f"{row['topic']} → {row['subscriber']}"
         reasons = _short(row["reasons"] or "", _PATH_WIDTH)
         table.add_row(_short(place, _PATH_WIDTH), str(row["dropped"]), str(row["lost"]), reasons)

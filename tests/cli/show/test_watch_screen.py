@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
-from rich.console import Console
+from rich.console import Console, RenderableType
 
 from msgflow.cli.show.watch_screen import WatchScreen
 from msgflow.run.window import Window
@@ -43,15 +44,26 @@ def report(*paths: dict[str, Any], **more: Any) -> WindowReport:
     return WindowReport(window, True, paths, [executor], **given)
 
 
-def lines(screen: WatchScreen, shown: WindowReport) -> list[str]:
-    console = Console(width=80, record=True, file=None, force_terminal=False, quiet=False)
+def terminal(width: int = 80, height: int = 40) -> Console:
+    return Console(width=width, height=height, force_terminal=False)
+
+
+def new_screen() -> WatchScreen:
+    return WatchScreen(terminal())
+
+
+def printed(shown: RenderableType, console: Console) -> list[str]:
     with console.capture() as capture:
-        console.print(screen.of(shown))
+        console.print(shown)
     return [line.rstrip() for line in capture.get().splitlines()]
 
 
+def lines(screen: WatchScreen, shown: WindowReport) -> list[str]:
+    return printed(screen.of(shown), terminal())
+
+
 def test_what_is_worst_comes_first() -> None:
-    found = lines(WatchScreen(), report(path("/a → /b", 80), path("/c → /d", 5, lost=3)))
+    found = lines(new_screen(), report(path("/a → /b", 80), path("/c → /d", 5, lost=3)))
     assert found[0] == "22:13:20 to 22:13:30   2 paths   lag 1.2 s   0 events lost by the tracer"
     order = [line.split()[0] for line in found if line.startswith("/")]
     assert order == ["/c", "/a"]
@@ -63,7 +75,7 @@ def test_what_is_worst_comes_first() -> None:
 
 @pytest.mark.parametrize("length", [10, 300])
 def test_it_fits_80_columns(length: int) -> None:
-    screen = WatchScreen()
+    screen = new_screen()
     losses = [
         {"topic": "/t" * length, "subscriber": "/n", "dropped": 12, "lost": 0, "reasons": "r" * 99}
     ]
@@ -81,7 +93,7 @@ def test_a_violation_stays_on_the_screen() -> None:
         "measured": "182.000 ms", "worst_ns": 182 * MS, "is_final": False,
         "culprit": "/detector ran 141.000 ms",
     }  # fmt: skip
-    screen = WatchScreen()
+    screen = new_screen()
     lines(screen, report(violations=[violation]))
     text = " ".join(lines(screen, report()))
     assert "22:13:30 /cmd: latency 182.000 ms, required max < 80 ms: /detector ran" in text
@@ -90,17 +102,14 @@ def test_a_violation_stays_on_the_screen() -> None:
 
 def after(screen: WatchScreen, *keys: str) -> list[str]:
     """Return the lines of the screen after the last of these keys."""
-    console = Console(width=80, file=None, force_terminal=False)
     for key in keys:
         shown = screen.after_key(key)
     assert shown is not None
-    with console.capture() as capture:
-        console.print(shown)
-    return [line.rstrip() for line in capture.get().splitlines()]
+    return printed(shown, terminal())
 
 
 def test_keys_choose_the_order() -> None:
-    screen = WatchScreen()
+    screen = new_screen()
     assert screen.after_key("s") is None  # nothing is shown yet
     lines(screen, report(path("/a", 80), path("/c", 5, lost=3)))
     found = after(screen, "s")
@@ -112,13 +121,74 @@ def test_keys_choose_the_order() -> None:
 
 
 def test_a_path_that_is_picked_is_seen_with_its_fates() -> None:
-    """It stays the same if another becomes worse, also below the first twelve."""
-    screen = WatchScreen()
+    """It stays the same if another becomes worse, also below those that have room."""
+    screen = WatchScreen(terminal(height=20))
     paths = [path(f"/p{number:02}", 100 - number) for number in range(20)]
     lines(screen, report(*paths))
     found = after(screen, *["down"] * 14, "up")
-    assert "/p12" in [line.split()[0] for line in found[2:14]]
+    assert len(found) == 20
+    assert "/p12" in [line.split()[0] for line in found]
+    assert "/p00" not in [line.split()[0] for line in found]
     assert "0 flows: 100 reached" in found
     found = lines(screen, report(*paths, path("/worse", 200, lost=1)))
     assert found[found.index("0 flows: 100 reached") - 1] == "/p12"
     assert "0 flows: 100 reached" not in after(screen, "escape")
+
+
+VIOLATION = {
+    "subject": "/scan → /cmd", "path": "/source → /scan → /filter → /cmd → /sink",
+    "metric": "latency", "condition": "max < 80 ms", "measured": "182.000 ms",
+    "worst_ns": 182 * MS, "is_final": False,
+    "culprit": "/filter ran 141.000 ms, /scan was on its way for 40.762 ms",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("width", [80, 100])
+@pytest.mark.parametrize("height", [16, 24, 30, 50])
+@pytest.mark.parametrize("violations", [0, 1, 5])
+@pytest.mark.parametrize("has_losses", [False, True])
+def test_it_is_as_high_as_the_terminal_at_most(
+    width: int, height: int, violations: int, has_losses: bool
+) -> None:
+    """What is violated, all tables and the keys are seen in each."""
+    console = terminal(width, height)
+    screen = WatchScreen(console)
+    loss = {
+        "topic": "/t",
+        "subscriber": "/n",
+        "dropped": 12,
+        "lost": 0,
+        "reasons": "overwritten 12",
+    }
+    executor = {"process": "detector", "tid": 77, "callback_share": 0.5, "callbacks": 100}
+    executor |= {"callback_ns": 5_000 * MS, "blocked_ns": 0}
+    shown = replace(
+        report(
+            *(path(f"/p{number:02}", 100 - number) for number in range(12)),
+            losses=[loss] * 5 if has_losses else (),
+            violations=[VIOLATION] * violations,
+        ),
+        executors=[executor] * 6,
+    )
+    found = printed(screen.of(shown), console)
+    assert len(found) <= height
+    assert found[-1].startswith("s: sort by another column")
+    if violations:
+        assert found[1] == "violations"
+        assert "/source → /scan → /filter → /cmd → /sink" in " ".join(found)
+    assert sum(line.startswith("/p") for line in found) >= 1
+    assert sum(line.startswith("detector 77") for line in found) >= 1
+    assert sum(line.startswith("/t → /n") for line in found) >= int(has_losses)
+    if len(found) < height:
+        # Nothing is left out where there is room.
+        assert sum(line.startswith("/p") for line in found) == 12
+        assert sum(line.startswith("detector 77") for line in found) == 5
+
+
+def test_a_high_terminal_shows_more_paths() -> None:
+    shown = report(*(path(f"/p{number:02}", 100 - number) for number in range(30)))
+    for height, count in ((40, 30), (24, 18)):
+        console = terminal(height=height)
+        found = printed(WatchScreen(console).of(shown), console)
+        assert sum(line.startswith("/p") for line in found) == count
+        assert ("and 12 more" in found) == (height == 24)

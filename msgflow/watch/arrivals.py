@@ -1,0 +1,128 @@
+"""When chunks came, on the clock of this machine: which source vanished, and whose clock errs."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from msgflow.watch.chunk import Chunk
+
+_SECOND_NS = 1_000_000_000
+# A source without a chunk for so many steps, or so many times the length of its last chunk, is not
+# waited for any more. One whose clock errs by so many steps is not, either.
+PATIENCE = 5
+# A chunk may come late; the earliest of so many tells the clock of its host.
+_LEAST_CHUNKS = 3
+
+
+@dataclass
+class _Source:
+    """What is known of a source.
+
+    Attributes:
+        number: of its last chunk.
+        came_s: when that came [s, monotonic].
+        length_s: of that chunk.
+        live_chunks: chunks that came while we looked.
+        ahead_ns: by how much its clock is ahead of ours, at least.
+    """
+
+    number: int
+    came_s: float
+    length_s: float
+    live_chunks: int = 0
+    ahead_ns: int | None = None
+    has_vanished: bool = False
+    is_left_out: bool = False
+
+
+class Arrivals:
+    """The sources of the chunks that have come so far."""
+
+    def __init__(self, step_ns: int) -> None:
+        """Start before the first chunk.
+
+        Args:
+            step_ns: how often chunks come at most.
+        """
+        self._step_ns = step_ns
+        self._sources: dict[Path, _Source] = {}
+
+    def is_left_out(self, chunk: Chunk) -> bool:
+        """Tell whether the clock of a chunk errs: until its session is created anew."""
+        source = self._sources.get(chunk.source)
+        if source is not None and chunk.number <= source.number:
+            del self._sources[chunk.source]
+            return False
+        return source is not None and source.is_left_out
+
+    def add(self, chunk: Chunk, end_ns: int | None, *, is_live: bool) -> None:
+        """Add a chunk that was read.
+
+        Args:
+            chunk: which one.
+            end_ns: up to when its source has recorded, by its own clock; None: nothing yet.
+            is_live: it came while we looked; of others, it is not known when they came.
+        """
+        age_s = _age_s(chunk.path)
+        source = self._sources.setdefault(chunk.source, _Source(chunk.number, 0, 0))
+        source.number = chunk.number
+        source.came_s = time.monotonic() - age_s
+        source.length_s = chunk.length_s
+        source.has_vanished = False
+        if is_live and end_ns is not None:
+            ahead_ns = end_ns - time.time_ns() + round(age_s * _SECOND_NS)
+            source.live_chunks += 1
+            source.ahead_ns = max(ahead_ns, source.ahead_ns or ahead_ns)
+
+    def vanished(self, looked_s: float) -> list[Path]:
+        """Return the sources whose next chunk is overdue, each once until a chunk comes again.
+
+        Args:
+            looked_s: when we looked for chunks [s, monotonic]: to read them takes time.
+        """
+        found = []
+        for path, source in self._sources.items():
+            usual_s = max(self._step_ns / _SECOND_NS, source.length_s)
+            is_late = looked_s - source.came_s > PATIENCE * usual_s
+            if is_late and not (source.has_vanished or source.is_left_out):
+                source.has_vanished = True
+                found.append(path)
+        return found
+
+    def clocks_ahead_s(self) -> dict[Path, float]:
+        """Return by how many seconds the clocks of sources are ahead of the right one, if known.
+
+        The right one is that with which most others are in step; else the one nearest to ours.
+        """
+        known = {
+            path: source.ahead_ns
+            for path, source in self._sources.items()
+            if source.ahead_ns is not None
+            and source.live_chunks >= _LEAST_CHUNKS
+            and not (source.has_vanished or source.is_left_out)
+        }
+
+        def trust(ahead_ns: int) -> tuple[int, int]:
+            in_step = [abs(other - ahead_ns) <= self._step_ns for other in known.values()]
+            return sum(in_step), -abs(ahead_ns)
+
+        right_ns = max(known.values(), key=trust, default=0)
+        return {path: (ahead - right_ns) / _SECOND_NS for path, ahead in known.items()}
+
+    def leave_out(self, path: Path) -> None:
+        """Leave out a source from now on."""
+        self._sources[path].is_left_out = True
+
+
+def _age_s(path: Path) -> float:
+    """Return for how long a chunk has been finished: LTTng renames it then."""
+    try:
+        return max(time.time() - path.stat().st_ctime, 0)
+    except OSError:
+        # It is gone already.
+        return 0
