@@ -146,7 +146,8 @@ def test_the_sum_of_latencies_does_not_fall_and_losses_have_reasons(
 def shown(*violations: dict[str, str], lag_s: float | None = None) -> WindowReport:
     return WindowReport(
         window=Window(0, SECOND), is_final=True, paths=(), executors=(), losses=(),
-        discarded_events=0, longest_flow_ns=0, longest_wait_ns=0, violations=violations, lag_s=lag_s,
+        discarded_events=0, longest_flow_ns=0, longest_wait_ns=0,
+        violations=violations, lag_s=lag_s,
     )  # fmt: skip
 
 
