@@ -133,6 +133,8 @@ def command(
     step_ns = duration_ns(step, "--step")
     window_ns = duration_ns(window, "--window")
     alarm = None if targets is None else _alarm(targets, paths)
+    # Where stdout is closed, nothing starts.
+    on_screen = is_screen() and not as_json
     exporter = None
     if prometheus is not None:
         exporter = Exporter()
@@ -165,7 +167,7 @@ def command(
             if as_json:
                 for report in reports:
                     print_lines([report.to_json()])
-            elif is_screen():
+            elif on_screen:
                 show_screen(reports)
             else:
                 for report in reports:

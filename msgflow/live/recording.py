@@ -97,7 +97,7 @@ def record(
         snapshot: a snapshot session that has the initialisation of nodes that run already; what it
             has is written too.
         note: gets sentences about what is wrong with the recording.
-        show: gets the status twice a second.
+        show: gets the status twice a second; what it raises ends the recording.
 
     Raises:
         UsageError: there is no such program.
@@ -191,6 +191,7 @@ class _Watch:
             losses(self._name),
             shutil.disk_usage(self._directory).free,
         )
+        self._show(self.status)
         if self.status.discarded and not before.discarded:
             self._note(
                 "events are being discarded, the buffers are too small: record again with a"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -14,6 +15,7 @@ from pathlib import Path
 
 import pytest
 from lttng_program import lttng
+from terminal import Terminal
 
 from msgflow.database import Database
 from msgflow.live.lttng import losses
@@ -84,6 +86,20 @@ def test_a_file_that_is_missing_is_said_before_anything_starts(
     assert ended.exit_code == 2
     assert "no-such.yaml" in ended.err
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("program", [[], ["--", "sleep", "60"]])
+def test_a_terminal_shows_how_the_recording_goes(tmp_path: Path, program: list[str]) -> None:
+    """In one line; beside a program, which writes there as well, in a line now and then."""
+    words = ("--duration", "11", "--no-ingest", *program)
+    with Terminal([sys.executable, "-m", "msgflow", "record", *words], tmp_path) as terminal:
+        assert terminal.wait() == 0
+    seconds = re.findall(
+        r"recording \(Ctrl-C ends it\): (\d+) s, some 0 events written \(0/s\), 0 discarded,",
+        terminal.shown,
+    )
+    assert set(seconds) >= ({"10"} if program else {"1", "5", "10"})
+    assert ("starting LTTng" in terminal.shown) != bool(program)
 
 
 def test_discarded_events_are_said_at_once(record: Record, robot: list[str]) -> None:

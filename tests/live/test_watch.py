@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -66,6 +67,25 @@ def test_a_program_is_recorded_and_watched(watch: Watch, robot: list[str], tmp_p
     require_whole(found)
     # The recording was temporary.
     assert [path.name for path in tmp_path.iterdir()] == ["library"]
+
+
+def test_a_program_ends_with_the_reader_of_the_view(watch: Watch, robot: list[str]) -> None:
+    """As with `| head -1`."""
+    process = watch("--", *robot, "0.05")
+    wait_for_window(process)
+    assert process.stdout is not None
+    process.stdout.close()
+    assert process.wait(20) == 0
+
+
+def test_a_closed_stdout_is_refused_before_anything_starts(tmp_path: Path) -> None:
+    words = [sys.executable, "-m", "msgflow", "watch", "--", "touch", "started"]
+    ended = subprocess.run(
+        ["sh", "-c", f"exec {shlex.join(words)} >&-"], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert ended.returncode == 2
+    assert "cannot write to stdout: it is closed" in ended.stderr
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.fixture
