@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -197,7 +198,7 @@ def command(
             if directory is None:
                 # The recording is ours alone: it need not grow.
                 watcher.on_passed = remove_chunk
-            _record(words, directory, step_ns, live)
+            _record(words, directory, step_ns, live, on_screen=on_screen)
     if alarm is not None and alarm.count(Verdict.FAILED):
         raise typer.Exit(ExitCode.FAILED)
     # Without a window, nothing was measured.
@@ -253,11 +254,16 @@ def _record(
     directory: Path | None,
     step_ns: int,
     live: Callable[[Path, Callable[[], bool]], None],
+    *,
+    on_screen: bool,
 ) -> None:
     """Start a program, record it, and watch the recording until it ends."""
     from msgflow.cli.output import print_note
     from msgflow.live import Channel, record
 
+    name = time.strftime("watch-%Y%m%d-%H%M%S")
+    # A pipe to stderr would stop the program where nobody empties it.
+    log = Path(f"{directory or name}.log") if on_screen and sys.stderr.isatty() else None
     ended = Event()
     with (
         tempfile.TemporaryDirectory(prefix="msgflow-watch-") as temporary,
@@ -275,9 +281,10 @@ def _record(
         try:
             recorded = record(
                 target,
-                name=time.strftime("watch-%Y%m%d-%H%M%S"),
+                name=name,
                 channel=Channel(EVENTS, "1M", 4, rotation_ns=step_ns),
                 program=words,
+                log=log,
                 note=print_note,
                 show=show,
             )
@@ -285,7 +292,8 @@ def _record(
             ended.set()
         watching.result()
     if recorded.exit_code:
-        print_note(f"{words[0]} ended with exit code {recorded.exit_code}")
+        where = "" if log is None or not log.exists() else f": {log} has what it printed"
+        print_note(f"{words[0]} ended with exit code {recorded.exit_code}{where}")
 
 
 def _rotated(session: str | None, step_ns: int) -> AbstractContextManager[Callable[[], None]]:

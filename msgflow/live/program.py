@@ -7,8 +7,9 @@ import shlex
 import shutil
 import signal
 import subprocess
+import sys
 import time
-from typing import TYPE_CHECKING
+from typing import IO, TYPE_CHECKING
 
 from msgflow.errors import UsageError
 
@@ -26,15 +27,23 @@ class Program:
     The group is its own, so that Ctrl-C of the terminal reaches it after the recording has stopped.
     """
 
-    def __init__(self, words: Sequence[str]) -> None:
+    def __init__(self, words: Sequence[str], output: IO[bytes] | None) -> None:
         """Start it.
+
+        Args:
+            words: the program with its arguments.
+            output: gets what it prints; None: our stderr does, since our stdout is for data.
 
         Raises:
             UsageError: there is no such program, or it cannot be executed.
         """
         require_program(words[0])
+        # A stderr that is closed is None.
+        stream = output or sys.__stderr__ or subprocess.DEVNULL
         try:
-            self._process = subprocess.Popen(list(words), start_new_session=True)
+            self._process = subprocess.Popen(
+                list(words), stdout=stream, stderr=stream, start_new_session=True
+            )
         except OSError as error:
             raise UsageError(
                 f"cannot execute {words[0]}: {(error.strerror or str(error)).lower()}",

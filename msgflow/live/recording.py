@@ -5,9 +5,9 @@ from __future__ import annotations
 import shlex
 import shutil
 import time
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import IO, TYPE_CHECKING
 
 from msgflow.errors import RecordingError
 from msgflow.live.daemon import session_daemon
@@ -26,7 +26,7 @@ from msgflow.live.written import recorded_bytes
 from msgflow.sql.interrupt import Terminated, noted_interrupts
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterator, Sequence
     from pathlib import Path
 
 BYTES_OF_EVENT = 45
@@ -79,6 +79,7 @@ def record(
     name: str,
     channel: Channel,
     program: Sequence[str] = (),
+    log: Path | None = None,
     seconds: float | None = None,
     kernel: bool = False,
     snapshot: str | None = None,
@@ -92,6 +93,7 @@ def record(
         name: of the LTTng session.
         channel: which events, in which buffers.
         program: to start once all is ready, and to end afterwards; with its arguments.
+        log: file that gets what the program prints, if it prints anything; None: our stderr.
         seconds: how long to record; None: without a limit.
         kernel: also record what the scheduler does.
         snapshot: a snapshot session that has the initialisation of nodes that run already; what it
@@ -127,13 +129,17 @@ def record(
                     f"the scheduler is not recorded: LTTng cannot trace this kernel (it"
                     f" needs its modules, and root or the group tracing), and {reason}"
                 )
+        output = None
+        if log is not None:
+            output = stack.enter_context(_written(log))
+            note(f"what {program[0]} prints goes to {log}")
         watch = _Watch(name, directory, channel, note, show, expects_nodes=bool(program))
         with ExitStack() as running:
             started = None
             with recording_session(name, directory, channel, with_kernel=by_lttng):
                 interrupts.check()
                 if program:
-                    started = Program(program)
+                    started = Program(program, output)
                     # Behind the session: what happens while nodes end is not recorded.
                     running.callback(started.end)
                 try:
@@ -148,6 +154,23 @@ def record(
         # All buffers are written now.
         last = replace(watch.status, event_bytes=recorded_bytes(directory))
     return Recorded(directory, last, ended_with)
+
+
+@contextmanager
+def _written(log: Path) -> Iterator[IO[bytes]]:
+    """Yield the file while a program may write to it; an empty one does not stay."""
+    try:
+        stream = log.open("wb")
+    except OSError as error:
+        raise RecordingError(
+            f"cannot write {log}: {(error.strerror or str(error)).lower()}", "another place: -o DIR"
+        ) from None
+    with stream:
+        try:
+            yield stream
+        finally:
+            if not log.stat().st_size:
+                log.unlink()
 
 
 class _Watch:

@@ -125,6 +125,12 @@ def test_all_that_a_program_started_ends_with_it(record: Record, tmp_path: Path)
     assert not Path(f"/proc/{child}").exists()
 
 
+def test_what_a_program_prints_is_not_among_the_tables(record: Record) -> None:
+    ended = record("--no-ingest", "--", "sh", "-c", "echo [INFO] started")
+    assert ended.out == ""
+    assert "[INFO] started" in ended.err
+
+
 @pytest.mark.parametrize("seconds", [0.2, 0.9, 1.4, 1.9, 3.5])
 def test_ctrl_c_leaves_nothing(record: Record, seconds: float) -> None:
     """Whether LTTng starts, the session begins, or events are recorded."""

@@ -16,6 +16,7 @@ from typing import Any
 
 import pytest
 from lttng_program import lttng
+from terminal import Terminal
 
 PATH = "/camera → /image → /detector"
 Watch = Callable[..., subprocess.Popen[str]]
@@ -85,6 +86,41 @@ def test_a_closed_stdout_is_refused_before_anything_starts(tmp_path: Path) -> No
     )
     assert ended.returncode == 2
     assert "cannot write to stdout: it is closed" in ended.stderr
+    assert not list(tmp_path.iterdir())
+
+
+SPEAKS = ["sh", "-c", "echo [INFO] started; echo [ERROR] failed >&2; sleep 9; exit 3"]
+
+
+def test_what_a_program_prints_is_no_window(watch: Watch) -> None:
+    out, err = watch("--", *SPEAKS).communicate(timeout=60)
+    assert out == ""
+    assert "[INFO] started\n[ERROR] failed\n" in err
+
+
+def test_what_a_program_prints_does_not_tear_the_screen(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "msgflow", "watch", "--", *SPEAKS]
+    with Terminal(command, tmp_path) as terminal:
+        terminal.wait()
+    assert "[INFO]" not in terminal.shown
+    assert "[ERROR]" not in terminal.shown
+    (log,) = tmp_path.iterdir()
+    assert log.read_text() == "[INFO] started\n[ERROR] failed\n"
+    assert f"what sh prints goes to {log.name}" in terminal.shown
+    assert f"sh ended with exit code 3: {log.name} has what it printed" in terminal.shown
+
+
+def test_a_recording_with_a_name_has_what_the_program_printed_beside_it(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "msgflow", "watch", "-o", "drive", "--", *SPEAKS]
+    with Terminal(command, tmp_path) as terminal:
+        terminal.wait()
+    assert {path.name for path in tmp_path.iterdir()} == {"drive", "drive.log"}
+
+
+def test_a_program_that_prints_nothing_leaves_nothing(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "msgflow", "watch", "--", "true"]
+    with Terminal(command, tmp_path) as terminal:
+        assert terminal.wait() == 0
     assert not list(tmp_path.iterdir())
 
 
