@@ -259,17 +259,17 @@ def _record(
 ) -> None:
     """Start a program, record it, and watch the recording until it ends."""
     from msgflow.cli.output import print_note
-    from msgflow.live import Channel, record
+    from msgflow.live import Channel, record, temporary_directory
 
     name = time.strftime("watch-%Y%m%d-%H%M%S")
     # A pipe to stderr would stop the program where nobody empties it.
     log = Path(f"{directory or name}.log") if on_screen and sys.stderr.isatty() else None
     ended = Event()
     with (
-        tempfile.TemporaryDirectory(prefix="msgflow-watch-") as temporary,
+        temporary_directory() as temporary,
         ThreadPoolExecutor(1) as beside,
     ):
-        target = (directory or Path(temporary) / "recording").absolute()
+        target = (directory or temporary / "recording").absolute()
         # The main thread records: it has the signals.
         watching = beside.submit(live, target, ended.is_set)
 

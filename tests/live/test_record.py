@@ -139,9 +139,11 @@ def test_ctrl_c_leaves_nothing(record: Record, seconds: float) -> None:
     assert subprocess.run(["pgrep", "-r", "D,R,S", "-f", "^sleep 1000"]).returncode
 
 
-def test_sigterm_leaves_nothing(record: Record) -> None:
-    ended = record("--", "sleep", "1000", after=4, number=signal.SIGTERM)
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_leaves_nothing(record: Record, number: signal.Signals) -> None:
+    ended = record("--", "sleep", "1000", after=4, number=number)
     assert ended.exit_code == 143
+    assert subprocess.run(["pgrep", "-r", "D,R,S", "-f", "^sleep 1000"]).returncode
 
 
 def test_sigkill_ends_the_daemon_too(record: Record) -> None:

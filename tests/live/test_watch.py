@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -122,6 +123,60 @@ def test_a_program_that_prints_nothing_leaves_nothing(tmp_path: Path) -> None:
     with Terminal(command, tmp_path) as terminal:
         assert terminal.wait() == 0
     assert not list(tmp_path.iterdir())
+
+
+@pytest.fixture
+def temporary(tmp_path: Path) -> Path:
+    """A directory for temporary files."""
+    path = tmp_path / "temporary"
+    path.mkdir()
+    return path
+
+
+SLEEPS = ["sh", "-c", "echo $$ >> programs; exec sleep 1000"]
+WATCH = [sys.executable, "-m", "msgflow", "watch", "--", *SLEEPS]
+
+
+def wait_for_words(terminal: Terminal) -> None:
+    terminal.wait_for(lambda: "no process has the tracepoints" in terminal.shown)
+
+
+def test_a_terminal_that_goes_away_ends_all(tmp_path: Path, temporary: Path) -> None:
+    with Terminal(WATCH, tmp_path, TMPDIR=str(temporary)) as terminal:
+        wait_for_words(terminal)
+        assert [path.name[:14] for path in temporary.iterdir()] == ["msgflow-watch-"]
+        terminal.hang_up()
+        terminal.process.wait(30)
+    assert not list(temporary.iterdir())
+    assert not Path("/proc", (tmp_path / "programs").read_text().strip()).exists()
+
+
+def test_what_a_killed_view_leaves_is_removed(
+    daemon: None, tmp_path: Path, temporary: Path
+) -> None:
+    """Its session, and its temporary directory; not those of a view that runs."""
+    words = [sys.executable, "-m", "msgflow", "record", "--no-ingest", "--duration", "0.5"]
+    with ExitStack() as stack:
+        terminals = []
+        for _ in range(2):
+            terminal = stack.enter_context(Terminal(WATCH, tmp_path, TMPDIR=str(temporary)))
+            wait_for_words(terminal)
+            terminals.append(terminal)
+        first, second = terminals
+        assert len(list(temporary.iterdir())) == 2
+        first.process.kill()
+        first.process.wait()
+        with Terminal(words, tmp_path, TMPDIR=str(temporary)) as third:
+            assert third.wait() == 0
+        (left,) = temporary.iterdir()
+        assert f"-{second.process.pid}-" in left.name
+        second.process.send_signal(signal.SIGINT)
+        assert second.wait() == 0
+    # The program of the one that was killed goes on.
+    programs = [int(line) for line in (tmp_path / "programs").read_text().splitlines()]
+    (program,) = (pid for pid in programs if Path(f"/proc/{pid}").exists())
+    os.kill(program, signal.SIGKILL)
+    assert "watch-" not in lttng("list").stdout
 
 
 @pytest.fixture

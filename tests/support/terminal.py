@@ -5,13 +5,13 @@ from __future__ import annotations
 import fcntl
 import os
 import pty
+import select
 import struct
 import subprocess
 import termios
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from threading import Thread
 from types import TracebackType
 
 _SIZE = struct.pack("HHHH", 30, 100, 0, 0)
@@ -25,8 +25,9 @@ class Terminal:
         shown: all that the terminal got so far, with its control characters.
     """
 
-    def __init__(self, words: Sequence[str], directory: Path) -> None:
-        self._master, slave = pty.openpty()
+    def __init__(self, words: Sequence[str], directory: Path, **environment: str) -> None:
+        master, slave = pty.openpty()
+        self._master = os.fdopen(master, "rb", buffering=0)
         fcntl.ioctl(slave, termios.TIOCSWINSZ, _SIZE)
         self.process = subprocess.Popen(
             ["setsid", "--ctty", *words],
@@ -34,35 +35,29 @@ class Terminal:
             stdin=slave,
             stdout=slave,
             stderr=slave,
-            env=os.environ | {"TERM": "xterm"},
+            env=os.environ | {"TERM": "xterm"} | environment,
         )
         os.close(slave)
         self.shown = ""
-        self._reader = Thread(target=self._read)
-        self._reader.start()
-
-    def _read(self) -> None:
-        # An error: all that wrote to the terminal have ended.
-        try:
-            while data := os.read(self._master, 65536):
-                self.shown += data.decode(errors="replace")
-        except OSError:
-            pass
 
     def wait_for(self, is_so: Callable[[], bool], seconds: float = 60) -> None:
         end = time.monotonic() + seconds
         while not is_so():
             assert time.monotonic() < end, self.shown
-            time.sleep(0.1)
-
-    def press(self, key: str) -> None:
-        os.write(self._master, key.encode())
+            if select.select([self._master], [], [], 0.1)[0]:
+                try:
+                    self.shown += self._master.read(65536).decode(errors="replace")
+                except OSError:  # all that wrote to the terminal have ended
+                    time.sleep(0.1)
 
     def wait(self) -> int:
         """Wait until the command ends, and return its exit code."""
-        code = self.process.wait(120)
-        self._reader.join(10)
-        return code
+        self.wait_for(lambda: self.process.poll() is not None, 120)
+        return self.process.wait()
+
+    def hang_up(self) -> None:
+        """Go away, as the terminal of a connection that is lost."""
+        self._master.close()
 
     def __enter__(self) -> Terminal:
         return self
@@ -75,5 +70,4 @@ class Terminal:
     ) -> None:
         self.process.kill()
         self.process.wait()
-        self._reader.join(10)
-        os.close(self._master)
+        self.hang_up()
