@@ -136,11 +136,12 @@ class FlightRecorder:
 def _reason(error: Exception) -> str:
     """Return what went wrong, with the remedy where there is one."""
     if isinstance(error, MsgflowError):
-        return error.message
-    if not isinstance(error, OSError):
+        reason = error.message
+    elif isinstance(error, shutil.Error):
+        # Of the first file that was not copied: its source, its target, and the reason.
+        reason = str(error.args[0][0][2])
+    elif isinstance(error, OSError):
+        reason = (error.strerror or str(error)).lower()
+    else:
         return f"{type(error).__name__}: {error}"
-    # Of the first file that was not copied: its source, its target, and the reason.
-    reason = error.args[0][0][2] if isinstance(error, shutil.Error) else error.strerror or error
-    return (
-        f"{str(reason).lower()}; remove files, or name another directory with --keep-on-violation"
-    )
+    return f"{reason}; remove files, or name another directory with --keep-on-violation"
