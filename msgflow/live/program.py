@@ -9,12 +9,13 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from typing import IO, TYPE_CHECKING
 
 from msgflow.errors import UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
 # Seconds after each signal; `ros2 launch` itself waits so long for its nodes.
 _PATIENCE = ((signal.SIGINT, 10.0), (signal.SIGTERM, 5.0), (signal.SIGKILL, 5.0))
@@ -37,6 +38,7 @@ class Program:
         Raises:
             UsageError: there is no such program, or it cannot be executed.
         """
+        self._name = words[0]
         require_program(words[0])
         # A stderr that is closed is None.
         stream = output or sys.__stderr__ or subprocess.DEVNULL
@@ -56,10 +58,13 @@ class Program:
         """Exit code; negative: the signal that ended it; None while it runs."""
         return self._process.poll()
 
-    def end(self) -> None:
+    def end(self, note: Callable[[str], None]) -> None:
         """Ask the group to end, as Ctrl-C does, then with more force; KeyboardInterrupt kills it.
 
         A shell starts its background processes so that they ignore Ctrl-C: they need the force.
+
+        Args:
+            note: gets the sentence that says what runs on.
         """
         try:
             for number, seconds in _PATIENCE:
@@ -72,8 +77,14 @@ class Program:
                     if not self._send(0):
                         return
                     time.sleep(_BETWEEN_LOOKS)
+        except PermissionError:
+            note(
+                f"{self._name} runs on, as it belongs to another user: sudo kill -INT --"
+                f" -{self._process.pid}"
+            )
         except KeyboardInterrupt:
-            self._send(signal.SIGKILL)
+            with suppress(PermissionError):
+                self._send(signal.SIGKILL)
             raise
 
     def _send(self, number: int) -> bool:

@@ -17,6 +17,7 @@ from msgflow.live.scheduling import recorded_with_perf, why_perf_cannot_record
 from msgflow.live.session import (
     Channel,
     can_trace_kernel,
+    is_there,
     record_snapshot,
     recording_session,
     remove_leftovers,
@@ -141,7 +142,7 @@ def record(
                 if program:
                     started = Program(program, output)
                     # Behind the session: what happens while nodes end is not recorded.
-                    running.callback(started.end)
+                    running.callback(started.end, note)
                 try:
                     while not watch.is_over(started, seconds):
                         interrupts.check()
@@ -197,7 +198,16 @@ class _Watch:
 
     def is_over(self, program: Program | None, seconds: float | None) -> bool:
         """Look, and tell whether the recording has to end."""
-        self._look()
+        try:
+            self._look()
+        except RecordingError:
+            if is_there(self._name):
+                raise
+            self._note(
+                f"the session {self._name} was destroyed by another program, or its daemon ended:"
+                " the recording ends here"
+            )
+            return True
         if self.status.free_bytes < _LEAST_FREE_BYTES:
             self._note("the disk is full: the recording ends here; remove files, or use -o DIR")
             return True

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from msgflow.errors import RecordingError
 from msgflow.live.kernel_events import KERNEL_EVENTS
-from msgflow.live.lttng import lttng, sessions
+from msgflow.live.lttng import is_daemon_running, lttng, sessions
 from msgflow.temporary_owner import is_abandoned, mark
 
 if TYPE_CHECKING:
@@ -84,7 +84,8 @@ def recording_session(
     finally:
         # It stops the session, and waits until all is written. Where it fails, the owner stays
         # named: the next recording removes the session.
-        lttng("destroy", name)
+        if is_there(name):
+            lttng("destroy", name)
         owner.unlink()
 
 
@@ -154,13 +155,18 @@ def remove_leftovers() -> list[str]:
     return [session.name for session in left]
 
 
+def is_there(name: str) -> bool:
+    """Tell whether a session daemon runs that has a session of this name."""
+    return is_daemon_running() and any(session.name == name for session in sessions())
+
+
 def require_new(name: str) -> None:
     """Refuse the name of a session that exists.
 
     Raises:
         RecordingError: there is one.
     """
-    if any(session.name == name for session in sessions()):
+    if is_there(name):
         raise RecordingError(
             f"LTTng has a session of this name — {name}",
             f"choose another --name, or end that session: lttng destroy {shlex.quote(name)}",

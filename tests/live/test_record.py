@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 import signal
@@ -19,6 +20,7 @@ from terminal import Terminal
 
 from msgflow.database import Database
 from msgflow.live.lttng import losses
+from msgflow.live.program import Program
 
 
 @dataclass
@@ -131,6 +133,24 @@ def test_what_a_program_prints_is_not_among_the_tables(record: Record) -> None:
     assert "[INFO] started" in ended.err
 
 
+def test_a_program_of_another_user_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As with sudo: we may not end it."""
+    program = Program(["sleep", "60"], None)
+    notes: list[str] = []
+
+    def refused(group: int, number: int) -> None:
+        raise PermissionError(errno.EPERM, "Operation not permitted")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "killpg", refused)
+        program.end(notes.append)
+    (note,) = notes
+    assert note.startswith("sleep runs on, as it belongs to another user: sudo kill -INT -- -")
+    os.kill(int(note.rpartition("-")[2]), signal.SIGKILL)
+    program.end(notes.append)
+    assert len(notes) == 1
+
+
 @pytest.mark.parametrize("seconds", [0.2, 0.9, 1.4, 1.9, 3.5])
 def test_ctrl_c_leaves_nothing(record: Record, seconds: float) -> None:
     """Whether LTTng starts, the session begins, or events are recorded."""
@@ -188,6 +208,17 @@ class TestForeignDaemon:
         assert "--dual start has them" in without.err
         assert "/image" not in without.out
         assert "/camera → /image → /detector" in ended.out
+
+    def test_a_session_that_another_program_destroyed_is_read(
+        self, record: Record, robot: list[str], tmp_path: Path
+    ) -> None:
+        destroy = "sleep 6; lttng --no-sessiond destroy drive"
+        with subprocess.Popen(["sh", "-c", destroy]):
+            ended = record("--name", "drive", "--", *robot, "0.05")
+        assert ended.exit_code == 0, ended.err
+        assert "the session drive was destroyed by another program" in ended.err
+        assert "/camera → /image → /detector" in ended.out
+        assert [path.name for path in (tmp_path / "drive").iterdir()] == ["ust"]
 
     def test_a_name_in_use_is_refused(self, record: Record, tmp_path: Path) -> None:
         ended = record("--name", "other", "--duration", "0.5")
