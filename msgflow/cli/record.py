@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -103,6 +103,8 @@ def command(
     if links is not None:
         read_links(links)
     read_clock_sync(clock_sync)
+    if ingest:
+        _require_database(database, name)
     target = directory or Path(name)
     with _status_shown(beside_program=bool(program)) as show:
         recorded = record(
@@ -122,6 +124,21 @@ def command(
     is_sound = not ingest or _answer(target, name, events or [], links, clock_sync, database)
     if recorded.exit_code or not is_sound:
         raise typer.Exit(ExitCode.FAILED)
+
+
+def _require_database(database: Path, name: str) -> None:
+    """Refuse a database that cannot take the recording, before it is made."""
+    from msgflow.db.connection import connect
+    from msgflow.db.migration import require_ingestable
+    from msgflow.db.workspace import workspace
+    from msgflow.ingest.stored_run import require_free_name
+
+    require_ingestable(database)
+    with workspace(database):
+        pass
+    if database.exists():
+        with closing(connect(database, read_only=True)) as con:
+            require_free_name(con, name)
 
 
 @contextmanager

@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from msgflow.live import Status
-    from msgflow.sql.interrupt import Interrupts
     from msgflow.watch import Alarm, WindowDatabase, WindowReport
 
 # Seconds between two looks whether a session is still there.
@@ -111,7 +110,8 @@ def command(
     """See a ROS 2 system while it runs: latency of every path, window by window.
 
     Ctrl-C ends it. `msgflow watch -- ros2 launch …` starts, records and watches a system; Ctrl-C
-    ends that, too. With --targets the exit code is that of `msgflow verify`.
+    ends that, too. With --targets the exit code is that of `msgflow verify`. It is 1 if COMMAND
+    failed.
     """
     from msgflow.cli.output import is_screen, print_lines, print_note
     from msgflow.cli.show.watch_screen import show_screen
@@ -119,6 +119,7 @@ def command(
     from msgflow.clocks import read_clock_sync
     from msgflow.links import read_links
     from msgflow.run.window import duration_ns
+    from msgflow.sql.interrupt import until_interrupted
     from msgflow.text.values import printable
     from msgflow.verify import Verdict
     from msgflow.watch import (
@@ -140,6 +141,7 @@ def command(
     if prometheus is not None:
         exporter = Exporter()
         exporter.serve(prometheus)
+    has_failed = False
     with _pages(ui, clock_sync) as database, ExitStack() as stack:
         recorder = None
         if keep is not None:
@@ -186,7 +188,7 @@ def command(
             show(watch_finished(place, watcher))
         elif len(words) == 1 and (source := _source(words[0], place)) is not None:
             found, session = source
-            with _rotated(session, step_ns) as go_on, _until_interrupted() as interrupts:
+            with _rotated(session, step_ns) as go_on, until_interrupted() as interrupts:
                 is_over = _session_is_over(session, go_on)
 
                 def ends() -> bool:
@@ -198,8 +200,8 @@ def command(
             if directory is None:
                 # The recording is ours alone: it need not grow.
                 watcher.on_passed = remove_chunk
-            _record(words, directory, step_ns, live, on_screen=on_screen)
-    if alarm is not None and alarm.count(Verdict.FAILED):
+            has_failed = _record(words, directory, step_ns, live, on_screen=on_screen)
+    if has_failed or (alarm is not None and alarm.count(Verdict.FAILED)):
         raise typer.Exit(ExitCode.FAILED)
     # Without a window, nothing was measured.
     if alarm is not None and not alarm.is_measured:
@@ -256,8 +258,12 @@ def _record(
     live: Callable[[Path, Callable[[], bool]], None],
     *,
     on_screen: bool,
-) -> None:
-    """Start a program, record it, and watch the recording until it ends."""
+) -> bool:
+    """Start a program, record it, and watch the recording until it ends.
+
+    Returns:
+        Whether the program failed.
+    """
     from msgflow.cli.output import print_note
     from msgflow.live import Channel, record, temporary_directory
 
@@ -294,6 +300,7 @@ def _record(
     if recorded.exit_code:
         where = "" if log is None or not log.exists() else f": {log} has what it printed"
         print_note(f"{words[0]} ended with exit code {recorded.exit_code}{where}")
+    return bool(recorded.exit_code)
 
 
 def _rotated(session: str | None, step_ns: int) -> AbstractContextManager[Callable[[], None]]:
@@ -301,20 +308,6 @@ def _rotated(session: str | None, step_ns: int) -> AbstractContextManager[Callab
     from msgflow.live import rotated
 
     return nullcontext(lambda: None) if session is None else rotated(session, step_ns)
-
-
-@contextmanager
-def _until_interrupted() -> Iterator[Interrupts]:
-    """Do what is in the block until Ctrl-C, which is how a view ends."""
-    from msgflow.sql.interrupt import Terminated, noted_interrupts
-
-    with noted_interrupts() as interrupts:
-        try:
-            yield interrupts
-        except Terminated:
-            raise
-        except KeyboardInterrupt:
-            interrupts.answer()
 
 
 def _source(word: str, place: Path) -> tuple[Path, str | None] | None:

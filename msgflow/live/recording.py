@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 import shutil
 import time
@@ -21,10 +22,12 @@ from msgflow.live.session import (
     record_snapshot,
     recording_session,
     remove_leftovers,
+    require_name,
     require_new,
+    require_snapshot,
 )
 from msgflow.live.written import recorded_bytes
-from msgflow.sql.interrupt import Terminated, noted_interrupts
+from msgflow.sql.interrupt import noted_interrupts, until_interrupted
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -110,6 +113,7 @@ def record(
     """
     if program:
         require_program(program[0])
+    require_name(name)
     _require_room(directory, note, seconds)
     with noted_interrupts() as interrupts, ExitStack() as stack:
         stack.enter_context(session_daemon(with_kernel=kernel, note=note))
@@ -118,6 +122,8 @@ def record(
         require_new(name)
         if snapshot is None:
             _note_running(note)
+        else:
+            require_snapshot(snapshot)
         directory.mkdir(parents=True, exist_ok=True)
         if snapshot is not None:
             record_snapshot(snapshot, directory / "snapshot")
@@ -143,14 +149,10 @@ def record(
                     started = Program(program, output)
                     # Behind the session: what happens while nodes end is not recorded.
                     running.callback(started.end, note)
-                try:
+                with until_interrupted():
                     while not watch.is_over(started, seconds):
                         interrupts.check()
                         time.sleep(_BETWEEN_LOOKS)
-                except Terminated:
-                    raise
-                except KeyboardInterrupt:
-                    interrupts.answer()
             ended_with = None if started is None else started.exit_code
         # All buffers are written now.
         last = replace(watch.status, event_bytes=recorded_bytes(directory))
@@ -240,9 +242,22 @@ class _Watch:
 
 
 def _require_room(directory: Path, note: Callable[[str], None], seconds: float | None) -> None:
-    if directory.exists() and (not directory.is_dir() or any(directory.iterdir())):
-        raise RecordingError(f"the directory is in use — {directory}", "another one: -o DIR")
-    existing = next(path for path in (directory, *directory.absolute().parents) if path.exists())
+    try:
+        if directory.exists() and (not directory.is_dir() or any(directory.iterdir())):
+            raise RecordingError(f"the directory is in use — {directory}", "another one: -o DIR")
+        existing = next(
+            path for path in (directory, *directory.absolute().parents) if path.exists()
+        )
+    except PermissionError as error:
+        raise RecordingError(
+            f"cannot write to {directory}: permission denied: {error.filename}",
+            "another directory: -o DIR",
+        ) from None
+    if not existing.is_dir() or not os.access(existing, os.W_OK | os.X_OK):
+        reason = "permission denied" if existing.is_dir() else "no directory"
+        raise RecordingError(
+            f"cannot write to {directory}: {reason}: {existing}", "another directory: -o DIR"
+        )
     free = shutil.disk_usage(existing).free
     if free < _LEAST_FREE_BYTES:
         raise RecordingError(

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from msgflow.errors import RecordingError
+from msgflow.errors import RecordingError, UsageError
 from msgflow.live.kernel_events import KERNEL_EVENTS
 from msgflow.live.lttng import is_daemon_running, lttng, sessions
 from msgflow.temporary_owner import is_abandoned, mark
@@ -123,8 +123,8 @@ def rotated(name: str, length_ns: int) -> Iterator[Callable[[], None]]:
                 lttng("disable-rotation", f"--session={name}", "--timer")
 
 
-def record_snapshot(name: str, directory: Path) -> None:
-    """Write what a snapshot session has in its buffers into a new directory.
+def require_snapshot(name: str) -> None:
+    """Refuse a name that no snapshot session has.
 
     Raises:
         RecordingError: there is no such snapshot session.
@@ -135,6 +135,14 @@ def record_snapshot(name: str, directory: Path) -> None:
             f"LTTng has no snapshot session of this name — {name}",
             f"one of: {', '.join(known)}" if known else "lttng create --snapshot makes one",
         )
+
+
+def record_snapshot(name: str, directory: Path) -> None:
+    """Write what a snapshot session has in its buffers into a new directory.
+
+    Raises:
+        RecordingError: LTTng refuses.
+    """
     lttng("snapshot", "record", f"--session={name}", f"file://{directory}")
 
 
@@ -158,6 +166,19 @@ def remove_leftovers() -> list[str]:
 def is_there(name: str) -> bool:
     """Tell whether a session daemon runs that has a session of this name."""
     return is_daemon_running() and any(session.name == name for session in sessions())
+
+
+def require_name(name: str) -> None:
+    """Refuse a name that LTTng does not take.
+
+    Raises:
+        UsageError: it has a slash, or begins like an option.
+    """
+    if "/" in name or name.startswith("-"):
+        raise UsageError(
+            f"a session cannot have a name with a slash, or with - in front — {name}",
+            "another --name; -o DIR names the directory",
+        )
 
 
 def require_new(name: str) -> None:

@@ -115,6 +115,18 @@ def noted_interrupts() -> Iterator[Interrupts]:
             signal.signal(number, before[number])
 
 
+@contextmanager
+def until_interrupted() -> Iterator[Interrupts]:
+    """Do what is in the block until Ctrl-C, which is how it ends; Terminated is raised."""
+    with noted_interrupts() as interrupts:
+        try:
+            yield interrupts
+        except Terminated:
+            raise
+        except KeyboardInterrupt:
+            interrupts.answer()
+
+
 def interruptible(connection: duckdb.DuckDBPyConnection, work: Callable[[], _T]) -> _T:
     """Return what `work` returns; Ctrl-C interrupts the statement that it runs on `connection`.
 

@@ -240,6 +240,26 @@ def test_a_missing_program_is_refused_before_anything_starts(record: Record) -> 
     assert "there is no such program — no-such-program" in ended.err
 
 
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        (("-o", "file/sub"), 1, "no directory"),
+        (("--name", "a/b"), 2, "a session cannot have a name with a slash"),
+        (("--dual", "nosuch"), 1, "LTTng has no snapshot session of this name — nosuch"),
+        (("--db", "nosuch/a.duckdb"), 4, "no such directory — nosuch"),
+        (("--db", "file"), 4, "file"),
+    ],
+)
+def test_what_cannot_be_is_refused_before_anything_starts(
+    record: Record, tmp_path: Path, words: tuple[str, ...], code: int, said: str
+) -> None:
+    (tmp_path / "file").write_text("taken")
+    ended = record(*words, "--", "touch", "started")
+    assert ended.exit_code == code, ended.err
+    assert said in ended.err
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
 def test_a_program_that_fails_at_once_is_named(record: Record) -> None:
     ended = record("--", "false")
     assert ended.exit_code == 3

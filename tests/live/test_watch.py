@@ -102,7 +102,8 @@ def test_what_a_program_prints_is_no_window(watch: Watch) -> None:
 def test_what_a_program_prints_does_not_tear_the_screen(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "msgflow", "watch", "--", *SPEAKS]
     with Terminal(command, tmp_path) as terminal:
-        terminal.wait()
+        # The program fails.
+        assert terminal.wait() == 1
     assert "[INFO]" not in terminal.shown
     assert "[ERROR]" not in terminal.shown
     (log,) = tmp_path.iterdir()
