@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 # Of ROS 2; of an instrumented DDS; of CARET.
 EVENTS = ("ros2:*", "dds:*", "ros2_caret:*")
 """The events that a recording has."""
+_SECONDS_BETWEEN_LINES = 10.0
 
 
 def command(
@@ -102,8 +103,10 @@ def command(
     if links is not None:
         read_links(links)
     read_clock_sync(clock_sync)
+    if ingest:
+        _require_database(database, name)
     target = directory or Path(name)
-    with _status_line() as show:
+    with _status_shown(beside_program=bool(program)) as show:
         recorded = record(
             target.absolute(),
             name=name,
@@ -123,19 +126,47 @@ def command(
         raise typer.Exit(ExitCode.FAILED)
 
 
+def _require_database(database: Path, name: str) -> None:
+    """Refuse a database that cannot take the recording, before it is made."""
+    from msgflow.db.connection import connect
+    from msgflow.db.migration import require_ingestable
+    from msgflow.db.workspace import workspace
+    from msgflow.ingest.stored_run import require_free_name
+
+    require_ingestable(database)
+    with workspace(database):
+        pass
+    if database.exists():
+        with closing(connect(database, read_only=True)) as con:
+            require_free_name(con, name)
+
+
 @contextmanager
-def _status_line() -> Iterator[Callable[[Status], None]]:
+def _status_shown(*, beside_program: bool) -> Iterator[Callable[[Status], None]]:
     """Yield the function that shows how the recording goes, on a terminal only."""
     from rich.console import Console
+
+    from msgflow.cli.output import print_status
 
     console = Console(stderr=True)
     if not console.is_terminal:
         yield lambda status: None
-        return
-    from rich.status import Status as Line
+    elif beside_program:
+        # It writes to the terminal, too: a line that moves would tear.
+        last = 0.0
 
-    with Line("starting LTTng", console=console) as line:
-        yield lambda status: line.update(f"recording (Ctrl-C ends it): {_words(status)}")
+        def print_line(status: Status) -> None:
+            nonlocal last
+            if status.seconds - last >= _SECONDS_BETWEEN_LINES:
+                last = status.seconds
+                print_status(f"recording (Ctrl-C ends it): {_words(status)}")
+
+        yield print_line
+    else:
+        from rich.status import Status as Line
+
+        with Line("starting LTTng", console=console) as line:
+            yield lambda status: line.update(f"recording (Ctrl-C ends it): {_words(status)}")
 
 
 def _words(status: Status) -> str:

@@ -1,7 +1,7 @@
-"""Signal handling of the program: SIGINT (Ctrl-C) and SIGTERM end a command cleanly.
+"""Signal handling of the program: Ctrl-C, SIGTERM and SIGHUP end a command cleanly.
 
 The first signal raises KeyboardInterrupt, so that the command can tidy up; during an import it ends
-the process at once. Then both signals have their default action again: a second one ends the
+the process at once. Then all signals have their default action again: a second one ends the
 process at once, as SIGKILL does. No database minds that.
 """
 
@@ -13,17 +13,15 @@ import sys
 from typing import TYPE_CHECKING
 
 from msgflow.errors import ExitCode
-from msgflow.sql.interrupt import Terminated
+from msgflow.sql.interrupt import SIGNALS, Terminated
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from types import FrameType
 
-_SIGNALS = (signal.SIGINT, signal.SIGTERM)
-
 
 class SignalHandler:
-    """The handler of both signals.
+    """The handler of all these signals.
 
     Attributes:
         came: exit code of the signal that came while the program ran; None without one.
@@ -44,7 +42,7 @@ class SignalHandler:
             SystemExit: of the program, or with the exit code of the signal.
         """
         self.came = None
-        for number in _SIGNALS:
+        for number in SIGNALS:
             if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
                 signal.signal(number, self)
         sys.unraisablehook = _end_after_lost_signal
@@ -58,26 +56,26 @@ class SignalHandler:
             raise SystemExit(int(code)) from None
         finally:
             # The command is over and has said so: a signal cannot change its exit code any more.
-            for number in _SIGNALS:
+            for number in SIGNALS:
                 if signal.getsignal(number) is self:
                     signal.signal(number, signal.SIG_IGN)
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
-        """Raise KeyboardInterrupt, or Terminated for SIGTERM."""
+        """Raise KeyboardInterrupt, or Terminated for the others."""
         restore_default_actions()
         if _is_importing(frame):
             # Code in C may lose an exception, and that of DuckDB would abort the process.
-            code = ExitCode.TERMINATED if number == signal.SIGTERM else ExitCode.INTERRUPTED
+            code = ExitCode.INTERRUPTED if number == signal.SIGINT else ExitCode.TERMINATED
             os.write(2, f"error: {code.name.lower()}\n".encode())
             os._exit(int(code))
-        error = (Terminated if number == signal.SIGTERM else KeyboardInterrupt)()
+        error = (KeyboardInterrupt if number == signal.SIGINT else Terminated)()
         self.came = _exit_code(error)
         raise error
 
 
 def restore_default_actions() -> None:
     """Let each signal end the process at once from now on, unless it is ignored."""
-    for number in _SIGNALS:
+    for number in SIGNALS:
         if signal.getsignal(number) is HANDLER:
             signal.signal(number, signal.SIG_DFL)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+import sys
 import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from msgflow.live import Status
-    from msgflow.sql.interrupt import Interrupts
     from msgflow.watch import Alarm, WindowDatabase, WindowReport
 
 _START = "starts, records and watches a program"
@@ -127,7 +127,8 @@ def command(
     """See a ROS 2 system while it runs: latency of every path, window by window.
 
     Ctrl-C ends it. `msgflow watch -- ros2 launch …` starts, records and watches a system; Ctrl-C
-    ends that, too. With --targets the exit code is that of `msgflow verify`.
+    ends that, too. With --targets the exit code is that of `msgflow verify`. It is 1 if COMMAND
+    failed.
     """
     from msgflow.cli.output import is_screen, print_lines, print_note
     from msgflow.cli.show.watch_screen import show_screen
@@ -135,6 +136,7 @@ def command(
     from msgflow.clocks import read_clock_sync
     from msgflow.links import read_links
     from msgflow.run.window import duration_ns
+    from msgflow.sql.interrupt import until_interrupted
     from msgflow.text.values import printable
     from msgflow.verify import Verdict
     from msgflow.watch import (
@@ -154,10 +156,13 @@ def command(
     step_ns = duration_ns(step, "--step")
     window_ns = duration_ns(window, "--window")
     alarm = None if targets is None else _alarm(targets, paths)
+    # Where stdout is closed, nothing starts.
+    on_screen = is_screen() and not as_json
     exporter = None
     if prometheus is not None:
         exporter = Exporter()
         exporter.serve(prometheus)
+    has_failed = False
     with _pages(ui, clock_sync) as database, ExitStack() as stack:
         recorder = None
         if keep is not None:
@@ -186,7 +191,7 @@ def command(
             if as_json:
                 for report in reports:
                     print_lines([report.to_json()])
-            elif is_screen():
+            elif on_screen:
                 show_screen(reports)
             else:
                 for report in reports:
@@ -203,14 +208,14 @@ def command(
             if directory is None:
                 # The recording is ours alone: it need not grow.
                 watcher.on_passed = remove_chunk
-            _record(program, directory, step_ns, live)
+            has_failed = _record(program, directory, step_ns, live, on_screen=on_screen)
         elif once:
             show(watch_finished(_finished(word), watcher))
         else:
             place = watched_place(word)
             with (
                 WatchedSessions(place, step_ns, print_note) as sessions,
-                _until_interrupted() as interrupts,
+                until_interrupted() as interrupts,
             ):
 
                 def is_over() -> bool:
@@ -218,7 +223,7 @@ def command(
                     return sessions.are_over()
 
                 live(place, is_over)
-    if alarm is not None and alarm.count(Verdict.FAILED):
+    if has_failed or (alarm is not None and alarm.count(Verdict.FAILED)):
         raise typer.Exit(ExitCode.FAILED)
     # Without a window, nothing was measured.
     if alarm is not None and not alarm.is_measured:
@@ -320,17 +325,26 @@ def _record(
     directory: Path | None,
     step_ns: int,
     live: Callable[[Path, Callable[[], bool]], None],
-) -> None:
-    """Start a program, record it, and watch the recording until it ends."""
-    from msgflow.cli.output import print_note
-    from msgflow.live import Channel, record
+    *,
+    on_screen: bool,
+) -> bool:
+    """Start a program, record it, and watch the recording until it ends.
 
+    Returns:
+        Whether the program failed.
+    """
+    from msgflow.cli.output import print_note
+    from msgflow.live import Channel, record, temporary_directory
+
+    name = time.strftime("watch-%Y%m%d-%H%M%S")
+    # A pipe to stderr would stop the program where nobody empties it.
+    log = Path(f"{directory or name}.log") if on_screen and sys.stderr.isatty() else None
     ended = Event()
     with (
-        tempfile.TemporaryDirectory(prefix="msgflow-watch-") as temporary,
+        temporary_directory() as temporary,
         ThreadPoolExecutor(1) as beside,
     ):
-        target = (directory or Path(temporary) / "recording").absolute()
+        target = (directory or temporary / "recording").absolute()
         # The main thread records: it has the signals.
         watching = beside.submit(live, target, ended.is_set)
 
@@ -342,9 +356,10 @@ def _record(
         try:
             recorded = record(
                 target,
-                name=time.strftime("watch-%Y%m%d-%H%M%S"),
+                name=name,
                 channel=Channel(EVENTS, "1M", 4, rotation_ns=step_ns),
                 program=words,
+                log=log,
                 note=print_note,
                 show=show,
             )
@@ -352,18 +367,6 @@ def _record(
             ended.set()
         watching.result()
     if recorded.exit_code:
-        print_note(f"{words[0]} ended with exit code {recorded.exit_code}")
-
-
-@contextmanager
-def _until_interrupted() -> Iterator[Interrupts]:
-    """Do what is in the block until Ctrl-C, which is how a view ends."""
-    from msgflow.sql.interrupt import Terminated, noted_interrupts
-
-    with noted_interrupts() as interrupts:
-        try:
-            yield interrupts
-        except Terminated:
-            raise
-        except KeyboardInterrupt:
-            interrupts.answer()
+        where = "" if log is None or not log.exists() else f": {log} has what it printed"
+        print_note(f"{words[0]} ended with exit code {recorded.exit_code}{where}")
+    return bool(recorded.exit_code)

@@ -4,6 +4,15 @@ from __future__ import annotations
 
 from msgflow.live.lttng import sessions
 from msgflow.live.recording import BYTES_OF_EVENT, Recorded, Status, record
-from msgflow.live.session import Channel, rotated
+from msgflow.live.session import Channel, rotated, temporary_directory
 
-__all__ = ["BYTES_OF_EVENT", "Channel", "Recorded", "Status", "record", "rotated", "sessions"]
+__all__ = [
+    "BYTES_OF_EVENT",
+    "Channel",
+    "Recorded",
+    "Status",
+    "record",
+    "rotated",
+    "sessions",
+    "temporary_directory",
+]

@@ -7,13 +7,15 @@ import shlex
 import shutil
 import signal
 import subprocess
+import sys
 import time
-from typing import TYPE_CHECKING
+from contextlib import suppress
+from typing import IO, TYPE_CHECKING
 
 from msgflow.errors import UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
 # Seconds after each signal; `ros2 launch` itself waits so long for its nodes.
 _PATIENCE = ((signal.SIGINT, 10.0), (signal.SIGTERM, 5.0), (signal.SIGKILL, 5.0))
@@ -26,15 +28,24 @@ class Program:
     The group is its own, so that Ctrl-C of the terminal reaches it after the recording has stopped.
     """
 
-    def __init__(self, words: Sequence[str]) -> None:
+    def __init__(self, words: Sequence[str], output: IO[bytes] | None) -> None:
         """Start it.
+
+        Args:
+            words: the program with its arguments.
+            output: gets what it prints; None: our stderr does, since our stdout is for data.
 
         Raises:
             UsageError: there is no such program, or it cannot be executed.
         """
+        self._name = words[0]
         require_program(words[0])
+        # A stderr that is closed is None.
+        stream = output or sys.__stderr__ or subprocess.DEVNULL
         try:
-            self._process = subprocess.Popen(list(words), start_new_session=True)
+            self._process = subprocess.Popen(
+                list(words), stdout=stream, stderr=stream, start_new_session=True
+            )
         except OSError as error:
             raise UsageError(
                 f"cannot execute {words[0]}: {(error.strerror or str(error)).lower()}",
@@ -47,10 +58,13 @@ class Program:
         """Exit code; negative: the signal that ended it; None while it runs."""
         return self._process.poll()
 
-    def end(self) -> None:
+    def end(self, note: Callable[[str], None]) -> None:
         """Ask the group to end, as Ctrl-C does, then with more force; KeyboardInterrupt kills it.
 
         A shell starts its background processes so that they ignore Ctrl-C: they need the force.
+
+        Args:
+            note: gets the sentence that says what runs on.
         """
         try:
             for number, seconds in _PATIENCE:
@@ -63,8 +77,14 @@ class Program:
                     if not self._send(0):
                         return
                     time.sleep(_BETWEEN_LOOKS)
+        except PermissionError:
+            note(
+                f"{self._name} runs on, as it belongs to another user: sudo kill -INT --"
+                f" -{self._process.pid}"
+            )
         except KeyboardInterrupt:
-            self._send(signal.SIGKILL)
+            with suppress(PermissionError):
+                self._send(signal.SIGKILL)
             raise
 
     def _send(self, number: int) -> bool:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 import shutil
 import time
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import IO, TYPE_CHECKING
 
 from msgflow.errors import RecordingError
 from msgflow.live.daemon import session_daemon
@@ -17,16 +18,19 @@ from msgflow.live.scheduling import recorded_with_perf, why_perf_cannot_record
 from msgflow.live.session import (
     Channel,
     can_trace_kernel,
+    is_there,
     record_snapshot,
     recording_session,
     remove_leftovers,
+    require_name,
     require_new,
+    require_snapshot,
 )
 from msgflow.live.written import recorded_bytes
-from msgflow.sql.interrupt import Terminated, noted_interrupts
+from msgflow.sql.interrupt import noted_interrupts, until_interrupted
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterator, Sequence
     from pathlib import Path
 
 BYTES_OF_EVENT = 45
@@ -79,6 +83,7 @@ def record(
     name: str,
     channel: Channel,
     program: Sequence[str] = (),
+    log: Path | None = None,
     seconds: float | None = None,
     kernel: bool = False,
     snapshot: str | None = None,
@@ -92,12 +97,13 @@ def record(
         name: of the LTTng session.
         channel: which events, in which buffers.
         program: to start once all is ready, and to end afterwards; with its arguments.
+        log: file that gets what the program prints, if it prints anything; None: our stderr.
         seconds: how long to record; None: without a limit.
         kernel: also record what the scheduler does.
         snapshot: a snapshot session that has the initialisation of nodes that run already; what it
             has is written too.
         note: gets sentences about what is wrong with the recording.
-        show: gets the status twice a second.
+        show: gets the status twice a second; what it raises ends the recording.
 
     Raises:
         UsageError: there is no such program.
@@ -107,6 +113,7 @@ def record(
     """
     if program:
         require_program(program[0])
+    require_name(name)
     _require_room(directory, note, seconds)
     with noted_interrupts() as interrupts, ExitStack() as stack:
         stack.enter_context(session_daemon(with_kernel=kernel, note=note))
@@ -115,6 +122,8 @@ def record(
         require_new(name)
         if snapshot is None:
             _note_running(note)
+        else:
+            require_snapshot(snapshot)
         directory.mkdir(parents=True, exist_ok=True)
         if snapshot is not None:
             record_snapshot(snapshot, directory / "snapshot")
@@ -127,27 +136,44 @@ def record(
                     f"the scheduler is not recorded: LTTng cannot trace this kernel (it"
                     f" needs its modules, and root or the group tracing), and {reason}"
                 )
+        output = None
+        if log is not None:
+            output = stack.enter_context(_written(log))
+            note(f"what {program[0]} prints goes to {log}")
         watch = _Watch(name, directory, channel, note, show, expects_nodes=bool(program))
         with ExitStack() as running:
             started = None
             with recording_session(name, directory, channel, with_kernel=by_lttng):
                 interrupts.check()
                 if program:
-                    started = Program(program)
+                    started = Program(program, output)
                     # Behind the session: what happens while nodes end is not recorded.
-                    running.callback(started.end)
-                try:
+                    running.callback(started.end, note)
+                with until_interrupted():
                     while not watch.is_over(started, seconds):
                         interrupts.check()
                         time.sleep(_BETWEEN_LOOKS)
-                except Terminated:
-                    raise
-                except KeyboardInterrupt:
-                    interrupts.answer()
             ended_with = None if started is None else started.exit_code
         # All buffers are written now.
         last = replace(watch.status, event_bytes=recorded_bytes(directory))
     return Recorded(directory, last, ended_with)
+
+
+@contextmanager
+def _written(log: Path) -> Iterator[IO[bytes]]:
+    """Yield the file while a program may write to it; an empty one does not stay."""
+    try:
+        stream = log.open("wb")
+    except OSError as error:
+        raise RecordingError(
+            f"cannot write {log}: {(error.strerror or str(error)).lower()}", "another place: -o DIR"
+        ) from None
+    with stream:
+        try:
+            yield stream
+        finally:
+            if not log.stat().st_size:
+                log.unlink()
 
 
 class _Watch:
@@ -174,7 +200,16 @@ class _Watch:
 
     def is_over(self, program: Program | None, seconds: float | None) -> bool:
         """Look, and tell whether the recording has to end."""
-        self._look()
+        try:
+            self._look()
+        except RecordingError:
+            if is_there(self._name):
+                raise
+            self._note(
+                f"the session {self._name} was destroyed by another program, or its daemon ended:"
+                " the recording ends here"
+            )
+            return True
         if self.status.free_bytes < _LEAST_FREE_BYTES:
             self._note("the disk is full: the recording ends here; remove files, or use -o DIR")
             return True
@@ -191,6 +226,7 @@ class _Watch:
             losses(self._name),
             shutil.disk_usage(self._directory).free,
         )
+        self._show(self.status)
         if self.status.discarded and not before.discarded:
             self._note(
                 "events are being discarded, the buffers are too small: record again with a"
@@ -206,9 +242,22 @@ class _Watch:
 
 
 def _require_room(directory: Path, note: Callable[[str], None], seconds: float | None) -> None:
-    if directory.exists() and (not directory.is_dir() or any(directory.iterdir())):
-        raise RecordingError(f"the directory is in use — {directory}", "another one: -o DIR")
-    existing = next(path for path in (directory, *directory.absolute().parents) if path.exists())
+    try:
+        if directory.exists() and (not directory.is_dir() or any(directory.iterdir())):
+            raise RecordingError(f"the directory is in use — {directory}", "another one: -o DIR")
+        existing = next(
+            path for path in (directory, *directory.absolute().parents) if path.exists()
+        )
+    except PermissionError as error:
+        raise RecordingError(
+            f"cannot write to {directory}: permission denied: {error.filename}",
+            "another directory: -o DIR",
+        ) from None
+    if not existing.is_dir() or not os.access(existing, os.W_OK | os.X_OK):
+        reason = "permission denied" if existing.is_dir() else "no directory"
+        raise RecordingError(
+            f"cannot write to {directory}: {reason}: {existing}", "another directory: -o DIR"
+        )
     free = shutil.disk_usage(existing).free
     if free < _LEAST_FREE_BYTES:
         raise RecordingError(

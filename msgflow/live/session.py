@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import json
-import os
 import shlex
+import shutil
+import tempfile
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from msgflow.errors import RecordingError
+from msgflow.errors import RecordingError, UsageError
 from msgflow.live.kernel_events import KERNEL_EVENTS
-from msgflow.live.lttng import lttng, sessions
+from msgflow.live.lttng import is_daemon_running, lttng, sessions
+from msgflow.temporary_owner import is_abandoned, mark
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -22,8 +23,9 @@ KERNEL_CONTEXTS = ("pid", "vpid", "vtid", "procname")
 # LTTng has it since 2.12.
 _LATER_CONTEXT = "pid_ns"
 _CHANNEL = "ros2"
-# In the directory of a recording while it is made.
-_OWNER = "msgflow-record.json"
+# In the directory of a recording while it is made: the mark of its process.
+_OWNER = ".msgflow-record"
+_TEMPORARY = "msgflow-watch-"
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +62,7 @@ def recording_session(
     """
     owner = directory / _OWNER
     try:
-        owner.write_text(json.dumps({"pid": os.getpid(), "started": _started(os.getpid())}))
+        owner.write_text(mark())
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
         raise RecordingError(
@@ -82,8 +84,17 @@ def recording_session(
     finally:
         # It stops the session, and waits until all is written. Where it fails, the owner stays
         # named: the next recording removes the session.
-        lttng("destroy", name)
+        if is_there(name):
+            lttng("destroy", name)
         owner.unlink()
+
+
+@contextmanager
+def temporary_directory() -> Iterator[Path]:
+    """Yield a directory for a recording that nobody keeps; it is gone afterwards."""
+    prefix = f"{_TEMPORARY}{mark()}."
+    with tempfile.TemporaryDirectory(prefix=prefix) as directory:
+        yield Path(directory)
 
 
 @contextmanager
@@ -112,8 +123,8 @@ def rotated(name: str, length_ns: int) -> Iterator[Callable[[], None]]:
                 lttng("disable-rotation", f"--session={name}", "--timer")
 
 
-def record_snapshot(name: str, directory: Path) -> None:
-    """Write what a snapshot session has in its buffers into a new directory.
+def require_snapshot(name: str) -> None:
+    """Refuse a name that no snapshot session has.
 
     Raises:
         RecordingError: there is no such snapshot session.
@@ -124,17 +135,50 @@ def record_snapshot(name: str, directory: Path) -> None:
             f"LTTng has no snapshot session of this name — {name}",
             f"one of: {', '.join(known)}" if known else "lttng create --snapshot makes one",
         )
+
+
+def record_snapshot(name: str, directory: Path) -> None:
+    """Write what a snapshot session has in its buffers into a new directory.
+
+    Raises:
+        RecordingError: LTTng refuses.
+    """
     lttng("snapshot", "record", f"--session={name}", f"file://{directory}")
 
 
 def remove_leftovers() -> list[str]:
-    """Destroy the sessions of recordings whose process is gone, and return their names."""
+    """Remove what recordings leave whose process is gone: sessions, temporary directories.
+
+    Returns:
+        The names of the sessions.
+    """
     left = [session for session in sessions() if _is_left(session.directory)]
     for session in left:
         lttng("destroy", session.name)
         assert session.directory is not None
         (session.directory / _OWNER).unlink()
+    for directory in Path(tempfile.gettempdir()).glob(f"{_TEMPORARY}*"):
+        if is_abandoned(directory.name.removeprefix(_TEMPORARY).rpartition(".")[0]):
+            shutil.rmtree(directory, ignore_errors=True)
     return [session.name for session in left]
+
+
+def is_there(name: str) -> bool:
+    """Tell whether a session daemon runs that has a session of this name."""
+    return is_daemon_running() and any(session.name == name for session in sessions())
+
+
+def require_name(name: str) -> None:
+    """Refuse a name that LTTng does not take.
+
+    Raises:
+        UsageError: it has a slash, or begins like an option.
+    """
+    if "/" in name or name.startswith("-"):
+        raise UsageError(
+            f"a session cannot have a name with a slash, or with - in front — {name}",
+            "another --name; -o DIR names the directory",
+        )
 
 
 def require_new(name: str) -> None:
@@ -143,7 +187,7 @@ def require_new(name: str) -> None:
     Raises:
         RecordingError: there is one.
     """
-    if any(session.name == name for session in sessions()):
+    if is_there(name):
         raise RecordingError(
             f"LTTng has a session of this name — {name}",
             f"choose another --name, or end that session: lttng destroy {shlex.quote(name)}",
@@ -206,17 +250,6 @@ def _is_left(directory: Path | None) -> bool:
     if directory is None:
         return False
     try:
-        owner = json.loads((directory / _OWNER).read_text())
-        return bool(owner["started"] != _started(owner["pid"]))
-    except (OSError, ValueError, KeyError, TypeError):
+        return is_abandoned((directory / _OWNER).read_text())
+    except (OSError, UnicodeDecodeError):
         return False
-
-
-def _started(pid: int) -> str | None:
-    """Return the start of a process, in ticks since the boot, or None if it does not run."""
-    try:
-        stat = Path(f"/proc/{pid:d}/stat").read_text()
-    except OSError:
-        return None
-    # Behind the name of the program, which may have any character: the 22nd field of all.
-    return stat.rpartition(")")[2].split()[19]

@@ -1,4 +1,4 @@
-"""Interrupts: Ctrl-C and SIGTERM, which are never lost and leave nothing half done.
+"""Interrupts: Ctrl-C, SIGTERM and SIGHUP, which are never lost and leave nothing half done.
 
 Python raises KeyboardInterrupt wherever the main thread happens to be. Inside a callback of the
 garbage collector it is printed and forgotten; inside DuckDB it becomes another exception. Hence the
@@ -23,7 +23,7 @@ _SECONDS_BETWEEN_ATTEMPTS = 0.05
 
 
 class Terminated(KeyboardInterrupt):
-    """SIGTERM, which the command line treats as Ctrl-C."""
+    """SIGTERM or SIGHUP, which the command line treats as Ctrl-C."""
 
 
 class Interrupts:
@@ -38,7 +38,7 @@ class Interrupts:
 
     def on_signal(self, number: int, frame: FrameType | None) -> None:
         """Note Ctrl-C; raise the second one at once, as the work may not ask for a long time."""
-        if number == signal.SIGTERM:
+        if number != signal.SIGINT:
             self._kind = Terminated
         if self._is_noted and not self._is_final:
             raise self._kind
@@ -73,7 +73,10 @@ class Interrupts:
                 connection.interrupt()
 
 
-_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+# Windows has no terminal that goes away.
+_GONE = [signal.SIGHUP] if hasattr(signal, "SIGHUP") else []
+SIGNALS = (signal.SIGINT, signal.SIGTERM, *_GONE)
+"""The signals that end a command cleanly."""
 
 
 def _may_be_replaced(handler: object) -> bool:
@@ -86,12 +89,12 @@ def noted_interrupts() -> Iterator[Interrupts]:
     """Note Ctrl-C instead of raising it; an inner block shares the state of the outer one.
 
     Only the main thread receives signals. A program that uses msgflow keeps its own handling of
-    Ctrl-C. SIGTERM is noted in the command line only.
+    Ctrl-C. SIGTERM and SIGHUP are noted in the command line only.
     """
     if threading.current_thread() is not threading.main_thread():
         yield Interrupts()
         return
-    before = {number: signal.getsignal(number) for number in _SIGNALS}
+    before = {number: signal.getsignal(number) for number in SIGNALS}
     for handler in before.values():
         outer = getattr(handler, "__self__", None)
         if isinstance(outer, Interrupts):
@@ -110,6 +113,18 @@ def noted_interrupts() -> Iterator[Interrupts]:
     finally:
         for number in ours:
             signal.signal(number, before[number])
+
+
+@contextmanager
+def until_interrupted() -> Iterator[Interrupts]:
+    """Do what is in the block until Ctrl-C, which is how it ends; Terminated is raised."""
+    with noted_interrupts() as interrupts:
+        try:
+            yield interrupts
+        except Terminated:
+            raise
+        except KeyboardInterrupt:
+            interrupts.answer()
 
 
 def interruptible(connection: duckdb.DuckDBPyConnection, work: Callable[[], _T]) -> _T:

@@ -83,9 +83,10 @@ class FlightRecorder:
         moment = time.strftime("%Y%m%d-%H%M%S", time.gmtime(end_ns // 1_000_000_000))
         names = (f"violation-{moment}" + (f"-{n}" if n > 1 else "") for n in count(1))
         target = next(path for path in map(self._directory.joinpath, names) if not path.exists())
-        # A directory of a session has `archives`, and is below that of its host.
-        common = os.path.commonpath([chunk.parents[2] for chunk in chunks])
+        # Whatever fails must not end the view.
         try:
+            # A directory of a session has `archives`, and is below that of its host.
+            common = os.path.commonpath([chunk.parents[2] for chunk in chunks])
             target.mkdir(parents=True)
             for chunk in chunks:
                 if chunk.is_dir():
@@ -93,10 +94,9 @@ class FlightRecorder:
                     shutil.copytree(chunk, target / "archives" / session / chunk.name)
             if learned is not None:
                 (target / LEARNED_FILE).write_text(learned, encoding="utf-8")
-        except OSError as error:
+            self._writing = self._beside.submit(self._write, target, traces, links)
+        except Exception as error:
             self._give_up(target, error)
-            return
-        self._writing = self._beside.submit(self._write, target, traces, links)
 
     def close(self) -> None:
         """Wait for the last database."""
@@ -119,7 +119,7 @@ class FlightRecorder:
                 clock_sync=self._clock_sync,
                 traces=traces,
             )
-        except (OSError, MsgflowError) as error:
+        except Exception as error:
             self._give_up(target, error)
             return
         others = sorted(set(self._directory.glob("violation-*")) - {target})
@@ -127,19 +127,21 @@ class FlightRecorder:
             shutil.rmtree(oldest, ignore_errors=True)
         self._note(f"kept: msgflow why --db {target / _DATABASE}")
 
-    def _give_up(self, target: Path, error: OSError | MsgflowError) -> None:
-        """Remove what was kept: a disk that is full must not end the view."""
+    def _give_up(self, target: Path, error: Exception) -> None:
+        """Remove what was kept, and say why."""
         shutil.rmtree(target, ignore_errors=True)
-        self._note(
-            f"the violation is not kept in {target}: {_reason(error)}; remove files, or name"
-            " another directory with --keep-on-violation"
-        )
+        self._note(f"the violation is not kept in {target}: {_reason(error)}")
 
 
-def _reason(error: OSError | MsgflowError) -> str:
+def _reason(error: Exception) -> str:
+    """Return what went wrong, with the remedy where there is one."""
     if isinstance(error, MsgflowError):
-        return error.message
-    if isinstance(error, shutil.Error):
+        reason = error.message
+    elif isinstance(error, shutil.Error):
         # Of the first file that was not copied: its source, its target, and the reason.
-        return str(error.args[0][0][2])
-    return (error.strerror or str(error)).lower()
+        reason = str(error.args[0][0][2])
+    elif isinstance(error, OSError):
+        reason = (error.strerror or str(error)).lower()
+    else:
+        return f"{type(error).__name__}: {error}"
+    return f"{reason}; remove files, or name another directory with --keep-on-violation"

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -14,9 +16,11 @@ from pathlib import Path
 
 import pytest
 from lttng_program import lttng
+from terminal import Terminal
 
 from msgflow.database import Database
 from msgflow.live.lttng import losses
+from msgflow.live.program import Program
 
 
 @dataclass
@@ -86,6 +90,20 @@ def test_a_file_that_is_missing_is_said_before_anything_starts(
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("program", [[], ["--", "sleep", "60"]])
+def test_a_terminal_shows_how_the_recording_goes(tmp_path: Path, program: list[str]) -> None:
+    """In one line; beside a program, which writes there as well, in a line now and then."""
+    words = ("--duration", "11", "--no-ingest", *program)
+    with Terminal([sys.executable, "-m", "msgflow", "record", *words], tmp_path) as terminal:
+        assert terminal.wait() == 0
+    seconds = re.findall(
+        r"recording \(Ctrl-C ends it\): (\d+) s, some 0 events written \(0/s\), 0 discarded,",
+        terminal.shown,
+    )
+    assert set(seconds) >= ({"10"} if program else {"1", "5", "10"})
+    assert ("starting LTTng" in terminal.shown) != bool(program)
+
+
 def test_discarded_events_are_said_at_once(record: Record, robot: list[str]) -> None:
     ended = record(
         *("--duration", "4", "--subbuf-size", "4K", "--num-subbuf", "2", "--no-ingest"),
@@ -109,6 +127,30 @@ def test_all_that_a_program_started_ends_with_it(record: Record, tmp_path: Path)
     assert not Path(f"/proc/{child}").exists()
 
 
+def test_what_a_program_prints_is_not_among_the_tables(record: Record) -> None:
+    ended = record("--no-ingest", "--", "sh", "-c", "echo [INFO] started")
+    assert ended.out == ""
+    assert "[INFO] started" in ended.err
+
+
+def test_a_program_of_another_user_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As with sudo: we may not end it."""
+    program = Program(["sleep", "60"], None)
+    notes: list[str] = []
+
+    def refused(group: int, number: int) -> None:
+        raise PermissionError(errno.EPERM, "Operation not permitted")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "killpg", refused)
+        program.end(notes.append)
+    (note,) = notes
+    assert note.startswith("sleep runs on, as it belongs to another user: sudo kill -INT -- -")
+    os.kill(int(note.rpartition("-")[2]), signal.SIGKILL)
+    program.end(notes.append)
+    assert len(notes) == 1
+
+
 @pytest.mark.parametrize("seconds", [0.2, 0.9, 1.4, 1.9, 3.5])
 def test_ctrl_c_leaves_nothing(record: Record, seconds: float) -> None:
     """Whether LTTng starts, the session begins, or events are recorded."""
@@ -117,9 +159,11 @@ def test_ctrl_c_leaves_nothing(record: Record, seconds: float) -> None:
     assert subprocess.run(["pgrep", "-r", "D,R,S", "-f", "^sleep 1000"]).returncode
 
 
-def test_sigterm_leaves_nothing(record: Record) -> None:
-    ended = record("--", "sleep", "1000", after=4, number=signal.SIGTERM)
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_leaves_nothing(record: Record, number: signal.Signals) -> None:
+    ended = record("--", "sleep", "1000", after=4, number=number)
     assert ended.exit_code == 143
+    assert subprocess.run(["pgrep", "-r", "D,R,S", "-f", "^sleep 1000"]).returncode
 
 
 def test_sigkill_ends_the_daemon_too(record: Record) -> None:
@@ -165,6 +209,17 @@ class TestForeignDaemon:
         assert "/image" not in without.out
         assert "/camera → /image → /detector" in ended.out
 
+    def test_a_session_that_another_program_destroyed_is_read(
+        self, record: Record, robot: list[str], tmp_path: Path
+    ) -> None:
+        destroy = "sleep 6; lttng --no-sessiond destroy drive"
+        with subprocess.Popen(["sh", "-c", destroy]):
+            ended = record("--name", "drive", "--", *robot, "0.05")
+        assert ended.exit_code == 0, ended.err
+        assert "the session drive was destroyed by another program" in ended.err
+        assert "/camera → /image → /detector" in ended.out
+        assert [path.name for path in (tmp_path / "drive").iterdir()] == ["ust"]
+
     def test_a_name_in_use_is_refused(self, record: Record, tmp_path: Path) -> None:
         ended = record("--name", "other", "--duration", "0.5")
         assert ended.exit_code == 1
@@ -183,6 +238,26 @@ def test_a_missing_program_is_refused_before_anything_starts(record: Record) -> 
     ended = record("--", "no-such-program")
     assert ended.exit_code == 2
     assert "there is no such program — no-such-program" in ended.err
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        (("-o", "file/sub"), 1, "no directory"),
+        (("--name", "a/b"), 2, "a session cannot have a name with a slash"),
+        (("--dual", "nosuch"), 1, "LTTng has no snapshot session of this name — nosuch"),
+        (("--db", "nosuch/a.duckdb"), 4, "no such directory — nosuch"),
+        (("--db", "file"), 4, "file"),
+    ],
+)
+def test_what_cannot_be_is_refused_before_anything_starts(
+    record: Record, tmp_path: Path, words: tuple[str, ...], code: int, said: str
+) -> None:
+    (tmp_path / "file").write_text("taken")
+    ended = record(*words, "--", "touch", "started")
+    assert ended.exit_code == code, ended.err
+    assert said in ended.err
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
 def test_a_program_that_fails_at_once_is_named(record: Record) -> None:

@@ -23,6 +23,7 @@ def test_a_context_that_an_old_lttng_lacks_is_left_out(
         said.append(words)
 
     monkeypatch.setattr(session, "lttng", lttng)
+    monkeypatch.setattr(session, "is_there", lambda name: True)
     with recording_session("robot", tmp_path, Channel(("ros2:*",), "1M", 4), with_kernel=True):
         pass
     contexts = [word for words in said for word in words if word.startswith("--type=")]

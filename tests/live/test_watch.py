@@ -5,16 +5,19 @@ from __future__ import annotations
 import itertools
 import json
 import os
+import shlex
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 import pytest
 from lttng_program import lttng
+from terminal import Terminal
 
 PATH = "/camera → /image → /detector"
 Watch = Callable[..., subprocess.Popen[str]]
@@ -66,6 +69,115 @@ def test_a_program_is_recorded_and_watched(watch: Watch, robot: list[str], tmp_p
     require_whole(found)
     # The recording was temporary.
     assert [path.name for path in tmp_path.iterdir()] == ["library"]
+
+
+def test_a_program_ends_with_the_reader_of_the_view(watch: Watch, robot: list[str]) -> None:
+    """As with `| head -1`."""
+    process = watch("--", *robot, "0.05")
+    wait_for_window(process)
+    assert process.stdout is not None
+    process.stdout.close()
+    assert process.wait(20) == 0
+
+
+def test_a_closed_stdout_is_refused_before_anything_starts(tmp_path: Path) -> None:
+    words = [sys.executable, "-m", "msgflow", "watch", "--", "touch", "started"]
+    ended = subprocess.run(
+        ["sh", "-c", f"exec {shlex.join(words)} >&-"], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert ended.returncode == 2
+    assert "cannot write to stdout: it is closed" in ended.stderr
+    assert not list(tmp_path.iterdir())
+
+
+SPEAKS = ["sh", "-c", "echo [INFO] started; echo [ERROR] failed >&2; sleep 9; exit 3"]
+
+
+def test_what_a_program_prints_is_no_window(watch: Watch) -> None:
+    out, err = watch("--", *SPEAKS).communicate(timeout=60)
+    assert out == ""
+    assert "[INFO] started\n[ERROR] failed\n" in err
+
+
+def test_what_a_program_prints_does_not_tear_the_screen(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "msgflow", "watch", "--", *SPEAKS]
+    with Terminal(command, tmp_path) as terminal:
+        # The program fails.
+        assert terminal.wait() == 1
+    assert "[INFO]" not in terminal.shown
+    assert "[ERROR]" not in terminal.shown
+    (log,) = tmp_path.iterdir()
+    assert log.read_text() == "[INFO] started\n[ERROR] failed\n"
+    assert f"what sh prints goes to {log.name}" in terminal.shown
+    assert f"sh ended with exit code 3: {log.name} has what it printed" in terminal.shown
+
+
+def test_a_recording_with_a_name_has_what_the_program_printed_beside_it(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "msgflow", "watch", "-o", "drive", "--", *SPEAKS]
+    with Terminal(command, tmp_path) as terminal:
+        terminal.wait()
+    assert {path.name for path in tmp_path.iterdir()} == {"drive", "drive.log"}
+
+
+def test_a_program_that_prints_nothing_leaves_nothing(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "msgflow", "watch", "--", "true"]
+    with Terminal(command, tmp_path) as terminal:
+        assert terminal.wait() == 0
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.fixture
+def temporary(tmp_path: Path) -> Path:
+    """A directory for temporary files."""
+    path = tmp_path / "temporary"
+    path.mkdir()
+    return path
+
+
+SLEEPS = ["sh", "-c", "echo $$ >> programs; exec sleep 1000"]
+WATCH = [sys.executable, "-m", "msgflow", "watch", "--", *SLEEPS]
+
+
+def wait_for_words(terminal: Terminal) -> None:
+    terminal.wait_for(lambda: "no process has the tracepoints" in terminal.shown)
+
+
+def test_a_terminal_that_goes_away_ends_all(tmp_path: Path, temporary: Path) -> None:
+    with Terminal(WATCH, tmp_path, TMPDIR=str(temporary)) as terminal:
+        wait_for_words(terminal)
+        assert [path.name[:14] for path in temporary.iterdir()] == ["msgflow-watch-"]
+        terminal.hang_up()
+        terminal.process.wait(30)
+    assert not list(temporary.iterdir())
+    assert not Path("/proc", (tmp_path / "programs").read_text().strip()).exists()
+
+
+def test_what_a_killed_view_leaves_is_removed(
+    daemon: None, tmp_path: Path, temporary: Path
+) -> None:
+    """Its session, and its temporary directory; not those of a view that runs."""
+    words = [sys.executable, "-m", "msgflow", "record", "--no-ingest", "--duration", "0.5"]
+    with ExitStack() as stack:
+        terminals = []
+        for _ in range(2):
+            terminal = stack.enter_context(Terminal(WATCH, tmp_path, TMPDIR=str(temporary)))
+            wait_for_words(terminal)
+            terminals.append(terminal)
+        first, second = terminals
+        assert len(list(temporary.iterdir())) == 2
+        first.process.kill()
+        first.process.wait()
+        with Terminal(words, tmp_path, TMPDIR=str(temporary)) as third:
+            assert third.wait() == 0
+        (left,) = temporary.iterdir()
+        assert f"-{second.process.pid}-" in left.name
+        second.process.send_signal(signal.SIGINT)
+        assert second.wait() == 0
+    # The program of the one that was killed goes on.
+    programs = [int(line) for line in (tmp_path / "programs").read_text().splitlines()]
+    (program,) = (pid for pid in programs if Path(f"/proc/{pid}").exists())
+    os.kill(program, signal.SIGKILL)
+    assert "watch-" not in lttng("list").stdout
 
 
 @pytest.fixture

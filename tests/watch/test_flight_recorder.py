@@ -1,0 +1,38 @@
+"""The flight recorder where it fails: it says so, and the view goes on."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from msgflow.watch import FlightRecorder, flight_recorder
+
+_SECOND_NS = 1_000_000_000
+
+
+def _fails(*words: object, **options: object) -> None:
+    raise RuntimeError("can't start new thread")
+
+
+@pytest.mark.parametrize("place", ["a thread", "the database"])
+def test_what_nobody_foresaw_is_a_note(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: str
+) -> None:
+    if place == "a thread":
+        monkeypatch.setattr(ThreadPoolExecutor, "submit", _fails)
+    else:
+        monkeypatch.setattr(flight_recorder, "ingest", _fails)
+    chunk = tmp_path / "drive" / "archives" / "0"
+    chunk.mkdir(parents=True)
+    notes: list[str] = []
+    recorder = FlightRecorder(
+        tmp_path / "kept", most=5, window_ns=_SECOND_NS, clock_sync="none", note=notes.append
+    )
+    for second in (0, 2):
+        recorder.keep(second * _SECOND_NS, None, [chunk], None, None)  # type: ignore[arg-type]
+    recorder.close()
+    assert [note.partition(" in ")[0] for note in notes] == ["the violation is not kept"] * 2
+    assert all(note.endswith(": RuntimeError: can't start new thread") for note in notes)
+    assert not list((tmp_path / "kept").iterdir())
