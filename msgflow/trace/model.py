@@ -69,6 +69,11 @@ class TraceInfo:
     event_names: tuple[str, ...]
     has_time: bool = True
 
+    @property
+    def identity(self) -> str:
+        """What chunks of one recording have in common."""
+        return self.uuid or str(self.path)
+
 
 def undeclared(path: Path, index: int) -> TraceInfo:
     """Describe a trace without any event data; see `TraceInfo` for the arguments."""

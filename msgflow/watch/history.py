@@ -43,7 +43,7 @@ class History:
         """
         self._window_ns = window_ns
         self._step_ns = step_ns
-        self._lasting: list[KeptChunk] = []
+        self._lasting: dict[Path, KeptChunk] = {}
         self._chunks: list[KeptChunk] = []
         self._borders: list[int] = []
         self._ends: dict[Path, int] = {}
@@ -156,17 +156,20 @@ class History:
         """Return the window up to the last border, whose last messages may be on the way."""
         return Window(self._start_of(self._borders[-1]), self._borders[-1])
 
-    def next_window(self, *, is_last: bool = False) -> tuple[Window, bool] | None:
+    def next_window(self, *, is_live: bool, is_last: bool = False) -> tuple[Window, bool] | None:
         """Return the next window to show, and whether it is final; None if there is none yet.
 
         Args:
+            is_live: what is not final is shown, too; else nobody waits for it.
             is_last: nothing more comes.
         """
         final = self.final_window(is_last=is_last)
-        if final is not None and (is_last or self._is_timely(final)):
+        if not is_live or is_last:
+            return None if final is None else (final, True)
+        if final is not None and self._is_timely(final):
             return final, True
         # The window up to the border before the last could be final, but messages take longer.
-        if is_last or len(self._borders) < 3 or self._borders[-1] <= self._shown_ns:
+        if len(self._borders) < 3 or self._borders[-1] <= self._shown_ns:
             return None
         return self.newest_window(), False
 
@@ -204,7 +207,7 @@ class History:
     def traces(self, window: Window) -> KeptTraces:
         """Return what a window needs: itself, and what comes before and after."""
         needed = self._needed(window)
-        return KeptTraces([*self._lasting, *self._lasting_without(needed)], needed)
+        return KeptTraces([*self._lasting.values(), *self._lasting_without(needed)], needed)
 
     def paths(self, window: Window) -> list[Path]:
         """Return the directories of the chunks that a window needs."""
@@ -217,7 +220,12 @@ class History:
             The directories of the chunks that are forgotten.
         """
         needed = self._needed(window)
-        self._lasting += self._lasting_without(needed)
+        for lasting in self._lasting_without(needed):
+            before = self._lasting.get(lasting.source)
+            # To put many parts together in each step would take long.
+            self._lasting[lasting.source] = (
+                lasting if before is None else before.followed_by(lasting)
+            )
         passed = [chunk.path for chunk in self._chunks if chunk not in needed]
         self._chunks = needed
         reach = self._reach(window)

@@ -16,7 +16,7 @@ from msgflow.trace import PACKET
 from msgflow.trace.numpy_arrow import to_arrow, to_numpy
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -68,6 +68,31 @@ class KeptChunk:
         if not kept:
             return None
         return replace(self, packets=(), event_counts={}, damages=(), **_renumbered(kept))
+
+    def followed_by(self, later: KeptChunk) -> KeptChunk:
+        """Return what lasts of both, this and a later chunk of the same source.
+
+        Args:
+            later: likewise what lasts of it.
+        """
+        traces = list(self.traces)
+        indexes = {trace.identity: trace.index for trace in traces}
+        for trace in later.traces:
+            if trace.identity not in indexes:
+                indexes[trace.identity] = len(traces)
+                traces.append(replace(trace, index=len(traces)))
+        places = [indexes[trace.identity] for trace in later.traces]
+        events = {name: [batch] for name, batch in self.events.items()}
+        for name, batch in later.events.items():
+            ids = to_numpy(batch["event_id"]) + self.times_ns.size
+            events.setdefault(name, []).append(placed(with_column(batch, "event_id", ids), places))
+        return replace(
+            later,
+            traces=tuple(traces),
+            events={name: joined(batches) for name, batches in events.items()},
+            times_ns=np.concatenate([self.times_ns, later.times_ns]),
+            begin_ns=self.begin_ns,
+        )
 
 
 def read_chunk(chunk: Chunk, after: Continuation) -> KeptChunk | None:
@@ -146,6 +171,12 @@ def joined(batches: list[pa.RecordBatch]) -> pa.RecordBatch:
     """Return the rows of batches of one schema as one batch."""
     table = pa.Table.from_batches(batches).unify_dictionaries().combine_chunks()
     return table.to_batches()[0] if table.num_rows else batches[0]
+
+
+def placed(batch: pa.RecordBatch, places: Sequence[int]) -> pa.RecordBatch:
+    """Return a batch with other indexes of traces: the place of each one so far."""
+    indexes = to_numpy(batch["trace_index"])
+    return with_column(batch, "trace_index", np.asarray(places, np.int32)[indexes])
 
 
 def with_column(batch: pa.RecordBatch, name: str, values: NDArray[Any]) -> pa.RecordBatch:

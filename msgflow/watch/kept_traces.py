@@ -10,7 +10,7 @@ import numpy as np
 
 from msgflow.trace import PACKET, EventBatch, TraceSet
 from msgflow.trace.numpy_arrow import to_numpy
-from msgflow.watch.kept_chunk import joined, with_column
+from msgflow.watch.kept_chunk import joined, placed, with_column
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -43,7 +43,7 @@ class KeptTraces(TraceSet):
         for part in lasting:
             own = []
             for trace in part.traces:
-                place = places.setdefault(trace.uuid or str(trace.path), len(traces))
+                place = places.setdefault(trace.identity, len(traces))
                 if place == len(traces):
                     # The set begins with its packets, however long ago its objects were made.
                     short = replace(trace, index=place, begin_ns=begin_ns, end_ns=begin_ns)
@@ -81,10 +81,10 @@ class KeptTraces(TraceSet):
         events: dict[str, list[pa.RecordBatch]] = {}
         for part, places, first in zip(self._parts, self._places, firsts[:-1], strict=True):
             for packets in part.packets:
-                yield EventBatch(PACKET, _placed(packets, places), 0)
+                yield EventBatch(PACKET, placed(packets, places), 0)
             for name, batch in part.events.items():
                 numbered = with_column(batch, "event_id", ids[first + to_numpy(batch["event_id"])])
-                events.setdefault(name, []).append(_placed(numbered, places))
+                events.setdefault(name, []).append(placed(numbered, places))
         for name, batches in events.items():
             batch = joined(batches)
             by_id = np.argsort(to_numpy(batch["event_id"]), kind="stable")
@@ -93,9 +93,3 @@ class KeptTraces(TraceSet):
 
     def close(self) -> None:
         """Do nothing: the chunks stay in memory."""
-
-
-def _placed(batch: pa.RecordBatch, places: Sequence[int]) -> pa.RecordBatch:
-    """Return a batch with the indexes that its traces have in the set."""
-    indexes = to_numpy(batch["trace_index"])
-    return with_column(batch, "trace_index", np.asarray(places, np.int32)[indexes])

@@ -130,12 +130,10 @@ class Watcher:
                 what is known so far is reported meanwhile.
             is_last: nothing more comes.
         """
-        found = self.history.next_window(is_last=is_last)
+        found = self.history.next_window(is_live=is_live, is_last=is_last)
         if found is None:
             return None
         window, may_be_final = found
-        if not may_be_final and not is_live:
-            return None
         return self._report(window, may_be_final=may_be_final, is_live=is_live, is_last=is_last)
 
     def keep_violation(self) -> None:

@@ -81,7 +81,7 @@ def test_data_that_nodes_keep_make_no_window_wait() -> None:
 
 def shown(history: History, *, is_last: bool = False) -> tuple[Window, bool] | None:
     """Return the next window as a view shows it."""
-    found = history.next_window(is_last=is_last)
+    found = history.next_window(is_live=True, is_last=is_last)
     if found is not None:
         history.note_shown(found[0], is_final=found[1])
     return found
@@ -109,6 +109,8 @@ def test_what_is_known_is_shown_while_messages_take_longer() -> None:
         (Window(700, 1_000), False),
     ]
     assert history.judged_window(Window(700, 1_000)) == Window(400, 1_000)
+    # Nobody waits for a recording that is finished.
+    assert history.next_window(is_live=False) == (Window(300, 600), True)
     assert shown(history, is_last=True) == (Window(400, 1_000), True)
     assert shown(history, is_last=True) is None
 

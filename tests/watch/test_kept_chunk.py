@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from functools import reduce
 from pathlib import Path
 
 import pyarrow as pa
 
+from msgflow.sim import Recording, simulate
 from msgflow.trace import Continuation
 from msgflow.watch import finished_chunks
-from msgflow.watch.kept_chunk import read_chunk
+from msgflow.watch.kept_chunk import KeptChunk, read_chunk
+from msgflow.watch.kept_traces import KeptTraces
 
 STREAM = ["trace_index", "stream_index"]
 
@@ -30,3 +33,21 @@ def test_every_stream_lasts_until_the_end_of_its_chunk(shared_traces: Path) -> N
             assert (row["event_count"], row["discarded_event_count"]) == (0, 0)
             assert row["begin_ns"] < row["end_ns"]
     assert added > 0
+
+
+def test_what_lasts_of_several_chunks_is_one_part(tmp_path: Path) -> None:
+    """Nodes that come and go leave objects in many chunks."""
+    rotations = tuple(200_000_000 * number for number in range(1, 9))
+    simulate("restarts", tmp_path / "trace", recording=Recording(rotations=rotations))
+    after = Continuation()
+    read = [read_chunk(chunk, after) for chunk in finished_chunks(tmp_path / "trace")]
+    *earlier, last = [chunk for chunk in read if chunk is not None]
+    parts = [lasting for chunk in earlier if (lasting := chunk.lasting()) is not None]
+    assert len(parts) > 2
+    one = reduce(KeptChunk.followed_by, parts)
+    assert one.times_ns.size == sum(part.times_ns.size for part in parts)
+    whole, single = (
+        {batch.name: batch.batch.to_pylist() for batch in KeptTraces(lasting, [last]).batches()}
+        for lasting in (parts, [one])
+    )
+    assert single == whole
