@@ -23,7 +23,7 @@
 --     the clock
 -- param: to_event VARCHAR {take|callback_start|callback_end} = 'callback_end'  Event that
 --     stops it
--- param: max_depth BIGINT {1..} = 32     Longest path, in topics
+-- param: max_depth BIGINT {1..} = 32     Longest path
 -- param: max_paths BIGINT {1..} = 1000   Most paths, shortest first, and chains of a length
 -- column: run_id BIGINT            Run
 -- column: rank BIGINT              Number of the flow, the slowest first

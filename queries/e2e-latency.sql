@@ -18,7 +18,7 @@
 --     stops it
 -- param: case VARCHAR {first|last|newest|every_pair} = 'first'  Arrivals that count: the
 --     first or last of each root, that of the newest root, or all
--- param: max_depth BIGINT {1..} = 32     Longest path, in topics
+-- param: max_depth BIGINT {1..} = 32     Longest path
 -- param: max_paths BIGINT {1..} = 1000   Most paths, shortest first, and chains of a length
 -- column: run_id BIGINT            Run
 -- column: roots BIGINT             Flows that began in the time window
