@@ -90,7 +90,7 @@ def test_behind_two_dashes_all_belongs_to_the_program(
     msgflow: Msgflow, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     started = []
-    monkeypatch.setattr("msgflow.cli.watch._record", lambda words, *_: started.append(words))
+    monkeypatch.setattr("msgflow.cli.watch._record", lambda words, *_, **__: started.append(words))
     assert msgflow("watch", "--json", "--", "env", "--", "sleep", "--once").exit_code == 0
     assert started == [["env", "--", "sleep", "--once"]]
 

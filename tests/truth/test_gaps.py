@@ -41,7 +41,7 @@ RECORDINGS: dict[str, tuple[Recording, set[str], bool]] = {
 def test_what_is_said_near_gaps_is_true(tmp_path: Path, name: str) -> None:
     recording, gaps, is_complete = RECORDINGS[name]
     simulation = simulate(
-        "container_multi_threaded", tmp_path / "trace", factor=0.07, recording=recording
+        "container_multi_threaded", tmp_path / "trace", factor=0.1, recording=recording
     )
     database = tmp_path / "run.duckdb"
     ingest_one(simulation.directory, database).connection.close()
