@@ -64,7 +64,9 @@ def require_whole(found: list[dict[str, Any]]) -> None:
 
 
 def test_a_program_is_recorded_and_watched(watch: Watch, robot: list[str], tmp_path: Path) -> None:
-    found, _ = windows(watch("--", "timeout", "-s", "INT", "8", *robot, "0.05"))
+    # It ends the program, and says so by its exit code, which would be that of the view.
+    ended = 'timeout -s INT 8 "$@" || test $? = 124'
+    found, _ = windows(watch("--", "sh", "-c", ended, "sh", *robot, "0.05"))
     assert len(found) > 1
     require_whole(found)
     # The recording was temporary.
