@@ -247,7 +247,7 @@ def _only_word(
         return None
     if directory is not None:
         raise UsageError(
-            "-o is where a program is recorded, and there is none",
+            "-o names the directory of a program that is recorded: COMMAND is missing",
             f"msgflow watch -o {shlex.quote(str(directory))} -- COMMAND",
         )
     if len(words) > 1:
@@ -266,7 +266,7 @@ def _finished(word: str | None) -> Path:
     """Return the directory of a finished recording.
 
     Raises:
-        TraceError: there is none.
+        TraceError: it does not exist.
     """
     assert word is not None
     place = path_of(word).absolute()
@@ -337,7 +337,7 @@ def _record(
     from msgflow.live import Channel, record, temporary_directory
 
     name = time.strftime("watch-%Y%m%d-%H%M%S")
-    # A pipe to stderr would stop the program where nobody empties it.
+    # A file, since the program would stop if it wrote to a full pipe.
     log = Path(f"{directory or name}.log") if on_screen and sys.stderr.isatty() else None
     ended = Event()
     with (

@@ -51,10 +51,14 @@ _MOST_PIECES = 2
 
 @dataclass(frozen=True)
 class _Told:
-    """What has been told of a requirement that is not met: the worst case, of the time until when.
+    """What an alarm has told of a requirement that is not met.
 
-    A window has its worst case for as long as it is in it. Those that are the worst when it has
-    passed are no news: only one that begins later, or is worse, is.
+    A case is news if it began after all that was judged, or is worse than all that was told. When
+    the worst case has left the window, the next worst one is no news.
+
+    Attributes:
+        worst_ns: the worst case so far; 0 of requirements that have no worst case.
+        until_ns: until when all was judged.
     """
 
     worst_ns: int

@@ -135,7 +135,7 @@ class History:
         return max((max(flow_ns, wait_ns) for _, flow_ns, wait_ns in self._longest), default=0)
 
     def note_longest(self, flow_ns: int, wait_ns: int) -> None:
-        """Note what a report has shown: it counts for the time of two windows, and as no more.
+        """Note what a report has shown. It counts for two windows, and as two windows at most.
 
         Args:
             flow_ns: how long a message or a flow was on the way at most.
@@ -157,10 +157,10 @@ class History:
         return Window(self._start_of(self._borders[-1]), self._borders[-1])
 
     def next_window(self, *, is_live: bool, is_last: bool = False) -> tuple[Window, bool] | None:
-        """Return the next window to show, and whether it is final; None if there is none yet.
+        """Return the next window to show, and whether it may be final; None until there is one.
 
         Args:
-            is_live: what is not final is shown, too; else nobody waits for it.
+            is_live: a window that is not final counts, too: somebody looks at the screen.
             is_last: nothing more comes.
         """
         final = self.final_window(is_last=is_last)

@@ -123,7 +123,7 @@ class Watcher:
             self._forget(self.history.newest_window())
 
     def report(self, *, is_live: bool, is_last: bool = False) -> WindowReport | None:
-        """Return the next window; None if there is none yet.
+        """Return what the next window shows; None until there is one.
 
         Args:
             is_live: the recording goes on at this moment: where messages take longer than a step,

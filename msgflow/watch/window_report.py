@@ -117,6 +117,9 @@ def report_of(con: duckdb.DuckDBPyConnection, window: Window, last_step: Window)
         con: with one run.
         window: which part of it counts.
         last_step: what came last: messages from before should have been taken by its end.
+
+    Returns:
+        The report, not marked as final.
     """
 
     def ask(name: str, columns: Sequence[str]) -> list[Row]:
