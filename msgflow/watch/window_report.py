@@ -133,8 +133,8 @@ def report_of(con: duckdb.DuckDBPyConnection, window: Window, last_step: Window)
     paths = ask("e2e-latency", _PATH)
     executors = ask("executor-usage", _EXECUTOR)
     losses = ask("topics-delivery", _LOSS)
-    ((transport, waiting, wait),) = con.execute(_LONGEST, last_step.bindings).fetchall()
-    longest = max(transport, *(row["max_ns"] or 0 for row in paths), 0)
+    on_way_ns, waiting_ns, kept_ns = longest_times(con, last_step)
+    slowest_ns = max(on_way_ns, *(row["max_ns"] or 0 for row in paths), 0)
     return WindowReport(
         window=window,
         is_final=False,
@@ -143,9 +143,24 @@ def report_of(con: duckdb.DuckDBPyConnection, window: Window, last_step: Window)
         losses=[row for row in losses if row["dropped"] or row["lost"]],
         discarded_events=discarded_events(con, window),
         # What waits still has the rest of its path before it.
-        longest_flow_ns=waiting + longest,
-        longest_wait_ns=wait,
+        longest_flow_ns=waiting_ns + slowest_ns,
+        longest_wait_ns=kept_ns,
     )
+
+
+def longest_times(con: duckdb.DuckDBPyConnection, last_step: Window) -> tuple[int, int, int]:
+    """Return how long something took, or has taken so far.
+
+    Args:
+        con: with one run.
+        last_step: messages from before should have been taken by its end.
+
+    Returns:
+        How long a message was on the way at most; how long ago the message was published that a
+        subscription took last, though others wait for it since; how long a node kept data [ns].
+    """
+    ((on_way_ns, waiting_ns, kept_ns),) = con.execute(_LONGEST, last_step.bindings).fetchall()
+    return int(on_way_ns), int(waiting_ns), int(kept_ns)
 
 
 def discarded_events(con: duckdb.DuckDBPyConnection, window: Window) -> int:

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
@@ -414,8 +415,11 @@ def test_a_node_that_hangs_for_longer_than_a_window(hang: Path, tmp_path: Path) 
         whole.ingest([hang])
         for report in found:
             require_equal(whole, report)
-    slowest = max(row["max_ns"] or 0 for report in found for row in report.paths)
-    assert slowest > 650 * MS
+    slowest = [max(row["max_ns"] or 0 for row in report.paths) for report in found]
+    assert max(slowest) > 650 * MS
+    # The next windows wait for as long.
+    for report, slowest_ns in zip(found, slowest, strict=True):
+        assert report.longest_flow_ns >= slowest_ns
 
 
 def test_the_view_goes_on_while_a_node_hangs(hang: Path) -> None:
@@ -435,3 +439,34 @@ def test_the_view_goes_on_while_a_node_hangs(hang: Path) -> None:
     assert final[-1].start_ns > provisional[0].window.start_ns
     for before, after in pairwise(final):
         assert after.start_ns <= before.end_ns < after.end_ns
+
+
+def test_what_is_judged_and_what_is_counted_while_a_node_hangs(hang: Path) -> None:
+    """Alarms miss nothing and wait for nothing; each moment is counted once, when it is final."""
+    alarm, exporter = Mock(), Mock()
+    alarm.judge.return_value = ([], Counter())
+    watcher = Watcher(
+        window_ns=2 * SECOND // 5,
+        step_ns=SECOND // 5,
+        links=None,
+        clocks=read_clock_sync("none"),
+        note=print,
+        alarm=alarm,
+        exporter=exporter,
+    )
+    shown = live(hang, watcher)
+    watcher.close()
+    judged = [call.args[1] for call in alarm.judge.call_args_list]
+    counted = [call.args[1] for call in exporter.count.call_args_list]
+    assert len(judged) == len(shown)
+    final_ns = shown[0].window.start_ns
+    for report, window in zip(shown, judged, strict=True):
+        assert window.start_ns <= min(report.window.start_ns, final_ns)
+        # The step behind a final window counts, too.
+        assert window.end_ns - report.window.end_ns > 0.15 * SECOND or not report.is_final
+        if report.is_final:
+            final_ns = report.window.end_ns
+    assert [window.end_ns for window in counted] == [
+        report.window.end_ns for report in shown if report.is_final
+    ]
+    assert all(before.end_ns == after.start_ns for before, after in pairwise(counted))
