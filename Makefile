@@ -1,7 +1,7 @@
 # `make demo` shows msgflow at work on a real recording, `make test` checks it. Both start on a bare
 # machine: everything is installed into .venv, except what only the distribution has: python3-venv,
-# and for the tests Babeltrace 2 to compare with, Chromium to look with and LTTng to record real
-# ROS 2. apt installs these where that is allowed.
+# and for the tests Babeltrace 2 to compare with, Chromium to look with, and LTTng and perf to record
+# real ROS 2. apt installs these where that is allowed.
 
 SHELL := /bin/sh
 PYTHON ?= python3
@@ -121,6 +121,7 @@ chromium:
 # Programs to record with, and an environment with the wheels of ROS 2.
 ros: $(VENV)/.made
 	@$(HAS_LTTNG) || { $(APT); apt_install lttng-tools liblttng-ust-dev gcc libc6-dev || true; }
+	@command -v perf >/dev/null || { $(APT); apt_install linux-perf || true; }
 	@test $(VENV)/ros/.installed -nt pyproject.toml || { $(BIN)/python -m venv --clear $(VENV)/ros \
 		&& $(VENV)/ros/bin/python -m pip install --quiet --upgrade 'pip>=25.1' \
 		&& $(VENV)/ros/bin/python -m pip install --quiet --group ros \

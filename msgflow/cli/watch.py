@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shlex
 import sys
-import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, closing, contextmanager
@@ -285,12 +284,13 @@ def _pages(port: int | None, clock_sync: str) -> Iterator[WindowDatabase | None]
         return
     from msgflow.cli.output import print_status
     from msgflow.confined_query import WarmSql
+    from msgflow.live import temporary_directory
     from msgflow.view.server import serving
     from msgflow.view.sql_page import MOST_SECONDS
     from msgflow.watch import WindowDatabase
 
-    with tempfile.TemporaryDirectory(prefix="msgflow-window-") as directory:
-        path = Path(directory) / "window.duckdb"
+    with temporary_directory() as directory:
+        path = directory / "window.duckdb"
         database = WindowDatabase(path, clock_sync=clock_sync)
         with (
             closing(WarmSql(path, memory_limit=None, seconds=MOST_SECONDS)) as sql,

@@ -91,7 +91,7 @@ def recording_session(
 
 @contextmanager
 def temporary_directory() -> Iterator[Path]:
-    """Yield a directory for a recording, and remove it afterwards."""
+    """Yield a directory, and remove it afterwards; after SIGKILL, `remove_leftovers` does."""
     prefix = f"{_TEMPORARY}{mark()}."
     with tempfile.TemporaryDirectory(prefix=prefix) as directory:
         yield Path(directory)

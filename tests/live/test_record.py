@@ -21,6 +21,8 @@ from terminal import Terminal
 from msgflow.database import Database
 from msgflow.live.lttng import losses
 from msgflow.live.program import Program
+from msgflow.live.scheduling import why_perf_cannot_record
+from msgflow.live.session import can_trace_kernel
 
 
 @dataclass
@@ -78,6 +80,51 @@ def test_from_a_robot_to_an_answer(record: Record, robot: list[str], tmp_path: P
     with Database(tmp_path / "msgflow.duckdb") as database:
         (clock,) = database.query("clocks").to_arrow().to_pylist()
     assert clock["offset_ns"] == -12_500
+
+
+class TestKernel:
+    """The scheduler, with perf: no LTTng of a virtual machine has its kernel modules."""
+
+    @pytest.fixture(autouse=True)
+    def _perf(self) -> None:
+        if can_trace_kernel():
+            pytest.skip("LTTng can trace this kernel")
+        if reason := why_perf_cannot_record():
+            pytest.skip(reason)
+
+    def test_why_a_thread_did_not_run(
+        self, record: Record, robot: list[str], tmp_path: Path
+    ) -> None:
+        ended = record("--kernel", "--duration", "5", "-o", "trace", "--", *robot, "0.05")
+        assert ended.exit_code == 0, ended.err
+        assert sorted(path.name for path in (tmp_path / "trace").iterdir()) == ["perf", "ust"]
+        with Database(tmp_path / "msgflow.duckdb") as database:
+            slept, ran = (
+                database.sql(
+                    "SELECT count(*) FILTER (state = 'sleeping'), count(*) FILTER (state = 'running')"
+                    " FROM thread_state JOIN thread USING (thread_id) JOIN node USING (process_id)"
+                    " WHERE node.name = 'camera'"
+                )
+                .to_arrow()
+                .to_pylist()[0]
+                .values()
+            )
+        # A timer of 20 Hz wakes the thread for each of its messages.
+        assert slept > 50
+        assert ran > 50
+
+    def test_a_perf_that_ends_early_is_said(
+        self, record: Record, robot: list[str], tmp_path: Path
+    ) -> None:
+        """What was recorded stays."""
+        ended = record(
+            *("--kernel", "--duration", "5", "-o", "trace"),
+            *("--", "sh", "-c", 'sleep 2; pkill -INT -x perf; exec "$@"', "sh", *robot, "0.05"),
+        )
+        assert ended.exit_code == 1
+        assert "perf ended before the recording" in ended.err
+        assert (tmp_path / "trace" / "perf.data").stat().st_size
+        assert (tmp_path / "trace" / "ust").is_dir()
 
 
 @pytest.mark.parametrize("option", ["--links", "--clock-sync"])

@@ -157,16 +157,19 @@ def test_a_terminal_that_goes_away_ends_all(tmp_path: Path, temporary: Path) -> 
 def test_what_a_killed_view_leaves_is_removed(
     daemon: None, tmp_path: Path, temporary: Path
 ) -> None:
-    """Its session, and its temporary directory; not those of a view that runs."""
+    """Its session, and its temporary directories; not those of a view that runs."""
     words = [sys.executable, "-m", "msgflow", "record", "--no-ingest", "--duration", "0.5"]
+    with_pages = [*WATCH[:4], "--ui", "0", *WATCH[4:]]
     with ExitStack() as stack:
         terminals = []
-        for _ in range(2):
-            terminal = stack.enter_context(Terminal(WATCH, tmp_path, TMPDIR=str(temporary)))
+        for view in (with_pages, WATCH):
+            terminal = stack.enter_context(Terminal(view, tmp_path, TMPDIR=str(temporary)))
             wait_for_words(terminal)
             terminals.append(terminal)
         first, second = terminals
-        assert len(list(temporary.iterdir())) == 2
+        # That of the recording, and that of the window that the pages show.
+        made = [path.name for path in temporary.iterdir()]
+        assert len([name for name in made if f"-{first.process.pid}-" in name]) == 2
         first.process.kill()
         first.process.wait()
         with Terminal(words, tmp_path, TMPDIR=str(temporary)) as third:
