@@ -9,6 +9,8 @@
 --     identified may have been of the message. Then the reason is unknown: if it came before the
 --     subscription is known not to have the message, or within ten times the usual time. A message
 --     is not `overwritten` if the subscription took none of the publisher, and no later one.
+--     A publisher may keep messages for subscriptions that come later, and those of its process
+--     take them from a ring buffer, where nothing identifies them.
 -- grain: one row per publication and subscription of its topic that is not known to have taken it
 CREATE OR REPLACE MACRO derive.undelivered(only_run) AS TABLE
 WITH arrival AS MATERIALIZED (
@@ -110,10 +112,18 @@ earliest AS (
 ),
 -- Takes that could be any message, and those that could be one without a stamp.
 unidentified AS MATERIALIZED (
-    SELECT t.subscription_id, t.taken_ns, t.source_timestamp_ns IS NULL AS has_no_stamp
+    SELECT
+        t.subscription_id, t.taken_ns, t.source_timestamp_ns IS NULL AS has_no_stamp,
+        t.method = 'ring_buffer' AS is_from_buffer
     FROM store.take AS t
     ANTI JOIN store.link_transport AS l ON t.take_id = l.take_id
     WHERE t.run_id = only_run AND t.subscription_id IN (SELECT subscription_id FROM missing)
+),
+first_from_buffer AS (
+    SELECT subscription_id, min(taken_ns) AS taken_ns
+    FROM unidentified
+    WHERE is_from_buffer
+    GROUP BY subscription_id
 ),
 long_wait AS (
     SELECT s.subscription_id, w.start_ns, w.end_ns
@@ -142,11 +152,14 @@ known AS (
             coalesce(s.created_ns, 0),
             CASE WHEN m.has_one_clock THEN coalesce(b.created_ns, 0) ELSE 0 END
         ) AS introduced_ns,
-        e.arrival_ns IS NOT NULL AS is_connected
+        e.arrival_ns IS NOT NULL AS is_connected,
+        b.process_id = s.process_id
+        AND k.taken_ns <= coalesce(n.taken_ns, k.taken_ns) AS may_be_kept
     FROM missing AS m
     JOIN life AS s ON m.subscription_id = s.subscription_id
     JOIN store.publisher AS b ON m.publisher_id = b.publisher_id
     LEFT JOIN pace AS c ON m.subscription_id = c.subscription_id
+    LEFT JOIN first_from_buffer AS k ON m.subscription_id = k.subscription_id
     LEFT JOIN earliest AS e
         ON m.subscription_id = e.subscription_id AND m.publisher_id = e.publisher_id
     ASOF LEFT JOIN later_of_publisher AS p
@@ -294,6 +307,7 @@ SELECT
     subscription_id,
     CASE
         WHEN arrival_ns IS NULL THEN 'unknown'
+        WHEN created_ns > arrival_ns AND may_be_kept THEN 'unknown'
         WHEN created_ns > arrival_ns THEN 'before_subscription'
         WHEN replaced_ns < arrival_ns THEN 'subscription_ended'
         WHEN has_gap THEN 'receiver_gap'

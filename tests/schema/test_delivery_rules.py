@@ -24,18 +24,20 @@ CREATE TABLE derive.subscription_life (run_id BIGINT DEFAULT 1, subscription_id 
     host_end_ns BIGINT DEFAULT 10_000_000_000, only_thread_id BIGINT DEFAULT 1);
 CREATE TABLE gap (process_id BIGINT DEFAULT 1, start_ns BIGINT, covered_until_ns BIGINT);
 CREATE MACRO derive.process_gap(only_run) AS TABLE FROM gap;
-CREATE TABLE store.publisher (publisher_id BIGINT, created_ns BIGINT);
+CREATE TABLE store.publisher (publisher_id BIGINT, created_ns BIGINT,
+    process_id BIGINT DEFAULT 1);
 CREATE TABLE derive.copied_pair (publisher_id BIGINT, subscription_id BIGINT);
 CREATE TABLE store.link_transport (run_id BIGINT DEFAULT 1, publication_id BIGINT,
     publisher_id BIGINT DEFAULT 1, subscription_id BIGINT DEFAULT 1, take_id BIGINT,
     is_copy BOOLEAN);
 CREATE TABLE store.take (run_id BIGINT DEFAULT 1, take_id BIGINT,
-    subscription_id BIGINT DEFAULT 1, taken_ns BIGINT, source_timestamp_ns BIGINT DEFAULT 1);
+    subscription_id BIGINT DEFAULT 1, taken_ns BIGINT, source_timestamp_ns BIGINT DEFAULT 1,
+    method VARCHAR DEFAULT 'rmw');
 CREATE TABLE derive.empty_take (run_id BIGINT DEFAULT 1, subscription_id BIGINT DEFAULT 1,
     failed_ns BIGINT);
 CREATE TABLE store.executor_state (run_id BIGINT DEFAULT 1, thread_id BIGINT DEFAULT 1,
     state VARCHAR DEFAULT 'wait', start_ns BIGINT, end_ns BIGINT);
-INSERT INTO store.publisher VALUES (1, 0), (2, 0);
+INSERT INTO store.publisher VALUES (1, 0, 1), (2, 0, 1);
 """
 RULES = ("delivery_limit", "stretch", "undelivered")
 
@@ -318,6 +320,33 @@ def test_as_many_newer_messages_as_fit(delivery: Delivery, newer: int, reason: s
 def test_created_before_the_message_arrived(delivery: Delivery, created: int, reason: str) -> None:
     delivery.lives(created_ns=created, last_seen_ns=301 * MS, host_end_ns=301 * MS)
     assert delivery.reason(delivery.publish(300 * MS)) == reason
+
+
+@pytest.mark.parametrize(
+    ("method", "process", "taken", "later", "reason"),
+    [
+        ("ring_buffer", 1, 302 * MS, 302 * MS, "unknown"),
+        ("ring_buffer", 1, 302 * MS, None, "unknown"),
+        # The first is one of those that were kept; the second is of what was published later.
+        ("ring_buffer", 1, 302 * MS + 1, 302 * MS, "before_subscription"),
+        ("ring_buffer", 2, 302 * MS, 303 * MS, "before_subscription"),
+        ("rmw", 1, 302 * MS, 303 * MS, "before_subscription"),
+    ],
+)
+def test_what_a_publisher_of_the_same_process_may_have_kept(
+    delivery: Delivery, method: str, process: int, taken: int, later: int | None, reason: str
+) -> None:
+    """For subscriptions that come later (transient local)."""
+    delivery.lives(created_ns=301 * MS, process_id=process)
+    missing = delivery.publish(300 * MS)
+    delivery.publish(301 * MS + 1, later)
+    for take, at in ((98, 400 * MS), (99, taken)):
+        delivery.con.execute(
+            "INSERT INTO store.take (take_id, taken_ns, source_timestamp_ns, method)"
+            " VALUES (?, ?, NULL, ?)",
+            [take, at, method],
+        )
+    assert delivery.reason(missing) == reason
 
 
 @pytest.mark.parametrize(
@@ -641,10 +670,10 @@ def fill(con: duckdb.DuckDBPyConnection, chance: random.Random, grid: int, begin
             start = end + chance.randrange(5 * MS)
         # One that could not be identified.
         con.execute(
-            "INSERT INTO store.take VALUES (1, ?, ?, ?, ?)",
+            "INSERT INTO store.take VALUES (1, ?, ?, ?, ?, 'rmw')",
             [10_000 + number, number, chance.choice(moments), chance.choice([None, 1])],
         )
-    con.execute("INSERT INTO store.publisher VALUES (3, 500_000_000)")
+    con.execute("INSERT INTO store.publisher VALUES (3, 500_000_000, 1)")
     take = 0
     for publication, arrival in enumerate(moments):
         publisher = chance.choice([1, 2, 3])
@@ -666,7 +695,8 @@ def fill(con: duckdb.DuckDBPyConnection, chance: random.Random, grid: int, begin
             take += 1
             needed = chance.choice([300_000, 400_000, 20 * MS])
             con.execute(
-                "INSERT INTO store.take VALUES (1, ?, ?, ?, 1)", [take, number, arrival + needed]
+                "INSERT INTO store.take VALUES (1, ?, ?, ?, 1, 'rmw')",
+                [take, number, arrival + needed],
             )
             con.execute(
                 "INSERT INTO store.link_transport VALUES (1, ?, ?, ?, ?, false)",
