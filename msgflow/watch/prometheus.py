@@ -179,13 +179,13 @@ class Exporter:
 
         busy = GaugeMetricFamily(
             "msgflow_executor_busy_ratio", "Part of its time that a thread is in callbacks",
-            labels=["host", "process", "tid"],
+            labels=["host", "nodes", "tid"],
         )  # fmt: skip
         lag = GaugeMetricFamily(
             "msgflow_watch_lag_seconds", "Age of the last event that a window had"
         )
         for row in self._last.executors if self._last is not None else ():
-            labels = [row["host"] or "", row["process"] or "", str(row["tid"])]
+            labels = [row["host"] or "", row["nodes"] or "", str(row["tid"])]
             busy.add_metric(labels, row["callback_share"] or 0)
         if self._last is not None and self._last.lag_s is not None:
             # It grows where no window comes any more.

@@ -25,8 +25,8 @@ _PATH = (
     "unknown", "cut_by_recording", "loss_affected", "median_ns", "p99_ns", "max_ns", "reasons",
 )  # fmt: skip
 _EXECUTOR = (
-    "host", "process", "pid", "tid", "executor_kind", "callback_share", "callbacks", "seen_ns",
-    "callback_ns", "blocked_ns",
+    "host", "nodes", "process", "pid", "tid", "executor_kind", "callback_share", "callbacks",
+    "seen_ns", "callback_ns", "blocked_ns",
 )  # fmt: skip
 _LOSS = ("topic", "subscriber", "published", "delivered", "dropped", "lost", "reasons")
 _DISCARDED = """

@@ -151,6 +151,18 @@ def shown(*violations: dict[str, str], lag_s: float | None = None) -> WindowRepo
     )  # fmt: skip
 
 
+def test_busy_threads_go_by_their_nodes() -> None:
+    """Of rclpy, all processes are called python."""
+    exporter = Exporter()
+    thread = {"host": "robot", "nodes": "/camera", "process": "python3", "tid": 7}
+    idle = {"host": None, "nodes": "/b", "process": "python3", "tid": 8, "callback_share": None}
+    exporter.show(replace(shown(), executors=[{**thread, "callback_share": 0.5}, idle]))
+    assert metrics(exporter, "msgflow_executor_busy_ratio") == {
+        ("robot", "/camera", "7"): 0.5,
+        ("", "/b", "8"): 0,
+    }
+
+
 def test_violations_are_counted() -> None:
     exporter = Exporter()
     late, rare = {"subject": "/a", "metric": "latency"}, {"subject": "/b", "metric": "rate"}

@@ -27,7 +27,7 @@ def shown(*reports: WindowReport) -> str:
 def test_names_are_text_and_all_fits() -> None:
     """A program may call itself what it likes: no markup, no control characters."""
     times = {"median_ns": 1_000_000, "p99_ns": 2_000_000, "max_ns": 2_000_000}
-    thread = {"process": "[/x] \x1b[31m", "tid": 7, "callback_share": 0.5, "callback_ns": 10}
+    thread = {"nodes": "[/x] \x1b[31m", "tid": 7, "callback_share": 0.5, "callback_ns": 10}
     loss = {"topic": "[/y]", "subscriber": "/s" * 40, "dropped": 4, "lost": 0, "reasons": None}
     report = WindowReport(
         window=Window(0, 2_000_000_000),

@@ -227,7 +227,7 @@ def _threads(report: WindowReport, rows: int) -> Table:
     table = _table("thread", "busy", "in callbacks", "blocked", "callbacks")
     for row in report.executors[:rows]:
         table.add_row(
-            _short(f"{row['process']} {row['tid']}", _NAME_WIDTH),
+            _short(f"{row['nodes']} {row['tid']}", _NAME_WIDTH),
             f"{100 * (row['callback_share'] or 0):.0f} %",
             _duration(row["callback_ns"]),
             _duration(row["blocked_ns"]),
