@@ -172,3 +172,29 @@ def test_a_clock_that_is_set_back_by_seconds_makes_none_wrong(
     score = {score.kind: score for score in compare_simulated(path, simulation.truth)[0]}
     assert score["transport"].wrong == 0
     assert score["transport"].found > least
+
+
+@pytest.mark.parametrize(
+    ("recording", "factor", "least"),
+    [
+        (Recording(lost_event_share=0.3), 0.3, 800),
+        # By four periods: nothing tells the publications of one period from those of another.
+        thorough(
+            Recording(realtime_steps=((SECOND // 5, 7_000), (SECOND // 2, -40_000_000))), 1, 0
+        ),
+    ],
+)
+def test_where_all_topics_have_one_period(
+    tmp_path: Path, recording: Recording, factor: float, least: int
+) -> None:
+    """Each message could be of any period: the right difference has the most votes by a few."""
+    simulation = simulate(
+        "container", tmp_path / "trace", factor=factor, layout="humble", recording=recording,
+        clock_offset_ns=350_000_000,
+    )  # fmt: skip
+    path = tmp_path / "run.duckdb"
+    ingest_one(simulation.directory, path).connection.close()
+    score = {score.kind: score for score in compare_simulated(path, simulation.truth)[0]}
+    transport = score["transport"]
+    assert transport.wrong == 0
+    assert transport.found >= least

@@ -7,7 +7,9 @@
 --     has one message: where several could be its own, only the first one counts. Else a burst
 --     could as well be one publication later, if its last one takes long. Some messages per
 --     stretch of time are enough, of every publisher in turn. Those of topics with one publisher
---     come first: a message of another topic may be of none of a publisher's publications.
+--     come first: a message of another topic may be of none of a publisher's publications. A
+--     message counts in one stretch, that of its take, whatever publication it may be of: else
+--     chance gives a wrong difference more messages than the right one.
 -- grain: one row per clock, message in the sample and publication that it may be of
 -- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.stamp_pair(only_run) AS TABLE
@@ -105,7 +107,8 @@ placed AS (
 turn AS (
     SELECT
         q.run_id, q.clock_id, q.publisher_id, q.publisher_count, q.source_timestamp_ns,
-        q.is_taken_here, q.near_ns, q.also_near_ns, q.stamped_ns, x.start_ns, x.stretch_ns,
+        q.is_taken_here, q.near_ns, q.also_near_ns, q.stamped_ns, x.start_ns, x.end_ns,
+        x.stretch_ns,
         (q.near_ns - x.start_ns) // x.stretch_ns AS stretch,
         row_number() OVER (
             PARTITION BY q.publisher_id, (q.near_ns - x.start_ns) // x.stretch_ns
@@ -117,7 +120,7 @@ turn AS (
 sampled AS (
     SELECT
         run_id, clock_id, publisher_id, source_timestamp_ns, is_taken_here, near_ns, also_near_ns,
-        stamped_ns, start_ns, stretch_ns
+        stamped_ns, start_ns, end_ns, stretch_ns
     FROM turn
     QUALIFY row_number() OVER (
         PARTITION BY clock_id, stretch
@@ -129,7 +132,8 @@ sampled AS (
 -- first publication tells nothing.
 moment AS (
     SELECT
-        s.run_id, s.clock_id, s.publisher_id, s.source_timestamp_ns, s.start_ns, s.stretch_ns,
+        s.run_id, s.clock_id, s.publisher_id, s.source_timestamp_ns, s.start_ns, s.end_ns,
+        s.stretch_ns,
         CASE WHEN s.is_taken_here THEN s.near_ns END AS taken_ns,
         s.place, p.position
     FROM (
@@ -145,7 +149,8 @@ moment AS (
 ),
 wanted AS (
     SELECT
-        run_id, clock_id, publisher_id, source_timestamp_ns, start_ns, stretch_ns, taken_ns,
+        run_id, clock_id, publisher_id, source_timestamp_ns, start_ns, end_ns, stretch_ns,
+        taken_ns,
         arg_min(position, place) AS latest_position,
         unnest(
             list_distinct(
@@ -160,7 +165,8 @@ wanted AS (
             )
         ) AS position
     FROM moment
-    GROUP BY run_id, clock_id, publisher_id, source_timestamp_ns, start_ns, stretch_ns, taken_ns
+    GROUP BY
+        run_id, clock_id, publisher_id, source_timestamp_ns, start_ns, end_ns, stretch_ns, taken_ns
 ),
 paired AS (
     SELECT
@@ -168,7 +174,10 @@ paired AS (
         w.taken_ns IS NOT NULL AS is_taken_here,
         w.position = w.latest_position AS is_latest,
         p.written_ns,
-        (p.written_ns - w.start_ns) // w.stretch_ns AS stretch,
+        -- The last ones are taken after all was published. Those taken elsewhere have no time of
+        -- take on this clock.
+        (least(coalesce(w.taken_ns, p.written_ns), w.end_ns) - w.start_ns) // w.stretch_ns
+            AS stretch,
         w.source_timestamp_ns - p.written_ns AS greatest_ns,
         w.source_timestamp_ns - p.closes_ns AS least_ns,
         w.source_timestamp_ns - p.next_written_ns AS later_ns,
