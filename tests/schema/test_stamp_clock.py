@@ -308,9 +308,7 @@ def test_a_jump_is_no_step(rules: duckdb.DuckDBPyConnection, at: float, count: i
     ] * count + [(-1_000_000, 1)] * (8 - count)
 
 
-def test_each_message_has_a_vote_in_the_stretch_in_which_it_was_taken(
-    rules: duckdb.DuckDBPyConnection,
-) -> None:
+def test_each_message_has_its_vote_in_one_stretch(rules: duckdb.DuckDBPyConnection) -> None:
     """Whatever publication it may be of: else a wrong difference could have more votes."""
     record(rules, width_ns=2_000, delay_ns=1_000, ppm=0, count=600, per_burst=6)
     query = (
@@ -324,6 +322,33 @@ def test_each_message_has_a_vote_in_the_stretch_in_which_it_was_taken(
     assert found[-1][0] == 10
     rules.execute("UPDATE message SET taken_ns = taken_ns + $late", {"late": 700_000_000})
     assert [stretch for stretch, _ in rules.execute(query).fetchall()] == [*range(1, 11)]
+
+
+@pytest.mark.parametrize("ahead_ns", [0, 2 * SECOND, -2 * SECOND])
+def test_a_message_that_waited_votes_where_it_was_published(
+    rules: duckdb.DuckDBPyConnection, ahead_ns: int
+) -> None:
+    """Also where the clock of stamps is wrong: others of the stretch did not wait."""
+    record(rules, width_ns=2_000, delay_ns=1_000, ppm=0, count=600)
+    rules.execute(
+        "UPDATE message SET taken_ns = taken_ns "
+        "+ CASE WHEN taken_ns // $period % 2 = 1 THEN 100000000 ELSE 0 END, "
+        "source_timestamp_ns = source_timestamp_ns + $ahead",
+        {"period": PERIOD_NS, "ahead": ahead_ns},
+    )
+    ((share,),) = rules.execute(
+        "SELECT avg((written_ns // stretch_ns = stretch)::INTEGER) FROM derive.stamp_pair(1)"
+        " WHERE $ahead BETWEEN least_ns AND greatest_ns",
+        {"ahead": ahead_ns},
+    ).fetchall()
+    assert share > 0.98
+
+
+def test_no_vote_lies_before_the_first_publication(rules: duckdb.DuckDBPyConnection) -> None:
+    """Where the clock was set back, stamps lie there."""
+    record(rules, width_ns=2_000, delay_ns=1_000, ppm=0)
+    step(rules, SECOND // 10, -3 * SECOND)
+    assert rules.execute("SELECT min(stretch) FROM derive.stamp_pair(1)").fetchall() == [(0,)]
 
 
 def test_one_step_after_another(rules: duckdb.DuckDBPyConnection) -> None:

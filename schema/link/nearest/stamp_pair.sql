@@ -8,8 +8,8 @@
 --     could as well be one publication later, if its last one takes long. Some messages per
 --     stretch of time are enough, of every publisher in turn. Those of topics with one publisher
 --     come first: a message of another topic may be of none of a publisher's publications. A
---     message counts in one stretch, that of its take, whatever publication it may be of: else
---     chance gives a wrong difference more messages than the right one.
+--     message counts in one stretch, whatever publication it may be of: else chance gives a wrong
+--     difference more messages than the right one.
 -- grain: one row per clock, message in the sample and publication that it may be of
 -- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.stamp_pair(only_run) AS TABLE
@@ -106,21 +106,37 @@ placed AS (
 ),
 turn AS (
     SELECT
-        q.run_id, q.clock_id, q.publisher_id, q.publisher_count, q.source_timestamp_ns,
-        q.is_taken_here, q.near_ns, q.also_near_ns, q.stamped_ns, x.start_ns, x.end_ns,
-        x.stretch_ns,
-        (q.near_ns - x.start_ns) // x.stretch_ns AS stretch,
+        *,
+        -- A message that was taken here was published about when its stamp says, on the clock
+        -- whose stamps the quickest one makes equal to its take.
+        CASE WHEN is_taken_here THEN
+            (
+                greatest(
+                    least(
+                        source_timestamp_ns + min(near_ns - source_timestamp_ns) OVER together,
+                        end_ns
+                    ),
+                    start_ns
+                ) - start_ns
+            ) // stretch_ns
+        END AS only_stretch,
         row_number() OVER (
-            PARTITION BY q.publisher_id, (q.near_ns - x.start_ns) // x.stretch_ns
-            ORDER BY hash(q.source_timestamp_ns), q.source_timestamp_ns
+            PARTITION BY publisher_id, stretch
+            ORDER BY hash(source_timestamp_ns), source_timestamp_ns
         ) AS turn
-    FROM placed AS q
-    JOIN extent AS x ON q.clock_id = x.clock_id
+    FROM (
+        SELECT
+            q.*, x.start_ns, x.end_ns, x.stretch_ns,
+            (q.near_ns - x.start_ns) // x.stretch_ns AS stretch
+        FROM placed AS q
+        JOIN extent AS x ON q.clock_id = x.clock_id
+    )
+    WINDOW together AS (PARTITION BY clock_id, is_taken_here, stretch)
 ),
 sampled AS (
     SELECT
         run_id, clock_id, publisher_id, source_timestamp_ns, is_taken_here, near_ns, also_near_ns,
-        stamped_ns, start_ns, end_ns, stretch_ns
+        stamped_ns, start_ns, stretch_ns, only_stretch
     FROM turn
     QUALIFY row_number() OVER (
         PARTITION BY clock_id, stretch
@@ -132,8 +148,8 @@ sampled AS (
 -- first publication tells nothing.
 moment AS (
     SELECT
-        s.run_id, s.clock_id, s.publisher_id, s.source_timestamp_ns, s.start_ns, s.end_ns,
-        s.stretch_ns,
+        s.run_id, s.clock_id, s.publisher_id, s.source_timestamp_ns, s.start_ns, s.stretch_ns,
+        s.only_stretch,
         CASE WHEN s.is_taken_here THEN s.near_ns END AS taken_ns,
         s.place, p.position
     FROM (
@@ -149,7 +165,7 @@ moment AS (
 ),
 wanted AS (
     SELECT
-        run_id, clock_id, publisher_id, source_timestamp_ns, start_ns, end_ns, stretch_ns,
+        run_id, clock_id, publisher_id, source_timestamp_ns, start_ns, stretch_ns, only_stretch,
         taken_ns,
         arg_min(position, place) AS latest_position,
         unnest(
@@ -166,7 +182,8 @@ wanted AS (
         ) AS position
     FROM moment
     GROUP BY
-        run_id, clock_id, publisher_id, source_timestamp_ns, start_ns, end_ns, stretch_ns, taken_ns
+        run_id, clock_id, publisher_id, source_timestamp_ns, start_ns, stretch_ns, only_stretch,
+        taken_ns
 ),
 paired AS (
     SELECT
@@ -174,10 +191,7 @@ paired AS (
         w.taken_ns IS NOT NULL AS is_taken_here,
         w.position = w.latest_position AS is_latest,
         p.written_ns,
-        -- The last ones are taken after all was published. Those taken elsewhere have no time of
-        -- take on this clock.
-        (least(coalesce(w.taken_ns, p.written_ns), w.end_ns) - w.start_ns) // w.stretch_ns
-            AS stretch,
+        coalesce(w.only_stretch, (p.written_ns - w.start_ns) // w.stretch_ns) AS stretch,
         w.source_timestamp_ns - p.written_ns AS greatest_ns,
         w.source_timestamp_ns - p.closes_ns AS least_ns,
         w.source_timestamp_ns - p.next_written_ns AS later_ns,
