@@ -107,8 +107,8 @@ placed AS (
 turn AS (
     SELECT
         *,
-        -- A message that was taken here was published about when its stamp says, on the clock
-        -- whose stamps the quickest one makes equal to its take.
+        -- The stamp of a message that was taken here says about when it was published: the message
+        -- of the stretch that waited least shows how far the clock of stamps is from this one.
         CASE WHEN is_taken_here THEN
             (
                 greatest(
