@@ -92,7 +92,7 @@ class TestKernel:
         if reason := why_perf_cannot_record():
             pytest.skip(reason)
 
-    def test_why_a_thread_did_not_run(
+    def test_states_of_threads_are_on_the_clock_of_messages(
         self, record: Record, robot: list[str], tmp_path: Path
     ) -> None:
         ended = record("--kernel", "--duration", "5", "-o", "trace", "--", *robot, "0.05")
@@ -100,7 +100,7 @@ class TestKernel:
         assert sorted(path.name for path in (tmp_path / "trace").iterdir()) == ["perf", "ust"]
         with Database(tmp_path / "msgflow.duckdb") as database:
             # In some virtual machines perf lacks the switches of a CPU that idles: then the states
-            # there are unknown. That their clock is that of the messages shows, too.
+            # there are unknown.
             found = database.sql(
                 "SELECT s.state FROM thread_state AS s JOIN thread USING (thread_id)"
                 " JOIN node AS n USING (process_id) WHERE n.name = 'camera' AND s.start_ns"

@@ -8,8 +8,8 @@
 --     could as well be one publication later, if its last one takes long. Some messages per
 --     stretch of time are enough, of every publisher in turn. Those of topics with one publisher
 --     come first: a message of another topic may be of none of a publisher's publications. A
---     message counts in one stretch, whatever publication it may be of: else chance gives a wrong
---     difference more messages than the right one.
+--     message that was taken on this clock counts in one stretch, whatever publication it may be
+--     of: else chance gives a wrong difference more messages than the right one.
 -- grain: one row per clock, message in the sample and publication that it may be of
 -- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.stamp_pair(only_run) AS TABLE
