@@ -27,12 +27,16 @@
 --     callback
 -- column: unknown_ns BIGINT [ns]    Not known: before the first event of the executor, in a gap of
 --     the trace, or outside of callbacks where the executor has no events
+-- column: longest_callback VARCHAR  The callback that kept the thread longest at a time, with its
+--     node if the process has several
+-- column: longest_ns BIGINT [ns]    For how long, without what was nested in it
 -- column: callbacks BIGINT          Callbacks that began
 -- column: callback_share DOUBLE [share] Callback time divided by time seen, 0 to 1
 -- column: executor_id BIGINT        Identity of the executor
 -- column: thread_id BIGINT          Identity of the thread
--- brief: nodes, tid, callback_share, callback_ns, blocked_ns, wait_ns, callbacks, select_ns,
---     take_ns, process, pid, host, seen_ns, unknown_ns, executor_kind
+-- brief: nodes, tid, callback_share, callback_ns, longest_ns, longest_callback, blocked_ns,
+--     wait_ns, callbacks, select_ns, take_ns, process, pid, host, seen_ns, unknown_ns,
+--     executor_kind
 -- note: callbacks
 WITH member AS (
     SELECT
@@ -59,7 +63,7 @@ broken AS (
 -- The last activity of a thread lasts until its last event; before a gap, its end is not known.
 activity AS (
     SELECT
-        a.thread_id, a.activity, a.start_ns,
+        a.thread_id, a.activity, a.callback_instance_id, a.start_ns,
         CASE
             WHEN a.end_ns IS NOT NULL THEN a.end_ns
             WHEN b.resumed_ns > a.start_ns THEN a.start_ns
@@ -72,6 +76,7 @@ spent AS (
     SELECT
         a.thread_id,
         CASE a.activity WHEN 'service' THEN 'callback' ELSE a.activity END AS activity,
+        a.callback_instance_id,
         sum(greatest(least(a.end_ns, m.last_ns) - greatest(a.start_ns, m.first_ns), 0))::BIGINT
             AS duration_ns
     FROM activity AS a
@@ -86,6 +91,9 @@ summed AS (
         coalesce(sum(duration_ns) FILTER (WHERE activity = 'take'), 0)::BIGINT AS take_ns,
         coalesce(sum(duration_ns) FILTER (WHERE activity = 'callback'), 0)::BIGINT AS callback_ns,
         coalesce(sum(duration_ns) FILTER (WHERE activity = 'blocked'), 0)::BIGINT AS blocked_ns,
+        max(duration_ns) FILTER (WHERE activity = 'callback') AS longest_ns,
+        arg_max(callback_instance_id, (duration_ns, -callback_instance_id))
+            FILTER (WHERE activity = 'callback') AS longest_id,
         sum(duration_ns)::BIGINT AS known_ns
     FROM spent
     GROUP BY thread_id
@@ -111,6 +119,8 @@ SELECT
     coalesce(s.callback_ns, 0) AS callback_ns,
     CASE WHEN m.has_states THEN coalesce(s.blocked_ns, 0) END AS blocked_ns,
     greatest(m.last_ns - m.first_ns, 0) - coalesce(s.known_ns, 0) AS unknown_ns,
+    CASE WHEN l.node = m.nodes THEN l.label ELSE l.node || ' ' || l.label END AS longest_callback,
+    s.longest_ns,
     coalesce(c.callbacks, 0) AS callbacks,
     coalesce(s.callback_ns, 0) / nullif(greatest(m.last_ns - m.first_ns, 0), 0)::DOUBLE
         AS callback_share,
@@ -119,4 +129,6 @@ SELECT
 FROM member AS m
 LEFT JOIN summed AS s ON m.thread_id = s.thread_id
 LEFT JOIN callback AS c ON m.thread_id = c.thread_id
+LEFT JOIN main.callback_instance AS i ON s.longest_id = i.callback_instance_id
+LEFT JOIN main.callback_label AS l ON i.callback_id = l.callback_id
 ORDER BY m.run_id, m.hostname, m.pid, m.tid, m.thread_id

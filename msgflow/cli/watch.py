@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 import sys
 import time
@@ -87,6 +88,15 @@ def command(
             help="Keep the chunks around a violation there, with a database of them",
         ),
     ] = None,
+    earlier: Annotated[
+        str | None,
+        typer.Option(
+            "--keep-before",
+            metavar="TIME",
+            help="Also keep what came so long before the window of a violation, such as 5min",
+            show_default="nothing",
+        ),
+    ] = None,
     most_kept: Annotated[
         int,
         typer.Option("--keep-most", min=1, help="Most violations that are kept, the last ones"),
@@ -152,8 +162,14 @@ def command(
 
     program = context.args
     word = _only_word(words or [], program, once=once, directory=directory)
+    earlier_ns = 0 if earlier is None else duration_ns(earlier, "--keep-before")
     step_ns = duration_ns(step, "--step")
     window_ns = duration_ns(window, "--window")
+    if earlier is not None and keep is None:
+        raise UsageError(
+            "--keep-before is about violations that are kept",
+            f"--keep-on-violation DIR --keep-before {earlier}",
+        )
     alarm = None if targets is None else _alarm(targets, paths)
     # Where stdout is closed, nothing starts.
     on_screen = is_screen() and not as_json
@@ -169,6 +185,7 @@ def command(
                 keep.absolute(),
                 most=most_kept,
                 window_ns=window_ns,
+                earlier_ns=earlier_ns,
                 clock_sync=clock_sync,
                 note=print_note,
             )
@@ -336,7 +353,7 @@ def _record(
     from msgflow.cli.output import print_note
     from msgflow.live import Channel, record, temporary_directory
 
-    name = time.strftime("watch-%Y%m%d-%H%M%S")
+    name = f"watch-{time.strftime('%Y%m%d-%H%M%S')}-{os.getpid()}"
     # A file, since the program would stop if it wrote to a full pipe.
     log = Path(f"{directory or name}.log") if on_screen and sys.stderr.isatty() else None
     ended = Event()

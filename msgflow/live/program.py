@@ -42,9 +42,11 @@ class Program:
         require_program(words[0])
         # A stderr that is closed is None.
         stream = output or sys.__stderr__ or subprocess.DEVNULL
+        # While its output goes to a file, the terminal has a screen, which has the keys.
+        keys = None if output is None else subprocess.DEVNULL
         try:
             self._process = subprocess.Popen(
-                list(words), stdout=stream, stderr=stream, start_new_session=True
+                list(words), stdin=keys, stdout=stream, stderr=stream, start_new_session=True
             )
         except OSError as error:
             raise UsageError(

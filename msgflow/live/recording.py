@@ -130,7 +130,7 @@ def record(
         by_lttng = kernel and can_trace_kernel()
         if kernel and not by_lttng:
             if (reason := why_perf_cannot_record()) is None:
-                stack.enter_context(recorded_with_perf(directory))
+                stack.enter_context(recorded_with_perf(directory, note))
             else:
                 note(
                     f"the scheduler is not recorded: LTTng cannot trace this kernel (it"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 import shutil
 import signal
 import subprocess
@@ -10,12 +9,11 @@ import tempfile
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from msgflow.errors import RecordingError
 from msgflow.live.daemon import started
 from msgflow.live.kernel_events import PERF_EVENTS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
     from pathlib import Path
 
 # The clock of LTTng; pages of memory of each CPU.
@@ -37,11 +35,12 @@ def why_perf_cannot_record() -> str | None:
 
 
 @contextmanager
-def recorded_with_perf(directory: Path) -> Iterator[None]:
+def recorded_with_perf(directory: Path, note: Callable[[str], None]) -> Iterator[None]:
     """Record the scheduler during the block, as a CTF trace below the directory.
 
-    Raises:
-        RecordingError: perf fails; what it recorded stays.
+    Args:
+        directory: of the recording.
+        note: gets a sentence if perf fails; what it recorded stays.
     """
     data = directory / "perf.data"
     with tempfile.TemporaryFile("w+") as words:
@@ -49,21 +48,25 @@ def recorded_with_perf(directory: Path) -> Iterator[None]:
         try:
             yield
         finally:
-            has_failed = perf.poll() is not None
+            ended_early = perf.poll() is not None
             perf.send_signal(signal.SIGINT)
             perf.wait()
-        if has_failed:
-            words.seek(0)
-            said = words.read().strip().splitlines() or ["no reason given"]
-            raise RecordingError(
-                f"perf ended before the recording: {said[-1]}", "msgflow record without --kernel"
-            )
-    convert = ["perf", "data", "convert", f"--to-ctf={directory / _TRACE}", f"--input={data}"]
+        words.seek(0)
+        if ended_early:
+            note(f"perf ended before the recording{_reason(words.read())}")
+    trace = directory / _TRACE
+    convert = ["perf", "data", "convert", f"--to-ctf={trace}", f"--input={data}"]
     run = subprocess.run(convert, capture_output=True, text=True, start_new_session=True)
     if run.returncode:
-        said = run.stderr.strip().splitlines() or ["no reason given"]
-        raise RecordingError(f"perf cannot write its data as CTF: {said[-1]}", shlex.join(convert))
-    data.unlink()
+        shutil.rmtree(trace, ignore_errors=True)
+        note(f"the scheduler is not recorded: perf cannot write {data} as CTF{_reason(run.stderr)}")
+    else:
+        data.unlink()
+
+
+def _reason(printed: str) -> str:
+    lines = printed.strip().splitlines()
+    return f": {lines[-1].strip()}" if lines else ""
 
 
 def _command(target: str) -> list[str]:

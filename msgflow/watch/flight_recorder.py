@@ -29,6 +29,9 @@ class FlightRecorder:
 
     A violation that goes on is kept once per window. Its database is written beside the view, which
     goes on meanwhile.
+
+    Attributes:
+        earlier_ns: how much of what came before the window of a violation is kept, too.
     """
 
     def __init__(
@@ -37,6 +40,7 @@ class FlightRecorder:
         *,
         most: int,
         window_ns: int,
+        earlier_ns: int,
         clock_sync: str,
         note: Callable[[str], None],
     ) -> None:
@@ -46,12 +50,14 @@ class FlightRecorder:
             directory: gets a directory per violation.
             most: how many of them stay.
             window_ns: length of a window.
+            earlier_ns: how much of what came before the window of a violation is kept, too.
             clock_sync: how clocks of several hosts are brought together, as `ingest` takes it.
             note: gets a sentence about what was kept, or why not.
         """
         self._directory = directory
         self._most = most
         self._window_ns = window_ns
+        self.earlier_ns = earlier_ns
         self._clock_sync = clock_sync
         self._note = note
         self._until_ns = 0

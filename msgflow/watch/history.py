@@ -204,22 +204,31 @@ class History:
             start_ns = min(start_ns, self.final_ns)
         return Window(start_ns, self._borders[-1])
 
-    def traces(self, window: Window) -> KeptTraces:
-        """Return what a window needs: itself, and what comes before and after."""
-        needed = self._needed(window)
+    def traces(self, window: Window, *, earlier_ns: int = 0) -> KeptTraces:
+        """Return what a window needs: itself, and what comes before and after.
+
+        Args:
+            window: the window.
+            earlier_ns: how much more of what came before to return.
+        """
+        needed = self._needed(window, earlier_ns)
         return KeptTraces([*self._lasting.values(), *self._lasting_without(needed)], needed)
 
-    def paths(self, window: Window) -> list[Path]:
-        """Return the directories of the chunks that a window needs."""
-        return [chunk.path for chunk in self._needed(window)]
+    def paths(self, window: Window, *, earlier_ns: int = 0) -> list[Path]:
+        """Return the directories of the chunks of `traces`."""
+        return [chunk.path for chunk in self._needed(window, earlier_ns)]
 
-    def forget(self, window: Window) -> list[Path]:
+    def forget(self, window: Window, *, earlier_ns: int = 0) -> list[Path]:
         """Forget what no window needs that comes after this one, but for what lasts.
+
+        Args:
+            window: the window.
+            earlier_ns: how much of what came before is kept all the same.
 
         Returns:
             The directories of the chunks that are forgotten.
         """
-        needed = self._needed(window)
+        needed = self._needed(window, earlier_ns)
         for lasting in self._lasting_without(needed):
             before = self._lasting.get(lasting.source)
             # To put many parts together in each step would take long.
@@ -262,8 +271,8 @@ class History:
         known = [b for b in before if b <= window.start_ns - self.before_ns]
         return max(known, default=0)
 
-    def _needed(self, window: Window) -> list[KeptChunk]:
-        reach = self._reach(window)
+    def _needed(self, window: Window, earlier_ns: int) -> list[KeptChunk]:
+        reach = self._reach(window) - earlier_ns
         return [chunk for chunk in self._chunks if chunk.end_ns > reach]
 
     def _lasting_without(self, needed: Sequence[KeptChunk]) -> list[KeptChunk]:

@@ -76,6 +76,7 @@ class Watcher:
         self._note = note
         self._alarm = alarm
         self._recorder = recorder
+        self._earlier_ns = 0 if recorder is None else recorder.earlier_ns
         self._exporter = exporter
         self._database = database
         self.on_passed: Callable[[Path], None] | None = None
@@ -147,7 +148,7 @@ class Watcher:
         self._con.close()
 
     def _forget(self, window: Window) -> None:
-        for path in self.history.forget(window):
+        for path in self.history.forget(window, earlier_ns=self._earlier_ns):
             if self.on_passed is not None:
                 self.on_passed(path)
 
@@ -235,8 +236,9 @@ class Watcher:
         if self._database is not None:
             self._database.offer(window.end_ns, traces, links)
         if report.violations:
-            paths = history.paths(judged)
-            self._violated = (history.border_ns, traces, paths, links, learned)
+            kept = history.traces(judged, earlier_ns=self._earlier_ns)
+            paths = history.paths(judged, earlier_ns=self._earlier_ns)
+            self._violated = (history.border_ns, kept, paths, links, learned)
         if is_live:
             report = replace(report, lag_s=self._lag_s())
         if self._exporter is not None:

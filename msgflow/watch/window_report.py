@@ -26,7 +26,7 @@ _PATH = (
 )  # fmt: skip
 _EXECUTOR = (
     "host", "nodes", "process", "pid", "tid", "executor_kind", "callback_share", "callbacks",
-    "seen_ns", "callback_ns", "blocked_ns",
+    "seen_ns", "callback_ns", "blocked_ns", "longest_callback", "longest_ns",
 )  # fmt: skip
 _LOSS = ("topic", "subscriber", "published", "delivered", "dropped", "lost", "reasons")
 _DISCARDED = """

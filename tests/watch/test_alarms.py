@@ -126,6 +126,38 @@ def test_what_was_kept_before_stays(watched, tmp_path: Path) -> None:
         assert all((directory / "msgflow.duckdb").exists() for directory in kept)
 
 
+def test_more_of_what_came_before_is_kept(watched, tmp_path: Path) -> None:
+    """Chunks, and their events in the database, with the names of nodes that began earlier."""
+    targets = TARGETS.replace("80 ms", "36 ms")
+    options = ("--window", "1s", "--step", "1s", "--keep-on-violation", tmp_path / "kept")
+    lengths = []
+    printed = set()
+    for before in ((), ("--keep-before", "2s")):
+        printed.add(watched(targets, *options, "--keep-most", 1, *before).stdout)
+        (directory,) = (tmp_path / "kept").iterdir()
+        chunks = len(list(directory.glob("archives/*/*")))
+        with Database(directory / "msgflow.duckdb") as database:
+            (run,) = database.runs()
+            names = database.sql("SELECT full_name FROM node").to_arrow()["full_name"].to_pylist()
+        assert run.start_ns is not None
+        assert run.end_ns is not None
+        lengths.append((chunks, run.end_ns - run.start_ns))
+        assert {"/source", "/filter", "/sink"} <= set(names)
+        shutil.rmtree(tmp_path / "kept")
+    # Windows are the same.
+    assert len(printed) == 1
+    (chunks, length_ns), (more_chunks, more_ns) = lengths
+    # A chunk that reaches into the time is kept as a whole.
+    assert chunks + 2 <= more_chunks <= chunks + 3
+    assert 2 <= (more_ns - length_ns) / SECOND < 3.1
+
+
+def test_what_came_before_is_kept_of_violations_only(watched) -> None:
+    result = watched(TARGETS, "--keep-before", "2s")
+    assert result.exit_code == 2
+    assert "--keep-on-violation DIR --keep-before 2s" in result.stderr
+
+
 @pytest.mark.parametrize("kilobytes", [100, 2_000])
 def test_a_full_disk_ends_no_view(watched, tmp_path: Path, kilobytes: int) -> None:
     """There is room for nothing, or for the chunks but not for the database."""
@@ -164,7 +196,7 @@ def test_sessions_of_one_name_on_two_hosts_are_kept(tmp_path: Path) -> None:
     read = [read_chunk(chunk, Continuation()) for chunk in chunks]
     notes: list[str] = []
     recorder = FlightRecorder(
-        tmp_path / "kept", most=1, window_ns=SECOND, clock_sync="none",
+        tmp_path / "kept", most=1, window_ns=SECOND, earlier_ns=0, clock_sync="none",
         note=notes.append,
     )  # fmt: skip
     traces = KeptTraces([], [chunk for chunk in read if chunk is not None])

@@ -28,7 +28,12 @@ def test_what_nobody_foresaw_is_a_note(
     chunk.mkdir(parents=True)
     notes: list[str] = []
     recorder = FlightRecorder(
-        tmp_path / "kept", most=5, window_ns=_SECOND_NS, clock_sync="none", note=notes.append
+        tmp_path / "kept",
+        most=5,
+        window_ns=_SECOND_NS,
+        earlier_ns=0,
+        clock_sync="none",
+        note=notes.append,
     )
     for second in (0, 2):
         recorder.keep(second * _SECOND_NS, None, [chunk], None, None)  # type: ignore[arg-type]

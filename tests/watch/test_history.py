@@ -148,6 +148,18 @@ def test_chunks_that_are_forgotten_are_named_once() -> None:
     assert history.forget(Window(400, 500)) == []
 
 
+def test_what_came_before_is_forgotten_later() -> None:
+    history = filled(100, 200, 300, 400, 500, 600)
+    window = Window(400, 500)
+    assert [path.name for path in history.paths(window, earlier_ns=200)] == [
+        "100", "200", "300", "400", "500",
+    ]  # fmt: skip
+    assert [path.name for path in history.forget(window, earlier_ns=200)] == ["0"]
+    # The window itself needs no more than before.
+    assert [path.name for path in history.paths(window)] == ["300", "400", "500"]
+    assert [path.name for path in history.forget(window, earlier_ns=100)] == ["100"]
+
+
 def test_a_host_is_waited_for_until_the_view_goes_on_without_it() -> None:
     history = filled(100)
     history.add(chunk(0, 100, LAPTOP))

@@ -27,13 +27,13 @@ def shown(*reports: WindowReport) -> str:
 def test_names_are_text_and_all_fits() -> None:
     """A program may call itself what it likes: no markup, no control characters."""
     times = {"median_ns": 1_000_000, "p99_ns": 2_000_000, "max_ns": 2_000_000}
-    thread = {"nodes": "[/x] \x1b[31m", "tid": 7, "callback_share": 0.5, "callback_ns": 10}
+    thread = {"nodes": "[/x] \x1b[31m", "tid": 7, "callback_share": 0.5, "longest_ns": 48_100_000}
     loss = {"topic": "[/y]", "subscriber": "/s" * 40, "dropped": 4, "lost": 0, "reasons": None}
     report = WindowReport(
         window=Window(0, 2_000_000_000),
         is_final=True,
         paths=[{"path": "[/z] → \x1b[2J", "reached": 20, **FATES, **times}],
-        executors=[{**thread, "blocked_ns": 0, "callbacks": 3}],
+        executors=[{**thread, "blocked_ns": 0, "longest_callback": "Subscription(/[b])"}],
         losses=[loss],
         discarded_events=0,
         longest_flow_ns=0,
@@ -41,6 +41,7 @@ def test_names_are_text_and_all_fits() -> None:
     )
     text = shown(report)
     assert all(name in text for name in ("[/x]", "[/y]", "[/z]"))
+    assert "48.1 ms  Subscription(/[b])" in text
     assert "\x1b" not in text
     assert max(map(len, text.splitlines())) <= 80
 

@@ -33,7 +33,7 @@ _STEPS = 10
 _THREADS, _LOSSES, _VIOLATIONS = 5, 5, 5
 # Violations before the last one have no more than this part of the screen.
 _PART_OF_VIOLATIONS = 3
-_PATH_WIDTH, _NAME_WIDTH = 26, 40
+_PATH_WIDTH, _CALLBACK_WIDTH = 26, 30
 _MISSING = ("dropped", "lost", "no_output", "unknown")
 _FATES = ("reached", "superseded", *_MISSING, "not_connected", "cut_by_recording")
 # By the title of the column that they sort by; what is worst comes first.
@@ -224,14 +224,15 @@ def _share(room: int, wanted: int, others: int) -> int:
 
 
 def _threads(report: WindowReport, rows: int) -> Table:
-    table = _table("thread", "busy", "in callbacks", "blocked", "callbacks")
+    table = _table("thread", "busy", "blocked", "longest")
+    table.add_column("callback", no_wrap=True)
     for row in report.executors[:rows]:
         table.add_row(
-            _short(f"{row['nodes']} {row['tid']}", _NAME_WIDTH),
+            _short(f"{row['nodes']} {row['tid']}", _PATH_WIDTH),
             f"{100 * (row['callback_share'] or 0):.0f} %",
-            _duration(row["callback_ns"]),
             _duration(row["blocked_ns"]),
-            str(row["callbacks"]),
+            _duration(row["longest_ns"]),
+            _short(row["longest_callback"] or NULL, _CALLBACK_WIDTH),
         )
     return table
 
