@@ -178,10 +178,13 @@ def test_a_clock_that_is_set_back_by_seconds_makes_none_wrong(
     ("recording", "factor", "least"),
     [
         (Recording(lost_event_share=0.3), 0.3, 800),
-        # By four periods: nothing tells the publications of one period from those of another.
+        # By four periods: only stamps that go back from take to take tell one from the other.
+        (Recording(realtime_steps=((13 * SECOND // 10, -40_000_000),)), 0.3, 650),
         thorough(
-            Recording(realtime_steps=((SECOND // 5, 7_000), (SECOND // 2, -40_000_000))), 1, 0
+            Recording(realtime_steps=((SECOND // 5, 7_000), (SECOND // 2, -40_000_000))), 1, 2_900
         ),
+        # Forward: no stamp goes back, but no later publication fits either.
+        thorough(Recording(realtime_steps=((143 * SECOND // 100, 40_000_000),)), 1, 2_700),
     ],
 )
 def test_where_all_topics_have_one_period(

@@ -64,13 +64,23 @@ origin AS (
     FROM pair
     GROUP BY clock_id, stretch
 ),
+-- By how much a clock may have been set back.
+set_back AS (
+    SELECT
+        z.clock_id, (z.taken_ns - x.start_ns) // x.stretch_ns AS stretch,
+        list(z.step_ns) AS steps_ns
+    FROM derive.clock_set_back(only_run) AS z
+    JOIN extent AS x ON z.clock_id = x.clock_id
+    GROUP BY ALL
+),
 region AS MATERIALIZED (
     SELECT
         a.clock_id, a.stretch, a.least_ns, a.greatest_ns, a.difference_ns, a.vote_count,
-        a.most_count, o.is_taken_here, x.stretch_ns
+        a.most_count, o.is_taken_here, x.stretch_ns, z.steps_ns
     FROM agreed AS a
     JOIN origin AS o ON a.clock_id = o.clock_id AND a.stretch = o.stretch
     JOIN extent AS x ON a.clock_id = x.clock_id
+    LEFT JOIN set_back AS z ON a.clock_id = z.clock_id AND a.stretch = z.stretch
 ),
 followed AS MATERIALIZED (
     FROM derive.followed_difference('region')
@@ -215,9 +225,12 @@ SELECT
     CASE WHEN f.standing_ns IS NULL THEN coalesce(s.drift_ppb, 0) ELSE 0 END::BIGINT AS drift_ppb,
     f.message_count,
     f.segment,
-    -- A drift needs two stretches to show. A stretch that is not sharp spoils those nearby.
+    -- Two stretches agree with some drift by chance. A stretch that is not sharp spoils those
+    -- nearby.
     f.standing_ns IS NOT NULL
-    OR min(s.is_sharp) OVER nearby AND count_if(f.message_count > 0) OVER nearby > 1 AS is_sharp
+    OR min(s.is_sharp) OVER nearby
+    AND count_if(f.message_count > 0) OVER nearby >= derive.clock_limit().sharp_stretches
+        AS is_sharp
 FROM stepped AS f
 JOIN extent AS x ON f.clock_id = x.clock_id
 LEFT JOIN sharp AS s ON f.clock_id = s.clock_id AND f.stretch = s.stretch

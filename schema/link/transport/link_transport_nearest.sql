@@ -43,6 +43,7 @@ set_back AS (
         s.difference_ns - z.set_back_ns + derive.clock_limit().write_ns AS most_ns
     FROM derive.clock_set_back(only_run) AS z
     ASOF JOIN sent AS s ON z.subscription_id = s.subscription_id AND z.taken_ns > s.taken_ns
+    WHERE z.is_lasting
 ),
 behind AS (
     SELECT s.take_id, h.clock_id, z.end_ns AS since_ns, s.end_ns AS until_ns, z.most_ns
