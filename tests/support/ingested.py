@@ -46,7 +46,11 @@ class Ingested:
 def ingest_one(traces: Path, path: Path) -> Ingested:
     """Ingest the traces below a path into a new database."""
     ingest([traces], path)
-    # One that may read files: what is true lies in some.
+    return open_ingested(path)
+
+
+def open_ingested(path: Path) -> Ingested:
+    """Open a database with one run; its connection may read files, as what is true lies in some."""
     return Ingested(duckdb.connect(str(path), read_only=True), path)
 
 

@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from ingested import Ingested, ingest_one
+from ingested import Ingested, ingest_one, open_ingested
 from thorough import SHOWN, few
 
 from msgflow.sim import scenarios, simulate
@@ -80,17 +80,13 @@ def complete(request: pytest.FixtureRequest, simulations: Callable[[str], Ingest
 
 
 @pytest.fixture(scope="session")
-def recordings(
-    shared_traces: Path, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[Callable[[str], Ingested]]:
-    """Ingests one of the recorded traces, by its path in the folder of all."""
-    directory = tmp_path_factory.mktemp("recorded")
+def recordings(real: Callable[[str], Path]) -> Iterator[Callable[[str], Ingested]]:
+    """Opens the database of one of the recorded traces, by its path in the folder of all."""
     with ExitStack() as opened:
 
         @cache
         def get(name: str) -> Ingested:
-            path = directory / f"{name.replace('/', '_')}.duckdb"
-            ingested = ingest_one(shared_traces / name, path)
+            ingested = open_ingested(real(name))
             opened.callback(ingested.connection.close)
             return ingested
 

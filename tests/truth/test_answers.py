@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -53,11 +53,11 @@ ORDER BY ALL
 """
 # Publications by topics of input and output, and the number of candidates; messages by path.
 RECORDED = {
-    "real_py_timer/ust": (
+    "real_py_timer": (
         [("/scan", "/filtered", 1, 117), ("/scan", "/tick", 2, 288)],
         {"/scan /filtered", "/tick"},
     ),
-    "real_py_mixed/ust": ([("/scan", "/filtered", 1, 112)], {"/scan /filtered"}),
+    "real_py_mixed": ([("/scan", "/filtered", 1, 112)], {"/scan /filtered"}),
     "rclpy_timer": (
         [
             ("/topic_a", "/pm_periodic", 2, 258),
@@ -77,21 +77,11 @@ RECORDED = {
 }
 
 
-@pytest.fixture
-def recorded(
-    request: pytest.FixtureRequest, shared_traces: Path, tmp_path: Path
-) -> Iterator[tuple[str, Ingested]]:
-    """A recording and what msgflow makes of it."""
-    ingested = ingest_one(shared_traces / request.param, tmp_path / "recorded.duckdb")
-    yield request.param, ingested
-    ingested.connection.close()
-
-
-@pytest.mark.parametrize("recorded", RECORDED, indirect=True)
+@pytest.mark.parametrize("name", RECORDED)
 def test_recorded_timers_are_doubtful_and_no_path_follows_them(
-    recorded: tuple[str, Ingested],
+    recordings: Callable[[str], Ingested], name: str
 ) -> None:
-    name, ingested = recorded
+    ingested = recordings(name)
     pairs, paths = RECORDED[name]
     assert ingested.rows(PAIRS) == pairs
     reached = dict(ingested.rows(PATHS))

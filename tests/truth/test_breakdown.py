@@ -26,7 +26,7 @@ RECORDINGS = [
     "periodic_async_jazzy24",
     "partial_sync",
     "tracecompass-ros2",
-    "real_overload/ust",
+    "real_overload",
 ]
 # What is wrong with a flow: its parts do not follow each other from its start to its end, or do
 # not add up to its latency; a flow without parts, or parts without a flow.
@@ -89,7 +89,7 @@ def test_parts_of_simulated_flows_add_up(simulations: Callable[[str], Ingested],
     check_flows(simulations(name))
 
 
-@pytest.mark.parametrize("name", few(RECORDINGS, "services", "real_overload/ust"))
+@pytest.mark.parametrize("name", few(RECORDINGS, "services", "real_overload"))
 def test_the_breakdown_adds_up_by_path(recordings: Callable[[str], Ingested], name: str) -> None:
     """Sums of the query over the parts of a path are those of its flows, from start to end."""
     con = recordings(name).connection

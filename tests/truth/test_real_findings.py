@@ -69,13 +69,13 @@ EXPECTED: dict[str, list[tuple[str, str | None, int]]] = {
 
 @pytest.mark.parametrize("name", EXPECTED)
 def test_findings(recordings: Callable[[str], Ingested], name: str) -> None:
-    found = recordings(f"{name}/ust").rows(FINDINGS)
+    found = recordings(name).rows(FINDINGS)
     assert [row[:3] for row in found] == EXPECTED[name], found
 
 
 def test_services_of_a_managed_node(recordings: Callable[[str], Ingested]) -> None:
     """rclcpp has copies of them: the order tells which is which."""
-    recording = recordings("real_lifecycle/ust")
+    recording = recordings("real_lifecycle")
     assert recording.rows(
         "SELECT service_name, c.symbol LIKE '%LifecycleNodeInterfaceImpl%' "
         "FROM service AS s JOIN callback AS c USING (service_id) JOIN node AS n "
@@ -94,7 +94,7 @@ def test_services_of_a_managed_node(recordings: Callable[[str], Ingested]) -> No
 
 def test_deferred_responses_before_kilted(recordings: Callable[[str], Ingested]) -> None:
     """The callback of /outer has no end in the trace; the node says that it took 1.3 ms."""
-    recording = recordings("real_jazzy_services/ust")
+    recording = recordings("real_jazzy_services")
     assert recording.rows(
         "SELECT s.service_name, i.is_end_inferred, count(*), "
         "median(i.end_ns - i.start_ns) BETWEEN 1_200_000 AND 1_400_000 "
@@ -105,7 +105,7 @@ def test_deferred_responses_before_kilted(recordings: Callable[[str], Ingested])
 
 def test_a_join_that_the_other_input_triggers(recordings: Callable[[str], Ingested]) -> None:
     """After the first twelve, /rear_tf is always last: the node ends flows from /front."""
-    recording = recordings("real_reference/ust")
+    recording = recordings("real_reference")
     counts = recording.rows(
         "SELECT e.status, count(*) FROM end_to_end([1], '/front', '/ground') AS e "
         "WHERE e.is_first GROUP BY ALL ORDER BY ALL"
@@ -117,7 +117,7 @@ def test_two_queries_say_the_same_of_the_same_messages(
     recordings: Callable[[str], Ingested],
 ) -> None:
     """Where a path has a queue that drops, its roots end as the messages on the topic do."""
-    connection = recordings("real_overload/ust").connection
+    connection = recordings("real_overload").connection
     delivery = {
         (row["topic_name"], row["subscriber"]): row
         for row in run_query(connection, load_query("topics-delivery"), {}).to_arrow().to_pylist()

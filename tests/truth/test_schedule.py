@@ -96,6 +96,8 @@ def test_perf_gives_the_same_answers(traced: Traced, tmp_path: Path) -> None:
         assert (kind, score.wrong, score.missing) == (kind, 0, 0)
 
 
+# What the comparison notices in one run, it notices in all.
+@pytest.mark.parametrize("traced", few(SYSTEMS, "real_time"), indirect=True, scope="module")
 @pytest.mark.parametrize(
     ("kind", "change"),
     [

@@ -15,7 +15,7 @@ from msgflow.query.runner import run_query
 @pytest.fixture
 def overload(recordings: Callable[[str], Ingested]) -> Ingested:
     """Real ROS 2: `/late` joins 2 s after `/talker`, and reads the last five of `/map`."""
-    return recordings("real_overload/ust")
+    return recordings("real_overload")
 
 
 def rows(overload: Ingested, query: str, **given: Any) -> list[dict[str, Any]]:
