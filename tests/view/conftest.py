@@ -54,13 +54,9 @@ def systems(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="session")
-def recorded(tmp_path_factory: pytest.TempPathFactory, shared_traces: Path) -> Path:
+def recorded(real: Callable[[str], Path]) -> Path:
     """The recording that Trace Compass is tested with."""
-    return made_once(
-        tmp_path_factory,
-        "recorded",
-        lambda path: ingest([shared_traces / "tracecompass-ros2"], path) and None,
-    )
+    return real("tracecompass-ros2")
 
 
 @pytest.fixture(scope="session")
