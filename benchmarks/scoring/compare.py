@@ -112,12 +112,7 @@ def compare_simulated(
         for name in ("drops", "orphans"):
             rows += connection.execute((_SQL / f"{name}.sql").read_text()).fetchall()
         drops = [Drop(*row) for row in rows]
-        # What waits to the end meets every hole behind it, however many there are.
-        excused = sum(
-            drop.messages
-            for drop in drops
-            if drop.undecided == EXCUSE and drop.truth != "pending_at_end"
-        )
+        excused = sum(drop.messages for drop in drops if drop.undecided == EXCUSE)
         return [*scores, _excused(connection, excused)], drops
 
 

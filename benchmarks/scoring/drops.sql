@@ -49,23 +49,29 @@ publication AS (
     FROM verdict
     WHERE kind = 'publication' AND from_id IS NOT NULL
 ),
+-- A loss may tear a publication in two; the part that names no publisher has no row.
+given AS (
+    SELECT b.true_id, v.subscription_id, v.status, v.reason
+    FROM publication AS b
+    JOIN analysed.main.stat_delivery AS v ON b.publication_id = v.publication_id
+),
 said AS (
     SELECT
         d.reason AS truth,
         v.reason,
         coalesce(v.reason, v.status, 'no row') AS said,
         CASE
-            WHEN v.reason = 'receiver_gap' THEN CASE WHEN d.is_in_hole THEN 'events are missing' END
+            WHEN v.reason = 'receiver_gap' THEN d.hidden
             WHEN v.reason = 'unknown' AND d.unclear IS NOT NULL THEN d.unclear
             ELSE d.undecided
         END AS undecided
     FROM truth_drop AS d
-    JOIN publication AS b ON d.publication_id = b.true_id
+    SEMI JOIN publication AS b ON d.publication_id = b.true_id
     JOIN place AS s
         ON d.host = s.host AND d.pid = s.pid AND d.subscription_handle = s.subscription_handle
         AND d.life = s.life
-    LEFT JOIN analysed.main.stat_delivery AS v
-        ON b.publication_id = v.publication_id AND s.subscription_id = v.subscription_id
+    LEFT JOIN given AS v
+        ON d.publication_id = v.true_id AND s.subscription_id = v.subscription_id
     UNION ALL
     SELECT
         concat('delivered, ', t.cause),
@@ -78,8 +84,8 @@ said AS (
                 AND (t.unclear IS NOT NULL OR t.cause = 'recorded')
                 THEN 'the link is not decided'
             -- Where a gap may hide the better partner, a message in a ring buffer has no link.
-            WHEN v.reason = 'receiver_gap' AND t.is_in_hole AND NOT t.is_decided
-                THEN 'events are missing'
+            WHEN v.reason = 'receiver_gap' AND NOT t.is_decided AND t.hidden IS NOT NULL
+                THEN t.hidden
             -- Nor is a take that has no event, in a node without events of callbacks.
             WHEN v.reason IN ('pending_at_end', 'subscription_ended') AND NOT t.is_decided
                 AND t.cause = 'recorded' AND (SELECT NOT has_take FROM truth_layout)
@@ -92,14 +98,13 @@ said AS (
             WHEN (t.host, t.pid) IN (SELECT (host, pid) FROM truth_mixed) THEN
                 'initialisation is missing'
         END
-    FROM analysed.main.stat_delivery AS v
-    JOIN publication AS b ON v.publication_id = b.publication_id
+    FROM given AS v
     JOIN place AS s ON v.subscription_id = s.subscription_id
     JOIN truth_delivery AS t
-        ON b.true_id = t.publication_id AND s.host = t.host AND s.pid = t.pid
+        ON v.true_id = t.publication_id AND s.host = t.host AND s.pid = t.pid
         AND s.subscription_handle = t.subscription_handle AND s.life = t.life
     ANTI JOIN truth_drop AS d
-        ON b.true_id = d.publication_id AND s.host = d.host AND s.pid = d.pid
+        ON v.true_id = d.publication_id AND s.host = d.host AND s.pid = d.pid
         AND s.subscription_handle = d.subscription_handle AND s.life = d.life
     WHERE v.status <> 'delivered'
 )

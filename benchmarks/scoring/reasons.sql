@@ -14,14 +14,25 @@ SELECT publication_id
 FROM simulated_publication
 QUALIFY count(*) OVER (PARTITION BY topic_name, source_timestamp_ns) > 1;
 
--- What the middleware brought to subscriptions that got the message from a ring buffer as well.
+-- What the middleware brought to subscriptions that got the message from a ring buffer as well, or
+-- would have, had it not been overwritten there.
 CREATE OR REPLACE TEMP TABLE truth_copy AS
 SELECT take_id
 FROM simulated_take
 WHERE method = 'rmw'
     AND (publication_id, subscription_id) IN (
         SELECT (publication_id, subscription_id) FROM simulated_take WHERE method = 'ring_buffer'
+        UNION
+        SELECT (publication_id, subscription_id) FROM simulated_undelivered
     );
+
+-- Links by time that the trace decides and that were not found: counted as missing, so neither their
+-- reasons are judged as well, nor what follows from their takes not being known.
+CREATE OR REPLACE TEMP TABLE truth_missing AS
+SELECT from_id AS publication_id, to_id AS take_id
+FROM truth_link AS l
+ANTI JOIN verdict AS v ON l.kind = v.kind AND l.from_id = v.from_id AND l.to_id = v.to_id
+WHERE l.kind = 'transport' AND l.is_decided AND l.needs = 'derive.link_transport_nearest';
 
 -- Each message and subscription of its topic, on the clock of the subscription: when it could be
 -- taken at the earliest (NULL: the trace does not tell how far the clocks are apart); since when
@@ -38,7 +49,7 @@ WITH life AS (
 ),
 sent AS (
     SELECT
-        publication_id, host, pid, publisher_handle, coalesce(rmw_ns, rcl_ns, intra_ns) AS sent_ns
+        publication_id, host, pid, publisher_handle, least(intra_ns, rcl_ns, rmw_ns) AS sent_ns
     FROM simulated_publication
 ),
 pair AS (
@@ -57,6 +68,7 @@ taken AS (
     JOIN sent AS s ON l.from_id = s.publication_id::VARCHAR
     WHERE l.kind = 'transport' AND l.is_decided
         AND t.take_id NOT IN (FROM truth_copy)
+        AND l.to_id NOT IN (SELECT take_id FROM truth_missing)
     GROUP BY ALL
 ),
 earliest AS (
@@ -103,24 +115,30 @@ ASOF LEFT JOIN taken AS n
 
 -- Pairs whose fate the trace may not show, and why: nothing joins the clocks of the two hosts; the
 -- take may be in a hole; only a hole shows whether the two knew each other; or the take may be one
--- of those whose message the trace does not show.
+-- of those whose message the trace does not show. Where nothing later was taken, every hole behind
+-- may hide the take (`hidden`: only such holes).
 CREATE OR REPLACE TEMP TABLE truth_excuse AS
 WITH unidentified AS (
     SELECT t.subscription_id, coalesce(t.dequeue_ns, t.rmw_ns) AS taken_ns
     FROM truth_link AS l
     JOIN simulated_take AS t ON l.to_id = t.take_id::VARCHAR
     JOIN truth_link AS r ON r.kind = 'take' AND l.to_id = r.to_id
-    WHERE l.kind = 'transport' AND NOT l.is_decided
+    WHERE l.kind = 'transport'
+        AND (NOT l.is_decided OR l.to_id IN (SELECT take_id FROM truth_missing))
         AND (r.is_decided OR (SELECT NOT has_take FROM truth_layout))
 )
 SELECT
     p.publication_id, p.subscription_id,
-    coalesce(
-        bool_or(p.arrival_ns IS NULL OR h.end_ns > p.arrival_ns) FILTER (h.host IS NOT NULL), false
-    ) AS is_in_hole,
+    CASE
+        WHEN bool_or(p.arrival_ns IS NULL OR h.end_ns > p.arrival_ns) FILTER (h.host IS NOT NULL)
+            THEN CASE
+                WHEN bool_or(p.has_later) THEN 'events are missing'
+                ELSE 'nothing later taken'
+            END
+    END AS hidden,
     CASE
         WHEN bool_or(p.arrival_ns IS NULL) THEN 'clocks are apart'
-        WHEN bool_or(h.host IS NOT NULL) THEN 'events are missing'
+        WHEN bool_or(h.host IS NOT NULL) AND bool_or(p.has_later) THEN 'events are missing'
         WHEN (p.subscription_id, p.publication_id) IN (
             SELECT (a.subscription_id, a.publication_id)
             FROM truth_pair AS a
@@ -128,20 +146,13 @@ SELECT
                 ON a.subscription_id = u.subscription_id
                 AND u.taken_ns BETWEEN a.arrival_ns AND a.until_ns
         ) THEN 'takes of unknown messages'
+        WHEN bool_or(h.host IS NOT NULL) THEN 'nothing later taken'
     END AS unclear
 FROM truth_pair AS p
 LEFT JOIN truth_hole AS h
     ON p.host = h.host AND coalesce(p.pid = h.pid, true)
     AND h.begin_ns < p.until_ns AND h.end_ns > p.since_ns
 GROUP BY p.publication_id, p.subscription_id;
-
--- Links by time that the trace decides and that were not found: counted as missing, so their reasons
--- are not judged as well.
-CREATE OR REPLACE TEMP TABLE truth_missing AS
-SELECT from_id AS publication_id, to_id AS take_id
-FROM truth_link AS l
-ANTI JOIN verdict AS v ON l.kind = v.kind AND l.from_id = v.from_id AND l.to_id = v.to_id
-WHERE l.kind = 'transport' AND l.is_decided AND l.needs = 'derive.link_transport_nearest';
 
 -- Messages that a subscription did not take, where the publication is in the trace. `undecided`
 -- says why the trace does not decide the reason even if nothing of it is missing, NULL where it
@@ -196,7 +207,7 @@ nameless AS (
 )
 SELECT
     u.publication_id::VARCHAR AS publication_id, s.host, s.pid, s.subscription_handle, s.life,
-    u.reason, u.is_internal, x.is_in_hole, x.unclear,
+    u.reason, u.is_internal, x.hidden, x.unclear,
     CASE
         WHEN (p.host, p.pid) IN (SELECT (host, pid) FROM unnamed)
             OR (s.host, s.pid) IN (SELECT (host, pid) FROM unnamed)
@@ -259,7 +270,7 @@ CREATE OR REPLACE TEMP TABLE truth_delivery AS
 SELECT
     t.publication_id::VARCHAR AS publication_id, s.host, s.pid, s.subscription_handle, s.life,
     coalesce(any_value(u.cause), 'recorded') AS cause,
-    bool_or(x.is_in_hole) AS is_in_hole,
+    any_value(x.hidden) AS hidden,
     any_value(x.unclear) AS unclear,
     bool_or(coalesce(l.is_decided, false)) AS is_decided,
     bool_or(t.take_id::VARCHAR IN (SELECT take_id FROM truth_missing)) AS is_missing,
@@ -298,33 +309,39 @@ written AS (
     WHERE event = 'dds:write'
     GROUP BY publication_id
 ),
--- How far stamps are from the clock of the trace.
+-- How far stamps are from the clock of the trace, at least and at most.
 shift AS (
-    SELECT host, min(source_timestamp_ns - rmw_ns) AS shift_ns
+    SELECT
+        host, min(source_timestamp_ns - rmw_ns) AS shift_ns,
+        max(source_timestamp_ns - rmw_ns) AS greatest_shift_ns
     FROM simulated_publication
     GROUP BY host
 ),
 -- Some ways to publish have no events, such as loaned and serialised messages of older releases.
 sent AS (
     SELECT
-        p.publication_id, p.topic_name, p.host, p.pid, p.tid, p.intra_ns,
+        p.publication_id, p.topic_name, p.host, p.pid, p.tid, p.intra_ns, p.source_timestamp_ns,
         coalesce(p.intra_ns, p.rclcpp_ns, p.rcl_ns, p.rmw_ns) IS NULL
         AND p.publication_id NOT IN (SELECT publication_id FROM simulated_dds_event)
             AS has_no_event,
-        coalesce(
-            CASE WHEN l.is_dds_stamped THEN w.ts_ns ELSE p.rmw_ns END,
-            p.source_timestamp_ns - h.shift_ns
-        ) AS stamped_ns
+        coalesce(e.ts_ns, p.source_timestamp_ns - h.greatest_shift_ns) AS earliest_ns,
+        coalesce(e.ts_ns, p.source_timestamp_ns - h.shift_ns) AS stamped_ns
     FROM simulated_publication AS p
     CROSS JOIN layout AS l
     LEFT JOIN written AS w ON p.publication_id = w.publication_id
     LEFT JOIN shift AS h ON p.host = h.host
+    CROSS JOIN LATERAL (
+        SELECT CASE WHEN l.is_dds_stamped THEN w.ts_ns ELSE p.rmw_ns END AS ts_ns
+    ) AS e
 ),
 sender AS (
     SELECT DISTINCT topic_name, host, pid FROM simulated_publication
 ),
 shared_topic AS (
     SELECT topic_name FROM sender GROUP BY topic_name HAVING count(*) > 1
+),
+unnamed AS (
+    SELECT DISTINCT host, pid FROM simulated_unrecorded WHERE event LIKE '%\_init' ESCAPE '\'
 ),
 absent AS (
     SELECT DISTINCT s.publication_id
@@ -333,25 +350,23 @@ absent AS (
         ON s.host = h.host AND s.pid = h.pid AND h.cpu IS NULL
         AND s.stamped_ns BETWEEN h.begin_ns AND h.end_ns
     WHERE s.topic_name IN (FROM shared_topic)
-        OR EXISTS (FROM simulated_unrecorded WHERE event LIKE '%\_init' ESCAPE '\')
+        OR EXISTS (FROM unnamed)
 ),
--- Stamped while events of its host, or of another one that publishes on the topic, were lost: what
--- says who sent it may be missing.
-apart AS (
-    SELECT
-        publication_host, take_host,
-        quantile_disc(take_rmw_ns - publication_rmw_ns - latency_ns, 0.5) AS apart_ns
-    FROM simulated_transport
-    WHERE publication_host <> take_host
-    GROUP BY ALL
-),
+-- Stamped while events of its host were lost, or of another one that would have given that stamp at
+-- that time, and that publishes on the topic or may do so: what says who sent it may be missing.
 possible AS (
-    SELECT publication_id, host, stamped_ns FROM sent
+    SELECT publication_id, host, earliest_ns, stamped_ns AS latest_ns FROM sent
     UNION
-    SELECT s.publication_id, o.host, s.stamped_ns + a.apart_ns
+    SELECT
+        s.publication_id, o.host, s.source_timestamp_ns - h.greatest_shift_ns,
+        s.source_timestamp_ns - h.shift_ns
     FROM sent AS s
-    JOIN sender AS o ON s.topic_name = o.topic_name
-    JOIN apart AS a ON s.host = a.publication_host AND o.host = a.take_host
+    JOIN (
+        SELECT topic_name, host FROM sender
+        UNION
+        SELECT NULL, host FROM unnamed
+    ) AS o ON s.topic_name = coalesce(o.topic_name, s.topic_name) AND s.host <> o.host
+    JOIN shift AS h ON o.host = h.host
 ),
 beside_hole AS (
     SELECT t.take_id
@@ -360,18 +375,14 @@ beside_hole AS (
     -- The stamp is of another clock than the hole.
     JOIN truth_hole AS h
         ON s.host = h.host
-        AND s.stamped_ns + 1_000_000 > h.begin_ns AND s.stamped_ns - 1_000_000 < h.end_ns
+        AND s.latest_ns + 1_000_000 > h.begin_ns AND s.earliest_ns - 1_000_000 < h.end_ns
 ),
 taken_beside_hole AS (
-    SELECT t.take_id
-    FROM simulated_take AS t
+    SELECT t.id::BIGINT AS take_id
+    FROM (FROM truth_time WHERE kind = 'take') AS t
     JOIN truth_hole AS h
         ON t.host = h.host AND coalesce(t.pid = h.pid, true)
-        AND coalesce(t.dequeue_ns, t.rmw_ns) + 1_000_000 > h.begin_ns
-        AND coalesce(t.dequeue_ns, t.rmw_ns) - 1_000_000 < h.end_ns
-),
-unnamed AS (
-    SELECT DISTINCT host, pid FROM simulated_unrecorded WHERE event LIKE '%\_init' ESCAPE '\'
+        AND t.ts_ns + 1_000_000 > h.begin_ns AND t.ts_ns - 1_000_000 < h.end_ns
 ),
 -- Since when there is an event of each process whose initialisation is missing: before, it may have
 -- been there and have sent anything.

@@ -50,17 +50,29 @@ channelled AS (
     JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
     WHERE b.is_without_event AND EXISTS (SELECT 1 FROM orphan)
 ),
--- Before Humble takes have no event of their own: that they have no stamp is not due to loss.
-stamping AS (
-    SELECT process_id
-    FROM store.process
-    WHERE host_id IN (
-        SELECT p.host_id
-        FROM store.take AS t
-        JOIN store.process AS p ON t.process_id = p.process_id
-        WHERE t.run_id = only_run AND t.source_timestamp_ns IS NOT NULL
-            AND EXISTS (SELECT 1 FROM orphan WHERE stamp_ns IS NULL)
-    )
+-- Before Humble takes have no event of their own, and before Iron what leaves a ring buffer has none:
+-- that they have no stamp is not due to loss.
+showing AS (
+    SELECT
+        p.host_id,
+        bool_or(t.source_timestamp_ns IS NOT NULL) AS has_stamps,
+        bool_or(t.method = 'ring_buffer') AS has_buffers
+    FROM store.take AS t
+    JOIN store.process AS p ON t.process_id = p.process_id
+    WHERE t.run_id = only_run AND EXISTS (SELECT 1 FROM orphan WHERE stamp_ns IS NULL)
+    GROUP BY p.host_id
+),
+stampable AS (
+    SELECT o.take_id
+    FROM (
+        SELECT take_id, process_id
+        FROM orphan
+        WHERE stamp_ns IS NULL AND method <> 'ring_buffer' AND is_loss_affected
+    ) AS o
+    JOIN store.process AS p ON o.process_id = p.process_id
+    JOIN showing AS h ON p.host_id = h.host_id
+    LEFT JOIN store.callback_instance AS c ON o.take_id = c.take_id
+    WHERE CASE WHEN c.is_intra_process THEN h.has_buffers ELSE h.has_stamps END
 ),
 -- Publications whose topic and message are not known.
 nameless AS (
@@ -128,7 +140,6 @@ sent AS (
         o.take_id, s.process_id, s.created_ns, s.last_seen_ns, s.recorded_from_ns, s.is_known,
         s.is_stampless,
         o.stamp_ns + coalesce(h.shift_ns, 0) AS at_ns,
-        o.stamp_ns + coalesce(h.shift_ns, 0) + derive.delivery_limit().stamp_slack_ns AS until_ns,
         o.stamp_ns + coalesce(h.greatest_shift_ns, 0) AS latest_ns
     FROM orphan AS o
     JOIN sender AS s ON o.topic_name IS NOT DISTINCT FROM s.topic_name
@@ -138,7 +149,7 @@ sent AS (
         AND (
             s.created_ns < s.begin_ns
             OR s.created_ns
-            <= o.stamp_ns + coalesce(h.shift_ns, 0) + derive.delivery_limit().stamp_slack_ns
+            <= o.stamp_ns + coalesce(h.greatest_shift_ns, 0) + derive.delivery_limit().stamp_slack_ns
         )
 ),
 judged AS (
@@ -163,8 +174,12 @@ judged AS (
         bool_or(s.last_seen_ns < s.latest_ns OR s.at_ns < s.recorded_from_ns) AS has_absent,
         bool_or(s.is_stampless AND s.created_ns <= s.at_ns) AS has_stampless
     FROM sent AS s
-    ASOF LEFT JOIN gap AS g ON s.process_id = g.process_id AND s.until_ns >= g.start_ns
-    ASOF LEFT JOIN nameless AS n ON s.process_id = n.process_id AND s.until_ns >= n.end_ns
+    ASOF LEFT JOIN gap AS g
+        ON s.process_id = g.process_id
+        AND s.latest_ns + derive.delivery_limit().stamp_slack_ns >= g.start_ns
+    ASOF LEFT JOIN nameless AS n
+        ON s.process_id = n.process_id
+        AND s.latest_ns + derive.delivery_limit().stamp_slack_ns >= n.end_ns
     GROUP BY s.take_id
 ),
 -- Messages leave a buffer in the order in which they came. This gives the time in which each was
@@ -215,9 +230,7 @@ SELECT
     CASE
         WHEN k.has_gap THEN 'publisher_gap'
         WHEN k.is_before_tracing THEN 'before_tracing'
-        WHEN o.stamp_ns IS NULL AND o.method <> 'ring_buffer' AND o.is_loss_affected
-            AND o.process_id IN (SELECT process_id FROM stamping)
-            THEN 'receiver_gap'
+        WHEN o.take_id IN (SELECT take_id FROM stampable) THEN 'receiver_gap'
         WHEN o.stamp_ns IS NULL THEN 'no_stamp'
         WHEN coalesce(j.is_before_tracing, o.stamp_ns < (SELECT begin_ns FROM run_begin))
             THEN 'before_tracing'

@@ -7,8 +7,9 @@
 --     reader that gets no CPU seems to wait, too, but takes the message when it wakes up. Only the
 --     depth of the queue tells `overwritten` from `lost_in_transport`. A take that cannot be
 --     identified may have been of the message. Then the reason is unknown: if it came before the
---     subscription is known not to have the message, or within ten times the usual time. A message
---     is not `overwritten` if the subscription took none of the publisher, and no later one.
+--     subscription is known not to have the message, or within ten times the usual time. Only what
+--     one thread sent with one publisher, and one thread takes, does not overtake each other. A
+--     message is not `overwritten` if the subscription took none of the publisher, and no later one.
 --     A publisher may keep messages for subscriptions that come later, and those of its process
 --     take them from a ring buffer, where nothing identifies them.
 -- grain: one row per publication and subscription of its topic that is not known to have taken it
@@ -113,17 +114,26 @@ earliest AS (
 -- Takes that could be any message, and those that could be one without a stamp.
 unidentified AS MATERIALIZED (
     SELECT
-        t.subscription_id, t.taken_ns, t.source_timestamp_ns IS NULL AS has_no_stamp,
+        t.take_id, t.subscription_id, t.taken_ns, t.source_timestamp_ns IS NULL AS has_no_stamp,
         t.method = 'ring_buffer' AS is_from_buffer
     FROM store.take AS t
     ANTI JOIN store.link_transport AS l ON t.take_id = l.take_id
     WHERE t.run_id = only_run AND t.subscription_id IN (SELECT subscription_id FROM missing)
 ),
+-- Before Iron only the callback tells what comes from a buffer.
 first_from_buffer AS (
-    SELECT subscription_id, min(taken_ns) AS taken_ns
-    FROM unidentified
-    WHERE is_from_buffer
-    GROUP BY subscription_id
+    SELECT u.subscription_id, min(u.taken_ns) AS taken_ns
+    FROM unidentified AS u
+    LEFT JOIN store.callback_instance AS c ON u.take_id = c.take_id
+    WHERE u.is_from_buffer OR c.is_intra_process
+    GROUP BY u.subscription_id
+),
+one_thread AS (
+    SELECT publisher_id
+    FROM store.publication
+    WHERE run_id = only_run AND publisher_id IN (SELECT publisher_id FROM missing)
+    GROUP BY publisher_id
+    HAVING min(thread_id) = max(thread_id)
 ),
 long_wait AS (
     SELECT s.subscription_id, w.start_ns, w.end_ns
@@ -153,12 +163,14 @@ known AS (
             CASE WHEN m.has_one_clock THEN coalesce(b.created_ns, 0) ELSE 0 END
         ) AS introduced_ns,
         e.arrival_ns IS NOT NULL AS is_connected,
+        s.only_thread_id IS NOT NULL AND t.publisher_id IS NOT NULL AS is_in_order,
         b.process_id = s.process_id
         AND k.taken_ns <= coalesce(n.taken_ns, k.taken_ns) AS may_be_kept
     FROM missing AS m
     JOIN life AS s ON m.subscription_id = s.subscription_id
     JOIN store.publisher AS b ON m.publisher_id = b.publisher_id
     LEFT JOIN pace AS c ON m.subscription_id = c.subscription_id
+    LEFT JOIN one_thread AS t ON m.publisher_id = t.publisher_id
     LEFT JOIN first_from_buffer AS k ON m.subscription_id = k.subscription_id
     LEFT JOIN earliest AS e
         ON m.subscription_id = e.subscription_id AND m.publisher_id = e.publisher_id
@@ -274,8 +286,14 @@ facts AS (
         g.covered_until_ns >= b.arrival_ns AS has_gap,
         i.covered_until_ns >= b.introduced_ns AS has_earlier_gap,
         f.failed_ns <= b.until_ns AS has_failed_take,
-        -- A later message may have overtaken it.
-        u.taken_ns <= coalesce(b.waited_ns, greatest(b.gone_ns, b.due_ns)) AS has_unidentified_take,
+        -- A later message may have overtaken it, unless one thread sent both, and one takes.
+        u.taken_ns <= coalesce(
+            b.waited_ns,
+            least(
+                CASE WHEN b.is_in_order THEN b.publisher_taken_ns END,
+                greatest(b.gone_ns, b.due_ns)
+            )
+        ) AS has_unidentified_take,
         q.count_so_far - o.position AS newer_count
     FROM bounded AS b
     JOIN ordered AS o ON b.publication_id = o.publication_id AND b.clock_id = o.clock_id

@@ -34,6 +34,8 @@ CREATE TABLE store.link_transport (run_id BIGINT DEFAULT 1, publication_id BIGIN
 CREATE TABLE store.take (run_id BIGINT DEFAULT 1, take_id BIGINT,
     subscription_id BIGINT DEFAULT 1, taken_ns BIGINT, source_timestamp_ns BIGINT DEFAULT 1,
     method VARCHAR DEFAULT 'rmw');
+CREATE TABLE store.publication (run_id BIGINT DEFAULT 1, publisher_id BIGINT, thread_id BIGINT);
+CREATE TABLE store.callback_instance (take_id BIGINT, is_intra_process BOOLEAN);
 CREATE TABLE derive.empty_take (run_id BIGINT DEFAULT 1, subscription_id BIGINT DEFAULT 1,
     failed_ns BIGINT);
 CREATE TABLE store.executor_state (run_id BIGINT DEFAULT 1, thread_id BIGINT DEFAULT 1,
@@ -58,13 +60,19 @@ class Delivery:
             list(columns.values()),
         )
 
-    def publish(self, arrival: int, taken: int | None = None, publisher: int = 1) -> int:
+    def publish(
+        self, arrival: int, taken: int | None = None, publisher: int = 1, thread: int = 1
+    ) -> int:
         """Publish a message that arrives, and is taken, at these times; return its number."""
         self._count += 1
         self.con.execute(
             "INSERT INTO derive.expected_arrival (publication_id, publisher_id, arrival_ns) "
             "VALUES (?, ?, ?)",
             [self._count, publisher, arrival],
+        )
+        self.con.execute(
+            "INSERT INTO store.publication (publisher_id, thread_id) VALUES (?, ?)",
+            [publisher, thread],
         )
         if taken is not None:
             self.con.execute(
@@ -332,6 +340,9 @@ def test_created_before_the_message_arrived(delivery: Delivery, created: int, re
         ("ring_buffer", 1, 302 * MS + 1, 302 * MS, "before_subscription"),
         ("ring_buffer", 2, 302 * MS, 303 * MS, "before_subscription"),
         ("rmw", 1, 302 * MS, 303 * MS, "before_subscription"),
+        # Before Iron, a callback that is handed what comes from a buffer.
+        ("callback_only", 1, 302 * MS, 302 * MS, "unknown"),
+        ("callback_only", 1, 302 * MS + 1, 302 * MS, "before_subscription"),
     ],
 )
 def test_what_a_publisher_of_the_same_process_may_have_kept(
@@ -346,6 +357,9 @@ def test_what_a_publisher_of_the_same_process_may_have_kept(
             "INSERT INTO store.take (take_id, taken_ns, source_timestamp_ns, method)"
             " VALUES (?, ?, NULL, ?)",
             [take, at, method],
+        )
+        delivery.con.execute(
+            "INSERT INTO store.callback_instance VALUES (?, ?)", [take, method == "callback_only"]
         )
     assert delivery.reason(missing) == reason
 
@@ -420,17 +434,25 @@ def test_a_take_without_a_message_was_before_a_later_one(
     assert delivery.reason(missing) == reason
 
 
+@pytest.mark.parametrize(("more", "reason"), [(0, "unknown"), (1, "lost_in_transport")])
 @pytest.mark.parametrize(
-    ("taken", "reason"), [(303 * MS, "unknown"), (303 * MS + 1, "lost_in_transport")]
+    ("publisher", "thread", "reader", "until"),
+    [
+        pytest.param(2, 1, 1, 303 * MS, id="of_another_publisher"),
+        pytest.param(1, 2, 1, 303 * MS, id="that_another_thread_sent"),
+        pytest.param(1, 1, None, 303 * MS, id="that_another_thread_took"),
+        pytest.param(1, 1, 1, 301 * MS, id="not_if_all_is_done_in_order"),
+    ],
 )
 def test_a_later_message_may_have_overtaken_one(
-    delivery: Delivery, taken: int, reason: str
-) -> None:
+    delivery: Delivery,
+    publisher: int, thread: int, reader: int | None, until: int, more: int, reason: str,
+) -> None:  # fmt: skip
     """A take without a message is of one that arrived less than ten usual times before."""
-    delivery.lives()
+    delivery.lives(only_thread_id=reader)
     missing = delivery.miss()
-    delivery.publish(300 * MS + 1, 301 * MS)
-    delivery.takes_without_message(taken)
+    delivery.publish(300 * MS + 1, 301 * MS, publisher, thread)
+    delivery.takes_without_message(until + more)
     assert delivery.reason(missing) == reason
 
 
@@ -688,6 +710,10 @@ def fill(con: duckdb.DuckDBPyConnection, chance: random.Random, grid: int, begin
                 None if publication == 200 else arrival,
                 chance.choice([1, 1, None]),
             ],
+        )
+        con.execute(
+            "INSERT INTO store.publication (publisher_id, thread_id) VALUES (?, ?)",
+            [publisher, chance.choice([1, 2]) if publisher == 2 else 1],
         )
         for number in [3] if publisher == 3 else range(3):
             is_bad_time = arrival // (250 * MS) % 3 == number % 3

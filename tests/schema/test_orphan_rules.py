@@ -27,6 +27,7 @@ CREATE TABLE store.publisher (run_id BIGINT DEFAULT 1, process_id BIGINT DEFAULT
     publisher_id BIGINT,
     topic_name VARCHAR DEFAULT '/a', created_ns BIGINT DEFAULT 0,
     is_inferred BOOLEAN DEFAULT false, is_internal BOOLEAN DEFAULT false);
+CREATE TABLE store.callback_instance (take_id BIGINT, is_intra_process BOOLEAN);
 CREATE TABLE store.node (run_id BIGINT DEFAULT 1, process_id BIGINT, is_inferred BOOLEAN);
 CREATE TABLE store.publication (run_id BIGINT DEFAULT 1, publication_id BIGINT,
     process_id BIGINT DEFAULT 1, publisher_id BIGINT DEFAULT 1, source_timestamp_ns BIGINT,
@@ -89,6 +90,13 @@ def recorded(process: int, begin: int, since: int) -> str:
     return (
         "INSERT INTO derive.process_presence (process_id, begin_ns, recorded_from_ns) "
         f"VALUES ({process}, {begin}, {since})"
+    )
+
+
+def shifted(least: int, greatest: int, since: int = 0) -> str:
+    return (
+        "INSERT INTO derive.stamp_shift (from_ns, shift_ns, greatest_shift_ns) "
+        f"VALUES ({since}, {least}, {greatest})"
     )
 
 
@@ -348,10 +356,7 @@ def test_a_message_is_stamped_a_while_before_or_behind_its_publication(
     con: duckdb.DuckDBPyConnection, end: int, expected: str
 ) -> None:
     """At the latest 10 µs before it: then nothing of its sender was left."""
-    shift = (
-        "INSERT INTO derive.stamp_shift (from_ns, shift_ns, greatest_shift_ns) "
-        "VALUES (0, -90000, 10000)"
-    )
+    shift = shifted(-90_000, 10_000)
     assert reason(con, TAKE, SENDER, RECORDED, shift, seen_until(end)) == expected
 
 
@@ -361,10 +366,7 @@ def test_a_message_is_stamped_a_while_before_or_behind_its_publication(
 def test_which_of_two_senders_was_left_then(
     con: duckdb.DuckDBPyConnection, end: int, expected: str
 ) -> None:
-    shift = (
-        "INSERT INTO derive.stamp_shift (from_ns, shift_ns, greatest_shift_ns) "
-        "VALUES (0, -90000, 10000)"
-    )
+    shift = shifted(-90_000, 10_000)
     found = reason(
         con, TAKE, SENDER, RECORDED, OTHER.format("'/a'"), shift, seen_until(end, 2),
         recorded(2, 100 * MS, 100 * MS),
@@ -380,13 +382,30 @@ def test_a_stamp_is_brought_to_the_clock_of_the_sender(
     con: duckdb.DuckDBPyConnection, since: int, expected: str
 ) -> None:
     """From that time of the clock of stamps on; there the sender has a gap, 300 ms later."""
-    shift = f"INSERT INTO derive.stamp_shift (from_ns, shift_ns) VALUES ({since}, {300 * MS})"
+    shift = shifted(300 * MS, 300 * MS, since)
     hidden = missed(STAMP + 300 * MS, STAMP + 300 * MS)
     assert reason(con, TAKE, SENDER, RECORDED, shift, hidden) == expected
 
 
+@pytest.mark.parametrize(
+    ("start", "end", "expected"),
+    [
+        (0, STAMP - 5 * MS, "publisher_gap"),
+        (0, STAMP - 5 * MS - 1, "publisher_not_traced"),
+        (STAMP, STAMP + 9 * MS, "publisher_gap"),
+        (STAMP + 1, STAMP + 9 * MS, "publisher_not_traced"),
+    ],
+)
+def test_a_gap_hides_a_publication_that_was_stamped_soon_or_late(
+    con: duckdb.DuckDBPyConnection, start: int, end: int, expected: str
+) -> None:
+    """Between 1 and 4 ms behind its events, give or take 1 ms."""
+    found = reason(con, TAKE, SENDER, RECORDED, shifted(-4 * MS, -MS), missed(start, end))
+    assert found == expected
+
+
 def test_who_was_created_later_on_its_own_clock(con: duckdb.DuckDBPyConnection) -> None:
-    shift = f"INSERT INTO derive.stamp_shift (from_ns, shift_ns) VALUES (0, {300 * MS})"
+    shift = shifted(200 * MS, 300 * MS)
     late = f"UPDATE store.publisher SET created_ns = {STAMP + 301 * MS}"
     hidden = missed(STAMP + 300 * MS, STAMP + 300 * MS)
     assert reason(con, TAKE, SENDER, RECORDED, shift, late, hidden) == "publisher_gap"
@@ -422,6 +441,30 @@ def test_a_take_without_a_stamp(
     stamped = "INSERT INTO store.take (take_id, process_id) VALUES (2, 2)"
     place = f"UPDATE store.process SET host_id = {host} WHERE process_id = 2"
     assert reason(con, plain, SENDER, stamped, place) == expected
+
+
+@pytest.mark.parametrize(
+    ("method", "host", "expected"),
+    [
+        ("ring_buffer", 1, "receiver_gap"),
+        ("ring_buffer", 2, "no_stamp"),
+        ("rmw", 1, "no_stamp"),
+    ],
+)
+def test_what_comes_from_a_buffer_without_an_event(
+    con: duckdb.DuckDBPyConnection, method: str, host: int, expected: str
+) -> None:
+    """Before Iron nothing has one that leaves a buffer. The callback tells that it did."""
+    found = reason(
+        con,
+        "INSERT INTO store.take (method, source_timestamp_ns, is_loss_affected) "
+        "VALUES ('callback_only', NULL, true)",
+        "INSERT INTO store.callback_instance VALUES (1, true)",
+        SENDER,
+        f"INSERT INTO store.take (take_id, process_id, method) VALUES (2, 2, '{method}')",
+        f"UPDATE store.process SET host_id = {host} WHERE process_id = 2",
+    )
+    assert found == expected
 
 
 def before(taken: int, put: int) -> list[str]:

@@ -281,6 +281,80 @@ def test_excuses_where_nothing_is_missing_are_wrong(losses, monkeypatch):
     assert excused.wrong == sum(drop.messages for drop in drops if drop.undecided is None) > 0
 
 
+LOSS = Recording(lost_event_share=0.3)
+STEPS = Recording(realtime_steps=((200_000_000, 7_000), (500_000_000, -40_000_000)))
+
+
+@pytest.mark.parametrize(
+    ("system", "layout", "factor", "recording"),
+    few(
+        [
+            # Copies of what a ring buffer overwrites are no deliveries; of a publication that a
+            # loss tore in two, one part names no publisher; a message may be taken before its
+            # publication ends.
+            ("overwritten_copies", "humble", 1, LOSS),
+            ("overwritten_copies", "iron", 1, LOSS),
+            ("overwritten_copies", "jazzy", 1, LOSS),
+            # Takes whose links count as missing.
+            ("losses", "iron", 0.3, STEPS),
+            # A take that has no event of its own, beside a hole.
+            ("layers", "iron", 1, LOSS),
+            # A host whose initialisation is missing may have sent anything in a hole; how long
+            # after its events a message is stamped.
+            ("bursts_two_hosts", "iron", 0.1, Recording(lost_packet_share=0.2)),
+            ("bursts_two_hosts", "humble", 1, LOSS),
+        ],
+        ("overwritten_copies", "iron", 1, LOSS),
+    ),
+)
+def test_what_a_trace_leaves_open_is_excused(tmp_path, system, layout, factor, recording):
+    simulation = simulate(
+        system, tmp_path / "trace",
+        layout=layout, factor=factor, recording=recording, clock_offset_ns=350_000_000,
+    )  # fmt: skip
+    path = tmp_path / "run.duckdb"
+    ingest_one(simulation.directory, path).connection.close()
+    scores, drops = compare_simulated(path, simulation.truth)
+    assert [score for score in scores if score.wrong] == []
+    assert [drop for drop in drops if not drop.undecided and not drop.is_right] == []
+
+
+def test_what_follows_from_a_missing_link_is_not_judged_twice(tmp_path):
+    """The take that comes after a message that was lost may be of it."""
+    simulation = simulate("losses", tmp_path / "trace", layout="humble", factor=0.2)
+    path = tmp_path / "run.duckdb"
+    ingest_one(simulation.directory, path).connection.close()
+    with duckdb.connect(str(path)) as connection:
+        ((take,),) = connection.execute(
+            """
+            SELECT min(l.take_id)
+            FROM (
+                SELECT publisher_id, subscription_id, min(publication_id) AS publication_id
+                FROM store.undelivered
+                WHERE reason = 'not_delivered'
+                GROUP BY ALL
+                ORDER BY count(*) DESC
+                LIMIT 1
+            ) AS u
+            JOIN store.link_transport AS l
+                ON u.publisher_id = l.publisher_id AND u.subscription_id = l.subscription_id
+                AND u.publication_id < l.publication_id
+            """
+        ).fetchall()
+
+    def lost():
+        _, drops = compare_simulated(path, simulation.truth)
+        return {d.undecided: d.messages for d in drops if d.truth == "lost_in_transport"}
+
+    _change(path, "UPDATE store.undelivered SET reason = 'unknown'")
+    before = lost()
+    assert "takes of unknown messages" not in before
+    _change(path, f"DELETE FROM store.link_transport WHERE take_id = {take}")
+    after = lost()
+    assert after[None] > 0
+    assert after[None] + after["takes of unknown messages"] == before[None]
+
+
 TRUNCATED = Recording(cut_streams=1, unfinished_streams=1)
 
 
