@@ -158,6 +158,15 @@ GAP_RECORDINGS = (
 # Links found by time alone depend on how stamps and the trace's clock differ.
 TIMED_LAYOUTS = ("humble", "iron")
 TIMED_SYSTEMS = ("bursts", "bursts_two_hosts")
+# In these layouts, recordings ten times as long show more: messages that wait behind a gap, copies,
+# and stretches of time in which the clocks differ otherwise.
+LONG_SYSTEMS = (
+    "channels", "container", "host_chain", "layers", "losses", "mixed_intra_process",
+    "overwritten_copies", "polled", "rivals", "services",
+)  # fmt: skip
+LONG_RECORDINGS = ("loss", "lost_begin", "steps")
+# All topics have one period, and a step is as long as some: a message may be of either side of it.
+ONE_PERIOD = {"container", "host_chain"}
 # What the kernel does, does not depend on the layout.
 KERNEL_SYSTEMS = ("cpu_hog", "real_time", "shared_map", "shared_memory", "kernel_losses")
 # What comes and goes in these does so after a second; clocks that drift, or are known from few
@@ -222,11 +231,19 @@ def cases(arguments: argparse.Namespace) -> Iterator[Case]:
                     continue
                 is_faulty = recording != PERFECT
                 is_asked_for = arguments.system or arguments.layout or arguments.recording
+                is_long = (
+                    not is_asked_for
+                    and layout in TIMED_LAYOUTS
+                    and system in LONG_SYSTEMS
+                    and recording in LONG_RECORDINGS
+                    and not (system in ONE_PERIOD and recording == "steps")
+                )
                 is_usual = (
                     not is_faulty
                     or (system in FAULTY_SYSTEMS and layout in FAULTY_LAYOUTS)
                     or (system in TIMED_SYSTEMS and layout in TIMED_LAYOUTS)
                     or recording == PERF
+                    or is_long
                     or (
                         layout == (CHANNEL_LAYOUT if system == "channels" else EVERY_LAYOUT)
                         and recording in EVERY_FAULT
@@ -244,7 +261,8 @@ def cases(arguments: argparse.Namespace) -> Iterator[Case]:
                     is_usual = True
                 if is_usual:
                     scenario = known[system]
-                    factor = max(1, arguments.factor) if system in WHOLE else arguments.factor
+                    least_factor = 1 if is_long or system in WHOLE else 0
+                    factor = max(least_factor, arguments.factor)
                     yield Case(system, layout, recording, scenario, factor)
 
 

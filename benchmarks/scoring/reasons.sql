@@ -125,7 +125,13 @@ WITH unidentified AS (
     JOIN truth_link AS r ON r.kind = 'take' AND l.to_id = r.to_id
     WHERE l.kind = 'transport'
         AND (NOT l.is_decided OR l.to_id IN (SELECT take_id FROM truth_missing))
-        AND (r.is_decided OR (SELECT NOT has_take FROM truth_layout))
+        AND (
+            r.is_decided
+            OR (
+                SELECT CASE t.method WHEN 'ring_buffer' THEN NOT has_dequeue ELSE NOT has_take END
+                FROM truth_layout
+            )
+        )
 )
 SELECT
     p.publication_id, p.subscription_id,
@@ -324,15 +330,14 @@ sent AS (
         coalesce(p.intra_ns, p.rclcpp_ns, p.rcl_ns, p.rmw_ns) IS NULL
         AND p.publication_id NOT IN (SELECT publication_id FROM simulated_dds_event)
             AS has_no_event,
-        coalesce(e.ts_ns, p.source_timestamp_ns - h.greatest_shift_ns) AS earliest_ns,
-        coalesce(e.ts_ns, p.source_timestamp_ns - h.shift_ns) AS stamped_ns
+        coalesce(
+            CASE WHEN l.is_dds_stamped THEN w.ts_ns ELSE p.rmw_ns END,
+            p.source_timestamp_ns - h.shift_ns
+        ) AS stamped_ns
     FROM simulated_publication AS p
     CROSS JOIN layout AS l
     LEFT JOIN written AS w ON p.publication_id = w.publication_id
     LEFT JOIN shift AS h ON p.host = h.host
-    CROSS JOIN LATERAL (
-        SELECT CASE WHEN l.is_dds_stamped THEN w.ts_ns ELSE p.rmw_ns END AS ts_ns
-    ) AS e
 ),
 sender AS (
     SELECT DISTINCT topic_name, host, pid FROM simulated_publication
@@ -352,20 +357,19 @@ absent AS (
     WHERE s.topic_name IN (FROM shared_topic)
         OR EXISTS (FROM unnamed)
 ),
--- Stamped while events of its host were lost, or of another one that would have given that stamp at
--- that time, and that publishes on the topic or may do so: what says who sent it may be missing.
+-- Stamped while events of a host were lost that publishes on the topic, or may do so: what says who
+-- sent it may be missing.
 possible AS (
-    SELECT publication_id, host, earliest_ns, stamped_ns AS latest_ns FROM sent
-    UNION
-    SELECT
-        s.publication_id, o.host, s.source_timestamp_ns - h.greatest_shift_ns,
-        s.source_timestamp_ns - h.shift_ns
+    SELECT DISTINCT
+        s.publication_id, o.host,
+        s.source_timestamp_ns - h.greatest_shift_ns AS earliest_ns,
+        s.source_timestamp_ns - h.shift_ns AS latest_ns
     FROM sent AS s
     JOIN (
         SELECT topic_name, host FROM sender
         UNION
         SELECT NULL, host FROM unnamed
-    ) AS o ON s.topic_name = coalesce(o.topic_name, s.topic_name) AND s.host <> o.host
+    ) AS o ON s.topic_name = coalesce(o.topic_name, s.topic_name)
     JOIN shift AS h ON o.host = h.host
 ),
 beside_hole AS (

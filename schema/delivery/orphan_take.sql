@@ -149,7 +149,7 @@ sent AS (
         AND (
             s.created_ns < s.begin_ns
             OR s.created_ns
-            <= o.stamp_ns + coalesce(h.greatest_shift_ns, 0) + derive.delivery_limit().stamp_slack_ns
+            <= o.stamp_ns + coalesce(h.shift_ns, 0) + derive.delivery_limit().stamp_slack_ns
         )
 ),
 judged AS (

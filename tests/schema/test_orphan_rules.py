@@ -405,7 +405,7 @@ def test_a_gap_hides_a_publication_that_was_stamped_soon_or_late(
 
 
 def test_who_was_created_later_on_its_own_clock(con: duckdb.DuckDBPyConnection) -> None:
-    shift = shifted(200 * MS, 300 * MS)
+    shift = shifted(300 * MS, 400 * MS)
     late = f"UPDATE store.publisher SET created_ns = {STAMP + 301 * MS}"
     hidden = missed(STAMP + 300 * MS, STAMP + 300 * MS)
     assert reason(con, TAKE, SENDER, RECORDED, shift, late, hidden) == "publisher_gap"
