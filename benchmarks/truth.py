@@ -165,7 +165,7 @@ LONG_SYSTEMS = (
     "overwritten_copies", "polled", "rivals", "services",
 )  # fmt: skip
 LONG_RECORDINGS = ("loss", "lost_begin", "steps")
-# All topics have one period, and a step is as long as some: a message may be of either side of it.
+# All topics share one period, and a step is as long as some of them: nothing shows that step.
 ONE_PERIOD = {"container", "host_chain"}
 # What the kernel does, does not depend on the layout.
 KERNEL_SYSTEMS = ("cpu_hog", "real_time", "shared_map", "shared_memory", "kernel_losses")
