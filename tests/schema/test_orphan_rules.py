@@ -311,6 +311,30 @@ def test_who_published_then_on_a_topic_that_is_not_known_may_have_sent_it(
 
 
 @pytest.mark.parametrize(
+    ("end", "expected"),
+    [
+        (STAMP - 5 * MS - 1, "publisher_trace_ends"),
+        (STAMP - 5 * MS, "unknown"),
+        (STAMP, "unknown"),
+        (STAMP + 1, "publisher_trace_ends"),
+    ],
+)
+def test_who_published_on_a_topic_that_is_not_known_was_stamped_soon_or_late(
+    con: duckdb.DuckDBPyConnection, end: int, expected: str
+) -> None:
+    """Between 1 and 4 ms behind its events, give or take 1 ms."""
+    published = (
+        "UPDATE store.publisher SET publisher_id = process_id;"
+        f"INSERT INTO store.publication (process_id, publisher_id, end_ns) VALUES (2, 2, {end})"
+    )
+    found = reason(
+        con, TAKE, SENDER, RECORDED, OTHER.format("NULL"), shifted(-4 * MS, -MS),
+        seen_until(STAMP - 2 * MS), published,
+    )  # fmt: skip
+    assert found == expected
+
+
+@pytest.mark.parametrize(
     ("created", "stamp", "expected"),
     [
         (STAMP, "NULL", "unknown"),
@@ -464,6 +488,26 @@ def test_what_comes_from_a_buffer_without_an_event(
         f"INSERT INTO store.take (take_id, process_id, method) VALUES (2, 2, '{method}')",
         f"UPDATE store.process SET host_id = {host} WHERE process_id = 2",
     )
+    assert found == expected
+
+
+@pytest.mark.parametrize(
+    ("method", "stamp", "expected"),
+    [("ring_buffer", "NULL", "no_stamp"), ("rmw", "7", "publisher_not_traced")],
+)
+def test_a_take_beside_a_gap_that_lacks_nothing(
+    con: duckdb.DuckDBPyConnection, method: str, stamp: str, expected: str
+) -> None:
+    """Messages in buffers have no stamps. Others of the host have some, or lack them."""
+    found = reason(
+        con,
+        "INSERT INTO store.take (method, source_timestamp_ns, is_loss_affected) "
+        f"VALUES ('{method}', {stamp}, true)",
+        SENDER, RECORDED, "UPDATE derive.process_presence SET recorded_from_ns = 0",
+        "UPDATE store.process SET first_seen_ns = 0",
+        "INSERT INTO store.take (take_id, process_id) VALUES (2, 2)",
+        "INSERT INTO store.take (take_id, source_timestamp_ns) VALUES (3, NULL)",
+    )  # fmt: skip
     assert found == expected
 
 
