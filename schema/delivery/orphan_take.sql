@@ -50,8 +50,8 @@ channelled AS (
     JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
     WHERE b.is_without_event AND EXISTS (SELECT 1 FROM orphan)
 ),
--- Before Humble takes have no event of their own, and before Iron what leaves a ring buffer has none:
--- that they have no stamp is not due to loss.
+-- Before Humble takes have no event of their own, and before Iron what leaves a ring buffer has
+-- none: that they have no stamp is not due to loss.
 showing AS (
     SELECT
         p.host_id,

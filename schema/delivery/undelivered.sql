@@ -7,10 +7,10 @@
 --     reader that gets no CPU seems to wait, too, but takes the message when it wakes up. Only the
 --     depth of the queue tells `overwritten` from `lost_in_transport`. A take that cannot be
 --     identified may have been of the message. Then the reason is unknown: if it came before the
---     subscription is known not to have the message, or within ten times the usual time. Only what
---     one thread sent with one publisher, and one thread takes, does not overtake each other. A
---     message is not `overwritten` if the subscription took none of the publisher, and no later one.
---     A publisher may keep messages for subscriptions that come later, and those of its process
+--     subscription is known not to have the message, or within ten times the usual time. Messages
+--     are in order only if one thread sends them with one publisher, and one thread takes them. A
+--     message is not `overwritten` if the subscription took none of the publisher and no later
+--     one. A publisher may keep messages for subscriptions that come later. Those of its process
 --     take them from a ring buffer, where nothing identifies them.
 -- grain: one row per publication and subscription of its topic that is not known to have taken it
 CREATE OR REPLACE MACRO derive.undelivered(only_run) AS TABLE
