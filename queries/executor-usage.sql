@@ -27,9 +27,10 @@
 --     callback
 -- column: unknown_ns BIGINT [ns]    Not known: before the first event of the executor, in a gap of
 --     the trace, or outside of callbacks where the executor has no events
--- column: longest_callback VARCHAR  The callback that kept the thread longest at a time, with its
---     node if the process has several
--- column: longest_ns BIGINT [ns]    For how long, without what was nested in it
+-- column: longest_callback VARCHAR  The callback that kept the thread longest at one call, with its
+--     node if the process has several; the first of equally long ones
+-- column: longest_ns BIGINT [ns]    For how long within the time window, without what was nested in
+--     it
 -- column: callbacks BIGINT          Callbacks that began
 -- column: callback_share DOUBLE [share] Callback time divided by time seen, 0 to 1
 -- column: executor_id BIGINT        Identity of the executor
@@ -91,9 +92,8 @@ summed AS (
         coalesce(sum(duration_ns) FILTER (WHERE activity = 'take'), 0)::BIGINT AS take_ns,
         coalesce(sum(duration_ns) FILTER (WHERE activity = 'callback'), 0)::BIGINT AS callback_ns,
         coalesce(sum(duration_ns) FILTER (WHERE activity = 'blocked'), 0)::BIGINT AS blocked_ns,
-        max(duration_ns) FILTER (WHERE activity = 'callback') AS longest_ns,
-        arg_max(callback_instance_id, (duration_ns, -callback_instance_id))
-            FILTER (WHERE activity = 'callback') AS longest_id,
+        max({'duration_ns': duration_ns, 'earlier': -callback_instance_id})
+            FILTER (WHERE activity = 'callback') AS longest,
         sum(duration_ns)::BIGINT AS known_ns
     FROM spent
     GROUP BY thread_id
@@ -120,7 +120,7 @@ SELECT
     CASE WHEN m.has_states THEN coalesce(s.blocked_ns, 0) END AS blocked_ns,
     greatest(m.last_ns - m.first_ns, 0) - coalesce(s.known_ns, 0) AS unknown_ns,
     CASE WHEN l.node = m.nodes THEN l.label ELSE l.node || ' ' || l.label END AS longest_callback,
-    s.longest_ns,
+    s.longest.duration_ns AS longest_ns,
     coalesce(c.callbacks, 0) AS callbacks,
     coalesce(s.callback_ns, 0) / nullif(greatest(m.last_ns - m.first_ns, 0), 0)::DOUBLE
         AS callback_share,
@@ -129,6 +129,6 @@ SELECT
 FROM member AS m
 LEFT JOIN summed AS s ON m.thread_id = s.thread_id
 LEFT JOIN callback AS c ON m.thread_id = c.thread_id
-LEFT JOIN main.callback_instance AS i ON s.longest_id = i.callback_instance_id
+LEFT JOIN main.callback_instance AS i ON i.callback_instance_id = -s.longest.earlier
 LEFT JOIN main.callback_label AS l ON i.callback_id = l.callback_id
 ORDER BY m.run_id, m.hostname, m.pid, m.tid, m.thread_id

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import shutil
 import signal
 import subprocess
@@ -59,7 +60,10 @@ def recorded_with_perf(directory: Path, note: Callable[[str], None]) -> Iterator
     run = subprocess.run(convert, capture_output=True, text=True, start_new_session=True)
     if run.returncode:
         shutil.rmtree(trace, ignore_errors=True)
-        note(f"the scheduler is not recorded: perf cannot write {data} as CTF{_reason(run.stderr)}")
+        note(
+            f"what perf recorded of the scheduler is not read: {shlex.join(convert)}"
+            f" failed{_reason(run.stderr)}"
+        )
     else:
         data.unlink()
 

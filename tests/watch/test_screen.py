@@ -66,3 +66,26 @@ def test_latencies_may_be_negative() -> None:
     ]
     assert "-2 ms" in shown(reports[0], reports[2])
     assert "▁█▁" in shown(*reports)
+
+
+def test_long_names_leave_the_columns_whole() -> None:
+    """In a terminal of 80 columns."""
+    thread = {
+        "nodes": "/perception/lidar/points, 3 more", "tid": 123_456, "callback_share": 1.0,
+        "blocked_ns": 312_000_000, "longest_ns": 45_600_000,
+        "longest_callback": "/perception/lidar/points Subscription(/lidar/top/pointcloud)",
+    }  # fmt: skip
+    report = WindowReport(
+        window=Window(0, 2_000_000_000),
+        is_final=True,
+        paths=(),
+        executors=[thread],
+        losses=(),
+        discarded_events=0,
+        longest_flow_ns=0,
+        longest_wait_ns=0,
+    )
+    (line,) = [line for line in shown(report).splitlines() if "100 %" in line]
+    assert line.split("  ")[-3:-1] == [" 312 ms", "45.6 ms"]
+    assert line.endswith("pointcloud)")
+    assert "busy  blocked  longest  callback" in shown(report)

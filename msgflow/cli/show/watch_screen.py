@@ -33,7 +33,7 @@ _STEPS = 10
 _THREADS, _LOSSES, _VIOLATIONS = 5, 5, 5
 # Violations before the last one have no more than this part of the screen.
 _PART_OF_VIOLATIONS = 3
-_PATH_WIDTH, _CALLBACK_WIDTH = 26, 30
+_PATH_WIDTH, _CALLBACK_WIDTH = 26, 27
 _MISSING = ("dropped", "lost", "no_output", "unknown")
 _FATES = ("reached", "superseded", *_MISSING, "not_connected", "cut_by_recording")
 # By the title of the column that they sort by; what is worst comes first.

@@ -4,11 +4,12 @@
 --     set back. It takes the messages of a publisher in the order in which they were published. If
 --     several in a row are older than the one before (is_lasting), they were stamped after the
 --     clock was set back, by set_back_ns at least. A few in the wrong order may be those of threads
---     that were held up, or the clock was set back by little. step_ns says by how much, if both
---     messages waited for equally long (negative). Topics of several publishers say nothing, since
---     each has an order of its own. clock_id is the clock of the take and of the publication; NULL
---     where these are two.
--- grain: one row per take of a message that is older than the one taken before it
+--     that were held up, or the clock was set back by little. If both messages waited equally
+--     long, it was set by step_ns, which is negative. Topics of several publishers say nothing,
+--     since each has an order of its own. clock_id is the clock of the take and of the publication;
+--     NULL where these are two.
+-- grain: one row per take of a message that is older than the one taken before it, unless the next
+--     one is later than both
 -- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.clock_set_back(only_run) AS TABLE
 WITH on_clock AS (
@@ -31,6 +32,7 @@ received AS (
         CASE WHEN c.clock_id = p.clock_id THEN c.clock_id END AS clock_id,
         t.taken_ns - lag(t.taken_ns) OVER in_order AS passed_ns,
         lag(t.source_timestamp_ns) OVER in_order AS previous_stamp_ns,
+        lead(t.source_timestamp_ns) OVER in_order AS next_stamp_ns,
         max(t.source_timestamp_ns) OVER (
             in_order ROWS BETWEEN CURRENT ROW AND derive.clock_limit().quorum - 1 FOLLOWING
         ) AS latest_stamp_ns
@@ -53,3 +55,5 @@ SELECT
     latest_stamp_ns < previous_stamp_ns - derive.clock_limit().write_ns AS is_lasting
 FROM received
 WHERE source_timestamp_ns < previous_stamp_ns - derive.clock_limit().write_ns
+    -- Where two threads took two messages in the wrong order, the next one is the latest of all.
+    AND coalesce(next_stamp_ns <= previous_stamp_ns + derive.clock_limit().write_ns, true)
