@@ -218,6 +218,39 @@ def test_a_publication_has_one_message(rules: duckdb.DuckDBPyConnection, apart_n
     ] * 8
 
 
+def test_every_earlier_message_counts(rules: duckdb.DuckDBPyConnection) -> None:
+    """Without the first publication of half of the bursts, one publication later explains as much.
+
+    What denies it is that the last publication of a burst would have two messages. Few of them vote
+    in a stretch.
+    """
+    record(rules, width_ns=2_000, delay_ns=1_000, ppm=0, per_burst=12)
+    rules.execute(
+        "UPDATE published SET next_event_ns = next_event_ns + 20000 WHERE publication_id % 12 = 11"
+    )
+    rules.execute("DELETE FROM published WHERE publication_id % 24 = 0")
+    rows = rules.execute("SELECT difference_ns, is_sharp FROM derive.stamp_clock(1)").fetchall()
+    assert [(abs(difference) < 1_000, is_sharp) for difference, is_sharp in rows] == [
+        (True, True)
+    ] * 8
+
+
+def test_each_channel_has_its_message(rules: duckdb.DuckDBPyConnection) -> None:
+    """A message for one subscription does not take the place of one for another."""
+    record(rules, width_ns=2_000, delay_ns=1_000, ppm=0)
+    rules.execute(
+        "INSERT INTO message (source_timestamp_ns, only_subscription_id, taken_ns) "
+        "SELECT source_timestamp_ns + 300, 5, taken_ns FROM message"
+    )
+    rows = rules.execute(
+        "SELECT stretch, count(DISTINCT written_ns + greatest_ns), count(DISTINCT written_ns + "
+        "greatest_ns) FILTER (0 BETWEEN least_ns AND greatest_ns) FROM derive.stamp_pair(1) "
+        "GROUP BY stretch"
+    ).fetchall()
+    assert len(rows) == 8
+    assert all(allowed == count > 40 for _, count, allowed in rows)
+
+
 def test_three_stretches_on_either_side_vote_together(rules: duckdb.DuckDBPyConnection) -> None:
     """Threads that go on late say little; the first stretch has others."""
     record(rules, width_ns=2_000, delay_ns=1_000, ppm=20)

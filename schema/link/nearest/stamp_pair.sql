@@ -4,12 +4,13 @@
 --     was written and before the publishing thread went on, so each pair allows an interval of
 --     differences between the clock of stamps and that of the trace. If several publications
 --     follow each other before the thread goes on, each has the time until the next. A publication
---     has one message: where several could be its own, only the first one counts. Else a burst
---     could as well be one publication later, if its last one takes long. Some messages per
---     stretch of time are enough, of every publisher in turn. Those of topics with one publisher
---     come first: a message of another topic may be of none of a publisher's publications. A
---     message that was taken on this clock counts in one stretch, whatever publication it may be
---     of: else chance gives a wrong difference more messages than the right one.
+--     has one message: where several could be its own, only the first one counts, whether it is in
+--     the sample or not. Else a burst could as well be one publication later, if its last one
+--     takes long. Some messages per stretch of time are enough, of every publisher in turn. Those
+--     of topics with one publisher come first: a message of another topic may be of none of a
+--     publisher's publications. A message that was taken on this clock counts in one stretch,
+--     whatever publication it may be of: else chance gives a wrong difference more messages than
+--     the right one.
 -- grain: one row per clock, message in the sample and publication that it may be of
 -- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.stamp_pair(only_run) AS TABLE
@@ -27,7 +28,7 @@ WITH published AS MATERIALIZED (
     WINDOW in_order AS (PARTITION BY publisher_id ORDER BY written_ns, publication_id)
 ),
 message AS MATERIALIZED (
-    SELECT run_id, topic_name, source_timestamp_ns, clock_id, taken_ns
+    SELECT run_id, topic_name, source_timestamp_ns, only_subscription_id, clock_id, taken_ns
     FROM derive.unstamped_message(only_run)
 ),
 extent AS (
@@ -60,7 +61,7 @@ publisher AS (
 heard AS (
     SELECT
         m.run_id, p.clock_id, p.publisher_id, p.publisher_count, m.source_timestamp_ns,
-        m.clock_id AS taken_clock_id, m.taken_ns, x.stretch_ns,
+        m.only_subscription_id, m.clock_id AS taken_clock_id, m.taken_ns, x.stretch_ns,
         m.source_timestamp_ns BETWEEN x.start_ns AND x.end_ns AS is_in_time
     FROM message AS m
     JOIN publisher AS p ON m.run_id = p.run_id AND m.topic_name = p.topic_name
@@ -92,6 +93,7 @@ apart AS (
 placed AS (
     SELECT
         h.run_id, h.clock_id, h.publisher_id, h.publisher_count, h.source_timestamp_ns,
+        h.only_subscription_id,
         bool_or(h.taken_clock_id = h.clock_id) AS is_taken_here,
         coalesce(
             min(CASE WHEN h.taken_clock_id = h.clock_id THEN h.taken_ns END),
@@ -102,11 +104,16 @@ placed AS (
         CASE WHEN any_value(h.is_in_time) THEN h.source_timestamp_ns END AS stamped_ns
     FROM heard AS h
     LEFT JOIN apart AS a ON h.clock_id = a.clock_id AND h.taken_clock_id = a.taken_clock_id
-    GROUP BY h.run_id, h.clock_id, h.publisher_id, h.publisher_count, h.source_timestamp_ns
+    GROUP BY
+        h.run_id, h.clock_id, h.publisher_id, h.publisher_count, h.source_timestamp_ns,
+        h.only_subscription_id
 ),
 turn AS (
     SELECT
         *,
+        lag(source_timestamp_ns) OVER (
+            PARTITION BY publisher_id, only_subscription_id ORDER BY source_timestamp_ns
+        ) AS earlier_timestamp_ns,
         -- The stamp of a message that was taken here says about when it was published: the message
         -- of the stretch that waited least shows how far the clock of stamps is from this one.
         CASE WHEN is_taken_here THEN
@@ -135,8 +142,8 @@ turn AS (
 ),
 sampled AS (
     SELECT
-        run_id, clock_id, publisher_id, source_timestamp_ns, is_taken_here, near_ns, also_near_ns,
-        stamped_ns, start_ns, stretch_ns, only_stretch
+        run_id, clock_id, publisher_id, source_timestamp_ns, earlier_timestamp_ns, is_taken_here,
+        near_ns, also_near_ns, stamped_ns, start_ns, stretch_ns, only_stretch
     FROM turn
     QUALIFY row_number() OVER (
         PARTITION BY clock_id, stretch
@@ -148,8 +155,8 @@ sampled AS (
 -- first publication tells nothing.
 moment AS (
     SELECT
-        s.run_id, s.clock_id, s.publisher_id, s.source_timestamp_ns, s.start_ns, s.stretch_ns,
-        s.only_stretch,
+        s.run_id, s.clock_id, s.publisher_id, s.source_timestamp_ns, s.earlier_timestamp_ns,
+        s.start_ns, s.stretch_ns, s.only_stretch,
         CASE WHEN s.is_taken_here THEN s.near_ns END AS taken_ns,
         s.place, p.position
     FROM (
@@ -165,8 +172,8 @@ moment AS (
 ),
 wanted AS (
     SELECT
-        run_id, clock_id, publisher_id, source_timestamp_ns, start_ns, stretch_ns, only_stretch,
-        taken_ns,
+        run_id, clock_id, publisher_id, source_timestamp_ns, earlier_timestamp_ns, start_ns,
+        stretch_ns, only_stretch, taken_ns,
         arg_min(position, place) AS latest_position,
         unnest(
             list_distinct(
@@ -182,8 +189,8 @@ wanted AS (
         ) AS position
     FROM moment
     GROUP BY
-        run_id, clock_id, publisher_id, source_timestamp_ns, start_ns, stretch_ns, only_stretch,
-        taken_ns
+        run_id, clock_id, publisher_id, source_timestamp_ns, earlier_timestamp_ns, start_ns,
+        stretch_ns, only_stretch, taken_ns
 ),
 paired AS (
     SELECT
@@ -195,9 +202,7 @@ paired AS (
         w.source_timestamp_ns - p.written_ns AS greatest_ns,
         w.source_timestamp_ns - p.closes_ns AS least_ns,
         w.source_timestamp_ns - p.next_written_ns AS later_ns,
-        lag(w.source_timestamp_ns) OVER (
-            PARTITION BY w.publisher_id, w.position ORDER BY w.source_timestamp_ns
-        ) - p.written_ns AS earlier_ns
+        w.earlier_timestamp_ns - p.written_ns AS earlier_ns
     FROM wanted AS w
     JOIN published AS p
         ON w.publisher_id = p.publisher_id
