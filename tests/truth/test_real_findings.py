@@ -12,8 +12,12 @@ from msgflow.query.catalogue import load_query
 from msgflow.query.runner import run_query
 
 FINDINGS = """
-SELECT name, subject, count, detail FROM finding WHERE severity <> 'info' ORDER BY ALL
+SELECT name, regexp_replace(subject, '^/.*/real_[a-z]+/', ''), count, detail
+FROM finding
+WHERE severity <> 'info'
+ORDER BY ALL
 """
+_ROTATED = "ust/archives/20261124T070908+0000-20261124T070909+0000-3"
 # Recordings, and the start of each sentence of msgflow check.
 EXPECTED: dict[str, list[tuple[str, str | None, int]]] = {
     "real_cache": [("dead_end", "/cacher", 292), ("dead_end", "/joiner", 176)],
@@ -63,7 +67,31 @@ EXPECTED: dict[str, list[tuple[str, str | None, int]]] = {
         ("dead_end", "/object_fusion", 49),
         ("dead_end", "/tracker", 58),
     ],
+    "real_rotate": [
+        ("discarded_events", f"{_ROTATED}/ust/uid/65534/64-bit", 12),
+        ("unmatched_callback_end", f"{_ROTATED}/ust/uid/65534/64-bit", 2),
+        ("unmatched_take", f"{_ROTATED}/ust/uid/65534/64-bit", 1),
+    ],
     "real_services": [],
+    "real_tiny": [
+        ("busy_waiting", "perception 13811 on vm", 50_555),
+        ("dead_end", "/behaviour", 165),
+        ("dead_end", "/localizer", 203),
+        ("dead_end", "/points_fusion", 52),
+        ("discarded_events", "ust/ust/uid/65534/64-bit", 30_685),
+        ("eliminated_owner", "the input", 1),
+        ("inferred_object", "callbacks", 3),
+        ("inferred_object", "nodes", 1),
+        ("inferred_object", "publishers", 3),
+        ("inferred_object", "subscriptions", 2),
+        ("inferred_object", "timers", 1),
+        ("initialisation_lost", "perception 13811 on vm", 6),
+        ("initialisation_lost", "sensing 13814 on vm", 4),
+        ("topic_unnamed", "from [perception 13811]", 4),
+        ("unmatched_callback_end", "ust/ust/uid/65534/64-bit", 23),
+        ("unmatched_take", "ust/ust/uid/65534/64-bit", 2),
+        ("unmatched_take", "ust/ust/uid/65534/64-bit", 15),
+    ],
 }
 
 
