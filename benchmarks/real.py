@@ -16,7 +16,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from recording.recorder import NotPossibleError, record, systems
+from recording.recorder import NotPossibleError, record, require, systems
 from scoring import compare_real
 from truth import Judged, show
 
@@ -35,6 +35,7 @@ def main() -> None:
     arguments = parser.parse_args()
     judged: list[Judged] = []
     try:
+        require(arguments.python)
         for system in arguments.system or systems(arguments.python):
             judged += show(_judged(arguments.python, system, arguments.seconds, arguments.keep))
     except NotPossibleError as error:

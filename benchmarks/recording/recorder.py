@@ -36,8 +36,7 @@ def systems(python: Path) -> dict[str, list[str]]:
     code = "import json, nodes; print(json.dumps({k: [*v] for k, v in nodes.SYSTEMS.items()}))"
     run = subprocess.run(
         [python, "-c", code],
-        cwd=_NODES.parent,
-        env=ros_environment(python),
+        env=ros_environment(python) | {"PYTHONPATH": str(_NODES.parent)},
         capture_output=True,
         text=True,
         check=True,
