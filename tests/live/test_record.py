@@ -150,9 +150,11 @@ def test_a_terminal_shows_how_the_recording_goes(tmp_path: Path, program: list[s
 
 
 def test_discarded_events_are_said_at_once(record: Record, robot: list[str]) -> None:
+    """A consumer that stands still for a second is too slow on any machine."""
+    stalls = "sleep 1; pkill -STOP -x lttng-consumerd; sleep 1; pkill -CONT -x lttng-consumerd"
     ended = record(
-        *("--duration", "4", "--subbuf-size", "4K", "--num-subbuf", "2", "--no-ingest"),
-        *("--", *robot, "0.0001"),
+        *("--duration", "5", "--subbuf-size", "4K", "--num-subbuf", "2", "--no-ingest"),
+        *("--", "sh", "-c", f'({stalls}) & exec "$@"', "sh", *robot, "0.0005"),
     )
     assert ended.exit_code == 0, ended.err
     assert "--subbuf-size several times as large as 4K" in ended.err
