@@ -5,6 +5,7 @@
 --     kept it waiting. So at least half comes after a moment, since the take, when the timer was
 --     due, and within a tenth of its period. Or nearly all comes after such a moment, and within a
 --     period before the thread takes its next message: else the timer would have published again.
+--     Answers that take nearly a period follow such a moment by chance, but not all of them do.
 --     A timer is due at its initialisation plus whole periods. Executors of rclpy initialise a
 --     timer for every wait that may time out: the first of each period stands for all.
 -- grain: one row per publisher and period of a timer of its process that explains it
@@ -33,8 +34,9 @@ possible AS (
 ),
 late AS (
     SELECT
-        f.publisher_id, f.delay_ns, f.rest_ns, t.period_ns,
-        (f.start_ns - t.created_ns) % t.period_ns AS late_ns
+        f.publisher_id, f.delay_ns, t.period_ns,
+        (f.start_ns - t.created_ns) % t.period_ns AS late_ns,
+        coalesce(f.rest_ns <= t.period_ns, true) AS ends_in_period
     FROM query_table(followers) AS f
     JOIN possible AS t ON f.publisher_id = t.publisher_id
 ),
@@ -43,12 +45,14 @@ explained AS (
         publisher_id,
         count(*) AS publication_count,
         count(CASE WHEN late_ns <= least(delay_ns, period_ns / 10) THEN 1 END) AS prompt_count,
-        count(
-            CASE WHEN late_ns <= delay_ns AND coalesce(rest_ns <= period_ns, true) THEN 1 END
-        ) AS due_count
+        count(CASE WHEN ends_in_period AND late_ns <= delay_ns THEN 1 END) AS due_count,
+        -- So many would come after such a moment if they knew nothing of the timer.
+        sum(CASE WHEN ends_in_period THEN least(delay_ns, period_ns) / period_ns ELSE 0 END)
+            AS chance_count
     FROM late
     GROUP BY publisher_id, period_ns
 )
 SELECT publisher_id
 FROM explained
-WHERE prompt_count >= 0.5 * publication_count OR due_count >= 0.8 * publication_count
+WHERE prompt_count >= 0.5 * publication_count
+    OR due_count - chance_count >= 0.8 * (publication_count - chance_count)
