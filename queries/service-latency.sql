@@ -36,7 +36,7 @@
 -- brief: service_name, client, round_trip_median_ns, round_trip_p99_ns, round_trip_max_ns,
 --     requests, round_trip_p95_ns, answered, server, not_taken, not_answered, not_received,
 --     callback_median_ns, wait_median_ns, request_median_ns, response_median_ns, reply_median_ns
--- note: clocks
+-- note: requests
 WITH single_service AS (
     SELECT run_id, service_name, min(service_id) AS service_id
     FROM main.service

@@ -45,6 +45,7 @@
 -- column: is_internal BOOLEAN       Infrastructure of ROS
 -- brief: node, callback, count, missed, lateness_p99_ns, lateness_max_ns, off_grid, jitter_p99_ns,
 --     meanwhile, busy_share, run_queue_share, lateness_median_ns, rate_hz, bunched
+-- note: callbacks
 WITH asked AS (
     SELECT c.run_id, c.callback_id, c.timer_id, c.symbol, t.period_ns, t.created_ns
     FROM main.callback AS c

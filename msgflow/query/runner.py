@@ -117,18 +117,14 @@ def run_query(
     if part.has_window:
         notes += _beside(runs, window)
     notes += missing
-    narrowing = _narrowing(own, selection)
-    if (
-        runs
-        and not has_rows
-        and header.note == "kernel"
-        and not _kernel_was_traced(connection, runs)
-    ):
-        notes.append("the kernel was not traced: msgflow record --kernel, see docs/scheduling.md")
-    elif runs and not has_rows and narrowing:
-        why = _missing_way(connection, runs, own) or "try with less"
-        notes.append(f"nothing fits {' '.join(narrowing)}: {why}")
-    if header.note == "clocks" and table.num_rows:
+    if runs and not has_rows:
+        untraced = _untraced(connection, runs, header.note)
+        notes += untraced
+        narrowing = _narrowing(own, selection)
+        if narrowing and not untraced:
+            why = _missing_way(connection, runs, own) or "try with less"
+            notes.append(f"nothing fits {' '.join(narrowing)}: {why}")
+    if header.note in {"clocks", "requests"} and table.num_rows:
         notes += clock_notes(connection, runs)
     if header.note == "callbacks":
         notes += _without_callbacks(connection, runs)
@@ -266,6 +262,15 @@ def _beside(runs: Sequence[Run], window: Window) -> list[str]:
     return [f"{nothing}: it lasts {format_duration(last - first)}, from {format_epoch(first)}"]
 
 
+def _untraced(
+    connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], note: str | None
+) -> list[str]:
+    """Return notes on events of which the rows would have been, if the runs lack them."""
+    if note == "kernel" and not _kernel_was_traced(connection, runs):
+        return ["the kernel was not traced: msgflow record --kernel, see docs/scheduling.md"]
+    return _without_requests(connection, runs) if note == "requests" else []
+
+
 def _kernel_was_traced(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run]) -> bool:
     ((known,),) = connection.execute(
         "SELECT count(*) > 0 FROM main.thread_state WHERE list_contains($runs, run_id)",
@@ -289,6 +294,17 @@ def _without_callbacks(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run
         f"{len(rows)} {what} no callbacks, without rclcpp (as those of rclpy): {names};"
         " path-breakdown has their times from take to publication"
     ]
+
+
+def _without_requests(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run]) -> list[str]:
+    """Return a note for each run in which callbacks of services ran, and no request was traced."""
+    rows = connection.execute(
+        "SELECT run_id, detail FROM main.finding WHERE list_contains($runs, run_id) "
+        "AND name = 'missing_layer' AND subject = 'requests' ORDER BY run_id",
+        {"runs": [run.run_id for run in runs]},
+    ).fetchall()
+    titles = {run.run_id: "" if len(runs) == 1 else f"run {run.title}: " for run in runs}
+    return [f"{titles[run_id]}{detail}" for run_id, detail in rows]
 
 
 def _columns_hint(header: Header, error: Exception) -> str:

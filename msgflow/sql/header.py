@@ -21,6 +21,7 @@ The header ends at the first line that is not a `--` comment. Two spaces end a p
 - `note: clocks`: rows compare times of hosts, so the runner names clocks that differ.
 - `note: callbacks`: rows are made of callbacks, so the runner names processes that record none.
 - `note: kernel`: rows are made of the kernel's events, so the runner says where there are none.
+- `note: requests`: likewise of requests to services. The rows compare times of hosts as well.
 - `brief`: the columns that a narrow terminal shows, the most important first.
 - `answer`: columns that stay where they are 0 in all rows, since people ask for them.
 - `heading`: columns that stand above a table on a terminal, once for each value of the first one,
@@ -81,7 +82,7 @@ _SINGLE = (
     "brief", "answer", "heading", "slowest", "zero", "variant",
 )  # fmt: skip
 _KINDS = ("view", "inline", "macro")
-_NOTES = ("clocks", "callbacks", "kernel")
+_NOTES = ("clocks", "callbacks", "kernel", "requests")
 
 
 class HeaderError(ValueError):
@@ -159,7 +160,8 @@ class Header:
         cause: cause of a finding, else None.
         cure: remedy for a finding, else None.
         note: 'clocks' where rows compare times of several hosts, 'callbacks' or 'kernel' where they
-            are made of callbacks or of the kernel's events, else None.
+            are made of callbacks or of the kernel's events, 'requests' where they compare times of
+            requests to services, else None.
         body: the SQL below the header; of a query in steps, the statement that returns its rows.
         path: the file.
         brief: columns for where not all have a place, the most important first.

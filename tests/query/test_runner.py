@@ -361,6 +361,29 @@ def test_processes_that_record_no_callbacks_are_named(
     assert not run_query(connection, header(QUERY), {}, Slice(run="first")).notes[1:]
 
 
+def test_requests_that_were_not_traced_are_the_reason_for_no_rows(
+    connection: duckdb.DuckDBPyConnection,
+) -> None:
+    connection.execute(
+        "CREATE TABLE finding AS SELECT * FROM (VALUES "
+        "(1, 'missing_layer', 'requests', 'no request'), (2, 'missing_layer', 'requests', 'none'), "
+        "(1, 'missing_layer', 'goals', 'no goal'), (1, 'started_late', 'requests', 'late')) "
+        "AS t (run_id, name, subject, detail)"
+    )
+    connection.execute("CREATE TABLE clock AS SELECT 1 AS run_id")
+    noted = header(QUERY.replace("-- param", "-- note: requests\n-- param"))
+
+    def notes(run: str, where: str | None = "start_ns < 0") -> list[str]:
+        narrowed = make_selection({"where": where})
+        return list(run_query(connection, noted, {}, Slice(run), selection=narrowed).notes)
+
+    assert notes("first") == ["no request"]
+    assert notes("all") == ["run first (1): no request", "run second (2): none"]
+    assert "no request" not in notes("first", None)
+    connection.execute("DELETE FROM finding WHERE subject = 'requests'")
+    assert notes("first") == ["nothing fits --where 'start_ns < 0': try with less"]
+
+
 def test_an_empty_answer_about_the_kernel_says_whether_it_was_traced(
     connection: duckdb.DuckDBPyConnection,
 ) -> None:

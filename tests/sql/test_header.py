@@ -99,6 +99,7 @@ def test_a_note_is_kept() -> None:
     assert parse_with("-- note: clocks").note == "clocks"
     assert parse_with("-- note: callbacks").note == "callbacks"
     assert parse_with("-- note: kernel").note == "kernel"
+    assert parse_with("-- note: requests").note == "requests"
     assert parse_with("-- grain: one row").note is None
 
 
