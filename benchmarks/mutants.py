@@ -124,6 +124,7 @@ RULES = (
     ("model/gap/silence.sql", ("model/test_loss.py",)),
     ("model/gap/pause.sql", ("model/test_loss.py",)),
     ("model/identity/process_life.sql", ("model/test_process.py",)),
+    ("model/identity/mixed_process.sql", ("model/test_process.py",)),
     ("model/callback/user_event.sql", ("model/test_user_event.py",)),
     ("overlap/session_container.sql", ("schema/test_session_container.py",)),
     ("overlap/session_pair.sql", ("schema/test_session_pair.py",)),

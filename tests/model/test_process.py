@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from analysis import Analyse
 from ros_system import RosSystem
-from staged_events import Thread
+from staged_events import STEP_NS, Thread
 
 MAIN = Thread(100)
 LIVES = "SELECT pid, life, name, first_seen_ns, last_seen_ns FROM store.process ORDER BY process_id"
@@ -450,3 +452,163 @@ def test_a_life_ends_the_runs_of_its_threads(system: RosSystem, analyse: Analyse
     assert len(model.rows(LIVES)) == 2
     assert model.column("SELECT end_ns FROM callback_instance") == [None]
     assert model.rows("SELECT * FROM link_causal") == []
+
+
+FAST_DDS = [1, 15]
+
+
+def gid(process: int, entity: int, vendor: list[int] = FAST_DDS, participant: int = 1) -> list[int]:
+    """Return the GID of an endpoint, where DDS gives each process a number of its own."""
+    return [*vendor, 8, 9, 7, 0, 6, process, participant, 0, 0, 0, 0, 0, entity, 3]
+
+
+MIXED = "SELECT pid, is_ambiguous FROM store.process ORDER BY process_id"
+FRONT = Thread(7, pid_ns=1)
+
+
+@pytest.mark.parametrize(
+    ("used", "rear"),
+    [
+        ("publisher", FRONT),
+        ("subscription", FRONT),
+        ("creation", FRONT),
+        ("publisher", replace(FRONT, pid=8)),
+        ("publisher", replace(FRONT, trace=1)),
+        ("publisher", replace(FRONT, pid_ns=2)),
+    ],
+)
+def test_objects_of_several_processes_are_used_by_turns(
+    system: RosSystem, analyse: Analyse, used: str, rear: Thread
+) -> None:
+    """Containers whose programs have one name, on one CPU."""
+    system.add_source(1, "beta", "boot-b")
+    system.publisher(FRONT, 0x10, "/a", gid=gid(1, 1))
+    system.subscription(FRONT, 0x20, "/b", gid=gid(1, 2))
+    system.publisher(rear, 0x30, "/b", gid=gid(2, 1))
+    system.subscription(rear, 0x40, "/a", gid=gid(2, 2))
+    system.publish(rear, 0x30, 1)
+    worker = replace(FRONT, tid=17)
+    if used == "publisher":
+        system.publish(worker, 0x10, 1)
+    elif used == "subscription":
+        system.take(worker, 0x20, 1)
+    else:
+        system.publisher(worker, 0x50, "/c", gid=gid(1, 3))
+    system.take(rear, 0x40, 1)
+    expected = [(7, True)] if rear == FRONT else [(7, False), (rear.pid, False)]
+    assert analyse(system).rows(MIXED) == expected
+
+
+def test_a_publisher_of_several_layers_is_of_one_process(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    """The layers of two processes were made by turns."""
+    for number in (1, 2):
+        system.add("ros2:rmw_publisher_init", MAIN, rmw_publisher_handle=number, gid=gid(number, 1))
+    for number in (1, 2):
+        system.add(
+            "ros2:rcl_publisher_init",
+            MAIN,
+            publisher_handle=0x10 + number,
+            rmw_publisher_handle=number,
+        )
+    system.publish(MAIN, 0x11, 1, rmw=1)
+    assert analyse(system).rows(MIXED) == [(100, True)]
+
+
+def test_two_participants_of_a_process_take_turns(system: RosSystem, analyse: Analyse) -> None:
+    """It initialised ROS twice, for two domains. A later process has its id."""
+    for number in (1, 2):
+        system.context(MAIN, 0xC0 + number)
+        system.publisher(MAIN, number, "/a", gid=gid(1, number, participant=number))
+    for _ in range(2):
+        system.publish(MAIN, 1, 1)
+        system.publish(MAIN, 2, 1)
+    system.publisher(MAIN, 3, "/a", gid=gid(2, 1))
+    assert analyse(system).rows(MIXED) == [(100, False)]
+
+
+@pytest.mark.parametrize("vendor", [[1, 16], [2, 15]])
+def test_other_middlewares_make_gids_as_they_like(
+    system: RosSystem, analyse: Analyse, vendor: list[int]
+) -> None:
+    for number in (1, 2):
+        system.publisher(MAIN, number, "/a", gid=gid(number, number, vendor))
+    system.publish(MAIN, 1, 1)
+    assert analyse(system).rows(MIXED) == [(100, False)]
+
+
+@pytest.mark.parametrize("handle", [0x10, 0x20])
+def test_objects_of_processes_that_follow_each_other(
+    system: RosSystem, analyse: Analyse, handle: int
+) -> None:
+    """The later one has its publisher at the address of the earlier one, or not. So has another."""
+    other = Thread(200)
+    publishers = {1: 0x10, 2: handle}
+
+    def begin(thread: Thread, life: int) -> None:
+        system.context(thread, 0xC0 + life)
+        system.publisher(thread, publishers[life], "/a", gid=gid(thread.pid + life, 1))
+        system.subscription(thread, 0x30, "/b", gid=gid(thread.pid + life, 2))
+
+    def use(thread: Thread, life: int) -> None:
+        system.publish(thread, publishers[life], life)
+        system.take(thread, 0x30, life)
+
+    begin(other, 1)
+    begin(MAIN, 1)
+    use(MAIN, 1)
+    begin(MAIN, 2)
+    use(other, 1)
+    begin(other, 2)
+    use(MAIN, 2)
+    use(other, 2)
+    assert not any(is_ambiguous for _, is_ambiguous in analyse(system).rows(MIXED))
+
+
+def test_addresses_are_those_of_one_process(system: RosSystem, analyse: Analyse) -> None:
+    """Another process has the same ones, and a later one has the id of each."""
+    other = Thread(200)
+
+    def rmw(thread: Thread, life: int, handle: int) -> None:
+        own = gid(thread.pid + life, 1)
+        system.add("ros2:rmw_publisher_init", thread, rmw_publisher_handle=handle, gid=own)
+
+    def rcl(thread: Thread, handle: int, rmw_handle: int) -> None:
+        handles = {"publisher_handle": handle, "rmw_publisher_handle": rmw_handle}
+        system.add("ros2:rcl_publisher_init", thread, **handles)
+
+    rmw(MAIN, 1, 1)
+    rmw(other, 1, 1)
+    rcl(MAIN, 0x10, 1)
+    system.publish(MAIN, 0x10, 1, rmw=1)
+    system.publisher(MAIN, 0x30, "/a", gid=gid(101, 2))
+    rmw(MAIN, 2, 2)
+    rcl(MAIN, 0x20, 2)
+    rmw(other, 2, 1)
+    rcl(other, 0x20, 1)
+    system.publish(MAIN, 0x20, 1, rmw=2)
+    assert analyse(system).rows(MIXED) == [(100, False), (200, False)]
+
+
+@pytest.mark.parametrize(
+    ("lost", "is_mixed"),
+    [("before", True), ("between", False), ("behind", True), ("elsewhere", True)],
+)
+def test_a_publisher_used_behind_a_gap_may_be_of_a_later_process(
+    system: RosSystem, analyse: Analyse, lost: str, is_mixed: bool
+) -> None:
+    system.node(MAIN, 1, "a")
+    system.wait(100)
+    made = system.publisher(MAIN, 0x10, "/a", gid=gid(1, 1)) - STEP_NS
+    system.wait(100)
+    system.subscription(MAIN, 0x30, "/b", gid=gid(2, 1))
+    used = system.publish(MAIN, 0x10, 1, layers="rcl")
+    system.wait(100)
+    end = system.publish(MAIN, 0x10, 2)
+    system.add_source(1, "beta", "boot-b")
+    between = (made + 20, made + 50)
+    gaps = {"before": (made - 50, made), "between": between, "behind": (used, used + 50)}
+    lose(system, 0, gaps.get(lost, (end, end + 1)), (end + 1, end + 5))
+    lose(system, 1, between)
+    assert analyse(system).rows(MIXED) == [(100, is_mixed)]

@@ -45,10 +45,11 @@ class RosSystem(StagedEvents):
         node: int = 0x1,
         rmw: int | None = None,
         depth: int = 10,
+        gid: list[int] | None = None,
     ) -> int:
         """rmw_publisher_init and rcl_publisher_init; returns the time of the latter."""
         rmw_handle = handle + RMW if rmw is None else rmw
-        self.add("ros2:rmw_publisher_init", thread, rmw_publisher_handle=rmw_handle)
+        self.add("ros2:rmw_publisher_init", thread, rmw_publisher_handle=rmw_handle, gid=gid)
         return self.add(
             "ros2:rcl_publisher_init",
             thread,
@@ -75,10 +76,11 @@ class RosSystem(StagedEvents):
         callback: int | None = None,
         rmw: int | None = None,
         depth: int = 10,
+        gid: list[int] | None = None,
     ) -> int:
         """The rcl subscription and, with a callback, its rclcpp object."""
         rmw_handle = handle + RMW if rmw is None else rmw
-        self.add("ros2:rmw_subscription_init", thread, rmw_subscription_handle=rmw_handle)
+        self.add("ros2:rmw_subscription_init", thread, rmw_subscription_handle=rmw_handle, gid=gid)
         created = self.add(
             "ros2:rcl_subscription_init",
             thread,

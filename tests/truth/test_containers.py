@@ -31,18 +31,26 @@ def test_processes_with_equal_ids_are_told_apart(tmp_path: Path, name: str) -> N
     assert [finding.severity for finding in report.findings if "ids" in finding.name] == ["info"]
 
 
-def test_links_of_processes_that_cannot_be_told_apart_are_marked(tmp_path: Path) -> None:
+@pytest.mark.parametrize("cpu_count", [4, pytest.param(1, marks=pytest.mark.thorough)])
+def test_links_of_processes_that_cannot_be_told_apart_are_marked(
+    tmp_path: Path, cpu_count: int
+) -> None:
     """Programs of one name: nothing in the trace says which of them an event is of."""
     scenario = scenarios()["containers_one_daemon"]
-    processes = tuple(replace(process, name="component") for process in scenario.processes)
-    simulation = simulate(replace(scenario, processes=processes), tmp_path / "trace", factor=0.1)
+    mixture = replace(
+        scenario,
+        hosts=tuple(replace(host, cpu_count=cpu_count) for host in scenario.hosts),
+        processes=tuple(replace(process, name="component") for process in scenario.processes),
+    )
+    simulation = simulate(mixture, tmp_path / "trace", factor=0.1)
     report = ingest([simulation.directory], tmp_path / "run.duckdb")
     (mixed,) = (finding for finding in report.findings if finding.name == "mixed_processes")
     assert mixed.severity == "error"
     assert mixed.detail.endswith("component 7 on alpha")
     scores, _ = compare_simulated(tmp_path / "run.duckdb", simulation.truth)
     links = {score.kind: score for score in scores if score.kind in {"direct", "transport"}}
-    assert links["direct"].misguessed > 0
+    # On one CPU, no simulated thread interrupts the callback of another.
+    assert (links["direct"].misguessed > 0) == (cpu_count > 1)
     assert [score.wrong for score in links.values()] == [0, 0]
     with duckdb.connect(str(tmp_path / "run.duckdb"), read_only=True) as con:
         for view in ("link_transport", "link_causal"):

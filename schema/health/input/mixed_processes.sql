@@ -1,9 +1,11 @@
 -- name: finding.mixed_processes
 -- title: Processes with equal ids cannot be told apart
--- description: Threads were on two CPUs at one moment: they are threads of several processes that
---     have the same ids and names. Each such mixture is one process here. Its objects, callbacks
---     and executors may be those of any of them, all its links between messages and callbacks have
---     a candidate_count above 1, and flows do not pass its callbacks.
+-- description: Several processes have the same ids and names, and their events are mixed. A thread
+--     was on two CPUs at one moment, or publishers and subscriptions were used by turns, whose GIDs
+--     Fast DDS made in several processes. Each such mixture is one process here. Its objects,
+--     callbacks and executors may be those of any of them, all its links between messages and
+--     callbacks have a candidate_count above 1, and flows do not pass its callbacks. A mixture may
+--     show neither sign, as with another middleware on one CPU.
 -- cause: Containers number their processes alike, and share a session daemon, or a hostname. Or the
 --     session lacks the ids of processes and threads.
 -- cure: Record the ids and their namespace (lttng add-context -u -t vpid -t vtid -t pid_ns), or

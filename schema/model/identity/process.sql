@@ -1,7 +1,6 @@
 -- name: staging.process
 -- description: Process lives. The name is that of the main thread (tid = pid), else of the first
---     thread seen; the version is what rcl_init stated, for display only. A thread that was on two
---     CPUs at one moment is several of processes with equal ids: all of these are ambiguous.
+--     thread seen; the version is what rcl_init stated, for display only.
 -- grain: one row per process life
 WITH life AS (
     SELECT
@@ -34,11 +33,6 @@ version AS (
         AND i.event_id >= l.from_event_id
         AND i.event_id < l.until_event_id
     GROUP BY ALL
-),
-ambiguous AS (
-    SELECT DISTINCT host_id, pid_ns, vpid
-    FROM staging.thread_seen
-    WHERE thread_index IN (SELECT thread_index FROM raw.cpu_return)
 )
 SELECT
     row_number() OVER (ORDER BY l.first_event_id) AS process_id,
@@ -50,12 +44,12 @@ SELECT
     l.last_seen_ns,
     l.pid_ns AS pid_namespace,
     l.life::INTEGER AS life,
-    a.vpid IS NOT NULL AS is_ambiguous
+    m.vpid IS NOT NULL AS is_ambiguous
 FROM life AS l
 LEFT JOIN version AS v
     ON l.host_id = v.host_id
     AND l.pid_ns IS NOT DISTINCT FROM v.pid_ns
     AND l.vpid = v.vpid
     AND l.life = v.life
-LEFT JOIN ambiguous AS a
-    ON l.host_id = a.host_id AND l.pid_ns IS NOT DISTINCT FROM a.pid_ns AND l.vpid = a.vpid
+LEFT JOIN staging.mixed_process AS m
+    ON l.host_id = m.host_id AND l.pid_ns IS NOT DISTINCT FROM m.pid_ns AND l.vpid = m.vpid
