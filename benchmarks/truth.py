@@ -63,9 +63,9 @@ LOWEST_RECALL |= dict.fromkeys(
 # Likewise of recordings: around a step of the clock, messages may be on either side; two in a
 # second leave little time without one.
 LOWEST_RECALL |= {"steps": 0.92, "clock_step": 0.995}
-# In Humble, a message may be of any write that goes on at the time of its stamp. The truth of
-# recordings does not say where that leaves several.
-LOWEST_RECALL |= {"large_messages": 0.96, "shared_publisher": 0.98, "untraced_rival": 0.998}
+# One of 6,508 was stamped 13.7 ms after its write, much later than others. The publisher writes for
+# most of the time, so the message could as well be of one that is not traced.
+LOWEST_RECALL |= {"shared_publisher": 0.9998}
 # Recorded with losses: their truth says which events are missing, but not where others might be. A
 # link over such a place is not decided, and a publication may be torn in two. Precision is judged.
 LOSSY_RECORDINGS = {"intra_lost", "lossy_intra", "lossy_intra_mt"}

@@ -17,7 +17,7 @@ EXCUSE = "events are missing"
 _SQL = Path(__file__).parent
 _RECORDED_COLUMNS = """{
     t: 'VARCHAR', id: 'VARCHAR', name: 'VARCHAR', kind: 'VARCHAR', host: 'VARCHAR',
-    vpid: 'INTEGER', vtid: 'INTEGER',
+    vpid: 'INTEGER', vtid: 'INTEGER', topic: 'VARCHAR', src: 'BIGINT',
     ev: 'MAP(VARCHAR, BIGINT)', "start": 'BIGINT', "end": 'BIGINT', msg: 'VARCHAR', cb: 'VARCHAR',
     seen: 'INTEGER', "in": 'VARCHAR', "out": 'VARCHAR', type: 'VARCHAR', annot: 'INTEGER',
     flavour: 'VARCHAR', hosts: 'MAP(VARCHAR, STRUCT(hostname VARCHAR))'

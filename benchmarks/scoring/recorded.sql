@@ -56,6 +56,47 @@ doubtful AS (
     WHERE l.t = 'link' AND l.type IN ('periodic_async', 'partial_sync')
         AND (o.id IS NOT NULL OR coalesce(i."end" > r."start", true))
 ),
+-- In Humble, messages are told by the times of their stamps alone. A write goes on until the next
+-- event of the thread; what was written is stamped meanwhile.
+written AS (
+    SELECT
+        b.id, b.topic, b.host, b.written_ns, e.ts_ns AS next_ns,
+        -- The least time to a stamp is none, before and behind a step of the clock alike.
+        b.src - greatest(
+            min(b.src - b.written_ns) OVER (
+                on_host RANGE BETWEEN 100_000_000 PRECEDING AND CURRENT ROW
+            ),
+            min(b.src - b.written_ns) OVER (
+                on_host RANGE BETWEEN CURRENT ROW AND 100_000_000 FOLLOWING
+            )
+        ) AS stamped_ns
+    FROM (SELECT *, ev['rmw_publish'] AS written_ns FROM pub) AS b
+    ASOF LEFT JOIN (
+        SELECT host, vpid, vtid, unnest(map_values(ev)) AS ts_ns FROM recorded
+        UNION ALL
+        SELECT host, vpid, vtid, unnest(["start", "end"]) FROM callback
+    ) AS e
+        ON b.host = e.host AND b.vpid = e.vpid AND b.vtid = e.vtid AND b.written_ns < e.ts_ns
+    WHERE b.written_ns IS NOT NULL
+        AND 'humble' IN (SELECT flavour FROM recorded WHERE t = 'meta')
+    WINDOW on_host AS (PARTITION BY b.host ORDER BY b.written_ns)
+),
+-- A message may be of any write of its topic that goes on at its stamp. Two messages that were
+-- stamped in one write, one of them by a publisher that is not traced, may both be of it.
+rivalled AS (
+    SELECT a.id
+    FROM written AS a
+    JOIN written AS b
+        ON a.topic = b.topic AND a.host = b.host AND a.id <> b.id
+        AND a.stamped_ns >= b.written_ns AND coalesce(a.stamped_ns < b.next_ns, true)
+    UNION
+    SELECT a.id
+    FROM written AS a
+    JOIN pub AS o ON a.topic = o.topic AND a.host = o.host AND o.ev['rmw_publish'] IS NULL
+    SEMI JOIN take AS k ON o.id = k.msg
+    JOIN pub AS b ON a.id = b.id
+    WHERE o.src - (b.src - a.stamped_ns) BETWEEN a.written_ns AND a.next_ns
+),
 link AS (
     SELECT
         l.type, k.cb, l."out", l.seen = 1 AND d."in" IS NULL AS is_seen
@@ -66,7 +107,9 @@ link AS (
 )
 SELECT
     'transport' AS kind, 'publication' AS from_kind, p.id AS from_id, 'take' AS to_kind,
-    k.id AS to_id, p.seen = 1 AND k.seen = 1 AS is_decided
+    k.id AS to_id,
+    p.seen = 1 AND k.seen = 1
+    AND (k.kind = 'intra' OR p.id NOT IN (FROM rivalled)) AS is_decided
 FROM take AS k
 JOIN pub AS p ON k.msg = p.id
 WHERE k.kind IN ('topic', 'intra')
