@@ -53,14 +53,18 @@ BEHIND_CONDITION = {
     "JOIN", "LEFT", "ASOF", "SEMI", "ANTI", "CROSS", "WHERE", "AS", "ELSE", "END", ",",
 }  # fmt: skip
 ONLY_RUN = re.compile(r"(\w+\.)?run_id (= (only_run|\w+\.run_id)|IN \(SELECT run_id FROM \w+\))")
-# Findings with numbers of their own: their golden cases have to notice when one changes.
+# Findings with conditions of their own: their golden cases have to notice when one changes.
 FINDINGS = (
     "busy_waiting",
     "clock_jumps",
     "discarded_events",
+    "doubtful_answer",
     "latency_uncertain",
+    "missing_layer",
     "path_cut",
     "process_fell_silent",
+    "service_without_callbacks",
+    "started_late",
     "stream_ends_early",
 )
 # Rules about messages that are matched by time, with cases of their own.
@@ -106,6 +110,10 @@ RULES = (
         for each in ("approximate_message", "approximate_set")
     ),
     (
+        "link/causal/link_causal_approximate.sql",
+        ("schema/cases/derive.link_causal_indirect", "model/test_approximate_links.py"),
+    ),
+    (
         "link/causal/link_causal_indirect.sql",
         ("schema/cases/derive.link_causal_indirect", "model/test_nested_inputs.py"),
     ),
@@ -126,6 +134,17 @@ RULES = (
     ("model/identity/process_life.sql", ("model/test_process.py",)),
     ("model/identity/mixed_process.sql", ("model/test_process.py",)),
     ("model/callback/user_event.sql", ("model/test_user_event.py",)),
+    ("model/callback/deferred_end.sql", ("model/test_service.py",)),
+    ("model/service/lifecycle_service.sql", ("model/test_service.py",)),
+    ("model/object/timer_use.sql", ("model/test_unknown_objects.py",)),
+    (
+        "model/executor/executor_polled.sql",
+        ("schema/cases/finding.polled_executor", "model/test_executor.py"),
+    ),
+    *(
+        (f"overlap/{each}.sql", ("schema/test_given_namespace.py",))
+        for each in ("given_namespace", "alternating_name")
+    ),
     ("overlap/session_container.sql", ("schema/test_session_container.py",)),
     ("overlap/session_pair.sql", ("schema/test_session_pair.py",)),
     ("public/goal.sql", ("schema/cases/main.goal",)),
