@@ -110,6 +110,31 @@ def test_a_message_is_stamped_within_its_write_and_taken_behind(
 
 
 @pytest.mark.parametrize(
+    ("closed_for", "is_told"),
+    [
+        pytest.param(1_700, False, id="as_at_the_start_of_a_container"),
+        pytest.param(3_999, False, id="less_than_all_others_take"),
+        pytest.param(4_000, True, id="more"),
+    ],
+)
+def test_a_message_may_be_of_what_was_written_right_before(
+    rules: duckdb.DuckDBPyConnection, closed_for: int, *, is_told: bool
+) -> None:
+    """All others come 4 µs after their writes: the clocks may differ by as much more.
+
+    This one comes 1.3 µs after the second of two. It would be of the first one then, if that write
+    was over for less than 4 µs.
+    """
+    clock(rules, (0, 1_000, 0))
+    second = periodic(rules, [4_000] * 110, 50_000)
+    stamp = second + 1_300
+    publish(rules, 1_000, stamp - closed_for - 2_300, stamp - closed_for)
+    publish(rules, 1_001, second, second + 50_000)
+    take(rules, stamp)
+    assert nearest(rules)[stamp] == (1_001 if is_told else None, 1)
+
+
+@pytest.mark.parametrize(
     ("clocks", "is_found"),
     [
         pytest.param([1, 1], False, id="first_here"),

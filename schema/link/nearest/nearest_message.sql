@@ -8,7 +8,9 @@
 --     bound the search. A message has no publication where that would be a guess: where several
 --     come into question; where two messages may both be of one publication; where another
 --     publication or message is within what a drift could move it, if the drift is not known; if it
---     was stamped sooner after a publication than is usual, and another publication may be lost.
+--     was stamped sooner after a publication than is usual, and another publication may be lost, or
+--     the thread was writing one just before: the difference of the clocks may be greater by what
+--     nearly all messages take at least.
 --     Nor has it one where the difference of the clocks is not known, or explains less than half of
 --     the messages.
 -- grain: one row per message that has, or might have, a publication
@@ -97,6 +99,9 @@ published AS MATERIALIZED (
         written_ns + then_ns AS opens_ns,
         next_event_ns + then_ns AS closes_ns,
         next_event_ns IS NOT NULL AND NOT has_break AS goes_on,
+        lag(next_event_ns + then_ns) OVER (
+            PARTITION BY side, publisher_id, thread_id ORDER BY written_ns, publication_id
+        ) AS closed_ns,
         wander_ns,
         wander_ns > 0 AND coalesce(
             least(
@@ -175,6 +180,7 @@ looked_up AS MATERIALIZED (
             false
         ) AS is_crowded,
         source_timestamp_ns - opens_ns AS delay_ns,
+        source_timestamp_ns - closed_ns AS closed_for_ns,
         source_timestamp_ns >= opens_ns AND coalesce(source_timestamp_ns < closes_ns, true)
             AS is_within,
         coalesce(source_timestamp_ns < closes_ns + wander_ns, true) AS is_near
@@ -187,7 +193,7 @@ looked_up AS MATERIALIZED (
 within AS MATERIALIZED (
     SELECT
         topic_name, publisher_id, source_timestamp_ns, only_subscription_id, publication_id,
-        clock_id, goes_on, is_crowded, delay_ns,
+        clock_id, goes_on, is_crowded, delay_ns, closed_for_ns,
         row_number() OVER (
             PARTITION BY publication_id, side, only_subscription_id ORDER BY source_timestamp_ns
         ) AS place
@@ -286,7 +292,8 @@ candidate AS MATERIALIZED (
     FROM (
         SELECT
             w.topic_name, w.source_timestamp_ns, w.only_subscription_id, w.publisher_id,
-            w.publication_id, w.is_crowded, w.goes_on,
+            w.publication_id, w.goes_on,
+            w.is_crowded OR coalesce(w.closed_for_ns < c.least_ns, false) AS is_crowded,
             w.delay_ns <= u.usual_ns AS is_prompt,
             coalesce(derive.clock_limit().usual_factor * w.delay_ns < c.least_ns, false)
                 AS is_hasty,
