@@ -109,6 +109,19 @@ def test_a_message_is_stamped_within_its_write_and_taken_behind(
     assert nearest(rules) == expected | ({stamp: (1, 1)} if is_found else {})
 
 
+def close_pair(con: duckdb.DuckDBPyConnection, at: int, closed_for: int) -> int:
+    """Two publications of which the second is written at that time; the stamp of one message.
+
+    It comes 1.3 µs after the second write, and so long after the first one was over.
+    """
+    stamp = at + 1_300
+    publish(con, at, stamp - closed_for - 2_300, stamp - closed_for)
+    publish(con, at + 1, at, at + 50_000)
+    take(con, stamp)
+    return stamp
+
+
+@pytest.mark.parametrize("others", [20, 110])
 @pytest.mark.parametrize(
     ("closed_for", "is_told"),
     [
@@ -118,20 +131,40 @@ def test_a_message_is_stamped_within_its_write_and_taken_behind(
     ],
 )
 def test_a_message_may_be_of_what_was_written_right_before(
-    rules: duckdb.DuckDBPyConnection, closed_for: int, *, is_told: bool
+    rules: duckdb.DuckDBPyConnection, others: int, closed_for: int, *, is_told: bool
 ) -> None:
     """All others come 4 µs after their writes: the clocks may differ by as much more.
 
-    This one comes 1.3 µs after the second of two. It would be of the first one then, if that write
-    was over for less than 4 µs.
+    The message would be of the first write then, if that was over for less than 4 µs.
     """
     clock(rules, (0, 1_000, 0))
-    second = periodic(rules, [4_000] * 110, 50_000)
-    stamp = second + 1_300
-    publish(rules, 1_000, stamp - closed_for - 2_300, stamp - closed_for)
-    publish(rules, 1_001, second, second + 50_000)
-    take(rules, stamp)
-    assert nearest(rules)[stamp] == (1_001 if is_told else None, 1)
+    at = periodic(rules, [4_000] * others, 50_000)
+    stamp = close_pair(rules, at, closed_for)
+    assert nearest(rules)[stamp] == (at + 1 if is_told else None, 1)
+
+
+@pytest.mark.parametrize(("closed_for", "is_told"), [(499_999, False), (500_000, True)])
+def test_what_messages_take_is_told_by_those_that_follow_no_other_write(
+    rules: duckdb.DuckDBPyConnection, closed_for: int, *, is_told: bool
+) -> None:
+    """A message comes 1.3 µs after its write, as the one in question: is it of this write?"""
+    clock(rules, (0, 1_000, 0))
+    at = periodic(rules, [4_000] * 20, 50_000)
+    close_pair(rules, at, closed_for)
+    stamp = close_pair(rules, at + PERIOD, 1_700)
+    assert nearest(rules)[stamp] == (at + PERIOD + 1 if is_told else None, 1)
+
+
+def test_a_burst_is_told_where_every_write_follows_another(
+    rules: duckdb.DuckDBPyConnection,
+) -> None:
+    clock(rules, (0, 1_000, 0))
+    publish(rules, 0, 0, 1_000)
+    stamps = range(2_500, 102_500, 2_000)
+    for stamp in stamps:
+        publish(rules, stamp, stamp - 500, stamp + 500)
+        take(rules, stamp)
+    assert nearest(rules) == {stamp: (stamp, 1) for stamp in stamps}
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@
 --     publication or message is within what a drift could move it, if the drift is not known; if it
 --     was stamped sooner after a publication than is usual, and another publication may be lost, or
 --     the thread was writing one just before: the difference of the clocks may be greater by what
---     nearly all messages take at least.
+--     nearly all messages take at least that follow no other write.
 --     Nor has it one where the difference of the clocks is not known, or explains less than half of
 --     the messages.
 -- grain: one row per message that has, or might have, a publication
@@ -266,6 +266,9 @@ usual_of_clock AS (
         clock_id,
         quantile_disc(delay_ns, derive.clock_limit().usual_quantile) AS usual_ns,
         quantile_disc(delay_ns, 1 - derive.clock_limit().usual_quantile) AS least_ns,
+        -- Only a message behind another write could be of that one.
+        quantile_disc(delay_ns, 1 - derive.clock_limit().usual_quantile)
+            FILTER (coalesce(closed_for_ns >= derive.clock_limit().burst_ns, true)) AS alone_ns,
         -- The usual delay of topics without other publishers, if enough messages show it.
         CASE
             WHEN count(*) FILTER (topic_name NOT IN (FROM strange))
@@ -293,7 +296,7 @@ candidate AS MATERIALIZED (
         SELECT
             w.topic_name, w.source_timestamp_ns, w.only_subscription_id, w.publisher_id,
             w.publication_id, w.goes_on,
-            w.is_crowded OR coalesce(w.closed_for_ns < c.least_ns, false) AS is_crowded,
+            w.is_crowded OR coalesce(w.closed_for_ns < c.alone_ns, false) AS is_crowded,
             w.delay_ns <= u.usual_ns AS is_prompt,
             coalesce(derive.clock_limit().usual_factor * w.delay_ns < c.least_ns, false)
                 AS is_hasty,
