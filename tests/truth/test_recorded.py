@@ -146,7 +146,7 @@ ONCE_WRONG = {
     "untraced_rival": {"transport": 1.0},
     # Writes that go on at the same time: some messages may be of either.
     "large_messages": {"transport": 1.0},
-    # One message was stamped much later than usual, and could be of somebody else.
+    # One message was stamped so late that later ones of other threads had been taken before.
     "shared_publisher": {"transport": 0.9998},
 }
 # How many messages there are, and how many of them had one write that they may be of.
