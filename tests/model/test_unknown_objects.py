@@ -93,6 +93,18 @@ def test_a_handle_used_before_its_initialisation_is_another_timer(
     ) == [(0xCB, None), (0xCC, 5_000_000)]
 
 
+def test_the_first_use_of_a_handle_stands_for_its_timer(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    for handle, callback in ((0x20, 0xCB), (0x21, 0xCC)):
+        system.add("ros2:rclcpp_timer_callback_added", MAIN, timer_handle=handle, callback=callback)
+    for handle in (0x21, 0x20):
+        system.add("ros2:rclcpp_timer_link_node", MAIN, timer_handle=handle, node_handle=0x1)
+    assert analyse(system).column("SELECT timer_handle FROM timer ORDER BY timer_id") == [
+        0x20, 0x21,
+    ]  # fmt: skip
+
+
 def test_timers_of_equal_handles_in_two_processes(system: RosSystem, analyse: Analyse) -> None:
     """Of one process, the timers lost their initialisation; each is one, whatever names it."""
     system.node(SOURCE, 0x1, "source")

@@ -95,7 +95,7 @@ def test_names_from_before_an_initialisation_do_not_count(con: duckdb.DuckDBPyCo
     assert alternating(con) == []
     con.execute("UPDATE raw.ros2_rcl_init SET event_id = 104")
     assert alternating(con) == [("a", 7, "x"), ("a", 7, "y")]
-    con.execute("UPDATE raw.ros2_rcl_init SET thread_index = 2, event_id = 2")
+    con.execute("UPDATE raw.ros2_rcl_init SET thread_index = 2, event_id = 103")
     assert alternating(con) == [("a", 7, "x"), ("a", 7, "y")]
 
 
@@ -111,6 +111,7 @@ def test_a_known_namespace_counts_more_than_names_and_containers(
     thread(con, 1, "x", "y", "x", pid_ns=5)
     thread(con, 2, "z", trace=2, pid_ns=6)
     con.execute("INSERT INTO session_container VALUES (2, 2)")
+    assert alternating(con) == []
     assert given(con) == []
 
 
@@ -137,18 +138,24 @@ def test_containers_count_more_than_names(con: duckdb.DuckDBPyConnection) -> Non
     [
         pytest.param(101, 102, 9, True, id="renamed_inside"),
         pytest.param(102, 102, 9, False, id="one_name"),
+        pytest.param(150, 160, 9, False, id="names_of_another_thread"),
         pytest.param(101, 102, 8, False, id="another_callback"),
     ],
 )
 def test_a_thread_that_renames_itself_in_a_callback_is_one(
     con: duckdb.DuckDBPyConnection, begin: int, end: int, callback: int, *, is_one: bool
 ) -> None:
-    """Nothing of that says whether those of another process, or of another host, are."""
+    """Nothing of that says whether those of another process, or of another host, are.
+
+    Another instance of the callback began under the first name.
+    """
     thread(con, 1, "x", "y", "x")
+    thread(con, 4, "o", vpid=9)
+    con.execute("UPDATE raw.thread_name SET first_event_id = 145 WHERE thread_index = 4")
     thread(con, 2, "p", "q", "p", vpid=8)
     thread(con, 3, "p", "q", "p", trace=3)
     con.execute("INSERT INTO raw.ros2_callback_start VALUES (1, ?, 9)", [begin])
-    con.execute("INSERT INTO raw.ros2_callback_start VALUES (1, 99, 9)")
+    con.execute("INSERT INTO raw.ros2_callback_start VALUES (1, 101, 9)")
     con.execute("INSERT INTO raw.ros2_callback_end VALUES (1, ?, ?, ?)", [end, callback, begin])
     others = [("a", 8, "p"), ("a", 8, "q"), ("b", 7, "p"), ("b", 7, "q")]
     assert alternating(con) == ([] if is_one else [("a", 7, "x"), ("a", 7, "y")]) + others
