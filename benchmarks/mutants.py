@@ -145,6 +145,7 @@ RULES = (
         (f"overlap/{each}.sql", ("schema/test_given_namespace.py",))
         for each in ("given_namespace", "alternating_name")
     ),
+    ("flow/certain_cause.sql", ("schema/cases/derive.certain_cause",)),
     ("overlap/session_container.sql", ("schema/test_session_container.py",)),
     ("overlap/session_pair.sql", ("schema/test_session_pair.py",)),
     ("public/goal.sql", ("schema/cases/main.goal",)),
