@@ -77,7 +77,8 @@ def test_offset_and_drift_are_recovered(drifting: Simulation, direct: Path) -> N
     offset = -7_000_000 - elapsed * 20e-6
     there, back = shortest(direct)
     assert abs(beta["offset_ns"] - offset) <= beta["uncertainty_ns"]
-    assert beta["uncertainty_ns"] <= (there + back) / 2 + 1
+    # The shortest messages come at other moments, where what is left of the drift counts.
+    assert beta["uncertainty_ns"] <= 1.01 * (there + back) / 2
     assert abs(beta["drift_ppb"] + 20_000) <= beta["drift_uncertainty_ppb"]
     assert beta["drift_uncertainty_ppb"] <= 1.1 * (there + back) / 3
     assert there > 0

@@ -1,9 +1,9 @@
 -- name: staging.mixed_process
--- description: Ids that several processes have at one time, whose events nothing tells apart. Either
---     a thread was on two CPUs at one moment. Or an object of one process was made or used after
---     another process had made its first: all GIDs that Fast DDS gives to a process begin with the
---     same eight bytes, two of them random. What is used behind a gap proves nothing: its object may
---     have been made again in it, by a later process.
+-- description: Ids that several processes have at one time, whose events nothing tells apart.
+--     Either a thread was on two CPUs at one moment. Or an object of one process was made or used
+--     after another process had made its first: all GIDs that Fast DDS gives to a process begin
+--     with the same eight bytes, two of them random. What is used behind a gap proves nothing: its
+--     object may have been made again in it, by a later process.
 -- grain: one row per host, PID namespace and pid
 WITH thread AS (
     SELECT
