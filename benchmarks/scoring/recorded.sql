@@ -56,12 +56,13 @@ doubtful AS (
     WHERE l.t = 'link' AND l.type IN ('periodic_async', 'partial_sync')
         AND (o.id IS NOT NULL OR coalesce(i."end" > r."start", true))
 ),
--- In Humble, messages are told by the times of their stamps alone. A write goes on until the next
--- event of the thread; what was written is stamped meanwhile.
+-- In Humble, only the time of a stamp tells of which publication a message is. A write goes on until
+-- the next event of the thread, and the middleware stamps the message meanwhile.
 written AS (
     SELECT
         b.id, b.topic, b.host, b.written_ns, e.ts_ns AS next_ns,
-        -- The least time to a stamp is none, before and behind a step of the clock alike.
+        -- The soonest stamp within 0.1 s comes at once: its difference is that of the clocks. The
+        -- greater one of both sides is that of this side of a step.
         b.src - greatest(
             min(b.src - b.written_ns) OVER (
                 on_host RANGE BETWEEN 100_000_000 PRECEDING AND CURRENT ROW

@@ -265,7 +265,7 @@ def _beside(runs: Sequence[Run], window: Window) -> list[str]:
 def _untraced(
     connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], note: str | None
 ) -> list[str]:
-    """Return notes on events of which the rows would have been, if the runs lack them."""
+    """Return notes on missing events, if the rows would have come from them."""
     if note == "kernel" and not _kernel_was_traced(connection, runs):
         return ["the kernel was not traced: msgflow record --kernel, see docs/scheduling.md"]
     return _without_requests(connection, runs) if note == "requests" else []

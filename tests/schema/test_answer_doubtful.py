@@ -263,11 +263,19 @@ def test_answers_and_a_timer_on_one_publisher() -> None:
     assert process.doubtful() == ticks
 
 
-@pytest.mark.parametrize("period", [31.5, 35, 40, 60])
+@pytest.mark.parametrize("period", [31.5, 33, 35, 37])
 @pytest.mark.parametrize("seed", range(5))
 def test_answers_that_take_nearly_a_period_of_a_timer(period: float, seed: int) -> None:
-    """Most come after a moment when it was due, but no more of them than by chance."""
-    process = run([Subscription(50, 9, (30, 30.5))], [Timer(period, 17)], threads=2, seed=seed)
+    """Most come after a moment when it was due, but no more of them than by chance.
+
+    The threads take other messages soon, so they do not tell that the timer was silent.
+    """
+    process = run(
+        [Subscription(50, 9, (30, 30.5)), Subscription(7, 1, publisher=None)],
+        [Timer(period, 17)],
+        threads=3,
+        seed=seed,
+    )
     assert process.doubtful_publishers() == {ANSWER: 0, TICK: 1}
 
 

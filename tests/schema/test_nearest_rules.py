@@ -110,9 +110,9 @@ def test_a_message_is_stamped_within_its_write_and_taken_behind(
 
 
 def close_pair(con: duckdb.DuckDBPyConnection, at: int, closed_for: int) -> int:
-    """Two publications of which the second is written at that time; the stamp of one message.
+    """Publish twice, the second time at `at`, and take one message; returns its stamp.
 
-    It comes 1.3 µs after the second write, and so long after the first one was over.
+    The stamp comes 1.3 µs after the second write began, and `closed_for` after the first one ended.
     """
     stamp = at + 1_300
     publish(con, at, stamp - closed_for - 2_300, stamp - closed_for)

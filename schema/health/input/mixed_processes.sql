@@ -1,8 +1,8 @@
 -- name: finding.mixed_processes
 -- title: Processes with equal ids cannot be told apart
 -- description: Several processes have the same ids and names, and their events are mixed. A thread
---     was on two CPUs at one moment, or publishers and subscriptions were used by turns, whose GIDs
---     Fast DDS made in several processes. Each such mixture is one process here. Its objects,
+--     was on two CPUs at one moment. Or Fast DDS made the GIDs of publishers and subscriptions in
+--     several processes, and these took turns. Each such mixture is one process here. Its objects,
 --     callbacks and executors may be those of any of them, all its links between messages and
 --     callbacks have a candidate_count above 1, and flows do not pass its callbacks. A mixture may
 --     show neither sign, as with another middleware on one CPU.

@@ -46,7 +46,7 @@ explained AS (
         count(*) AS publication_count,
         count(CASE WHEN late_ns <= least(delay_ns, period_ns / 10) THEN 1 END) AS prompt_count,
         count(CASE WHEN ends_in_period AND late_ns <= delay_ns THEN 1 END) AS due_count,
-        -- So many would come after such a moment if they knew nothing of the timer.
+        -- So many would come after such a moment without any timer.
         sum(CASE WHEN ends_in_period THEN least(delay_ns, period_ns) / period_ns ELSE 0 END)
             AS chance_count
     FROM late

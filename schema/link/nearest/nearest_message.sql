@@ -8,9 +8,9 @@
 --     bound the search. A message has no publication where that would be a guess: where several
 --     come into question; where two messages may both be of one publication; where another
 --     publication or message is within what a drift could move it, if the drift is not known; if it
---     was stamped sooner after a publication than is usual, and another publication may be lost, or
---     the thread was writing one just before: the difference of the clocks may be greater by what
---     nearly all messages take at least that follow no other write.
+--     was stamped sooner after a publication than is usual, and another publication may be lost; if
+--     the thread was writing another just before. Nearly all messages come some time after their
+--     write, and the difference of the clocks may be wrong by that time.
 --     Nor has it one where the difference of the clocks is not known, or explains less than half of
 --     the messages.
 -- grain: one row per message that has, or might have, a publication
@@ -266,7 +266,7 @@ usual_of_clock AS (
         clock_id,
         quantile_disc(delay_ns, derive.clock_limit().usual_quantile) AS usual_ns,
         quantile_disc(delay_ns, 1 - derive.clock_limit().usual_quantile) AS least_ns,
-        -- Only a message behind another write could be of that one.
+        -- A message soon behind another write may be of that one, and shows nothing.
         quantile_disc(delay_ns, 1 - derive.clock_limit().usual_quantile)
             FILTER (coalesce(closed_for_ns >= derive.clock_limit().burst_ns, true)) AS alone_ns,
         -- The usual delay of topics without other publishers, if enough messages show it.

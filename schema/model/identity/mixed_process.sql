@@ -28,14 +28,14 @@ identified AS (
 ),
 endpoint AS (
     SELECT
-        i.process, i.event_id, i.handle, i.prefix,
-        coalesce(min(g.start_ns), 9223372036854775807) AS gap_ns
+        i.process, i.event_id, i.handle, i.prefix, min(g.start_ns) AS gap_ns
     FROM identified AS i
     JOIN staging.recording AS r ON i.trace_index = r.trace_index
     LEFT JOIN staging.recording_gap AS g
         ON r.recording_index = g.recording_index AND i.ts_ns < g.covered_until_ns
     GROUP BY ALL
 ),
+-- Hardly any recording has one: then nothing below reads the publications and takes.
 suspect AS (
     SELECT thread_index, process FROM thread WHERE process IN (SELECT process FROM endpoint)
 ),
@@ -63,7 +63,7 @@ shown AS (
     JOIN suspect AS s ON u.thread_index = s.thread_index
     ASOF JOIN object AS o
         ON s.process = o.process AND u.handle = o.handle AND u.event_id >= o.event_id
-    WHERE u.ts_ns <= o.gap_ns
+    WHERE coalesce(u.ts_ns <= o.gap_ns, true)
 ),
 several AS (
     SELECT process
