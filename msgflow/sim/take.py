@@ -83,20 +83,21 @@ class Taken:
 def take(
     thread: Thread, middleware: Middleware, subscription: SubscriptionObject, time: int
 ) -> tuple[Taken | None, int]:
-    """Take the oldest message that can be taken; None and the time of the attempt if none can.
+    """Take the oldest message that can be taken; None if none can.
 
-    Else the message and the time of the last event of the take.
+    Returns the time of the last event of the take, too.
     """
-    scheduler, machine = thread.scheduler, thread.machine
-    random, epoch = scheduler.random, machine.epoch
-    tracepoints = machine.tracepoints
-    emit, context = thread.emit, thread.context
-    buffer = subscription.message
-    reading = time + 2_000 + int(random() * 8_000)
+    scheduler = thread.scheduler
+    epoch, buffer = thread.machine.epoch, subscription.message
+    reading = time + 2_000 + int(scheduler.random() * 8_000)
     message = middleware.next_message(subscription, reading)
     if message is None:
         middleware.failed_takes += 1
-        return None, read(thread, subscription.rmw_handle, buffer, reading, 0, 0)
+        if subscription.is_silent:
+            return None, reading
+        rmw = read(thread, subscription.rmw_handle, buffer, reading, 0, 0)
+        rcl, rclcpp = _pass_layers(thread, subscription, rmw)
+        return None, rclcpp or rcl
     taken = Taken(
         next(scheduler.take_ids), message, reading, "callback_only", None,
         is_copy=message.is_copy_for(subscription),
@@ -108,11 +109,25 @@ def take(
     assert stamp_ns is not None
     rmw = read(thread, subscription.rmw_handle, buffer, reading, stamp_ns, 1)
     taken.method, taken.time, taken.rmw_ns = "rmw", rmw, rmw + epoch
-    last = rmw + 200 + int(random() * 900)
-    emit(tracepoints.rcl_take, last, context, buffer)
-    taken.rcl_ns = last + epoch
-    if subscription.is_rclcpp:
-        last += 150 + int(random() * 600)
-        emit(tracepoints.rclcpp_take, last, context, buffer)
-        taken.rclcpp_ns = last + epoch
-    return taken, last
+    rcl, rclcpp = _pass_layers(thread, subscription, rmw)
+    taken.rcl_ns = rcl + epoch
+    if rclcpp is not None:
+        taken.rclcpp_ns = rclcpp + epoch
+    return taken, rclcpp or rcl
+
+
+def _pass_layers(
+    thread: Thread, subscription: SubscriptionObject, rmw: int
+) -> tuple[int, int | None]:
+    """Emit what the layers above rmw emit after its `rmw_take`, also of a take that failed.
+
+    Returns the times of rcl_take and of rclcpp_take.
+    """
+    random, tracepoints = thread.scheduler.random, thread.machine.tracepoints
+    rcl = rmw + 200 + int(random() * 900)
+    thread.emit(tracepoints.rcl_take, rcl, thread.context, subscription.message)
+    if not subscription.is_rclcpp:
+        return rcl, None
+    rclcpp = rcl + 150 + int(random() * 600)
+    thread.emit(tracepoints.rclcpp_take, rclcpp, thread.context, subscription.message)
+    return rcl, rclcpp

@@ -48,7 +48,8 @@ JOIN main.publication AS b ON d.publication_id = b.publication_id
 JOIN main.subscription AS s ON d.subscription_id = s.subscription_id
 JOIN main.process AS p ON s.process_id = p.process_id
 LEFT JOIN main.node AS n ON s.node_id = n.node_id
-WHERE d.status IN ('dropped', 'lost') AND b.start_ns >= $start_ns AND b.start_ns < $end_ns
+WHERE d.status IN ('dropped', 'lost') AND NOT s.is_internal
+    AND b.start_ns >= $start_ns AND b.start_ns < $end_ns
 GROUP BY ALL
 """
 

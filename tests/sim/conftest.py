@@ -33,6 +33,8 @@ from msgflow.trace import bt2_library
 _LENGTH = 0.15
 # Some things happen only later in a scenario.
 _LENGTHS = {
+    # The detector is slow now and then.
+    "demo": 0.3,
     # Nothing is lost before.
     "kernel_losses": 0.1,
     "losses": 0.7,

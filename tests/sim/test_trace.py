@@ -33,7 +33,7 @@ _LETTERS = {
 }
 _CALLBACK = r"\((abc|bc)*\)"
 # What follows "execute": a timer's callback, a take with its callback, a take that failed.
-_EXECUTION = rf"x({_CALLBACK}|123{_CALLBACK}|1)"
+_EXECUTION = rf"x({_CALLBACK}|123({_CALLBACK})?)"
 _SPIN = re.compile(rf"(g{_EXECUTION}|gwg{_EXECUTION}|gwg(?=g)|gwg$|gw$|g$)*")
 
 
