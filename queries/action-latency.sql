@@ -51,6 +51,7 @@
 --     loss_affected, result_p95_ns, accepted, rejected, finished, cancelled, server,
 --     accept_median_ns, first_feedback_median_ns, execution_median_ns, not_answered, doubtful,
 --     overlapping
+-- note: goals
 WITH measured AS (
     SELECT
         run_id,

@@ -268,7 +268,7 @@ def _untraced(
     """Return notes on missing events, if the rows would have come from them."""
     if note == "kernel" and not _kernel_was_traced(connection, runs):
         return ["the kernel was not traced: msgflow record --kernel, see docs/scheduling.md"]
-    return _without_requests(connection, runs) if note == "requests" else []
+    return _without_layer(connection, runs, note) if note in {"requests", "goals"} else []
 
 
 def _kernel_was_traced(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run]) -> bool:
@@ -296,12 +296,14 @@ def _without_callbacks(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run
     ]
 
 
-def _without_requests(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run]) -> list[str]:
-    """Return a note for each run in which callbacks of services ran, and no request was traced."""
+def _without_layer(
+    connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], layer: str
+) -> list[str]:
+    """Return a note for each run in which other events show that this kind was not traced."""
     rows = connection.execute(
         "SELECT run_id, detail FROM main.finding WHERE list_contains($runs, run_id) "
-        "AND name = 'missing_layer' AND subject = 'requests' ORDER BY run_id",
-        {"runs": [run.run_id for run in runs]},
+        "AND name = 'missing_layer' AND subject = $layer ORDER BY run_id",
+        {"runs": [run.run_id for run in runs], "layer": layer},
     ).fetchall()
     titles = {run.run_id: "" if len(runs) == 1 else f"run {run.title}: " for run in runs}
     return [f"{titles[run_id]}{detail}" for run_id, detail in rows]

@@ -361,7 +361,7 @@ def test_processes_that_record_no_callbacks_are_named(
     assert not run_query(connection, header(QUERY), {}, Slice(run="first")).notes[1:]
 
 
-def test_requests_that_were_not_traced_are_the_reason_for_no_rows(
+def test_a_layer_that_was_not_traced_is_the_reason_for_no_rows(
     connection: duckdb.DuckDBPyConnection,
 ) -> None:
     connection.execute(
@@ -371,13 +371,14 @@ def test_requests_that_were_not_traced_are_the_reason_for_no_rows(
         "AS t (run_id, name, subject, detail)"
     )
     connection.execute("CREATE TABLE clock AS SELECT 1 AS run_id")
-    noted = header(QUERY.replace("-- param", "-- note: requests\n-- param"))
 
-    def notes(run: str, where: str | None = "start_ns < 0") -> list[str]:
+    def notes(run: str, where: str | None = "start_ns < 0", layer: str = "requests") -> list[str]:
+        noted = header(QUERY.replace("-- param", f"-- note: {layer}\n-- param"))
         narrowed = make_selection({"where": where})
         return list(run_query(connection, noted, {}, Slice(run), selection=narrowed).notes)
 
     assert notes("first") == ["no request"]
+    assert notes("all", layer="goals") == ["run first (1): no goal"]
     assert notes("all") == ["run first (1): no request", "run second (2): none"]
     assert "no request" not in notes("first", None)
     connection.execute("DELETE FROM finding WHERE subject = 'requests'")
