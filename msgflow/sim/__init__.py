@@ -23,7 +23,8 @@ publication — one row per publication:
     events; NULL: no such event, since /rosout does not pass rclcpp, ros_discovery_info only rmw),
     source_timestamp_ns, callback_instance_id (the callback that published, else NULL),
     is_internal, intra_ns (rclcpp_intra_publish; such a publication has the others only if a
-    subscription needs DDS). node and publisher_handle are NULL for ros_discovery_info.
+    subscription needs DDS). node and publisher_handle are NULL for ros_discovery_info. After a
+    shutdown, only rclcpp_ns is there: nothing was sent.
 take — one row per message that was handed over to a subscription:
     take_id, host, pid, tid, node, topic_name, subscription_handle, rmw_ns, rcl_ns, rclcpp_ns,
     source_timestamp_ns, publication_id, callback_instance_id (NULL: taken without a callback),

@@ -37,6 +37,7 @@ class Lifecycle:
 
     node: str
     handle: int
+    events: PublisherObject
     state: str = "unconfigured"
 
 
@@ -156,9 +157,9 @@ def _transition(
     _: Transition,
     objects: NodeObjects,
     thread: ExecutorThread,
-    __: Middleware,
+    middleware: Middleware,
     time: int,
-    ___: CallbackInstance | None,
+    instance: CallbackInstance | None,
 ) -> Steps:
     lifecycle = objects.lifecycle
     assert lifecycle is not None
@@ -174,6 +175,7 @@ def _transition(
             time + machine.epoch, lifecycle.state, state,
         )  # fmt: skip
         lifecycle.state = state
+        time = publish(thread, middleware, lifecycle.events, time + 500, instance)
     return time + 1_000
     yield  # It takes no step, but is called as one that does.
 

@@ -376,9 +376,10 @@ class Creator:
                 tuple(node.publishers[topic].handle for topic in link.outputs),
             )
 
-    def lifecycle(self, node: NodeContext) -> None:
-        """The state machine of a managed node."""
-        node.objects.lifecycle = Lifecycle(node.description.full_name, self._memory.allocate())
+    def lifecycle(self, node: NodeContext, events: PublisherObject) -> None:
+        """The state machine of a managed node, and the publisher that tells of its transitions."""
+        name = node.description.full_name
+        node.objects.lifecycle = Lifecycle(name, self._memory.allocate(), events)
         self.emit("rcl_lifecycle_state_machine_init", node.handle, node.objects.lifecycle.handle)
 
     def _code(

@@ -156,6 +156,11 @@ class RunningProcess:
         self.goal_threads = 0
         self._entities = 0
 
+    def is_shut_down(self, time: int) -> bool:
+        """Whether ROS is shut down at that time; what runs may go on then."""
+        stop_ns = self.description.stop_ns
+        return stop_ns is not None and time >= stop_ns
+
     def gid(self, kind: int) -> bytes:
         """A new DDS identifier (16 bytes; kind 3: writer, 4: reader) in an array of 24.
 
@@ -177,6 +182,16 @@ Run = int | Steps
 def settle(run: Run) -> Steps:
     """Go through the steps, if there are any."""
     return run if isinstance(run, int) else (yield from run)
+
+
+def at_once(steps: Steps) -> int:
+    """Go through steps during which nothing else can happen; returns when they have ended."""
+    try:
+        time = next(steps)
+        while True:
+            time = steps.send(time or 0)
+    except StopIteration as ended:
+        return int(ended.value)
 
 
 class Thread:

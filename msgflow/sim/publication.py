@@ -38,6 +38,13 @@ def publish(
     if message is None:
         message = Message(next(scheduler.publication_ids), publisher, thread.tid, instance)
 
+    if thread.process.is_shut_down(time) and not publisher.is_silent:
+        # rclcpp finds that out behind its event, and then the call returns.
+        if publisher.is_rclcpp:
+            emit(tracepoints.rclcpp_publish, time, context, publisher.handle, publisher.message)
+            message.rclcpp_ns = time + epoch
+            write_publication(thread, publisher, message, instance)
+        return time + 1_000 + int(random() * 2_000)
     if publisher.is_silent:
         message.rmw, message.stamp_ns = time + 600, machine.stamp_ns(time + 500)
         write_publication(thread, publisher, message, instance)

@@ -5,6 +5,7 @@ The steps are separate, so that other processes start meanwhile.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from msgflow.sim import entity, symbols, system
@@ -13,7 +14,9 @@ from msgflow.sim.discovery import Discovery, DiscoveryListener
 from msgflow.sim.entity import MICROSECOND
 from msgflow.sim.executor import Executor
 from msgflow.sim.executor_thread import ExecutorThread
+from msgflow.sim.intra_process import publish_intra
 from msgflow.sim.links import link_objects
+from msgflow.sim.machine import at_once
 from msgflow.sim.publication import publish
 from msgflow.sim.user_thread import UserThread
 
@@ -171,15 +174,23 @@ class Startup:
                 service = entity.Service(f"{node.description.full_name}/{name}")
                 creator.service(node, service, symbol)
                 yield True
-            events = creator.publisher(node, entity.Publisher(PARAMETER_EVENTS, _INTERNAL_DEPTH))
+            events = creator.publisher(
+                node,
+                entity.Publisher(
+                    PARAMETER_EVENTS,
+                    _INTERNAL_DEPTH,
+                    intra_process=node.description.uses_intra_process,
+                ),
+            )
             yield True
             # One event per parameter that is declared.
             self._publish(events)
             yield True
         if self._process.is_rclcpp:
-            creator.listen(
-                creator.subscription(node, _PARAMETER_SUBSCRIPTION, symbols.PARAMETER_EVENTS)
+            listener = replace(
+                _PARAMETER_SUBSCRIPTION, intra_process=node.description.uses_intra_process
             )
+            creator.listen(creator.subscription(node, listener, symbols.PARAMETER_EVENTS))
             yield True
         for _ in range(3 if events is not None else 0):
             assert events is not None
@@ -226,23 +237,31 @@ class Startup:
     def _create_lifecycle(self, node: NodeContext) -> Iterator[bool]:
         """The state machine of a managed node, behind its services and before their callbacks."""
         creator, services = self._creator, []
+        events = creator.publisher(
+            node, entity.Publisher(f"{node.description.full_name}/transition_event", kind="rcl")
+        )
+        yield True
         described = {service.name: service for service in node.description.services}
         for name in symbols.LIFECYCLE_SERVICES:
             full_name = f"{node.description.full_name}/{name}"
             service = described.get(full_name, entity.Service(full_name))
             services.append(creator.rcl_service(node, service))
             yield True
-        creator.lifecycle(node)
+        creator.lifecycle(node, events)
         for created in services:
             creator.copied_service(created, symbols.service_callback("lifecycle_node"))
             creator.spin_service(created)
         yield True
 
     def _publish(self, publisher: PublisherObject) -> None:
-        self._creator.work(8 * MICROSECOND)
-        self._creator.time = publish(
-            self.thread, self._middleware, publisher, self._creator.time, None
-        )
+        creator, thread, middleware = self._creator, self.thread, self._middleware
+        creator.work(8 * MICROSECOND)
+        if publisher.intra is None:
+            creator.time = publish(thread, middleware, publisher, creator.time, None)
+            return
+        # No other thread of the process reads the buffers yet.
+        steps = publish_intra(thread, middleware, publisher, creator.time, None)
+        creator.time = at_once(steps)
 
 
 def _is_of_lifecycle(node: NodeContext, service: entity.Service) -> bool:

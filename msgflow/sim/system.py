@@ -106,6 +106,11 @@ class Node:
         """Namespace and name, as in `/camera/driver`."""
         return f"{self.namespace.rstrip('/')}/{self.name}"
 
+    @property
+    def uses_intra_process(self) -> bool:
+        """Whether it uses ring buffers, hence also for the events of its parameters."""
+        return any(each.intra_process for each in (*self.publishers, *self.subscriptions))
+
 
 @dataclass(frozen=True, slots=True)
 class Process:

@@ -26,13 +26,17 @@ REAL = {
     "real_reference": "kilted",
     "real_filters": "kilted",
     "real_py_mixed": "kilted",
+    "real_cache": "kilted",
+    "real_late": "kilted",
+    "real_rotate": "kilted",
+    "real_lifecycle": "kilted",
     "real_jazzy_container": "jazzy",
     "real_jazzy_pipeline": "jazzy",
     "real_jazzy_services": "jazzy",
 }
 # With those that end while the recording goes on.
 SIMULATED = {
-    "services": 0.1,
+    "services": 0.3,
     "calls": 0.1,
     "mixed_intra_process": 0.1,
     "demo": 0.1,
@@ -41,20 +45,8 @@ SIMULATED = {
 }
 # Objects are created in many orders, and most of them only once.
 _AT_WORK = "NOT regexp_matches(name, '_(init|added|register|node|buffer|subscription|ipb)$')"
-# What simulations do not show yet. Nodes that use intra-process communication publish their
-# parameter events that way, before further objects are announced.
-_ANNOUNCED = {
-    ("rclcpp_ring_buffer_enqueue", "rmw_publish"),
-    ("rclcpp_intra_publish", "rmw_publish"),
-}
-# A callback publishes after the shutdown.
-_SHUT_DOWN = {("rclcpp_publish", "callback_end")}
-NOT_SIMULATED = {
-    "real_intra": _ANNOUNCED,
-    "real_container": _SHUT_DOWN,
-    "real_jazzy_container": _SHUT_DOWN,
-    "real_overload": _SHUT_DOWN,
-}
+# A node that is configured creates objects, and its process announces them.
+NOT_SIMULATED = {"real_lifecycle": {("rcl_lifecycle_transition", "rmw_publish")}}
 
 
 def pairs_of(path: Path) -> set[Pair]:
@@ -101,7 +93,7 @@ def simulated(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], set[P
         REAL.items(),
         *(
             (name, REAL[name])
-            for name in ("real_pipeline", "real_services", "real_intra", "real_container")
+            for name in ("real_pipeline", "real_services", "real_intra", "real_lifecycle")
         ),
     ),
 )

@@ -38,12 +38,13 @@ def test_stamps_are_those_of_events(recording, table, prefix, layers):
             f"SELECT {prefix}host, {prefix}pid, {prefix}tid, {prefix}{layer}_ns, "
             f"source_timestamp_ns FROM {table} WHERE {prefix}{layer}_ns IS NOT NULL"
         )
-        assert rows
+        # Where all is in one process, only /rosout needs the middleware, and nobody takes it.
+        assert rows or recording.meta["scenario"] == "intra_process"
         for *place, stamp in rows:
             fields = events[(*place, name)].fields
             if stamp is None:
-                # In the process it is known without a stamp.
-                assert table == "transport"
+                # In the process it is known without a stamp. None is given after a shutdown.
+                assert table == "transport" or layer == "rclcpp"
                 continue
             assert stamp in (fields.get("timestamp", stamp), 0)
             assert fields.get("source_timestamp", stamp) == stamp
@@ -203,7 +204,9 @@ def test_every_message_was_taken_once_by_every_subscription_or_is_accounted_for(
         """
         WITH pair AS (
             SELECT publication_id, subscription_id, topic_name
-            FROM publication JOIN subscription USING (topic_name)
+            FROM publication AS p JOIN subscription USING (topic_name)
+            -- After a shutdown, publish() sends nothing.
+            WHERE p.source_timestamp_ns IS NOT NULL OR p.intra_ns IS NOT NULL
         ),
         copy AS (
             SELECT t.take_id FROM take t JOIN publication p USING (publication_id)
