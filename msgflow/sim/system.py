@@ -109,7 +109,9 @@ class Node:
     @property
     def uses_intra_process(self) -> bool:
         """Whether it uses ring buffers, hence also for the events of its parameters."""
-        return any(each.intra_process for each in (*self.publishers, *self.subscriptions))
+        return any(publisher.intra_process for publisher in self.publishers) or any(
+            subscription.intra_process for subscription in self.subscriptions
+        )
 
 
 @dataclass(frozen=True, slots=True)
