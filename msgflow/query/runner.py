@@ -299,7 +299,7 @@ def _without_callbacks(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run
 def _without_layer(
     connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], layer: str
 ) -> list[str]:
-    """Return a note for each run in which other events show that this kind was not traced."""
+    """Return a note for each run whose other events show that this layer was not traced."""
     rows = connection.execute(
         "SELECT run_id, detail FROM main.finding WHERE list_contains($runs, run_id) "
         "AND name = 'missing_layer' AND subject = $layer ORDER BY run_id",

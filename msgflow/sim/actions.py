@@ -165,7 +165,9 @@ def _transition(
     assert lifecycle is not None
     machine = thread.machine
     for state in _TRANSITIONS[lifecycle.state]:
-        time += 4_000 + int(thread.scheduler.random() * 20_000)
+        # Others learn of it before its event.
+        time = publish(thread, middleware, lifecycle.events, time + 4_000, instance)
+        time += int(thread.scheduler.random() * 20_000)
         thread.emit(
             machine.tracepoints.rcl_lifecycle_transition, time, thread.context,
             lifecycle.handle, lifecycle.state, state,
@@ -175,7 +177,6 @@ def _transition(
             time + machine.epoch, lifecycle.state, state,
         )  # fmt: skip
         lifecycle.state = state
-        time = publish(thread, middleware, lifecycle.events, time + 500, instance)
     return time + 1_000
     yield  # It takes no step, but is called as one that does.
 

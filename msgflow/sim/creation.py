@@ -377,7 +377,7 @@ class Creator:
             )
 
     def lifecycle(self, node: NodeContext, events: PublisherObject) -> None:
-        """The state machine of a managed node, and the publisher that tells of its transitions."""
+        """The state machine of a managed node; `events` publishes its transitions."""
         name = node.description.full_name
         node.objects.lifecycle = Lifecycle(name, self._memory.allocate(), events)
         self.emit("rcl_lifecycle_state_machine_init", node.handle, node.objects.lifecycle.handle)

@@ -157,7 +157,10 @@ class RunningProcess:
         self._entities = 0
 
     def is_shut_down(self, time: int) -> bool:
-        """Whether ROS is shut down at that time; what runs may go on then."""
+        """Whether ROS is shut down at that time.
+
+        Callbacks are simulated ahead, so `is_stopped` may not tell yet.
+        """
         stop_ns = self.description.stop_ns
         return stop_ns is not None and time >= stop_ns
 
@@ -189,7 +192,8 @@ def at_once(steps: Steps) -> int:
     try:
         time = next(steps)
         while True:
-            time = steps.send(time or 0)
+            assert time is not None
+            time = steps.send(time)
     except StopIteration as ended:
         return int(ended.value)
 

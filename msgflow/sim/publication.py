@@ -38,9 +38,9 @@ def publish(
     if message is None:
         message = Message(next(scheduler.publication_ids), publisher, thread.tid, instance)
 
-    if thread.process.is_shut_down(time) and not publisher.is_silent:
-        # rclcpp finds that out behind its event, and then the call returns.
-        if publisher.is_rclcpp:
+    if thread.process.is_shut_down(time):
+        # rcl refuses the message, so only the event of rclcpp is left.
+        if publisher.is_rclcpp and not publisher.is_silent:
             emit(tracepoints.rclcpp_publish, time, context, publisher.handle, publisher.message)
             message.rclcpp_ns = time + epoch
             write_publication(thread, publisher, message, instance)

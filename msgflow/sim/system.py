@@ -108,7 +108,7 @@ class Node:
 
     @property
     def uses_intra_process(self) -> bool:
-        """Whether it uses ring buffers, hence also for the events of its parameters."""
+        """Whether the node uses ring buffers. Then its parameter events use them, too."""
         return any(publisher.intra_process for publisher in self.publishers) or any(
             subscription.intra_process for subscription in self.subscriptions
         )

@@ -83,9 +83,9 @@ class Taken:
 def take(
     thread: Thread, middleware: Middleware, subscription: SubscriptionObject, time: int
 ) -> tuple[Taken | None, int]:
-    """Take the oldest message that can be taken; None if none can.
+    """Take the oldest message that can be taken.
 
-    Returns the time of the last event of the take, too.
+    Returns it, or None if there is none, and the time of the last event of the take.
     """
     scheduler = thread.scheduler
     epoch, buffer = thread.machine.epoch, subscription.message

@@ -283,8 +283,9 @@ ordered AS MATERIALIZED (
 facts AS (
     SELECT
         b.*,
+        -- A gap ends at the first event behind it, which may be the publication or the creation.
         g.covered_until_ns > b.arrival_ns AS has_gap,
-        i.covered_until_ns >= b.introduced_ns AS has_earlier_gap,
+        i.covered_until_ns > b.introduced_ns AS has_earlier_gap,
         f.failed_ns <= b.until_ns AS has_failed_take,
         -- A later message may have overtaken it, unless one thread sent both, and one takes.
         u.taken_ns <= coalesce(

@@ -294,10 +294,10 @@ def test_a_gap_that_ends_before_a_message_arrives(
 @pytest.mark.parametrize(
     ("created", "publisher", "until", "reason"),
     [
-        (100 * MS, 50 * MS, 100 * MS, "unknown"),
-        (100 * MS, 50 * MS, 100 * MS - 1, "before_discovery"),
-        (50 * MS, 100 * MS, 100 * MS, "unknown"),
-        (50 * MS, 100 * MS, 100 * MS - 1, "before_discovery"),
+        (100 * MS, 50 * MS, 100 * MS + 1, "unknown"),
+        (100 * MS, 50 * MS, 100 * MS, "before_discovery"),
+        (50 * MS, 100 * MS, 100 * MS + 1, "unknown"),
+        (50 * MS, 100 * MS, 100 * MS, "before_discovery"),
     ],
 )
 def test_a_gap_hides_what_the_two_knew_of_each_other(

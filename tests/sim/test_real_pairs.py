@@ -93,7 +93,7 @@ def simulated(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], set[P
         REAL.items(),
         *(
             (name, REAL[name])
-            for name in ("real_pipeline", "real_services", "real_intra", "real_lifecycle")
+            for name in ("real_services", "real_intra", "real_container", "real_lifecycle")
         ),
     ),
 )

@@ -23,6 +23,7 @@ _LETTERS = {
     "ros2:rclcpp_executor_wait_for_work": "w",
     "ros2:rclcpp_executor_execute": "x",
     "ros2:rmw_take": "1",
+    "failed": "0",
     "ros2:rcl_take": "2",
     "ros2:rclcpp_take": "3",
     "ros2:callback_start": "(",
@@ -33,7 +34,7 @@ _LETTERS = {
 }
 _CALLBACK = r"\((abc|bc)*\)"
 # What follows "execute": a timer's callback, a take with its callback, a take that failed.
-_EXECUTION = rf"x({_CALLBACK}|123({_CALLBACK})?)"
+_EXECUTION = rf"x({_CALLBACK}|123{_CALLBACK}|023)"
 _SPIN = re.compile(rf"(g{_EXECUTION}|gwg{_EXECUTION}|gwg(?=g)|gwg$|gw$|g$)*")
 
 
@@ -75,7 +76,9 @@ def test_executors_emit_in_the_order_of_rclcpp(basic):
     texts = defaultdict(str)
     for event in recording.events:
         if event.tid == event.pid:
-            texts[event.host, event.pid] += _LETTERS.get(event.name, "")
+            is_failed = event.name == "ros2:rmw_take" and not event.fields["taken"]
+            name = "failed" if is_failed else event.name
+            texts[event.host, event.pid] += _LETTERS.get(name, "")
     assert len(texts) == len(recording.meta["processes"])
     for text in texts.values():
         spinning = text[text.index("g") :]

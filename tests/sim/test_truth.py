@@ -11,6 +11,7 @@ from msgflow.sim import simulate
 _SECOND = 1_000_000_000
 _PUBLICATION = {"rclcpp": "rclcpp_publish", "rcl": "rcl_publish", "rmw": "rmw_publish"}
 _TAKE = {"rmw": "rmw_take", "rcl": "rcl_take", "rclcpp": "rclcpp_take"}
+_OF_ROSOUT = (("publication", "rcl"), ("publication", "rmw"))
 # Timers without a subscriber; actions, whose flows go through services.
 _WITHOUT_FLOWS = ("timers", "actions")
 
@@ -38,13 +39,14 @@ def test_stamps_are_those_of_events(recording, table, prefix, layers):
             f"SELECT {prefix}host, {prefix}pid, {prefix}tid, {prefix}{layer}_ns, "
             f"source_timestamp_ns FROM {table} WHERE {prefix}{layer}_ns IS NOT NULL"
         )
-        # Where all is in one process, only /rosout needs the middleware, and nobody takes it.
-        assert rows or recording.meta["scenario"] == "intra_process"
+        # Where all is in one process, only /rosout goes through the middleware, and not rclcpp.
+        is_alone = recording.meta["scenario"] == "intra_process"
+        assert rows or (is_alone and (table, layer) not in _OF_ROSOUT)
         for *place, stamp in rows:
             fields = events[(*place, name)].fields
             if stamp is None:
                 # In the process it is known without a stamp. None is given after a shutdown.
-                assert table == "transport" or layer == "rclcpp"
+                assert table == "transport" or (table, layer) == ("publication", "rclcpp")
                 continue
             assert stamp in (fields.get("timestamp", stamp), 0)
             assert fields.get("source_timestamp", stamp) == stamp
@@ -205,8 +207,8 @@ def test_every_message_was_taken_once_by_every_subscription_or_is_accounted_for(
         WITH pair AS (
             SELECT publication_id, subscription_id, topic_name
             FROM publication AS p JOIN subscription USING (topic_name)
-            -- After a shutdown, publish() sends nothing.
-            WHERE p.source_timestamp_ns IS NOT NULL OR p.intra_ns IS NOT NULL
+            -- After a shutdown, rcl refuses the message.
+            WHERE p.rclcpp_ns IS NULL OR p.rcl_ns IS NOT NULL
         ),
         copy AS (
             SELECT t.take_id FROM take t JOIN publication p USING (publication_id)
@@ -284,3 +286,16 @@ def test_messages_of_one_publisher_stay_in_order(tmp_path, burst, read):
     )
     assert len(taken) > 500
     assert taken == sorted(taken)
+
+
+def test_a_callback_that_outlives_the_shutdown_publishes_nothing(recordings):
+    """Only the event of rclcpp is left."""
+    recording = recordings["restarts"]
+    refused = recording.truth(
+        "SELECT p.rclcpp_ns, c.end_ns FROM publication AS p "
+        "JOIN callback_instance AS c USING (callback_instance_id) "
+        "WHERE p.topic_name = '/result' AND p.rcl_ns IS NULL"
+    )
+    assert len(refused) == 1
+    ((published, ended),) = refused
+    assert published < ended
