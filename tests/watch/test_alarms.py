@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import subprocess
 from contextlib import chdir
@@ -97,7 +98,9 @@ def test_a_target_that_falls_silent_is_said_once(tmp_path: Path) -> None:
     windows = [json.loads(line)["verdicts"] for line in result.stdout.splitlines()]
     counted = [set(verdicts) for verdicts in windows]
     assert {"no data"} in counted[counted.index({"passed"}) :]
-    assert result.stderr.count("no data of /relay → /result: rate > 1 Hz") == 1
+    # Without a single message, it is not known whose they would be.
+    said = re.findall(r"no data of (?:/relay → )?/result: rate > 1 Hz", result.stderr)
+    assert len(said) == 1
     assert result.exit_code == 0
 
 
