@@ -66,9 +66,6 @@ LOWEST_RECALL |= {"steps": 0.92, "clock_step": 0.995}
 # One of 6,508 was stamped 13.7 ms after its write. A message written 9 ms later had been taken
 # before, as if the clock had been set back.
 LOWEST_RECALL |= {"shared_publisher": 0.9998}
-# The last message of a thread was stamped 7 µs after its write, and the eight before it 1 to 2 µs
-# after theirs. What the thread did next is not known, so it may be of a later write.
-LOWEST_RECALL |= {"own_events": 0.98}
 # Recorded with losses: their truth says which events are missing, but not where others might be. A
 # link over such a place is not decided, and a publication may be torn in two. Precision is judged.
 LOSSY_RECORDINGS = {"intra_lost", "lossy_intra", "lossy_intra_mt"}

@@ -165,7 +165,7 @@ def _transition(
     assert lifecycle is not None
     machine = thread.machine
     for state in _TRANSITIONS[lifecycle.state]:
-        # Others learn of it before its event.
+        # rcl publishes a transition before it emits the event.
         time = publish(thread, middleware, lifecycle.events, time + 4_000, instance)
         time += int(thread.scheduler.random() * 20_000)
         thread.emit(

@@ -260,8 +260,7 @@ class Startup:
             creator.time = publish(thread, middleware, publisher, creator.time, None)
             return
         # No other thread of the process reads the buffers yet.
-        steps = publish_intra(thread, middleware, publisher, creator.time, None)
-        creator.time = at_once(steps)
+        creator.time = at_once(publish_intra(thread, middleware, publisher, creator.time, None))
 
 
 def _is_of_lifecycle(node: NodeContext, service: entity.Service) -> bool:

@@ -83,9 +83,9 @@ class Taken:
 def take(
     thread: Thread, middleware: Middleware, subscription: SubscriptionObject, time: int
 ) -> tuple[Taken | None, int]:
-    """Take the oldest message that can be taken.
+    """Take the oldest message, and return it with the time of the take's last event.
 
-    Returns it, or None if there is none, and the time of the last event of the take.
+    The message is None if none can be taken.
     """
     scheduler = thread.scheduler
     epoch, buffer = thread.machine.epoch, subscription.message

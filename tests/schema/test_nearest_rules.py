@@ -282,6 +282,31 @@ def test_or_for_twice_what_is_usual_on_its_host(
 
 
 @pytest.mark.parametrize(
+    ("own", "delay", "is_found"),
+    [
+        pytest.param(99, 396_000, True, id="usual_on_the_host"),
+        pytest.param(99, 396_001, False, id="unusual_on_the_host"),
+        pytest.param(100, 2_000, True, id="usual_for_it"),
+        pytest.param(100, 2_001, False, id="unusual_for_it"),
+    ],
+)
+def test_a_hundred_messages_tell_what_is_usual_for_a_publisher(
+    rules: duckdb.DuckDBPyConnection, own: int, delay: int, *, is_found: bool
+) -> None:
+    """Where it has fewer, its host tells, if that needs longer."""
+    clock(rules, (0, 100, 0))
+    time = periodic(rules, [MICROSECOND] * own, MILLISECOND)
+    for number in range(1, 201):
+        publish(rules, 500 + number, time, time + MILLISECOND, topic="/b")
+        take(rules, time + number * MICROSECOND, topic="/b")
+        time += PERIOD
+    publish(rules, 999, time, None)
+    take(rules, time + delay)
+    found = nearest(rules)
+    assert found.get(time + delay, (None, 0))[0] == (999 if is_found else None)
+
+
+@pytest.mark.parametrize(
     ("median", "width", "delay", "is_found"),
     [
         pytest.param(1, 44, 16.0, True, id="writes_for_less_than_half"),

@@ -98,7 +98,7 @@ def test_a_target_that_falls_silent_is_said_once(tmp_path: Path) -> None:
     windows = [json.loads(line)["verdicts"] for line in result.stdout.splitlines()]
     counted = [set(verdicts) for verdicts in windows]
     assert {"no data"} in counted[counted.index({"passed"}) :]
-    # Without a single message, it is not known whose they would be.
+    # A topic without a message has no known publisher.
     said = re.findall(r"no data of (?:/relay → )?/result: rate > 1 Hz", result.stderr)
     assert len(said) == 1
     assert result.exit_code == 0

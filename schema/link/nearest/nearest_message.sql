@@ -253,7 +253,9 @@ usual AS (
                     derive.clock_limit().median_factor * median(w.delay_ns)
                 )
         END AS limit_ns,
-        quantile_disc(w.delay_ns, derive.clock_limit().usual_quantile) AS usual_ns
+        quantile_disc(w.delay_ns, derive.clock_limit().usual_quantile) AS usual_ns,
+        -- What 99 % of a few messages need says little of the next one.
+        count(*) * (1 - derive.clock_limit().usual_quantile) < 1 AS is_little_known
     FROM within AS w
     JOIN share AS s ON w.publisher_id = s.publisher_id
     WHERE w.place = 1 AND w.goes_on
@@ -304,7 +306,10 @@ candidate AS MATERIALIZED (
                 WHEN x.publisher_id IS NOT NULL THEN coalesce(w.delay_ns <= c.familiar_ns, false)
                 WHEN w.goes_on THEN coalesce(w.delay_ns <= u.limit_ns, true)
                 ELSE w.delay_ns <= coalesce(
-                    derive.clock_limit().usual_factor * coalesce(u.usual_ns, c.usual_ns),
+                    derive.clock_limit().usual_factor * CASE
+                        WHEN u.is_little_known THEN greatest(u.usual_ns, c.usual_ns)
+                        ELSE coalesce(u.usual_ns, c.usual_ns)
+                    END,
                     derive.clock_limit().write_ns
                 )
             END AS is_usual
