@@ -111,12 +111,14 @@ def derive_table(con: duckdb.DuckDBPyConnection, name: str, run_id: int) -> None
     """Derive one of `derived_tables` anew, inside the open transaction."""
     columns = ", ".join(STORE.tables[f"store.{name}"].columns.keys())
     con.execute(f"DELETE FROM store.{name} WHERE run_id = ?", [run_id])
-    if not _may_have_rows(con, _header(f"derive.{name}"), run_id):
-        return
-    con.execute(
-        f"INSERT INTO store.{name} ({columns}) SELECT {columns} FROM {_of_run(f'derive.{name}')}",
-        [run_id],
-    )
+    whole = _header(f"derive.{name}")
+    for header in (whole, *map(_header, whole.also)):
+        if _may_have_rows(con, header, run_id):
+            con.execute(
+                f"INSERT INTO store.{name} ({columns}) "
+                f"SELECT {columns} FROM {_of_run(header.name)}",
+                [run_id],
+            )
 
 
 def _may_have_rows(con: duckdb.DuckDBPyConnection, header: Header, run_id: int) -> bool:

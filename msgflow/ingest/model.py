@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import functools
 import re
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from msgflow.db import objects
+from msgflow.db.finding import kinds_of, statement
 from msgflow.db.tables import STORE
 from msgflow.ingest import staging
 from msgflow.ingest.caret_initialisation import restore
@@ -38,6 +40,9 @@ def build(con: duckdb.DuckDBPyConnection, *, keep: bool = False, findings: bool 
     staging.narrow(con, empty)
     last_uses = {} if keep else _last_uses(headers)
     for position, header in enumerate(headers):
+        if header.name == _FINDING:
+            kinds = [kind for kind in kinds_of("input") if not _has_no_row(kind, empty)]
+            header = replace(header, body=statement(kinds))
         create(con, header, empty)
         for name, last_use in last_uses.items():
             # A table without rows is no burden.
@@ -74,7 +79,12 @@ def create(con: duckdb.DuckDBPyConnection, header: Header, empty: set[str]) -> N
 def _stays_empty(header: Header, empty: set[str]) -> bool:
     """Tell whether a table needs no SQL: it has no row, and is there or declares its columns."""
     is_known = header.name in empty or bool(header.columns)
-    return is_known and bool(header.when) and empty.issuperset(header.when)
+    return is_known and _has_no_row(header, empty)
+
+
+def _has_no_row(header: Header, empty: set[str]) -> bool:
+    """Tell whether an object cannot have a row, by what `when` of its header says."""
+    return bool(header.when) and empty.issuperset(header.when)
 
 
 def _last_uses(headers: tuple[Header, ...]) -> dict[str, int]:

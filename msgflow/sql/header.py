@@ -14,6 +14,7 @@
     -- heading: rank, latency_ns
     -- note: clocks
     -- when: staging.gap
+    -- also: derive.a_b
     -- variant: measure VARCHAR {latency|age} = 'latency'  What is measured
 
 The header ends at the first line that is not a `--` comment. Two spaces end a parameter's default.
@@ -34,6 +35,8 @@ The header ends at the first line that is not a `--` comment. Two spaces end a p
   columns, from which the empty table is made. One that does not is left out only where the table is
   there already: `msgflow watch` ingests into one database again and again. Only objects that take
   long to plan declare columns.
+- `also`: objects whose rows the table of this one holds, too, unless their `when` has no rows. What
+  few recordings have needs no plan in the others.
 
 - `variant`: a parameter whose values are queries of their own. The default is this file, and `age`
   stands in the file of the same name with `-age` behind it; a BOOLEAN `each`, in that with `-each`.
@@ -41,8 +44,8 @@ The header ends at the first line that is not a `--` comment. Two spaces end a p
 The unit of a column may also say what the column names: 'node', 'topic', 'callback', 'host' or
 'path'. Options that choose rows by them use it. In a public view over the table of the same name, a
 column may stand by its name alone: the table declares the rest. Files in `schema/health` have a
-`severity`, a `cause` and a `cure`. An object is made after all objects that its statement or its
-`when` names.
+`severity`, a `cause` and a `cure`. An object is made after all objects that its statement, its
+`when` or its `also` names.
 
 The tables that a statement looks up stay in memory until it ends. A query may therefore go in
 steps: other statements stand before its own, each of the form
@@ -80,7 +83,7 @@ _MINIMUM = re.compile(r"(-?\d+)\.\.")
 _REPEATABLE = ("param", "column")
 _SINGLE = (
     "name", "title", "description", "cause", "cure", "grain", "kind", "severity", "note", "when",
-    "brief", "answer", "heading", "slowest", "zero", "variant",
+    "also", "brief", "answer", "heading", "slowest", "zero", "variant",
 )  # fmt: skip
 _KINDS = ("view", "inline", "macro")
 _NOTES = ("clocks", "callbacks", "kernel", "requests", "goals")
@@ -172,6 +175,7 @@ class Header:
         zero: column that is 0 in rows that a terminal leaves out, else None.
         steps: what a query makes before, in order.
         when: tables and macros of a run; if none of them has a row, this has none.
+        also: objects whose rows are stored in the same table.
         variant: parameter that chooses between this query and others; its default is this one.
         chosen: of a variant: the name of the query, and the option that chooses this one.
     """
@@ -196,6 +200,7 @@ class Header:
     zero: str | None = None
     steps: tuple[Step, ...] = ()
     when: tuple[str, ...] = ()
+    also: tuple[str, ...] = ()
     variant: Param | None = None
     chosen: str | None = None
 
@@ -211,7 +216,7 @@ class Header:
         A name in a string counts, since a table may be given to a macro by name.
         """
         named = (name for text in self.statements for name in _OBJECT.findall(_code(text)))
-        return tuple(sorted({*named, *self.when} - {self.name}))
+        return tuple(sorted({*named, *self.when, *self.also} - {self.name}))
 
     @cached_property
     def relations(self) -> frozenset[str]:
@@ -299,6 +304,7 @@ def parse(text: str, path: Path) -> Header:
         zero=single.get("zero"),
         steps=steps,
         when=_names(single.get("when", "")),
+        also=_names(single.get("also", "")),
         variant=variants[0] if variants else None,
     )
 

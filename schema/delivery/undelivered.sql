@@ -131,7 +131,12 @@ first_from_buffer AS (
 one_thread AS (
     SELECT publisher_id
     FROM store.publication
-    WHERE run_id = only_run AND publisher_id IN (SELECT publisher_id FROM missing)
+    WHERE run_id = only_run
+        AND publisher_id IN (
+            SELECT publisher_id
+            FROM missing
+            WHERE subscription_id IN (SELECT subscription_id FROM unidentified)
+        )
     GROUP BY publisher_id
     HAVING min(thread_id) = max(thread_id)
 ),

@@ -20,7 +20,7 @@ WITH named AS (
     JOIN session_trace AS s ON r.trace_index = s.trace_index
     WHERE r.pid_ns IS NULL AND n.procname IS NOT NULL
 ),
-alternating AS (
+alternating AS MATERIALIZED (
     SELECT host, vpid, thread_index
     FROM named
     GROUP BY host, vpid, thread_index, initialised_event_id
@@ -30,7 +30,11 @@ renamed AS (
     SELECT a.host, a.vpid
     FROM alternating AS a
     JOIN raw.ros2_callback_end AS e ON a.thread_index = e.thread_index
-    JOIN raw.ros2_callback_start AS b
+    -- Most recordings have none of these threads: then no callback is looked at.
+    JOIN (
+        FROM raw.ros2_callback_start
+        WHERE thread_index IN (SELECT thread_index FROM alternating)
+    ) AS b
         ON e.previous_callback_event_id = b.event_id AND e.callback = b.callback
     ASOF JOIN named AS f ON b.thread_index = f.thread_index AND b.event_id >= f.first_event_id
     ASOF JOIN named AS l ON e.thread_index = l.thread_index AND e.event_id >= l.first_event_id

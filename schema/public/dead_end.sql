@@ -28,18 +28,8 @@
 -- column: is_loop BOOLEAN  The messages descend from what the node publishes
 -- column: is_likely BOOLEAN  Nothing speaks against a link
 CREATE OR REPLACE MACRO main.dead_end(runs) AS TABLE
-WITH RECURSIVE received AS (
-    SELECT
-        c.subscription_id, count(*) AS message_count, min(i.start_ns) AS first_ns,
-        quantile_disc(i.end_ns - i.start_ns, 0.5) AS run_ns
-    FROM store.callback_instance AS i
-    JOIN store.callback AS c ON i.callback_id = c.callback_id
-    WHERE list_contains(runs, i.run_id) AND c.subscription_id IS NOT NULL
-    GROUP BY c.subscription_id
-    HAVING count(*) >= 3
-),
 -- Logging is no effect.
-caused AS NOT MATERIALIZED (
+WITH RECURSIVE caused AS NOT MATERIALIZED (
     SELECT
         l.kind, l.callback_instance_id, l.take_id, l.subscription_id, l.publication_id,
         l.publisher_id, p.node_id, p.topic_name
@@ -47,7 +37,18 @@ caused AS NOT MATERIALIZED (
     JOIN store.publisher AS p ON l.publisher_id = p.publisher_id
     WHERE list_contains(runs, l.run_id) AND NOT p.is_internal
 ),
--- Links have the subscription of a message whose take is known.
+candidate AS MATERIALIZED (
+    SELECT run_id, node_id, subscription_id
+    FROM derive.unanswered_subscription
+    WHERE list_contains(runs, run_id)
+),
+instance AS MATERIALIZED (
+    SELECT d.subscription_id, i.callback_instance_id, i.start_ns, i.end_ns - i.start_ns AS run_ns
+    FROM candidate AS d
+    JOIN store.callback AS c ON d.subscription_id = c.subscription_id
+    JOIN store.callback_instance AS i ON c.callback_id = i.callback_id
+    WHERE list_contains(runs, i.run_id)
+),
 effective AS (
     SELECT callback_instance_id FROM caused WHERE take_id IS NULL
     UNION ALL
@@ -55,23 +56,17 @@ effective AS (
     UNION ALL
     SELECT callback_instance_id FROM store.link_response WHERE list_contains(runs, run_id)
 ),
-followed AS (
-    SELECT subscription_id FROM caused
-    UNION ALL
-    SELECT c.subscription_id
-    FROM effective AS e
-    JOIN store.callback_instance AS i ON e.callback_instance_id = i.callback_instance_id
-    JOIN store.callback AS c ON i.callback_id = c.callback_id
-    UNION ALL
-    SELECT subscription_id FROM store.annotation_input
-),
 idle AS MATERIALIZED (
-    SELECT s.run_id, s.node_id, s.subscription_id, r.message_count, r.first_ns, r.run_ns
-    FROM received AS r
-    JOIN store.subscription AS s ON r.subscription_id = s.subscription_id
-    ANTI JOIN followed AS l ON s.subscription_id = l.subscription_id
-    ANTI JOIN store.publisher AS p ON s.node_id = p.node_id AND s.topic_name = p.topic_name
-    WHERE NOT s.is_internal AND s.topic_name <> '/clock' AND s.node_id IS NOT NULL
+    SELECT
+        d.run_id, d.node_id, d.subscription_id,
+        count(*) AS message_count,
+        min(i.start_ns) AS first_ns,
+        quantile_disc(i.run_ns, 0.5) AS run_ns
+    FROM candidate AS d
+    JOIN instance AS i ON d.subscription_id = i.subscription_id
+    LEFT JOIN effective AS e ON i.callback_instance_id = e.callback_instance_id
+    GROUP BY d.run_id, d.node_id, d.subscription_id
+    HAVING count(*) >= 3 AND count(e.callback_instance_id) = 0
 ),
 published AS MATERIALIZED (
     SELECT

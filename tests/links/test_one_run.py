@@ -26,6 +26,7 @@ FILLED = {
     "derive.annotated_publication",
     "derive.annotated_run",
     "derive.link_causal",
+    "derive.link_causal_annotated",
     "derive.link_causal_direct",
     "derive.link_causal_indirect",
 }

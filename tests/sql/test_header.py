@@ -30,6 +30,7 @@ FULL = """\
 --     When
 -- when: main.a,
 --     main.b
+-- also: main.c, main.d
 -- answer: median_ns
 -- heading: start_ns, median_ns
 -- brief: start_ns,
@@ -67,6 +68,7 @@ def test_everything_is_parsed() -> None:
         Column("start_ns", "BIGINT", "epoch ns", "When"),
     )
     assert header.when == ("main.a", "main.b")
+    assert header.also == ("main.c", "main.d")
     assert header.severity == "warning"
     assert header.brief == ("start_ns", "median_ns")
     assert header.answer == ("median_ns",)
@@ -77,11 +79,12 @@ def test_everything_is_parsed() -> None:
 def test_an_object_needs_what_its_statements_name() -> None:
     header = parse_with(
         "-- when: staging.d, derive.f\n"
+        "-- also: derive.g\n"
         "CREATE OR REPLACE TEMP TABLE step AS\nFROM store.c;\n\n"
         "WITH e AS (FROM main.b) -- not main.x\nSELECT derive.f(e.main, 'a.b') FROM e\n"
         "JOIN query_table('raw.a') USING (id)"
     )
-    assert header.needs == ("derive.f", "main.b", "raw.a", "staging.d", "store.c")
+    assert header.needs == ("derive.f", "derive.g", "main.b", "raw.a", "staging.d", "store.c")
     assert header.relations == {"e"}
 
 

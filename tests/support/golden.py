@@ -233,7 +233,7 @@ class Bench:
 
     def _fill(self, path: Path, case: Case) -> None:
         self._empty()
-        _stage(self._connection, case)
+        stage(self._connection, case)
         self._connection.begin()
         self._rows = rows_of(path)
         fill_case(self._connection, path)
@@ -407,7 +407,8 @@ def _create(connection: duckdb.DuckDBPyConnection, what: str, text: str) -> None
         connection.execute(f"CREATE {what} AS FROM read_csv(?, header = true)", [file.name])
 
 
-def _stage(connection: duckdb.DuckDBPyConnection, case: Case) -> None:
+def stage(connection: duckdb.DuckDBPyConnection, case: Case) -> None:
+    """Attach `staging` with the tables of a case, if it has some."""
     if case.staging:
         connection.execute("ATTACH ':memory:' AS staging")
     for table, text in case.staging.items():

@@ -8,6 +8,7 @@
 --     time, and ingest both. Enable ros2:*, so that takes and executors show.
 -- grain: one row, if there are any
 -- severity: warning
+-- when: staging.buffer_owner
 SELECT
     count(*) AS count,
     'ring buffers without a known subscription: their creation was not traced, and several '

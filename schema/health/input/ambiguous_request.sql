@@ -7,6 +7,7 @@
 -- cure: None needed. How long these requests took is not known.
 -- grain: one row, if there are any
 -- severity: warning
+-- when: staging.client_gid
 WITH ambiguous_request AS (
     SELECT DISTINCT t.event_id
     FROM staging.service_event AS t

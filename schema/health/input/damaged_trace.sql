@@ -8,6 +8,7 @@
 --     again and compare sizes.
 -- grain: one row per damage, the first twenty of each trace, then one for the rest
 -- severity: error
+-- when: staging.damage
 WITH damage AS (
     SELECT
         trace_index, file, position, byte_offset, message,

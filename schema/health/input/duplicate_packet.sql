@@ -5,6 +5,7 @@
 -- cure: None needed.
 -- grain: one row, if there are any
 -- severity: info
+-- when: staging.packet_read_once
 SELECT
     packet_count AS count,
     'packets that several of the given traces hold were read once' AS detail

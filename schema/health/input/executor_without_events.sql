@@ -14,20 +14,22 @@ WITH enabled AS (
     FROM staging.declared
     WHERE name = 'ros2:rclcpp_executor_get_next_ready'
 ),
-running AS (
-    SELECT process_id, thread_id, trace_index, count(*) AS number
-    FROM staging.callback_pair
-    GROUP BY process_id, thread_id, trace_index
-),
 silent AS (
-    SELECT r.process_id, r.thread_id, r.number
-    FROM running AS r
-    SEMI JOIN enabled AS e ON r.trace_index = e.trace_index
-    ANTI JOIN staging.executor_first AS x ON r.thread_id = x.thread_id
-    ANTI JOIN staging.thread_break AS b ON r.thread_id = b.thread_id
+    SELECT p.process_id, p.thread_id, count(*) AS number
+    FROM staging.callback_pair AS p
+    SEMI JOIN enabled AS e ON p.trace_index = e.trace_index
+    ANTI JOIN staging.executor_first AS x ON p.thread_id = x.thread_id
+    ANTI JOIN staging.thread_break AS b ON p.thread_id = b.thread_id
+    GROUP BY p.process_id, p.thread_id, p.trace_index
     -- An executor chose the first one before the recording began, perhaps. It would have said so
     -- before the next.
-    WHERE r.number > 1
+    HAVING count(*) > 1
+),
+running AS (
+    SELECT process_id, count(DISTINCT thread_id) AS threads
+    FROM staging.callback_pair
+    WHERE process_id IN (SELECT process_id FROM silent)
+    GROUP BY process_id
 )
 SELECT
     l.label AS subject,
@@ -37,8 +39,6 @@ SELECT
         sum(s.number)::BIGINT, count(*), any_value(t.threads)
     ) AS detail
 FROM silent AS s
-JOIN (
-    SELECT process_id, count(DISTINCT thread_id) AS threads FROM running GROUP BY process_id
-) AS t ON s.process_id = t.process_id
+JOIN running AS t ON s.process_id = t.process_id
 JOIN process_label AS l ON s.process_id = l.process_id
 GROUP BY s.process_id, l.label

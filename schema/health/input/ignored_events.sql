@@ -6,6 +6,7 @@
 -- cure: Ingest again without the option: msgflow ingest --replace TRACE.
 -- grain: one row, if there are any
 -- severity: warning
+-- when: staging.ignored
 WITH by_pattern AS (
     SELECT i.place, i.pattern, sum(e.event_count)::BIGINT AS event_count
     FROM staging.ignored AS i

@@ -5,6 +5,7 @@
 -- cure: Compare it with the names that msgflow events TRACE lists.
 -- grain: one row, if there are any
 -- severity: warning
+-- when: staging.ignored
 SELECT
     count(*) AS count,
     'patterns of events to leave out that match none: '

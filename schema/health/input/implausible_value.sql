@@ -7,6 +7,7 @@
 --     again and compare sizes.
 -- grain: one row per field of an event
 -- severity: warning
+-- when: staging.implausible
 SELECT
     value_count AS count,
     printf('values of %s in %s that cannot be %s: left out', field, event, what) AS detail

@@ -8,6 +8,7 @@
 -- cure: Record with LTTng's kernel modules, or outside of the virtual machine (docs/scheduling.md).
 -- grain: one row per kernel trace in which a twentieth of the time of a CPU, or more, is not known
 -- severity: warning
+-- when: staging.cpu_schedule
 SELECT
     s.trace_index + 1 AS trace_id,
     s.unknown_count AS count,

@@ -8,6 +8,7 @@
 --     dump (docs/scheduling.md).
 -- grain: one row per process
 -- severity: info
+-- when: staging.schedule
 SELECT
     coalesce(p.name, 'process ' || p.pid) AS subject,
     count(*) AS count,

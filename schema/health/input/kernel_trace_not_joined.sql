@@ -7,6 +7,7 @@
 -- cure: Record again with the clock of LTTng (docs/scheduling.md); convert with a newer perf.
 -- grain: one row per kernel trace
 -- severity: warning
+-- when: staging.schedule
 SELECT
     trace_index + 1 AS trace_id,
     event_count - agreeing_count AS count,

@@ -6,6 +6,7 @@
 -- cure: None needed.
 -- grain: one row per kernel trace
 -- severity: info
+-- when: staging.schedule
 SELECT
     trace_index + 1 AS trace_id,
     agreeing_count AS count,

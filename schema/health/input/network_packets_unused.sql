@@ -5,6 +5,7 @@
 -- cure: None needed; docs/clocks.md says which packets are used.
 -- grain: one row, if there are any
 -- severity: info
+-- when: staging.network_packet
 WITH packet_use AS (
     SELECT
         count(*) AS number,

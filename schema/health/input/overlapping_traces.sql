@@ -6,6 +6,7 @@
 -- cure: None needed. To read one of them alone: msgflow ingest --replace TRACE.
 -- grain: one row per pair of traces
 -- severity: warning
+-- when: staging.left_out
 SELECT
     o.trace_index + 1 AS trace_id,
     o.event_count AS count,

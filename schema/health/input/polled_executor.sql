@@ -7,6 +7,7 @@
 -- cure: None needed. Where messages wait for the loop, let the executor spin.
 -- grain: one row per process
 -- severity: warning
+-- when: staging.executor_polled
 SELECT
     l.label AS subject,
     sum(p.polls)::BIGINT AS count,

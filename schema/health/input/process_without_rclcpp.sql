@@ -13,14 +13,22 @@
 WITH enabled AS (
     SELECT trace_index FROM staging.declared WHERE name = 'ros2:callback_start'
 ),
+rclcpp AS (
+    SELECT process_id FROM staging.callback
+    UNION
+    SELECT t.process_id
+    FROM staging.thread AS t
+    SEMI JOIN staging.executor_first AS x ON t.thread_id = x.thread_id
+),
 sent AS (
     SELECT
-        process_id,
-        bool_and(trace_index IN (SELECT trace_index FROM enabled)) AS is_enabled,
-        bool_or(rclcpp_ns IS NOT NULL OR intra_ns IS NOT NULL) AS has_rclcpp,
+        p.process_id,
+        bool_and(p.trace_index IN (SELECT trace_index FROM enabled)) AS is_enabled,
+        bool_or(p.rclcpp_ns IS NOT NULL OR p.intra_ns IS NOT NULL) AS has_rclcpp,
         count(*) AS number
-    FROM staging.publication_call
-    GROUP BY process_id
+    FROM staging.publication_call AS p
+    ANTI JOIN rclcpp AS r ON p.process_id = r.process_id
+    GROUP BY p.process_id
 ),
 timed AS (
     SELECT process_id, count(*) AS number FROM staging.timer GROUP BY process_id
@@ -32,13 +40,6 @@ named AS (
     FROM staging.node
     WHERE NOT is_inferred
     GROUP BY process_id
-),
-rclcpp AS (
-    SELECT process_id FROM staging.callback
-    UNION
-    SELECT t.process_id
-    FROM staging.thread AS t
-    SEMI JOIN staging.executor_first AS x ON t.thread_id = x.thread_id
 )
 SELECT
     printf('%s (%s)', n.nodes, l.label) AS subject,
@@ -47,7 +48,6 @@ SELECT
         AS detail
 FROM sent AS s
 JOIN named AS n ON s.process_id = n.process_id
-ANTI JOIN rclcpp AS r ON s.process_id = r.process_id
 LEFT JOIN timed AS t ON s.process_id = t.process_id
 JOIN process_label AS l ON s.process_id = l.process_id
 WHERE s.is_enabled AND NOT s.has_rclcpp

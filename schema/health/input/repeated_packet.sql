@@ -5,6 +5,7 @@
 -- cure: None needed. Without the copy, other tools read the trace right, too.
 -- grain: one row, if there are any
 -- severity: warning
+-- when: staging.packet_read_once
 SELECT
     sum(packet_count) AS count,
     'packets that one trace holds twice, such as those of a stream file copied beside itself, were '

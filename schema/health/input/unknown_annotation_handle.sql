@@ -8,6 +8,7 @@
 --     file (msgflow links apply).
 -- grain: one row, if there are any
 -- severity: warning
+-- when: staging.annotation
 SELECT
     count(*) AS count,
     'inputs or outputs of declared indirect links that are not known subscriptions or publishers, '

@@ -5,6 +5,7 @@
 -- cure: Start the session before the nodes, and see whether events were lost (msgflow check).
 -- grain: one row per trace
 -- severity: warning
+-- when: staging.callback_left_over
 SELECT
     trace_index + 1 AS trace_id,
     count(*) AS count,

@@ -9,6 +9,7 @@
 --     lttng enable-event -u 'my_pkg:*', or ros2 trace -u 'ros2:*' 'my_pkg:*'.
 -- grain: one row, if there are any
 -- severity: warning
+-- when: staging.asked
 WITH pattern AS (
     SELECT
         a.place,

@@ -12,11 +12,16 @@
 -- severity: warning
 WITH waited AS (
     SELECT
-        run_id, executor_id, count(*) AS number, count(DISTINCT thread_id) AS threads
-    FROM store.executor_state
+        s.run_id, s.executor_id, count(*) AS number, count(DISTINCT s.thread_id) AS threads
+    FROM store.executor_state AS s
+    SEMI JOIN (FROM store.executor WHERE kind LIKE 'multi_threaded%') AS e
+        ON s.executor_id = e.executor_id
     -- Over within a millisecond: something was ready.
-    WHERE state = 'wait' AND end_ns - start_ns < 1_000_000
-    GROUP BY run_id, executor_id
+    WHERE s.state = 'wait' AND s.end_ns - s.start_ns < 1_000_000
+    GROUP BY s.run_id, s.executor_id
+),
+thread AS (
+    FROM store.executor_thread SEMI JOIN waited USING (executor_id)
 ),
 -- Those of clients and action servers are not traced, but what they are called with is.
 run AS (
@@ -29,7 +34,7 @@ run AS (
 ran AS (
     SELECT x.executor_id, count(*) AS number
     FROM run AS i
-    JOIN store.executor_thread AS x ON i.thread_id = x.thread_id
+    JOIN thread AS x ON i.thread_id = x.thread_id
     GROUP BY x.executor_id
 )
 SELECT
@@ -48,4 +53,4 @@ JOIN main.process AS p ON e.process_id = p.process_id
 JOIN main.host AS h ON p.host_id = h.host_id
 -- One that sleeps until a callback is due waits once for it, or a few times: it is woken for what
 -- it does for itself, too. One that is busy waits twenty times and more.
-WHERE e.kind LIKE 'multi_threaded%' AND w.number > 10 * r.number
+WHERE w.number > 10 * r.number

@@ -8,6 +8,7 @@
 --     each (docs/causes.md).
 -- grain: one row per topic
 -- severity: warning
+-- when: derive.unnamed_endpoint
 -- param: run_id BIGINT  Run
 SELECT
     run_id,

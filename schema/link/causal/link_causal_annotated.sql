@@ -1,0 +1,20 @@
+-- name: derive.link_causal_annotated
+-- kind: macro
+-- description: Publications that messages led to which were kept until then, as annotations tell.
+--     A link may be spoilt by lost events where a gap touches the callback instance that kept the
+--     message, or the publication.
+-- grain: one row per callback instance, publication that it led to, and annotation
+-- when: store.annotation
+-- param: only_run BIGINT  Run to look at
+CREATE OR REPLACE MACRO derive.link_causal_annotated(only_run) AS TABLE
+WITH link AS (
+    SELECT
+        x.run_id, x.callback_instance_id, i.take_id, x.publication_id, b.publisher_id, x.kind,
+        x.annotation_id, x.candidate_count,
+        x.is_loss_affected OR i.is_loss_affected OR b.is_loss_affected AS is_loss_affected
+    FROM derive.link_causal_indirect(only_run) AS x
+    JOIN store.callback_instance AS i ON x.callback_instance_id = i.callback_instance_id
+    JOIN store.publication AS b ON x.publication_id = b.publication_id
+    WHERE i.run_id = only_run AND b.run_id = only_run
+)
+FROM derive.causal_link(only_run, 'link')
