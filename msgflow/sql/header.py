@@ -30,13 +30,13 @@ The header ends at the first line that is not a `--` comment. Two spaces end a p
   on which the others depend.
 - `slowest`: the column that `--slowest N` goes by.
 - `zero`: the column that is 0 in rows that a terminal leaves out.
-- `when`: tables, or macros of a run. If none of them has a row, this object has none either, and an
-  ingest leaves it empty without running its SQL. In `schema/model` such an object may declare its
+- `when`: tables, views, or macros of a run. If none of them has a row, this object has none either,
+  and an ingest does not run its SQL. In `schema/model` such an object may declare its
   columns, from which the empty table is made. One that does not is left out only where the table is
   there already: `msgflow watch` ingests into one database again and again. Only objects that take
   long to plan declare columns.
-- `also`: objects whose rows the table of this one holds, too, unless their `when` has no rows. What
-  few recordings have needs no plan in the others.
+- `also`: objects whose rows are stored in the table of this one, too. Each has a `when` of its own,
+  so that what few recordings have is planned only there.
 
 - `variant`: a parameter whose values are queries of their own. The default is this file, and `age`
   stands in the file of the same name with `-age` behind it; a BOOLEAN `each`, in that with `-each`.
@@ -174,7 +174,7 @@ class Header:
         slowest: column by which rows are the slowest, else None.
         zero: column that is 0 in rows that a terminal leaves out, else None.
         steps: what a query makes before, in order.
-        when: tables and macros of a run; if none of them has a row, this has none.
+        when: tables, views and macros of a run; if none of them has a row, this has none.
         also: objects whose rows are stored in the same table.
         variant: parameter that chooses between this query and others; its default is this one.
         chosen: of a variant: the name of the query, and the option that chooses this one.

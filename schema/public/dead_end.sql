@@ -37,18 +37,16 @@ WITH RECURSIVE caused AS NOT MATERIALIZED (
     JOIN store.publisher AS p ON l.publisher_id = p.publisher_id
     WHERE list_contains(runs, l.run_id) AND NOT p.is_internal
 ),
-candidate AS MATERIALIZED (
-    SELECT run_id, node_id, subscription_id
-    FROM derive.unanswered_subscription
-    WHERE list_contains(runs, run_id)
-),
 instance AS MATERIALIZED (
-    SELECT d.subscription_id, i.callback_instance_id, i.start_ns, i.end_ns - i.start_ns AS run_ns
-    FROM candidate AS d
+    SELECT
+        d.run_id, d.node_id, d.subscription_id, i.callback_instance_id, i.start_ns,
+        i.end_ns - i.start_ns AS run_ns
+    FROM derive.unanswered_subscription AS d
     JOIN store.callback AS c ON d.subscription_id = c.subscription_id
     JOIN store.callback_instance AS i ON c.callback_id = i.callback_id
-    WHERE list_contains(runs, i.run_id)
+    WHERE list_contains(runs, d.run_id) AND list_contains(runs, i.run_id)
 ),
+-- What led to something although no take is known: the view has looked at the others.
 effective AS (
     SELECT callback_instance_id FROM caused WHERE take_id IS NULL
     UNION ALL
@@ -58,14 +56,13 @@ effective AS (
 ),
 idle AS MATERIALIZED (
     SELECT
-        d.run_id, d.node_id, d.subscription_id,
+        i.run_id, i.node_id, i.subscription_id,
         count(*) AS message_count,
         min(i.start_ns) AS first_ns,
         quantile_disc(i.run_ns, 0.5) AS run_ns
-    FROM candidate AS d
-    JOIN instance AS i ON d.subscription_id = i.subscription_id
+    FROM instance AS i
     LEFT JOIN effective AS e ON i.callback_instance_id = e.callback_instance_id
-    GROUP BY d.run_id, d.node_id, d.subscription_id
+    GROUP BY i.run_id, i.node_id, i.subscription_id
     HAVING count(*) >= 3 AND count(e.callback_instance_id) = 0
 ),
 published AS MATERIALIZED (

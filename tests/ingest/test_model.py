@@ -186,6 +186,30 @@ def have_no_row_without_their_when(
         assert built(shown[0], header.when)[header.name] == (columns, 0)
 
 
+@pytest.mark.parametrize("is_damaged", [False, True])
+def test_findings_of_which_nothing_tells_are_not_planned(
+    lossy: Path, is_damaged: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    planned = {}
+    create = model.create
+
+    def note(con: duckdb.DuckDBPyConnection, header: Any, empty: set[str]) -> None:
+        planned[header.name] = header.body
+        create(con, header, empty)
+
+    monkeypatch.setattr(model, "create", note)
+    with duckdb.connect() as con:
+        read(con, lossy)
+        if is_damaged:
+            con.execute("INSERT INTO staging.damage VALUES (0, 'stream_0', 4096, 12, 'cut off')")
+        model.build(con)
+        found = con.execute("SELECT name FROM staging.finding").fetchall()
+    assert ("'damaged_trace'" in planned["staging.finding"]) == is_damaged
+    assert (("damaged_trace",) in found) == is_damaged
+    assert "'open_callback'" in planned["staging.finding"]
+    assert "'kernel_trace_not_joined'" not in planned["staging.finding"]
+
+
 def test_an_object_without_a_row_has_its_columns_all_the_same(planned: dict[str, Any]) -> None:
     with duckdb.connect() as con:
         con.execute("ATTACH ':memory:' AS staging")

@@ -329,6 +329,19 @@ def fill(connection: duckdb.DuckDBPyConnection, tables: Mapping[str, str] | None
         insert(connection, table, names, rows)
 
 
+def empty(connection: duckdb.DuckDBPyConnection, name: str) -> None:
+    """Delete the rows of a table, or let a view or macro return none."""
+    headers = [header for header in objects.views() if header.name == name]
+    if not headers:
+        connection.execute(f"DELETE FROM {name}")
+    for header in headers:
+        head, body = "", header.body
+        if header.kind == "macro":
+            head, body = body.split(" AS TABLE\n", 1)
+        head = f"{head} AS TABLE" if head else f"CREATE OR REPLACE VIEW {name} AS"
+        connection.execute(f"{head}\nSELECT * FROM ({body}) WHERE false")
+
+
 def insert(
     connection: duckdb.DuckDBPyConnection, table: str, names: list[str | None], rows: Rows
 ) -> None:

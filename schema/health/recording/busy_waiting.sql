@@ -21,7 +21,8 @@ WITH waited AS (
     GROUP BY s.run_id, s.executor_id
 ),
 thread AS (
-    FROM store.executor_thread SEMI JOIN waited USING (executor_id)
+    FROM store.executor_thread
+    SEMI JOIN (FROM store.executor WHERE kind LIKE 'multi_threaded%') USING (executor_id)
 ),
 -- Those of clients and action servers are not traced, but what they are called with is.
 run AS (

@@ -1,12 +1,14 @@
 -- name: derive.causal_link
 -- kind: macro
 -- description: Causal links as they are stored. In a process that is several with equal ids, the
---     cause may be one of another process, so there is one candidate more. A file of links may
---     declare that a publisher does not answer a subscription (`independent`), or that it waits for
---     the messages closest in time (`approximate_sync`): then there is no link of that kind.
+--     cause may be one of another process, so there is one candidate more. Annotations may declare
+--     that a publisher does not answer a subscription (`independent`): then there is no link of the
+--     kinds `direct` and `take_adjacent`. Or that it waits for the messages closest in time
+--     (`approximate_sync`): then there is none of the kind `direct`.
 -- grain: one row per link that is not declared away
 -- param: only_run BIGINT  Run to look at
--- param: links VARCHAR  Name of the links: what led to each publication, and the kind of the link
+-- param: links VARCHAR  Name of rows of run_id, callback_instance_id, take_id, publication_id,
+--     publisher_id, kind, annotation_id, candidate_count, is_loss_affected
 CREATE OR REPLACE MACRO derive.causal_link(only_run, links) AS TABLE
 WITH mixed AS (
     SELECT publication_id
