@@ -146,6 +146,12 @@ RULES = (
         for each in ("given_namespace", "alternating_name")
     ),
     ("flow/certain_cause.sql", ("schema/cases/derive.certain_cause",)),
+    (
+        "flow/stuck_root.sql",
+        ("schema/cases/derive.stuck_root", "schema/cases/main.end_to_end", "query/cases/flows"),
+    ),
+    ("flow/unanswered_subscription.sql", ("schema/cases/derive.unanswered_subscription",)),
+    ("public/dead_end.sql", ("schema/cases/main.dead_end", "schema/cases/finding.dead_end")),
     ("overlap/session_container.sql", ("schema/test_session_container.py",)),
     ("overlap/session_pair.sql", ("schema/test_session_pair.py",)),
     ("public/goal.sql", ("schema/cases/main.goal",)),
