@@ -128,7 +128,7 @@ first_from_buffer AS (
     WHERE u.is_from_buffer OR c.is_intra_process
     GROUP BY u.subscription_id
 ),
--- Their order matters only where a take is not identified.
+-- The order of messages matters only where a take is not identified.
 one_thread AS (
     SELECT publisher_id
     FROM store.publication

@@ -30,7 +30,7 @@ renamed AS (
     SELECT a.host, a.vpid
     FROM alternating AS a
     JOIN raw.ros2_callback_end AS e ON a.thread_index = e.thread_index
-    -- Most recordings have none of these threads: then no callback is looked at.
+    -- Most recordings have no such thread, and their callbacks are not read.
     JOIN (
         FROM raw.ros2_callback_start
         WHERE thread_index IN (SELECT thread_index FROM alternating)

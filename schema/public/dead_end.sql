@@ -46,7 +46,7 @@ instance AS MATERIALIZED (
     JOIN store.callback_instance AS i ON c.callback_id = i.callback_id
     WHERE list_contains(runs, d.run_id) AND list_contains(runs, i.run_id)
 ),
--- What led to something although no take is known: the view has looked at the others.
+-- What led to something, but for known takes: derive.unanswered_subscription leaves those out.
 effective AS (
     SELECT callback_instance_id FROM caused WHERE take_id IS NULL
     UNION ALL

@@ -45,12 +45,9 @@ def messages(random: Random, inputs: int) -> Messages:
 
 
 def record(
-    arrived: Messages, *, silent: float = 0, random: Random | None = None, second: int = 0
+    arrived: Messages, *, silent: float = 0, random: Random | None = None
 ) -> tuple[RosSystem, dict[int, list[int]]]:
-    """The events of such a system, and of each publication the callbacks of its set.
-
-    A second filter has the first inputs, as many as `second` says.
-    """
+    """The events of such a system, and of each publication the callbacks of its set."""
     inputs = 1 + max(number for number, _ in arrived)
     system = RosSystem()
     system.context(SOURCE)
@@ -60,22 +57,18 @@ def record(
     for number in range(inputs):
         system.publisher(SOURCE, 0x21 + number, f"/in{number}")
         system.subscription(NODE, 0x11 + number, f"/in{number}", callback=0xC1 + number)
-    filters: dict[int, tuple[int, ApproximateTime[int]]] = {}
-    for output, count in ((OUTPUT, inputs), (OUTPUT + 1, second)):
-        if count:
-            system.publisher(NODE, output, f"/out{output}")
-            system.annotate(NODE, "approximate_sync", [0x11 + n for n in range(count)], [output])
-            filters[output] = count, ApproximateTime(count)
+    system.publisher(NODE, OUTPUT, "/out")
+    system.annotate(NODE, "approximate_sync", [0x11 + n for n in range(inputs)], [OUTPUT])
+    filters: ApproximateTime[int] = ApproximateTime(inputs)
     sets: dict[int, list[int]] = {}
     outputs = iter(range(10**12, 2 * 10**12))
     for number, stamp in arrived:
         system.publish(SOURCE, 0x21 + number, stamp)
         system.take(NODE, 0x11 + number, stamp)
         start = system.start(NODE, 0xC1 + number)
-        for output, (count, each) in filters.items():
-            for used in each.add(number, stamp, start) if number < count else ():
-                if random is None or random.random() >= silent:
-                    sets[system.publish(NODE, output, next(outputs))] = sorted(used)
+        for used in filters.add(number, stamp, start):
+            if random is None or random.random() >= silent:
+                sets[system.publish(NODE, OUTPUT, next(outputs))] = sorted(used)
         system.end(NODE, 0xC1 + number)
     return system, sets
 
@@ -125,14 +118,3 @@ def test_a_filter_whose_sets_are_not_all_published(
     assert links.keys() <= sets.keys()
     wrong = {each for each, (used, count) in links.items() if count == 1 and used != sets[each]}
     assert wrong == set()
-
-
-@pytest.mark.parametrize("seed", few(range(12), 0))
-def test_two_filters_of_the_same_messages(analysis: Analysis, seed: int) -> None:
-    system, sets = record(messages(Random(seed), 3), second=2)
-    links = found(analysis, system)
-    assert links.keys() == sets.keys()
-    assert 1 in {count for _, count in links.values()}
-    assert {
-        each for each, (used, count) in links.items() if count == 1 and used != sets[each]
-    } == set()

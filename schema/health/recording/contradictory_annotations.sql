@@ -21,8 +21,8 @@ SELECT
     ) AS detail
 FROM (
     SELECT DISTINCT p.run_id, p.subscription_id, p.publisher_id, p.kind, s.kind AS other
-    FROM declared_pair AS p
-    JOIN declared_pair AS s
+    FROM derive.declared_pair AS p
+    JOIN derive.declared_pair AS s
         ON p.subscription_id = s.subscription_id AND p.publisher_id = s.publisher_id
     WHERE (derive.is_indirect(p.kind) AND derive.is_indirect(s.kind) AND p.kind > s.kind)
         OR (p.kind = 'direct' AND s.kind = 'independent')

@@ -32,13 +32,7 @@ doubtful AS (
         SELECT publication_id FROM slept
     ) AS l
     JOIN adjacent AS a ON l.publication_id = a.publication_id
-    ANTI JOIN (
-        SELECT i.subscription_id, o.publisher_id
-        FROM store.annotation AS a
-        JOIN store.annotation_input AS i ON a.annotation_id = i.annotation_id
-        JOIN store.annotation_output AS o ON a.annotation_id = o.annotation_id
-        WHERE a.run_id = only_run AND a.kind = 'direct'
-    ) AS d
+    ANTI JOIN (FROM derive.declared_pair WHERE run_id = only_run AND kind = 'direct') AS d
         ON a.subscription_id = d.subscription_id AND a.publisher_id = d.publisher_id
 ),
 link AS (

@@ -142,12 +142,6 @@ copy AS (
     WHERE l.method <> 'ring_buffer'
 ),
 -- Of processes that are several with equal ids.
-mixed_publication AS (
-    SELECT publication_id
-    FROM store.publication
-    WHERE run_id = only_run
-        AND process_id IN (SELECT process_id FROM store.process WHERE is_ambiguous)
-),
 mixed_take AS (
     SELECT take_id
     FROM store.take
@@ -181,5 +175,5 @@ LEFT JOIN store.subscription AS s
 LEFT JOIN store.node AS n ON s.node_id = n.node_id
 LEFT JOIN exposed AS x ON l.take_id = x.take_id
 LEFT JOIN copy AS c ON l.take_id = c.take_id
-LEFT JOIN mixed_publication AS mb ON l.publication_id = mb.publication_id
+LEFT JOIN derive.mixed_publication(only_run) AS mb ON l.publication_id = mb.publication_id
 LEFT JOIN mixed_take AS mt ON l.take_id = mt.take_id

@@ -1,0 +1,11 @@
+-- name: derive.mixed_publication
+-- kind: macro
+-- description: Publications of processes that are several with equal ids: nothing says which of
+--     these processes published.
+-- grain: one row per such publication
+-- param: only_run BIGINT  Run to look at
+CREATE OR REPLACE MACRO derive.mixed_publication(only_run) AS TABLE
+SELECT publication_id
+FROM store.publication
+WHERE run_id = only_run
+    AND process_id IN (SELECT process_id FROM store.process WHERE is_ambiguous)
