@@ -109,6 +109,10 @@ RULES = (
         )
         for each in ("approximate_message", "approximate_set")
     ),
+    *(
+        (f"link/causal/{each}.sql", ("schema/test_causal_link.py",))
+        for each in ("causal_link", "link_causal_by_hand", "link_causal_annotated")
+    ),
     (
         "link/causal/link_causal_approximate.sql",
         ("schema/cases/derive.link_causal_indirect", "model/test_approximate_links.py"),
@@ -121,6 +125,7 @@ RULES = (
         "delivery/delivery_limit.sql",
         ("schema/test_delivery_rules.py", "schema/test_orphan_rules.py"),
     ),
+    ("delivery/expected_arrival.sql", ("schema/test_expected_arrival.py",)),
     ("delivery/undelivered.sql", ("schema/test_delivery_rules.py",)),
     ("delivery/orphan_take.sql", ("schema/test_orphan_rules.py", "schema/test_delivery_rules.py")),
     ("clock/clock_hull.sql", ("schema/test_clock_hull.py", "schema/test_clock_pair.py")),

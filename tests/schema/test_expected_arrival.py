@@ -19,7 +19,7 @@ CREATE TABLE store.clock AS FROM (
 ) AS c(clock_id, reference_clock_id, offset_ns, drift_ppb, reference_ns);
 CREATE TABLE derive.clock_shift AS FROM (
     VALUES (1, 1, 2, 100, 7), (1, 1, 2, 200, 8),
-    (1, 1, 3, 150, 97), (1, 2, 1, 150, 98), (2, 1, 2, 150, 99)
+    (1, 3, 2, 150, 96), (1, 1, 3, 150, 97), (1, 2, 1, 150, 98), (2, 1, 2, 150, 99)
 ) AS s(run_id, from_clock_id, to_clock_id, from_ns, shift_ns);
 CREATE TABLE store.subscription AS FROM (
     VALUES (1, '/a', 1), (1, '/a', 2), (1, '/a', 2), (1, '/b', 3), (2, '/a', 4)
