@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 from rules import derived
 
-# Processes with clocks of their own: 1 publishes on /a, to which 1 and 2 subscribe. From 100 on
-# messages tell how far their clocks are apart. Process 3 has another topic, process 4 is of another
-# run.
+# Each process has a clock of its own. Process 1 publishes on /a; processes 1 and 2 subscribe to it.
+# From 100 on messages tell how far their clocks are apart. Process 3 has another topic. Process 4
+# is of another run. Nobody subscribes to /c.
 STAGE = """
 CREATE SCHEMA derive;
 CREATE SCHEMA store;
@@ -67,7 +67,7 @@ def test_the_last_shift_counts_else_both_corrections(end: int, there: int) -> No
 
 
 @pytest.mark.parametrize("reference", [None, 8])
-def test_nothing_tells_without_a_common_reference(reference: int | None) -> None:
+def test_corrections_need_a_common_reference(reference: int | None) -> None:
     with derived(STAGE, RULES) as con:
         con.execute("UPDATE store.clock SET reference_clock_id = ? WHERE clock_id = 2", [reference])
         con.execute("INSERT INTO store.publication VALUES (1, 1, 1, NULL, 50, 50)")
