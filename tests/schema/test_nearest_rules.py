@@ -589,18 +589,52 @@ def lose(con: duckdb.DuckDBPyConnection, start: int, end: int) -> None:
     )
 
 
+@pytest.mark.parametrize("topic", ["/a", "/b"])
 @pytest.mark.parametrize(("delay", "is_told"), [(5_000, True), (4_999, False)])
 def test_what_is_stamped_much_sooner_than_usual_may_be_of_a_lost_publication(
-    rules: duckdb.DuckDBPyConnection, delay: int, *, is_told: bool
+    rules: duckdb.DuckDBPyConnection, delay: int, topic: str, *, is_told: bool
 ) -> None:
     """1 of 100 delays is shorter than 10 µs. Where nothing is lost, there is no other."""
     clock(rules, (0, 100, 0))
     time = periodic(rules, [5_500] + [10_000] * 199, MILLISECOND)
-    publish(rules, 999, time, time + MILLISECOND)
-    take(rules, time + delay)
+    publish(rules, 999, time, time + MILLISECOND, topic)
+    take(rules, time + delay, topic=topic)
     assert nearest(rules)[time + delay] == (999, 1)
     lose(rules, time - 1, time)
     assert nearest(rules)[time + delay] == (999 if is_told else None, 1)
+
+
+@pytest.mark.parametrize(("delay", "is_told"), [(500_000, True), (499_999, False)])
+def test_what_is_usual_for_small_messages_is_too_soon_for_a_large_one(
+    rules: duckdb.DuckDBPyConnection, delay: int, *, is_told: bool
+) -> None:
+    clock(rules, (0, 100, 0))
+    time = periodic(rules, [MILLISECOND] * 200, 2 * MILLISECOND)
+    for identity in range(1000, 1200):
+        moment = (identity - 1000) * PERIOD + 10 * MILLISECOND
+        publish(rules, identity, moment, moment + MILLISECOND, "/b")
+        take(rules, moment + 1_000, topic="/b")
+    publish(rules, 999, time, time + 2 * MILLISECOND)
+    take(rules, time + delay)
+    lose(rules, time - 1, time)
+    assert nearest(rules)[time + delay] == (999 if is_told else None, 1)
+
+
+@pytest.mark.parametrize("has_rival", [True, False])
+def test_messages_of_another_writer_do_not_make_a_publisher_fast(
+    rules: duckdb.DuckDBPyConnection, *, has_rival: bool
+) -> None:
+    """Ten messages come 10 µs behind a write. If another publisher writes, too, they may be its."""
+    clock(rules, (0, 100, 0))
+    time = periodic(rules, [MILLISECOND] * 200, 2 * MILLISECOND)
+    for moment in range(0, time, 20 * PERIOD):
+        if has_rival:
+            publish(rules, 1000 + moment // PERIOD, moment - 20_000, moment + 15_000, publisher=2)
+        take(rules, moment + 10_000)
+    publish(rules, 999, time, time + 2 * MILLISECOND)
+    take(rules, time + 400_000)
+    lose(rules, time - 1, time)
+    assert nearest(rules)[time + 400_000] == (None if has_rival else 999, 1)
 
 
 def test_nothing_is_too_soon_where_nothing_is_usual(rules: duckdb.DuckDBPyConnection) -> None:

@@ -291,13 +291,14 @@ candidate AS MATERIALIZED (
         bool_or(is_usual) AS is_usual,
         bool_or(is_prompt) AS is_prompt,
         bool_or(is_hasty) AS is_hasty,
+        min(delay_ns) AS delay_ns,
         count(*) OVER (
             PARTITION BY topic_name, source_timestamp_ns, only_subscription_id
         ) AS candidate_count
     FROM (
         SELECT
             w.topic_name, w.source_timestamp_ns, w.only_subscription_id, w.publisher_id,
-            w.publication_id, w.goes_on,
+            w.publication_id, w.goes_on, w.delay_ns,
             w.is_crowded OR coalesce(w.closed_for_ns < c.alone_ns, false) AS is_crowded,
             w.delay_ns <= u.usual_ns AS is_prompt,
             coalesce(derive.clock_limit().usual_factor * w.delay_ns < c.least_ns, false)
@@ -335,10 +336,23 @@ owned AS MATERIALIZED (
         PARTITION BY publication_id, only_subscription_id ORDER BY source_timestamp_ns
     )
 ),
+-- Large messages take long to write. One that comes much sooner than nearly all others of its
+-- publisher may be of a publication that was lost. Those that others wrote meanwhile do not count.
+soonest AS (
+    SELECT
+        publisher_id,
+        quantile_disc(delay_ns, 1 - derive.clock_limit().usual_quantile) AS least_ns
+    FROM candidate
+    WHERE candidate_count = 1
+    GROUP BY publisher_id
+),
 left_over AS (
     SELECT
         c.topic_name, c.source_timestamp_ns, c.only_subscription_id, c.publisher_id,
-        c.publication_id, c.is_crowded, c.is_usual, c.is_hasty, c.is_prompt,
+        c.publication_id, c.is_crowded, c.is_usual, c.is_prompt,
+        c.is_hasty
+        OR coalesce(derive.clock_limit().usual_factor * c.delay_ns < u.least_ns, false)
+            AS is_hasty,
         count(*) OVER (
             PARTITION BY c.topic_name, c.source_timestamp_ns, c.only_subscription_id
         ) AS candidate_count
@@ -348,6 +362,7 @@ left_over AS (
         AND c.only_subscription_id = o.only_subscription_id
         AND c.source_timestamp_ns <> o.source_timestamp_ns
         AND o.place = 1
+    LEFT JOIN soonest AS u ON c.publisher_id = u.publisher_id
     WHERE o.publication_id IS NULL
         OR NOT o.is_usual
         OR (o.is_rivalled AND c.candidate_count = 1 AND c.is_prompt)
