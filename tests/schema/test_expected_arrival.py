@@ -7,7 +7,7 @@ from rules import derived
 
 # Each process has a clock of its own. Process 1 publishes on /a; processes 1 and 2 subscribe to it.
 # From 100 on messages tell how far their clocks are apart. Process 3 has another topic. Process 4
-# is of another run. Nobody subscribes to /c.
+# belongs to another run. /c has no subscription.
 STAGE = """
 CREATE SCHEMA derive;
 CREATE SCHEMA store;
@@ -75,7 +75,7 @@ def test_corrections_need_a_common_reference(reference: int | None) -> None:
     assert rows == [(1, 50, True), (2, None, False)]
 
 
-def test_a_topic_that_nobody_subscribes_to_has_no_arrivals() -> None:
+def test_nothing_arrives_without_a_subscription() -> None:
     with derived(STAGE, RULES) as con:
         con.execute("INSERT INTO store.publication VALUES (1, 1, 2, NULL, 203, 203)")
         assert con.execute(ARRIVALS).fetchall() == []

@@ -290,8 +290,8 @@ candidate AS MATERIALIZED (
         bool_or(is_crowded) AS is_crowded,
         bool_or(is_usual) AS is_usual,
         bool_or(is_prompt) AS is_prompt,
-        bool_or(is_hasty) AS is_hasty,
         min(delay_ns) AS delay_ns,
+        any_value(least_ns) AS least_ns,
         count(*) OVER (
             PARTITION BY topic_name, source_timestamp_ns, only_subscription_id
         ) AS candidate_count
@@ -301,8 +301,7 @@ candidate AS MATERIALIZED (
             w.publication_id, w.goes_on, w.delay_ns,
             w.is_crowded OR coalesce(w.closed_for_ns < c.alone_ns, false) AS is_crowded,
             w.delay_ns <= u.usual_ns AS is_prompt,
-            coalesce(derive.clock_limit().usual_factor * w.delay_ns < c.least_ns, false)
-                AS is_hasty,
+            c.least_ns,
             CASE
                 WHEN x.publisher_id IS NOT NULL THEN coalesce(w.delay_ns <= c.familiar_ns, false)
                 WHEN w.goes_on THEN coalesce(w.delay_ns <= u.limit_ns, true)
@@ -337,7 +336,8 @@ owned AS MATERIALIZED (
     )
 ),
 -- Large messages take long to write. One that comes much sooner than nearly all others of its
--- publisher may be of a publication that was lost. Those that others wrote meanwhile do not count.
+-- publisher may be of a publication that was lost. Messages that others may have written do not
+-- count.
 soonest AS (
     SELECT
         publisher_id,
@@ -350,9 +350,10 @@ left_over AS (
     SELECT
         c.topic_name, c.source_timestamp_ns, c.only_subscription_id, c.publisher_id,
         c.publication_id, c.is_crowded, c.is_usual, c.is_prompt,
-        c.is_hasty
-        OR coalesce(derive.clock_limit().usual_factor * c.delay_ns < u.least_ns, false)
-            AS is_hasty,
+        coalesce(
+            derive.clock_limit().usual_factor * c.delay_ns < greatest(u.least_ns, c.least_ns),
+            false
+        ) AS is_hasty,
         count(*) OVER (
             PARTITION BY c.topic_name, c.source_timestamp_ns, c.only_subscription_id
         ) AS candidate_count
