@@ -1,9 +1,10 @@
 -- name: staging.process_life
 -- description: Lives of each pid. A new life starts at an rcl_init of a context handle initialised
---     before, unless an object of the old life is used or a callback goes on after it; and at one
---     from another main thread or process name, unless another thread of the pid goes on. (Threads
---     that seem to go on prove nothing in the first case: containers number them alike in every
---     life.) What is used behind a gap proves nothing: its object may have been made again in it.
+--     before, or at the first recorded rcl_init if objects were used before it, unless an object of
+--     the old life is used or a callback goes on after it; and at an rcl_init from another main
+--     thread or process name, unless another thread of the pid goes on. (Threads that seem to go on
+--     prove nothing in the first two cases: containers number them alike in every life.) What is
+--     used behind a gap proves nothing: its object may have been made again in it.
 -- grain: one row per host, PID namespace, pid and life
 WITH initialisation AS (
     SELECT
@@ -27,51 +28,65 @@ WITH initialisation AS (
             PARTITION BY p.host_id, p.pid_ns, p.vpid, i.context_handle ORDER BY i.event_id
         )
 ),
+first_seen AS (
+    SELECT host_id, pid_ns, vpid, min(first_event_id) AS first_event_id
+    FROM staging.thread_presence
+    GROUP BY ALL
+),
 candidate AS (
     SELECT
         i.host_id, i.pid_ns, i.vpid, i.vtid, i.event_id, i.is_other_main, i.is_same_context,
+        i.is_repeated,
         coalesce(min(g.start_ns), 9223372036854775807) AS gap_ns
     FROM initialisation AS i
+    JOIN first_seen AS f
+        ON i.host_id = f.host_id AND i.pid_ns IS NOT DISTINCT FROM f.pid_ns AND i.vpid = f.vpid
     JOIN staging.recording AS r ON i.trace_index = r.trace_index
     LEFT JOIN staging.recording_gap AS g
         ON r.recording_index = g.recording_index AND i.ts_ns < g.covered_until_ns
-    WHERE i.is_repeated AND (i.is_other_main OR i.is_same_context)
+    WHERE CASE
+            WHEN i.is_repeated THEN i.is_other_main OR i.is_same_context
+            ELSE f.first_event_id < i.event_id
+        END
     GROUP BY ALL
 ),
-made AS (
-    SELECT thread_index, event_id, publisher_handle AS handle
+-- Every callback is registered, but what logs to /rosout publishes on a handle that is never made.
+handled AS (
+    SELECT
+        thread_index, event_id, ts_ns, publisher_handle AS handle, true AS is_made,
+        true AS shows_object
     FROM raw.ros2_rcl_publisher_init
     UNION ALL
-    SELECT thread_index, event_id, callback
+    SELECT thread_index, event_id, ts_ns, callback, true, true
     FROM raw.ros2_rclcpp_callback_register
-),
-used AS (
-    SELECT thread_index, event_id, ts_ns, publisher_handle AS handle
+    UNION ALL
+    SELECT thread_index, event_id, ts_ns, publisher_handle, false, false
     FROM raw.ros2_rcl_publish
     UNION ALL
-    SELECT thread_index, event_id, ts_ns, callback
+    SELECT thread_index, event_id, ts_ns, callback, false, true
     FROM raw.ros2_callback_start
 ),
--- An object made before and used afterwards, without being made again, or a callback of
--- another thread that began before and ends afterwards: the life goes on.
-surviving AS (
-    SELECT DISTINCT c.event_id
+-- What there was before: when it is used afterwards, and when it is made again.
+old AS (
+    SELECT
+        c.event_id,
+        min(h.event_id) FILTER (
+            NOT h.is_made AND h.event_id > c.event_id AND h.ts_ns <= c.gap_ns
+        ) AS used_event_id,
+        min(h.event_id) FILTER (h.is_made AND h.event_id > c.event_id) AS made_event_id
     FROM candidate AS c
     JOIN staging.thread_seen AS s
         ON c.host_id = s.host_id AND c.pid_ns IS NOT DISTINCT FROM s.pid_ns AND c.vpid = s.vpid
-    JOIN used AS u
-        ON s.thread_index = u.thread_index AND u.event_id > c.event_id AND u.ts_ns <= c.gap_ns
-    ASOF JOIN (
-        SELECT t.host_id, t.pid_ns, t.vpid, m.handle, m.event_id
-        FROM made AS m
-        JOIN staging.thread_seen AS t ON m.thread_index = t.thread_index
-    ) AS m
-        ON s.host_id = m.host_id
-        AND s.pid_ns IS NOT DISTINCT FROM m.pid_ns
-        AND s.vpid = m.vpid
-        AND u.handle = m.handle
-        AND u.event_id >= m.event_id
-    WHERE m.event_id < c.event_id
+    JOIN handled AS h ON s.thread_index = h.thread_index
+    GROUP BY c.event_id, h.handle
+    HAVING min(h.event_id) FILTER (h.shows_object) < c.event_id
+),
+-- An object of before that is used afterwards, without being made again, or a callback of
+-- another thread that began before and ends afterwards: the life goes on.
+surviving AS (
+    SELECT event_id
+    FROM old
+    WHERE used_event_id < coalesce(made_event_id, 9223372036854775807)
     UNION
     SELECT c.event_id
     FROM candidate AS c
@@ -91,9 +106,16 @@ surviving AS (
 split AS (
     SELECT i.host_id, i.pid_ns, i.vpid, i.event_id
     FROM candidate AS i
-    WHERE (i.is_same_context AND i.event_id NOT IN (SELECT event_id FROM surviving))
+    WHERE (
+            CASE
+                WHEN i.is_repeated THEN i.is_same_context
+                ELSE i.event_id IN (SELECT event_id FROM old)
+            END
+            AND i.event_id NOT IN (SELECT event_id FROM surviving)
+        )
         OR (
-            i.is_other_main
+            i.is_repeated
+            AND i.is_other_main
             AND NOT EXISTS (
                 SELECT 1
                 FROM staging.thread_presence AS p
