@@ -47,6 +47,8 @@ class Score:
         decided: those of them that the trace decides, which must be found.
         found: rows.
         wrong: rows that are not true.
+        loss_affected: those of them that say that events are missing which may belong to a better
+            partner (`is_loss_affected`): links of messages that are matched by time.
         misguessed: likewise, of rows that say to be one of several possible ones.
         repeated: rows beyond the first for one true link.
         missing: decided, but not found.
@@ -61,6 +63,7 @@ class Score:
     decided: int
     found: int
     wrong: int
+    loss_affected: int
     misguessed: int
     repeated: int
     missing: int
@@ -149,7 +152,7 @@ def _excused(connection: duckdb.DuckDBPyConnection, excused: int) -> Score:
     wrong = max(excused - allowed, 0)
     precision = 1 - wrong / excused if excused else 1.0
     return Score(
-        "excused", pairs or 0, 0, excused, wrong, 0, 0, 0, 0, precision, 1.0,
+        "excused", pairs or 0, 0, excused, wrong, 0, 0, 0, 0, 0, precision, 1.0,
         f"at most {allowed}",
     )  # fmt: skip
 

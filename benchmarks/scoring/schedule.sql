@@ -233,7 +233,8 @@ labelled AS (
 )
 SELECT
     e.kind, e.happened, e.decided, coalesce(c.found, 0) AS found, coalesce(c.wrong, 0) AS wrong,
-    coalesce(c.misguessed, 0) AS misguessed, 0 AS repeated, e.missing, 0 AS doubted,
+    0 AS loss_affected, coalesce(c.misguessed, 0) AS misguessed, 0 AS repeated, e.missing,
+    0 AS doubted,
     coalesce(c.right_count / nullif(c.right_count + c.wrong, 0), 1) AS precision,
     coalesce(1 - e.missing / nullif(e.decided, 0), 1) AS recall,
     l.labels

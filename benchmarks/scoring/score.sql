@@ -73,6 +73,13 @@ found AS (
         count(*) AS found,
         count(from_id) AS right_count,
         count(*) FILTER (from_id IS NULL AND NOT is_guess) AS wrong,
+        count(*) FILTER (
+            from_id IS NULL AND kind = 'transport' AND (found_from_id, found_to_id) IN (
+                SELECT (publication_id, take_id)
+                FROM analysed.store.link_transport
+                WHERE method = 'nearest' AND is_loss_affected
+            )
+        ) AS loss_affected,
         count(*) FILTER (from_id IS NULL AND is_guess) AS misguessed
     FROM verdict
     GROUP BY kind
@@ -109,6 +116,7 @@ SELECT
     coalesce(e.decided, 0) AS decided,
     coalesce(f.found, 0) AS found,
     coalesce(f.wrong, 0) AS wrong,
+    coalesce(f.loss_affected, 0) AS loss_affected,
     coalesce(f.misguessed, 0) AS misguessed,
     coalesce(r.repeated, 0) AS repeated,
     coalesce(e.missing, 0) AS missing,

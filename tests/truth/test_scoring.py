@@ -148,6 +148,34 @@ def test_a_link_to_another_message_is_wrong(simulation, database):
     assert score.missing == 4
 
 
+def test_a_wrong_link_by_time_may_say_that_events_are_missing(simulation, database):
+    """No other method says so of the partner. A link that is right is not counted."""
+    _change(
+        database,
+        """
+        UPDATE store.link_transport AS l
+        SET publication_id = o.publication_id,
+            method = CASE WHEN o.place <= 3 THEN 'nearest' ELSE 'exact' END,
+            is_loss_affected = o.place <> 1
+        FROM (
+            SELECT
+                take_id, lead(publication_id) OVER (ORDER BY take_id) AS publication_id,
+                row_number() OVER (ORDER BY take_id) AS place
+            FROM store.link_transport
+        ) AS o
+        WHERE l.take_id = o.take_id AND o.place <= 4
+        """,
+    )
+    _change(
+        database,
+        "UPDATE store.link_transport SET method = 'nearest', is_loss_affected = true "
+        "WHERE take_id = (SELECT max(take_id) FROM store.link_transport)",
+    )
+    score = _scores(simulation, database)["transport"]
+    assert (score.wrong, score.loss_affected, score.misguessed) == (4, 2, 0)
+
+
+
 @pytest.mark.parametrize(
     ("end_shift_ns", "is_marked", "wrong"), [(1, True, 0), (1, False, 1), (0, True, 1)]
 )
