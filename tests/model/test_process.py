@@ -255,6 +255,98 @@ def test_nor_while_an_old_callback_is_called(system: RosSystem, analyse: Analyse
     assert len(analyse(system).rows(LIVES)) == 1
 
 
+def called_once(system: RosSystem, thread: Thread, callback: int) -> int:
+    system.start(thread, callback)
+    return system.end(thread, callback)
+
+
+@pytest.mark.parametrize(
+    ("goes_on", "lives"),
+    [("nothing", 2), ("made_again", 2), ("another", 2), ("callback", 1), ("running", 1)],
+)
+def test_the_first_initialisation_recorded_may_not_be_the_first(
+    system: RosSystem, analyse: Analyse, goes_on: str, lives: int
+) -> None:
+    """The recording began while a process ran. What goes on behind it is of the same process."""
+    worker = Thread(100, 101, "worker")
+    called_once(system, MAIN, 0xC1)
+    system.start(worker, 0xC2)
+    system.context(MAIN)
+    if goes_on == "made_again":
+        system.timer(MAIN, 0x40, callback=0xC1)
+    if goes_on == "another":
+        called_once(system, MAIN, 0xC3)
+    if goes_on in {"made_again", "callback"}:
+        called_once(system, MAIN, 0xC1)
+    if goes_on == "running":
+        system.end(worker, 0xC2)
+    assert len(analyse(system).rows(LIVES)) == lives
+
+
+@pytest.mark.parametrize("is_made_first", [True, False])
+def test_an_address_goes_on_if_it_is_used_before_it_is_made_again(
+    system: RosSystem, analyse: Analyse, is_made_first: bool
+) -> None:
+    """Whatever comes later."""
+    called_once(system, MAIN, 0xC1)
+    system.context(MAIN)
+    if is_made_first:
+        system.timer(MAIN, 0x40, callback=0xC1)
+    called_once(system, MAIN, 0xC1)
+    system.timer(MAIN, 0x40, callback=0xC1)
+    called_once(system, MAIN, 0xC1)
+    assert len(analyse(system).rows(LIVES)) == 1 + is_made_first
+
+
+def test_an_object_made_before_the_first_initialisation_recorded_is_of_an_old_life(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    system.publisher(MAIN, 0x10, "/old")
+    system.context(MAIN)
+    system.publisher(MAIN, 0x10, "/new")
+    system.publish(MAIN, 0x10, 1)
+    model = analyse(system)
+    assert len(model.rows(LIVES)) == 2
+    assert model.column(
+        "SELECT topic_name FROM publication JOIN publisher USING (publisher_id)"
+    ) == ["/new"]
+
+
+@pytest.mark.parametrize("is_again", [True, False])
+def test_a_publisher_that_is_never_made_shows_no_life(
+    system: RosSystem, analyse: Analyse, is_again: bool
+) -> None:
+    """What logs to /rosout publishes on an address of its stack, the same in every life."""
+    if is_again:
+        system.context(MAIN)
+    system.publish(MAIN, 0x10, 1)
+    system.context(MAIN)
+    system.publish(MAIN, 0x10, 2)
+    assert len(analyse(system).rows(LIVES)) == 1 + is_again
+
+
+def test_a_callback_whose_registration_was_lost_goes_on(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    system.context(MAIN)
+    called_once(system, MAIN, 0xC1)
+    system.context(MAIN)
+    called_once(system, MAIN, 0xC1)
+    assert len(analyse(system).rows(LIVES)) == 1
+
+
+@pytest.mark.parametrize(("is_lost", "lives"), [(True, 2), (False, 1)])
+def test_a_callback_behind_a_gap_may_have_been_registered_in_it(
+    system: RosSystem, analyse: Analyse, is_lost: bool, lives: int
+) -> None:
+    called_once(system, MAIN, 0xC1)
+    first = system.context(MAIN)
+    system.wait(100)
+    end = called_once(system, MAIN, 0xC1)
+    lose(system, 0, (first + 1, first + 2) if is_lost else (end, end + 1))
+    assert len(analyse(system).rows(LIVES)) == lives
+
+
 another = pytest.mark.parametrize(
     "other",
     [
@@ -286,6 +378,16 @@ def test_what_another_process_goes_on_with_keeps_no_life_going(
     system.end(worker, 0xC2)
     system.end(other, 0xC1)
     assert analyse(system).rows(OTHERS) == [("main", 2), ("other", 1)]
+
+
+@another
+def test_what_another_process_did_before_begins_no_life(
+    system: RosSystem, analyse: Analyse, other: Thread
+) -> None:
+    system.add_source(1, "beta", "boot-b")
+    called_once(system, other, 0xC1)
+    system.context(Thread(100, pid_ns=1))
+    assert analyse(system).rows(OTHERS) == [("main", 1), ("other", 1)]
 
 
 @another

@@ -1,10 +1,10 @@
 -- name: staging.process_life
 -- description: Lives of each pid. A new life starts at an rcl_init of a context handle initialised
---     before, or at the first recorded rcl_init if objects were used before it, unless an object of
---     the old life is used or a callback goes on after it; and at an rcl_init from another main
---     thread or process name, unless another thread of the pid goes on. (Threads that seem to go on
---     prove nothing in the first two cases: containers number them alike in every life.) What is
---     used behind a gap proves nothing: its object may have been made again in it.
+--     before, and at the first rcl_init that was recorded if there were objects before it, unless
+--     an object of the old life is used or a callback goes on after it; and at one from another
+--     main thread or process name, unless another thread of the pid goes on. (Threads that seem to
+--     go on prove nothing in the first two cases: containers number them alike in every life.) What
+--     is used behind a gap proves nothing: its object may have been made again in it.
 -- grain: one row per host, PID namespace, pid and life
 WITH initialisation AS (
     SELECT
@@ -28,26 +28,24 @@ WITH initialisation AS (
             PARTITION BY p.host_id, p.pid_ns, p.vpid, i.context_handle ORDER BY i.event_id
         )
 ),
-first_seen AS (
-    SELECT host_id, pid_ns, vpid, min(first_event_id) AS first_event_id
-    FROM staging.thread_presence
-    GROUP BY ALL
-),
 candidate AS (
     SELECT
         i.host_id, i.pid_ns, i.vpid, i.vtid, i.event_id, i.is_other_main, i.is_same_context,
         i.is_repeated,
         coalesce(min(g.start_ns), 9223372036854775807) AS gap_ns
     FROM initialisation AS i
-    JOIN first_seen AS f
-        ON i.host_id = f.host_id AND i.pid_ns IS NOT DISTINCT FROM f.pid_ns AND i.vpid = f.vpid
     JOIN staging.recording AS r ON i.trace_index = r.trace_index
     LEFT JOIN staging.recording_gap AS g
         ON r.recording_index = g.recording_index AND i.ts_ns < g.covered_until_ns
-    WHERE CASE
-            WHEN i.is_repeated THEN i.is_other_main OR i.is_same_context
-            ELSE f.first_event_id < i.event_id
-        END
+    -- Most are the first event of their process.
+    WHERE EXISTS (
+        SELECT 1
+        FROM staging.thread_presence AS p
+        WHERE p.host_id = i.host_id
+            AND p.pid_ns IS NOT DISTINCT FROM i.pid_ns
+            AND p.vpid = i.vpid
+            AND p.first_event_id < i.event_id
+    )
     GROUP BY ALL
 ),
 -- Every callback is registered, but what logs to /rosout publishes on a handle that is never made.
