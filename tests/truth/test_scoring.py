@@ -406,7 +406,7 @@ def test_streams_that_end_early_are_judged(tmp_path, system, layout):
         system,
         tmp_path / "trace",
         layout=layout,
-        factor=0.1,
+        factor=0.2,
         recording=TRUNCATED,
         clock_offset_ns=350_000_000,
     )
