@@ -66,8 +66,8 @@ LOWEST_RECALL |= {"steps": 0.92, "clock_step": 0.995}
 # One of 6,508 was stamped 13.7 ms after its write. A message written 9 ms later had been taken
 # before, as if the clock had been set back.
 LOWEST_RECALL |= {"shared_publisher": 0.9998}
-# Two threads share a publisher in it, and may write within microseconds. If the publication of one is
-# lost, and the take of the other's message, nothing in the trace tells. All such links are marked.
+# Several threads write to one topic within microseconds. If the publication of one is lost, and the
+# take of another's message, nothing in the trace tells. So a wrong link must at least be marked.
 MOST_LOSS_AFFECTED = {"rivals": 0.001}
 # Recorded with losses: their truth says which events are missing, but not where others might be. A
 # link over such a place is not decided, and a publication may be torn in two. Precision is judged.
@@ -206,7 +206,7 @@ class Judged:
 
     @property
     def is_good(self) -> bool:
-        """Whether every figure that must be 1.000 is."""
+        """Whether every figure is as good as it must be."""
         if self.system in LOSSY_RECORDINGS:
             return not self.score.wrong and self.score.recall >= LOSSY_RECALL
         least = min(LOWEST_RECALL.get(name, 1) for name in (self.system, self.recording))

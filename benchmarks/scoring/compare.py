@@ -47,9 +47,9 @@ class Score:
         decided: those of them that the trace decides, which must be found.
         found: rows.
         wrong: rows that are not true.
-        loss_affected: those of them that say that events are missing which may belong to a better
-            partner (`is_loss_affected`): links of messages that are matched by time.
-        misguessed: likewise, of rows that say to be one of several possible ones.
+        loss_affected: those of the wrong ones that are matched by time and say that events are
+            missing (`is_loss_affected`).
+        misguessed: rows that are not true, but say to be one of several possible ones.
         repeated: rows beyond the first for one true link.
         missing: decided, but not found.
         doubted: decided and found, but said to be one of several possible ones.

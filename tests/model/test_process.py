@@ -262,7 +262,14 @@ def called_once(system: RosSystem, thread: Thread, callback: int) -> int:
 
 @pytest.mark.parametrize(
     ("goes_on", "lives"),
-    [("nothing", 2), ("made_again", 2), ("another", 2), ("callback", 1), ("running", 1)],
+    [
+        ("nothing", 2),
+        ("made_again", 2),
+        ("another", 2),
+        ("callback", 1),
+        ("running", 1),
+        ("around", 1),
+    ],
 )
 def test_the_first_initialisation_recorded_may_not_be_the_first(
     system: RosSystem, analyse: Analyse, goes_on: str, lives: int
@@ -271,7 +278,11 @@ def test_the_first_initialisation_recorded_may_not_be_the_first(
     worker = Thread(100, 101, "worker")
     called_once(system, MAIN, 0xC1)
     system.start(worker, 0xC2)
+    if goes_on == "around":
+        system.start(MAIN, 0xC4)
     system.context(MAIN)
+    if goes_on == "around":
+        system.end(MAIN, 0xC4)
     if goes_on == "made_again":
         system.timer(MAIN, 0x40, callback=0xC1)
     if goes_on == "another":
@@ -287,7 +298,7 @@ def test_the_first_initialisation_recorded_may_not_be_the_first(
 def test_an_address_goes_on_if_it_is_used_before_it_is_made_again(
     system: RosSystem, analyse: Analyse, is_made_first: bool
 ) -> None:
-    """Whatever comes later."""
+    """What comes later changes nothing."""
     called_once(system, MAIN, 0xC1)
     system.context(MAIN)
     if is_made_first:
@@ -316,7 +327,7 @@ def test_an_object_made_before_the_first_initialisation_recorded_is_of_an_old_li
 def test_a_publisher_that_is_never_made_shows_no_life(
     system: RosSystem, analyse: Analyse, is_again: bool
 ) -> None:
-    """What logs to /rosout publishes on an address of its stack, the same in every life."""
+    """The logger publishes to /rosout on a stack address, which may be the same in every life."""
     if is_again:
         system.context(MAIN)
     system.publish(MAIN, 0x10, 1)
@@ -336,7 +347,7 @@ def test_a_callback_whose_registration_was_lost_goes_on(
 
 
 @pytest.mark.parametrize(("is_lost", "lives"), [(True, 2), (False, 1)])
-def test_a_callback_behind_a_gap_may_have_been_registered_in_it(
+def test_a_callback_behind_a_gap_keeps_no_life_going(
     system: RosSystem, analyse: Analyse, is_lost: bool, lives: int
 ) -> None:
     called_once(system, MAIN, 0xC1)
@@ -386,6 +397,7 @@ def test_what_another_process_did_before_begins_no_life(
 ) -> None:
     system.add_source(1, "beta", "boot-b")
     called_once(system, other, 0xC1)
+    system.publish(Thread(100, pid_ns=1), 0x20, 1)
     system.context(Thread(100, pid_ns=1))
     assert analyse(system).rows(OTHERS) == [("main", 1), ("other", 1)]
 

@@ -1,10 +1,12 @@
 -- name: staging.process_life
--- description: Lives of each pid. A new life starts at an rcl_init of a context handle initialised
---     before, and at the first rcl_init that was recorded if there were objects before it, unless
---     an object of the old life is used or a callback goes on after it; and at one from another
---     main thread or process name, unless another thread of the pid goes on. (Threads that seem to
---     go on prove nothing in the first two cases: containers number them alike in every life.) What
---     is used behind a gap proves nothing: its object may have been made again in it.
+-- description: Lives of each pid. A new life starts at an rcl_init (1) of a context handle
+--     initialised before, (2) that is the first one recorded, if a publisher was made or a callback
+--     was seen before it, or (3) from another main thread or process name than the one before. In
+--     (1) and (2), the life goes on if a publisher or callback of it is used afterwards, or a
+--     callback ends. (Threads that seem to go on prove nothing there: containers number them alike
+--     in every life.) What is used behind a gap proves nothing: its object may have been made again
+--     in it, and a restart is likelier than a second context. In (3), the life goes on if another
+--     thread does.
 -- grain: one row per host, PID namespace, pid and life
 WITH initialisation AS (
     SELECT
@@ -37,7 +39,7 @@ candidate AS (
     JOIN staging.recording AS r ON i.trace_index = r.trace_index
     LEFT JOIN staging.recording_gap AS g
         ON r.recording_index = g.recording_index AND i.ts_ns < g.covered_until_ns
-    -- Most are the first event of their process.
+    -- Most initialisations are the first event of their process. Nothing was before them.
     WHERE EXISTS (
         SELECT 1
         FROM staging.thread_presence AS p
@@ -48,7 +50,8 @@ candidate AS (
     )
     GROUP BY ALL
 ),
--- Every callback is registered, but what logs to /rosout publishes on a handle that is never made.
+-- A callback that starts was registered, whether that was recorded or not. A publication shows no
+-- object: what logs to /rosout publishes on a handle that is never made.
 handled AS (
     SELECT
         thread_index, event_id, ts_ns, publisher_handle AS handle, true AS is_made,
@@ -64,7 +67,7 @@ handled AS (
     SELECT thread_index, event_id, ts_ns, callback, false, true
     FROM raw.ros2_callback_start
 ),
--- What there was before: when it is used afterwards, and when it is made again.
+-- Objects from before an initialisation: when they are first used after it, and made again.
 old AS (
     SELECT
         c.event_id,
@@ -79,8 +82,9 @@ old AS (
     GROUP BY c.event_id, h.handle
     HAVING min(h.event_id) FILTER (h.shows_object) < c.event_id
 ),
--- An object of before that is used afterwards, without being made again, or a callback of
--- another thread that began before and ends afterwards: the life goes on.
+-- An object from before that is used afterwards without being made again, or a callback that began
+-- before and ends afterwards: the life goes on. The thread that initialises again is that of the new
+-- life; where the first initialisation is not known, it may do so inside a callback.
 surviving AS (
     SELECT event_id
     FROM old
@@ -92,7 +96,7 @@ surviving AS (
         ON c.host_id = s.host_id
         AND c.pid_ns IS NOT DISTINCT FROM s.pid_ns
         AND c.vpid = s.vpid
-        AND c.vtid <> s.vtid
+        AND (c.vtid <> s.vtid OR NOT c.is_repeated)
     JOIN raw.ros2_callback_end AS e
         ON s.thread_index = e.thread_index
         AND e.event_id > c.event_id
