@@ -36,9 +36,12 @@ _WITH_GAPS = (
     "container",
     "container_multi_threaded",
     "python",
+    "python_timers",
     "layers",
     "services",
+    "calls",
 )
+_WITHOUT_FLOWS = ("timers", "actions")
 # Which run filled a cache, and so which flow a message is on, is a guess in these.
 _DOUBTFUL = ("reentrant",)
 
@@ -70,7 +73,7 @@ def simulated(request: pytest.FixtureRequest, simulations: Callable[[str], Inges
     return simulations(request.param)
 
 
-_COMPLETE = [name for name in scenarios() if name not in (*_WITH_GAPS, *_DOUBTFUL)]
+_COMPLETE = [name for name in scenarios() if name not in (*_WITH_GAPS, *_DOUBTFUL, *_WITHOUT_FLOWS)]
 
 
 @pytest.fixture(params=few(_COMPLETE, *(name for name in SHOWN if name in _COMPLETE)))

@@ -21,7 +21,7 @@ NOT_FOUND = {
 IN_DOUBT = {
     "periodic_async": {"/sharing"},
     "partial_sync": {"/partial_2_to_2", "/partial_3_to_3", "/spinning"},
-    "reentrant": {"/sync_late"},
+    "reentrant": set(),
     "merges": {"/four_to_four", "/kept", "/two_pairs"},
 }
 
