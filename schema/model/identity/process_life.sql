@@ -83,8 +83,8 @@ old AS (
     HAVING min(h.event_id) FILTER (h.shows_object) < c.event_id
 ),
 -- An object from before that is used afterwards without being made again, or a callback that began
--- before and ends afterwards: the life goes on. The thread that initialises again is that of the new
--- life; where the first initialisation is not known, it may do so inside a callback.
+-- before and ends afterwards: the life goes on. The thread that initialises again is that of the
+-- new life. Where the first initialisation is not known, it may do so inside a callback.
 surviving AS (
     SELECT event_id
     FROM old
