@@ -74,7 +74,8 @@ found AS (
         count(from_id) AS right_count,
         count(*) FILTER (from_id IS NULL AND NOT is_guess) AS wrong,
         count(*) FILTER (
-            from_id IS NULL AND NOT is_guess AND kind = 'transport' AND (found_from_id, found_to_id) IN (
+            from_id IS NULL AND NOT is_guess AND kind = 'transport'
+            AND (found_from_id, found_to_id) IN (
                 SELECT (publication_id, take_id)
                 FROM analysed.store.link_transport
                 WHERE method = 'nearest' AND is_loss_affected

@@ -33,7 +33,7 @@ def test_of_rivals_one_link_in_a_thousand_may_be_wrong(system, wrong, loss_affec
 
 
 @pytest.mark.parametrize("fault", ["repeated", "doubted"])
-def test_a_fault_is_one_in_every_system(fault):
+def test_other_faults_of_rivals_are_not_excused(fault):
     assert not _judged("rivals", 0, 0, **{fault: 1}).is_good
 
 

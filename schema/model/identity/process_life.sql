@@ -2,11 +2,11 @@
 -- description: Lives of each pid. A new life starts at an rcl_init (1) of a context handle
 --     initialised before, (2) that is the first one recorded, if a publisher was made or a callback
 --     was seen before it, or (3) from another main thread or process name than the one before. In
---     (1) and (2), the life goes on if a publisher or callback of it is used afterwards, or a
---     callback ends. (Threads that seem to go on prove nothing there: containers number them alike
---     in every life.) What is used behind a gap proves nothing: its object may have been made again
---     in it, and a restart is likelier than a second context. In (3), the life goes on if another
---     thread does.
+--     (1) and (2), the life goes on if a publisher or callback of it is used afterwards without
+--     being made again, or if a callback ends that began before. (Threads that seem to go on prove
+--     nothing there: containers number them alike in every life.) What is used behind a gap proves
+--     nothing: its object may have been made again in it, and a restart is likelier than a second
+--     context. In (3), the life goes on if another thread does.
 -- grain: one row per host, PID namespace, pid and life
 WITH initialisation AS (
     SELECT
