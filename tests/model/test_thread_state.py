@@ -366,6 +366,10 @@ def in_container(
     system.add(
         "ros2:rcl_init", Thread(100, pid_ns=pid_ns), ts=begin, context_handle=1, version="8.4.0"
     )
+    system.add(
+        "ros2:rclcpp_callback_register", Thread(100, pid_ns=pid_ns), ts=begin + 10,
+        callback=0xC1, symbol="work",
+    )  # fmt: skip
     call(system, begin + 60, begin + 70, Thread(100, 101, cpu=begin // 2000, pid_ns=pid_ns))
     kernel.switch(begin - 10, 0, 41)
     kernel.switch(begin + 700, tid, 0, BLOCKED, cpu=begin // 2000, ids=ids)
