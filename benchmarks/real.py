@@ -1,11 +1,11 @@
 """Precision and recall of what msgflow finds in real ROS 2, recorded here and now.
 
-    python benchmarks/real.py --python PYTHON [--system NAME]… [--seconds 5] [--keep DIR]
+    python benchmarks/real.py --python PYTHON [--system NAME]… [--seconds 5] [--to DIR]
 
 Nodes of rclpy run in processes of their own, and LTTng records them. They write down what they send
 and in which callback. The trace is ingested and compared with that, as `truth.py` does. PYTHON has
-the wheels of ROS 2 (`make real` installs them). The exit code is 1 if a figure is not what it must
-be.
+the wheels of ROS 2 (`make real` installs them). Traces and truths stay in DIR until the next run: a
+recording cannot be repeated. The exit code is 1 if a figure is not what it must be.
 """
 
 from __future__ import annotations
@@ -31,27 +31,29 @@ def main() -> None:
     parser.add_argument("--python", type=Path, required=True, help="Python with rclpy")
     parser.add_argument("--system", action="append", help="one of the systems; all when none")
     parser.add_argument("--seconds", type=float, default=5, help="how long each runs")
-    parser.add_argument("--keep", type=Path, help="directory to keep traces and truths in")
+    parser.add_argument(
+        "--to", type=Path, default=Path("build/real"),
+        help="directory for a folder of each system, which replaces that of an earlier run",
+    )  # fmt: skip
     arguments = parser.parse_args()
     judged: list[Judged] = []
     try:
         require(arguments.python)
         for system in arguments.system or systems(arguments.python):
-            judged += show(_judged(arguments.python, system, arguments.seconds, arguments.keep))
+            directory = arguments.to.resolve() / system
+            judged += show(_judged(arguments.python, system, arguments.seconds, directory))
     except NotPossibleError as error:
         sys.exit(f"cannot record: {error}")
     bad = [one for one in judged if not one.is_good]
     print(f"\n{len(judged)} figures, {len(bad)} of them not what they must be")
+    print(f"recorded in {arguments.to}")
     sys.exit(1 if bad else 0)
 
 
-def _judged(python: Path, system: str, seconds: float, keep: Path | None) -> list[Judged]:
+def _judged(python: Path, system: str, seconds: float, directory: Path) -> list[Judged]:
+    shutil.rmtree(directory, ignore_errors=True)
+    trace, truth = record(python, system, seconds, directory)
     with tempfile.TemporaryDirectory() as temporary:
-        directory = Path(temporary) / system
-        trace, truth = record(python, system, seconds, directory)
-        if keep is not None:
-            shutil.copytree(trace, keep / system / "trace")
-            shutil.copy(truth, keep / system)
         database = Path(temporary) / "run.duckdb"
         ingest([trace], database)
         return [Judged(system, "rclpy", "recorded", one) for one in compare_real(database, truth)]

@@ -7,6 +7,10 @@ WHERE NOT EXISTS (
         AND f.to_ns = t.ts_ns
         AND (
             f.to_kind = 'publication'
-            OR EXISTS (FROM truth_link AS l WHERE f.kind = l.kind AND t.id = l.to_id)
+            OR EXISTS (
+                FROM truth_link AS l
+                -- Whether a goal was accepted: both answers are judged.
+                WHERE (f.kind = l.kind OR f.kind LIKE 'goal_%') AND t.id = l.to_id
+            )
         )
 );

@@ -32,35 +32,36 @@ WHERE k IN ('publication', 'request', 'response')
     -- What a filter of messages publishes has no callback, and its causes are no triggers.
     AND NOT (cb = 0 AND coalesce(json_array_length(causes), 0) > 0);
 
+-- What threads sent and took.
+CREATE OR REPLACE TEMP TABLE sent AS
+SELECT 'publication' AS k, u.topic_name AS name, b.thread_id, b.start_ns AS ts_ns
+FROM analysed.store.publication AS b
+JOIN analysed.store.publisher AS u ON b.publisher_id = u.publisher_id
+UNION ALL
+SELECT 'request', c.service_name, q.sender_thread_id, q.sent_ns
+FROM analysed.store.request AS q
+JOIN analysed.store.client AS c ON q.client_id = c.client_id
+UNION ALL
+SELECT 'response', v.service_name, s.sender_thread_id, s.sent_ns
+FROM analysed.store.response AS s
+JOIN analysed.store.service AS v ON s.service_id = v.service_id;
+
+CREATE OR REPLACE TEMP TABLE taken AS
+SELECT
+    'sub' AS kind, 'take' AS kind_found, s.topic_name AS name, t.thread_id, t.taken_ns AS ts_ns
+FROM analysed.store.take AS t
+JOIN analysed.store.subscription AS s ON t.subscription_id = s.subscription_id
+UNION ALL
+SELECT 'service', 'request_taken', v.service_name, q.receiver_thread_id, q.taken_ns
+FROM analysed.store.request AS q
+JOIN analysed.store.service AS v ON q.service_id = v.service_id
+UNION ALL
+SELECT 'client', 'response_taken', c.service_name, s.receiver_thread_id, s.taken_ns
+FROM analysed.store.response AS s
+JOIN analysed.store.client AS c ON s.client_id = c.client_id;
+
 CREATE OR REPLACE TEMP TABLE truth_time AS
-WITH sent AS (
-    SELECT 'publication' AS k, u.topic_name AS name, b.thread_id, b.start_ns AS ts_ns
-    FROM analysed.store.publication AS b
-    JOIN analysed.store.publisher AS u ON b.publisher_id = u.publisher_id
-    UNION ALL
-    SELECT 'request', c.service_name, q.sender_thread_id, q.sent_ns
-    FROM analysed.store.request AS q
-    JOIN analysed.store.client AS c ON q.client_id = c.client_id
-    UNION ALL
-    SELECT 'response', v.service_name, s.sender_thread_id, s.sent_ns
-    FROM analysed.store.response AS s
-    JOIN analysed.store.service AS v ON s.service_id = v.service_id
-),
-taken AS (
-    SELECT
-        'sub' AS kind, 'take' AS kind_found, s.topic_name AS name, t.thread_id, t.taken_ns AS ts_ns
-    FROM analysed.store.take AS t
-    JOIN analysed.store.subscription AS s ON t.subscription_id = s.subscription_id
-    UNION ALL
-    SELECT 'service', 'request_taken', v.service_name, q.receiver_thread_id, q.taken_ns
-    FROM analysed.store.request AS q
-    JOIN analysed.store.service AS v ON q.service_id = v.service_id
-    UNION ALL
-    SELECT 'client', 'response_taken', c.service_name, s.receiver_thread_id, s.taken_ns
-    FROM analysed.store.response AS s
-    JOIN analysed.store.client AS c ON s.client_id = c.client_id
-),
-placed_taken AS (
+WITH placed_taken AS (
     SELECT t.*, p.host, p.pid, p.tid FROM taken AS t JOIN place AS p ON t.thread_id = p.thread_id
 ),
 placed_run AS (
@@ -176,6 +177,25 @@ goal AS (
     WHERE a.accepted
     GROUP BY ALL
 ),
+-- Goals that a thread rejected before it published the status of another one. In rclpy, no event
+-- lies between the two, as if the goal was accepted. Each result asked for later may be of it.
+deed AS (
+    SELECT k, name, thread_id, ts_ns FROM sent
+    UNION ALL
+    SELECT kind, name, thread_id, ts_ns FROM taken
+),
+followed AS (
+    SELECT *, lead(name) OVER (PARTITION BY thread_id ORDER BY ts_ns) AS next_name
+    FROM deed
+),
+unclear AS (
+    SELECT a.name, a.callback, a.t0
+    FROM truth_callback AS a
+    JOIN place AS p ON a.pid = p.pid AND a.tid = p.tid
+    ASOF JOIN (FROM followed WHERE k = 'response') AS f
+        ON p.thread_id = f.thread_id AND a.name = f.name AND a.t0 < f.ts_ns
+    WHERE NOT a.accepted AND f.next_name = replace(a.name, 'send_goal', 'status')
+),
 -- Whose feedback it is, is said of the first and last message, if no other goal was accepted
 -- meanwhile.
 first_and_last AS (
@@ -187,7 +207,15 @@ first_and_last AS (
         ON g.name = o.name AND g.id <> o.id
         AND o.accepted_ns < coalesce(g.finished_ns, o.accepted_ns + 1)
         AND coalesce(o.finished_ns > g.accepted_ns, true)
+    ANTI JOIN unclear AS u ON g.name = u.name AND coalesce(g.finished_ns > u.t0, true)
     GROUP BY g.sent
+),
+obscured AS (
+    SELECT l.from_id
+    FROM link AS l
+    JOIN truth_sent AS s ON l.to_id = s.sent
+    JOIN unclear AS u ON replace(s.topic, 'get_result', 'send_goal') = u.name AND s.t0 > u.t0
+    WHERE l.kind = 'goal_result'
 )
 -- Before Kilted, services have no events but those of callbacks.
 SELECT
@@ -201,6 +229,11 @@ SELECT
     ) AND (
         l.kind <> 'goal_accepted'
         OR l.from_id IN (SELECT from_id FROM link WHERE kind = 'goal_result')
+    ) AND (
+        l.kind NOT IN ('goal_accepted', 'goal_result')
+        OR l.from_id NOT IN (FROM obscured)
+    ) AND (
+        l.kind <> 'goal_rejected' OR l.to_id NOT IN (SELECT callback FROM unclear)
     ) AS is_decided
 FROM link AS l
 CROSS JOIN recording AS r;

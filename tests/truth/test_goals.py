@@ -11,8 +11,10 @@ from scoring import Score, compare_real, compare_simulated
 from msgflow.ingest import ingest
 from msgflow.sim import simulate
 
-# Kilted, Fast DDS: a server with four threads executes goals of two actions of one client.
+# Kilted, Fast DDS: a server with some threads executes goals of two actions of one client.
 REAL = Path(__file__).parent / "real_actions"
+# The same system. Its processes were stopped at random: goals pile up, and more of them overlap.
+STALLED = Path(__file__).parent / "real_actions_stalled"
 KINDS = {"goal_accepted", "goal_rejected", "goal_result", "goal_message"}
 
 
@@ -33,6 +35,25 @@ def assert_right(scores: list[Score]) -> None:
     assert by_kind.keys() >= KINDS
     assert all(by_kind[kind].found > 5 for kind in KINDS)
     assert not [score for score in scores if score.wrong or score.missing or score.doubted]
+
+
+def test_goals_of_real_nodes_that_stand_still_at_times(tmp_path: Path) -> None:
+    """A thread rejects a goal of /dock, waits, and publishes the status of the next one.
+
+    Nothing in the trace tells it from an accepted one. So all that the client asks for afterwards
+    may be of it.
+    """
+    ingested = ingest_one(STALLED / "trace.tar.xz", tmp_path / "run.duckdb")
+    decided = ingested.rows(
+        "SELECT action_name, is_accepted, count(*) FROM goal WHERE answer_taken_ns IS NOT NULL "
+        "GROUP BY ALL ORDER BY ALL"
+    )
+    ingested.connection.close()
+    assert decided == [
+        ("/dock", False, 7), ("/dock", True, 16), ("/dock", None, 18),
+        ("/move", False, 6), ("/move", True, 28),
+    ]  # fmt: skip
+    assert_right(compare_real(tmp_path / "run.duckdb", STALLED / "truth.jsonl.gz"))
 
 
 def test_what_is_known_of_goals_before_kilted(tmp_path: Path) -> None:

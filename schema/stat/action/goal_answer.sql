@@ -4,16 +4,19 @@
 --     the same thread does is to publish the status of its goals: rclcpp and rclpy do nothing in
 --     between. If the thread goes on with anything else, the goal was rejected. A thread without
 --     executor events and callbacks (rclpy) may also have turned to another goal that it executes,
---     and may publish how that ended: there, the status tells only if no other goal is open. Where
---     events may be missing between the two, where the thread does nothing more, and in processes
---     that are several, it is not known.
+--     and may publish its status: there, the status tells only if no other goal is open, and none
+--     was answered in between. Where events may be missing between the two, where the thread does
+--     nothing more, and in processes that are several, it is not known.
 -- grain: one row per response to a goal that an action server sent
 -- param: servers VARCHAR  Name of the rows of action servers, see main.goal
 CREATE OR REPLACE MACRO derive.goal_answer(servers) AS TABLE
 WITH answer AS MATERIALIZED (
     SELECT
         r.response_id, r.sender_thread_id AS thread_id, r.sent_ns, s.action_server_id,
-        s.status_publisher_id, coalesce(p.is_ambiguous, false) AS is_ambiguous
+        s.status_publisher_id, coalesce(p.is_ambiguous, false) AS is_ambiguous,
+        lead(r.sent_ns) OVER (
+            PARTITION BY s.action_server_id ORDER BY r.sent_ns, r.response_id
+        ) AS next_sent_ns
     FROM store.response AS r
     JOIN query_table(servers) AS s ON r.service_id = s.action_server_id
     JOIN store.process AS p ON s.process_id = p.process_id
@@ -42,6 +45,7 @@ deed AS (
 followed AS (
     SELECT
         a.response_id, a.thread_id, a.action_server_id, a.sent_ns,
+        coalesce(a.next_sent_ns < d.at_ns, false) AS is_other_answered,
         CASE
             WHEN a.status_publisher_id IS NOT NULL AND NOT a.is_ambiguous AND d.at_ns IS NOT NULL
                 AND coalesce(b.resumed_ns <= a.sent_ns, true)
@@ -82,7 +86,7 @@ SELECT
     f.response_id,
     CASE
         WHEN NOT f.is_followed_by_status
-            OR c.open = 1
+            OR (c.open = 1 AND NOT f.is_other_answered)
             OR f.thread_id IN (SELECT thread_id FROM executing)
             THEN f.is_followed_by_status
     END AS is_accepted
