@@ -177,8 +177,9 @@ goal AS (
     WHERE a.accepted
     GROUP BY ALL
 ),
--- Goals that a thread rejected before it published the status of another one. In rclpy, no event
--- lies between the two, as if the goal was accepted. Each result asked for later may be of it.
+-- Goals that a thread rejected before it published the status of another one, or nothing more. In
+-- rclpy, no event lies between the two, as if the goal was accepted. Each result asked for later
+-- may be of it.
 deed AS (
     SELECT k, name, thread_id, ts_ns FROM sent
     UNION ALL
@@ -194,7 +195,7 @@ unclear AS (
     JOIN place AS p ON a.pid = p.pid AND a.tid = p.tid
     ASOF JOIN (FROM followed WHERE k = 'response') AS f
         ON p.thread_id = f.thread_id AND a.name = f.name AND a.t0 < f.ts_ns
-    WHERE NOT a.accepted AND f.next_name = replace(a.name, 'send_goal', 'status')
+    WHERE NOT a.accepted AND coalesce(f.next_name = replace(a.name, 'send_goal', 'status'), true)
 ),
 -- Whose feedback it is, is said of the first and last message, if no other goal was accepted
 -- meanwhile.
