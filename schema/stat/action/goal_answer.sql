@@ -57,7 +57,8 @@ followed AS (
     ASOF LEFT JOIN store.thread_break AS b
         ON a.thread_id = b.thread_id AND d.at_ns >= b.resumed_ns
 ),
--- Goals that may be open then: all that were not rejected, without those whose results were sent.
+-- Goals that may be open then: all that were not rejected, without those whose results were sent. A
+-- result that was asked for before the recording, or in a gap, is of a goal that was open since.
 step AS (
     SELECT action_server_id, sent_ns, response_id, 1 AS change
     FROM followed
@@ -66,6 +67,13 @@ step AS (
     SELECT s.action_server_id, r.sent_ns, r.response_id, -1
     FROM store.response AS r
     JOIN query_table(servers) AS s ON r.service_id = s.result_service_id
+    UNION ALL
+    SELECT s.action_server_id, coalesce(l.start_ns, 0), NULL, 1
+    FROM store.response AS r
+    JOIN query_table(servers) AS s ON r.service_id = s.result_service_id
+    JOIN store.process AS p ON s.process_id = p.process_id
+    ASOF LEFT JOIN derive.host_gap AS l ON p.host_id = l.host_id AND r.sent_ns >= l.start_ns
+    WHERE r.request_id IS NULL
 ),
 summed AS (
     SELECT *, sum(change) OVER earlier AS balance
@@ -74,7 +82,7 @@ summed AS (
         PARTITION BY action_server_id ORDER BY sent_ns, response_id ROWS UNBOUNDED PRECEDING
     )
 ),
--- A result of no known goal leaves none open: the sum begins anew.
+-- Any other result of no known goal leaves none open: the sum begins anew.
 counted AS (
     SELECT response_id, balance - least(0, min(balance) OVER earlier) AS open
     FROM summed
