@@ -3,8 +3,8 @@
 -- description: From when to when an action server was concerned with a goal that it accepted, or
 --     may have: from its answer until it sent the result; without an end if nobody asked for that.
 --     Clients that ask late get it late. Of goals whose results cannot be told apart, the ends are
---     those of all, in some order. A result of which nothing else is in the trace is of a goal that
---     began in the gap before, one of the server's host, or before the recording.
+--     those of all, in some order. A result of a goal that the server was not seen to take is of one
+--     that began in the gap before, one of the server's host, or before the recording.
 -- grain: one row per goal that a server took and is not known to have rejected; one without a goal
 --     per result of an unknown goal
 -- param: servers VARCHAR  Name of the rows of action servers, see main.goal
@@ -30,7 +30,12 @@ WITH span AS (
     JOIN query_table(servers) AS s ON r.service_id = s.result_service_id
     JOIN store.process AS p ON s.process_id = p.process_id
     ASOF LEFT JOIN derive.host_gap AS l ON p.host_id = l.host_id AND r.sent_ns >= l.start_ns
-    WHERE r.request_id IS NULL
+    WHERE r.request_id IS NULL OR r.request_id IN (
+        SELECT p.request_id
+        FROM query_table(results) AS p
+        JOIN query_table(goals) AS g ON p.goal_id = g.goal_id
+        WHERE g.taken_ns IS NULL
+    )
 )
 SELECT
     *,
