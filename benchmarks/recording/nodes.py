@@ -25,6 +25,7 @@ import rclpy
 from rcl_interfaces.srv import ListParameters
 from rclpy.action import ActionClient, ActionServer, CancelResponse, GoalResponse
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
+from rclpy.exceptions import InvalidHandle
 from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
@@ -316,7 +317,8 @@ def main() -> None:
     end = threading.Thread(target=lambda: (sys.stdin.read(), rclpy.shutdown()))
     end.start()
     print("ready", flush=True)
-    with suppress(ExternalShutdownException):
+    # A callback may run while ROS shuts down.
+    with suppress(ExternalShutdownException, InvalidHandle):
         # Its spin() of rclpy 9.1 does nothing but use the CPU.
         while executor_class is EventsExecutor and rclpy.ok():
             executor.spin_once(0.1)
