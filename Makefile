@@ -129,4 +129,4 @@ ros: $(VENV)/.made
 		|| echo "note: no rclpy: the tests with real ROS 2 are skipped" >&2
 
 clean:
-	rm -rf $(VENV) $(DEMO) .site .cache
+	rm -rf $(VENV) $(DEMO) .site .cache build/real

@@ -51,7 +51,8 @@ def main() -> None:
 
 
 def _judged(python: Path, system: str, seconds: float, directory: Path) -> list[Judged]:
-    shutil.rmtree(directory, ignore_errors=True)
+    if directory.exists():
+        shutil.rmtree(directory)
     trace, truth = record(python, system, seconds, directory)
     with tempfile.TemporaryDirectory() as temporary:
         database = Path(temporary) / "run.duckdb"

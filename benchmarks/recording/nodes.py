@@ -18,7 +18,7 @@ import os
 import sys
 import threading
 import time
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 import rclpy
@@ -317,12 +317,17 @@ def main() -> None:
     end = threading.Thread(target=lambda: (sys.stdin.read(), rclpy.shutdown()))
     end.start()
     print("ready", flush=True)
-    # A callback may run while ROS shuts down.
-    with suppress(ExternalShutdownException, InvalidHandle):
+    try:
         # Its spin() of rclpy 9.1 does nothing but use the CPU.
         while executor_class is EventsExecutor and rclpy.ok():
             executor.spin_once(0.1)
         executor.spin()
+    except ExternalShutdownException:
+        pass
+    except InvalidHandle:
+        # A callback may run while ROS shuts down.
+        if rclpy.ok():
+            raise
     end.join()
     truth.save(Path(path))
     # Threads of the middleware may still call Python while it ends.

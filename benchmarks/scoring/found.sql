@@ -146,7 +146,7 @@ link AS (
     UNION ALL
     SELECT
         CASE WHEN is_accepted THEN 'goal_accepted' ELSE 'goal_rejected' END, 'goal',
-        'request_sent', goal_id, 'request_taken', goal_id, is_loss_affected
+        'request_sent', goal_id, 'request_taken', goal_id, false
     FROM analysed.main.goal
     WHERE is_accepted IS NOT NULL
     UNION ALL

@@ -9,8 +9,15 @@ WHERE NOT EXISTS (
             f.to_kind = 'publication'
             OR EXISTS (
                 FROM truth_link AS l
-                -- Whether a goal was accepted: both answers are judged.
-                WHERE (f.kind = l.kind OR f.kind LIKE 'goal_%') AND t.id = l.to_id
+                -- The truth has one of the two; the other one is wrong.
+                WHERE (f.kind = l.kind OR f.kind IN ('goal_accepted', 'goal_rejected')) AND t.id = l.to_id
             )
         )
+);
+
+-- A result near a gap may be of another goal, and is marked. So may be what follows from it.
+UPDATE found_link AS f SET is_guess = true
+WHERE kind = 'goal_accepted' AND EXISTS (
+    FROM found_link AS r
+    WHERE r.kind = 'goal_result' AND r.is_guess AND f.from_id = r.from_id
 );

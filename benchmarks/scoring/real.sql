@@ -177,16 +177,15 @@ goal AS (
     WHERE a.accepted
     GROUP BY ALL
 ),
--- Goals that a thread rejected before it published the status of another one, or nothing more. In
--- rclpy, no event lies between the two, as if the goal was accepted. Each result asked for later
--- may be of it.
+-- Rejected goals that look like accepted ones: in rclpy, the thread publishes the status of another goal
+-- next, or does nothing more. Any later result may be of such a goal.
 deed AS (
     SELECT k, name, thread_id, ts_ns FROM sent
     UNION ALL
     SELECT kind, name, thread_id, ts_ns FROM taken
 ),
 followed AS (
-    SELECT *, lead(name) OVER (PARTITION BY thread_id ORDER BY ts_ns) AS next_name
+    SELECT *, lead((k, name)) OVER (PARTITION BY thread_id ORDER BY ts_ns, k, name) AS next_deed
     FROM deed
 ),
 unclear AS (
@@ -195,7 +194,9 @@ unclear AS (
     JOIN place AS p ON a.pid = p.pid AND a.tid = p.tid
     ASOF JOIN (FROM followed WHERE k = 'response') AS f
         ON p.thread_id = f.thread_id AND a.name = f.name AND a.t0 < f.ts_ns
-    WHERE NOT a.accepted AND coalesce(f.next_name = replace(a.name, 'send_goal', 'status'), true)
+    ANTI JOIN traced AS t ON a.pid = t.pid
+    WHERE NOT a.accepted
+        AND coalesce(f.next_deed = ('publication', replace(a.name, 'send_goal', 'status')), true)
 ),
 -- Whose feedback it is, is said of the first and last message, if no other goal was accepted
 -- meanwhile.

@@ -3,8 +3,8 @@
 --     action show it (events of requests: Kilted and later). The identity that ROS gives to a goal
 --     is not in the trace, and neither is how it ended: succeeded, aborted or cancelled. So a
 --     result is known to be of a goal if the client asked for it in the callback of the answer, or
---     if no other accepted goal of that client was open. Feedback and requests to cancel are known
---     to be of it if the server was concerned with no other goal at that time.
+--     if no other goal of that client was open that may have been accepted. Feedback and requests
+--     to cancel are known to be of it if the server was concerned with no other goal at that time.
 -- grain: one row per goal and action server that took it; one per goal that none took
 -- column: run_id BIGINT  Run that the row belongs to
 -- column: goal_id BIGINT  Identity of the goal: that of the request that sent it
@@ -17,7 +17,8 @@
 --     from then on it may execute it
 -- column: answer_taken_ns BIGINT [epoch ns]  The client took that answer
 -- column: is_accepted BOOLEAN  Whether the server accepted it: it published its status right after
---     its answer, or the client asked for the result; NULL: not known
+--     its answer, or the client asked for the result, which near a gap may be that of another goal;
+--     NULL: not known
 -- column: result_asked_ns BIGINT [epoch ns]  The client asked for the result
 -- column: result_sent_ns BIGINT [epoch ns]  The server sent the result: when there was one, and
 --     the client had asked
@@ -97,7 +98,20 @@ timed AS (
     SELECT
         g.run_id, g.goal_id, g.action_name, g.action_client_id, g.action_server_id,
         q.sent_ns, q.taken_ns, a.sent_ns AS answered_ns, a.taken_ns AS answer_taken_ns,
-        coalesce(g.is_accepted, CASE WHEN r.goal_id IS NOT NULL THEN true END) AS is_accepted,
+        -- A status that a thread publishes right after its answer is of that goal if no other one
+        -- was open, and none was answered in between.
+        coalesce(
+            g.is_accepted,
+            CASE
+                WHEN r.goal_id IS NOT NULL
+                    OR (
+                        g.status_ns IS NOT NULL
+                        AND NOT s.is_begun_during_other
+                        AND coalesce(s.next_start_ns >= g.status_ns, true)
+                    )
+                    THEN true
+            END
+        ) AS is_accepted,
         r.asked_ns AS result_asked_ns, r.sent_ns AS result_sent_ns,
         r.taken_ns AS result_taken_ns, r.request_id AS result_request_id,
         p.candidate_count AS result_candidate_count,

@@ -11,7 +11,19 @@
 -- param: goals VARCHAR  Name of the rows of derive.goal_request
 -- param: results VARCHAR  Name of the rows of derive.goal_result
 CREATE OR REPLACE MACRO derive.goal_span(servers, goals, results) AS TABLE
-WITH span AS (
+WITH unseen AS (
+    SELECT
+        r.run_id, s.action_server_id, p.host_id, r.sent_ns,
+        least(g.answer_taken_ns, r.sent_ns) AS begun_ns,
+        r.request_id IS NOT NULL AND g.goal_id IS NULL AS is_surplus
+    FROM store.response AS r
+    JOIN query_table(servers) AS s ON r.service_id = s.result_service_id
+    JOIN store.process AS p ON s.process_id = p.process_id
+    LEFT JOIN query_table(results) AS q ON r.request_id = q.request_id
+    LEFT JOIN query_table(goals) AS g ON q.goal_id = g.goal_id
+    WHERE g.taken_ns IS NULL
+),
+span AS (
     SELECT
         g.run_id,
         g.goal_id,
@@ -25,29 +37,28 @@ WITH span AS (
     WHERE g.taken_ns IS NOT NULL AND g.is_accepted IS DISTINCT FROM false
     GROUP BY g.run_id, g.goal_id, g.action_server_id, g.answered_ns, g.taken_ns
     UNION ALL
-    SELECT r.run_id, NULL, s.action_server_id, coalesce(l.start_ns, 0), r.sent_ns, false
-    FROM store.response AS r
-    JOIN query_table(servers) AS s ON r.service_id = s.result_service_id
-    JOIN store.process AS p ON s.process_id = p.process_id
-    ASOF LEFT JOIN derive.host_gap AS l ON p.host_id = l.host_id AND r.sent_ns >= l.start_ns
-    WHERE r.request_id IS NULL OR r.request_id IN (
-        SELECT p.request_id
-        FROM query_table(results) AS p
-        JOIN query_table(goals) AS g ON p.goal_id = g.goal_id
-        WHERE g.taken_ns IS NULL
-    )
+    SELECT u.run_id, NULL, u.action_server_id, coalesce(l.start_ns, 0), u.sent_ns, false
+    FROM unseen AS u
+    ASOF LEFT JOIN derive.host_gap AS l ON u.host_id = l.host_id AND u.begun_ns >= l.start_ns
+    -- A client may ask for a result once more.
+    WHERE NOT u.is_surplus OR l.start_ns IS NOT NULL
+),
+placed AS (
+    SELECT
+        *,
+        coalesce(bool_or(end_ns IS NULL) OVER before OR max(end_ns) OVER before > start_ns, false)
+            AS is_begun_during_other,
+        lead(start_ns) OVER ordered AS next_start_ns
+    FROM span
+    WINDOW
+        ordered AS (PARTITION BY action_server_id ORDER BY start_ns, goal_id),
+        before AS (
+            PARTITION BY action_server_id ORDER BY start_ns, goal_id
+            ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING
+        )
 )
 SELECT
     *,
-    coalesce(bool_or(end_ns IS NULL) OVER before OR max(end_ns) OVER before > start_ns, false)
-    OR (
-        lead(start_ns) OVER ordered IS NOT NULL
-        AND coalesce(lead(start_ns) OVER ordered < end_ns, true)
-    ) AS is_overlapping
-FROM span
-WINDOW
-    ordered AS (PARTITION BY action_server_id ORDER BY start_ns, goal_id),
-    before AS (
-        PARTITION BY action_server_id ORDER BY start_ns, goal_id
-        ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING
-    )
+    is_begun_during_other
+    OR (next_start_ns IS NOT NULL AND coalesce(next_start_ns < end_ns, true)) AS is_overlapping
+FROM placed
