@@ -1,9 +1,9 @@
 -- name: derive.goal_answer
 -- kind: macro
--- description: What an action server said to a goal, as far as its thread shows. Once it has accepted
---     one, the next thing that the same thread does is to publish the status of its goals: rclcpp
---     and rclpy do nothing in between. If the thread goes on with anything else, the goal was
---     rejected. A thread without executor events and callbacks (rclpy) may also have turned to
+-- description: What an action server said to a goal, as far as its thread shows. Once it has
+--     accepted one, the next thing that the same thread does is to publish the status of its goals:
+--     rclcpp and rclpy do nothing in between. If the thread goes on with anything else, the goal
+--     was rejected. A thread without executor events and callbacks (rclpy) may also have turned to
 --     another goal that it executes, and may publish its status: what other goals were open decides
 --     (main.goal). Where events may be missing between the two, where the thread does nothing more,
 --     and in processes that are several, it is not known.

@@ -3,8 +3,9 @@
 -- description: From when to when an action server was concerned with a goal that it accepted, or
 --     may have: from its answer until it sent the result; without an end if nobody asked for that.
 --     Clients that ask late get it late. Of goals whose results cannot be told apart, the ends are
---     those of all, in some order. A result of a goal that the server was not seen to take is of one
---     that began in the gap before, one of the server's host, or before the recording.
+--     those of all, in some order. A result of a goal that the server was not seen to take is of
+--     one that began in a gap of the server's host, or before the recording: the last gap before
+--     the client took the answer, or before the result if that is not known.
 -- grain: one row per goal that a server took and is not known to have rejected; one without a goal
 --     per result of an unknown goal
 -- param: servers VARCHAR  Name of the rows of action servers, see main.goal
