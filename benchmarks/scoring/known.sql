@@ -10,7 +10,8 @@ WHERE NOT EXISTS (
             OR EXISTS (
                 FROM truth_link AS l
                 -- The truth has one of the two; the other one is wrong.
-                WHERE (f.kind = l.kind OR f.kind IN ('goal_accepted', 'goal_rejected')) AND t.id = l.to_id
+                WHERE t.id = l.to_id
+                    AND (f.kind = l.kind OR f.kind IN ('goal_accepted', 'goal_rejected'))
             )
         )
 );

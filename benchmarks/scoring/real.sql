@@ -177,8 +177,8 @@ goal AS (
     WHERE a.accepted
     GROUP BY ALL
 ),
--- Rejected goals that look like accepted ones: in rclpy, the thread publishes the status of another goal
--- next, or does nothing more. Any later result may be of such a goal.
+-- Rejected goals that look like accepted ones: in rclpy, the thread publishes the status of another
+-- goal next, or does nothing more. Any later result may be of such a goal.
 deed AS (
     SELECT k, name, thread_id, ts_ns FROM sent
     UNION ALL
