@@ -49,7 +49,8 @@ demo: $(VENV)/.installed
 	@echo '  msgflow query callbacks                          how long callbacks run, how often'
 	@echo '  msgflow sql "FROM callback_run WHERE NOT is_internal LIMIT 10"         anything else'
 	@echo 'see it: $(BIN)/msgflow ui --db $(DEMO)/msgflow.duckdb'
-	@echo 'two hosts, simulated: $(BIN)/msgflow simulate demo -o $(DEMO)/two_hosts'
+	@echo 'two hosts, simulated: $(BIN)/pip install -q -e simulator &&'
+	@echo '  $(BIN)/msgflow simulate demo -o $(DEMO)/two_hosts'
 
 quick: $(VENV)/.developed
 	$(BIN)/ruff check .
@@ -69,16 +70,16 @@ test test-all: $(VENV)/.developed babeltrace chromium ros
 	$(BIN)/pytest -n auto --dist worksteal --assert=plain $(SELECTED) \
 		|| { $(BIN)/pytest --last-failed --last-failed-no-failures none $(SELECTED); exit 1; }
 
-bench: $(VENV)/.installed babeltrace
+bench: $(VENV)/.simulates babeltrace
 	$(BIN)/python benchmarks/run.py
 
-truth: $(VENV)/.installed
+truth: $(VENV)/.simulates
 	$(BIN)/python benchmarks/truth.py
 
 real: $(VENV)/.installed ros
 	$(BIN)/python benchmarks/real.py --python $(VENV)/ros/bin/python
 
-fuzz: $(VENV)/.installed
+fuzz: $(VENV)/.simulates
 	$(BIN)/python benchmarks/fuzz.py
 
 mutants: $(VENV)/.developed
@@ -103,9 +104,14 @@ $(VENV)/.installed: pyproject.toml $(VENV)/.made
 	$(BIN)/python -m pip install --quiet --editable .
 	@touch $@
 
-$(VENV)/.developed: pyproject.toml $(VENV)/.made
-	$(BIN)/python -m pip install --quiet --editable . --group dev
-	@touch $@ $(VENV)/.installed
+# The same, with the simulator.
+$(VENV)/.simulates: simulator/pyproject.toml $(VENV)/.installed
+	$(BIN)/python -m pip install --quiet --editable simulator
+	@touch $@
+
+$(VENV)/.developed: pyproject.toml simulator/pyproject.toml $(VENV)/.made
+	$(BIN)/python -m pip install --quiet --editable . --editable simulator --group dev
+	@touch $(VENV)/.installed $(VENV)/.simulates $@
 
 babeltrace:
 	@$(APT); { $(HAS_BT2) && command -v babeltrace2 >/dev/null; } \

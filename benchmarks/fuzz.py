@@ -160,7 +160,7 @@ def _base(directory: Path, system: str, layout: str) -> Base:
 
     def make() -> dict[str, Any]:
         from msgflow.db import migration
-        from msgflow.sim import simulate
+        from msgflow_sim import simulate
 
         if not empty.exists():
             migration.create(empty)

@@ -30,7 +30,7 @@ from playwright.sync_api import sync_playwright
 
 from msgflow.database import open_db
 from msgflow.ingest import ingest
-from msgflow.sim import simulate
+from msgflow_sim import simulate
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "support"))
 from browser import ARGUMENTS, find_browser

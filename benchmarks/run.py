@@ -38,7 +38,7 @@ NO_ROOM = "more memory is needed"  # What the command says where a query does no
 QUERIES = ("e2e-latency", "flows", "path-breakdown", "critical-path", "waits")
 
 SIMULATE = """
-import sys; from pathlib import Path; from msgflow.sim import Recording, simulate
+import sys; from pathlib import Path; from msgflow_sim import Recording, simulate
 recording = Recording(packet_bytes=int(sys.argv[3]))
 simulate("pipeline", Path(sys.argv[1]), factor=float(sys.argv[2]), recording=recording)
 """

@@ -237,8 +237,8 @@ def moments(
     # For the processes forked from this one.
     import msgflow.database
     import msgflow.export
-    import msgflow.ingest
-    import msgflow.sim  # noqa: F401
+    import msgflow.ingest  # noqa: F401
+    import msgflow_sim  # noqa: F401
 
     chance = random.Random(seed)
     with tempfile.TemporaryDirectory() as directory:

@@ -34,7 +34,7 @@ from scoring import Drop, Score, compare_real, compare_recorded, compare_simulat
 
 from msgflow.errors import TraceError
 from msgflow.ingest import ingest
-from msgflow.sim import (
+from msgflow_sim import (
     Buffers,
     Recording,
     Scenario,

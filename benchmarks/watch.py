@@ -19,8 +19,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from msgflow.clocks import read_clock_sync
-from msgflow.sim import Recording, simulate
 from msgflow.watch import Watcher, watch_finished
+from msgflow_sim import Recording, simulate
 
 if TYPE_CHECKING:
     from msgflow.watch.chunk import Chunk

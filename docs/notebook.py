@@ -27,7 +27,7 @@ This file is written by `python docs/notebook.py`, which runs it.""",
     [
         """%matplotlib inline
 import msgflow
-from msgflow.sim import simulate
+from msgflow_sim import simulate
 
 simulate("demo", "trace", factor=0.2)
 db = msgflow.open_db("robot.duckdb")

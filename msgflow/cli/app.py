@@ -1,10 +1,14 @@
-"""The program `msgflow`: a group of commands, each imported when it is run."""
+"""The program `msgflow`: a group of commands, each imported when it is run.
+
+Another distribution adds a command by an entry point of the group `msgflow.commands`, which names a
+module. The help shows the summary of that distribution.
+"""
 
 from __future__ import annotations
 
 import sys
 from importlib import import_module
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer.core import TyperCommand, TyperGroup
@@ -16,6 +20,9 @@ from msgflow.cli.signals import HANDLER
 from msgflow.errors import ExitCode, UsageError
 from msgflow.sql.interrupt import Terminated
 from msgflow.version import __version__
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoints
 
 COMMANDS = {
     "record": (
@@ -48,13 +55,16 @@ COMMANDS = {
     "db": "Upgrade and describe a database file.",
     "fleet": "Many recordings, on one machine or many, into one lake of Parquet files.",
     "mcp": "Serve the database to an agent, over stdin and stdout (Model Context Protocol).",
-    "simulate": "Write the trace of a simulated ROS 2 system, and the links that really happened.",
 }
 """The commands in the order in which a user needs them, with their summaries in the help.
 
 Each is a module of `msgflow.cli` with a function `command`, or a group `app`. Its class `Command`,
 if it has one, reads the words of the function.
 """
+_SIMULATOR = (
+    "pip install ros2-msgflow-sim; or in a checkout of msgflow:"
+    " uv tool install . --with ./simulator"
+)
 
 
 class RootGroup(TyperGroup):
@@ -66,11 +76,20 @@ class RootGroup(TyperGroup):
             name: TyperCommand(name, help=summary) for name, summary in COMMANDS.items()
         }
 
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Return the names of all commands, those of other distributions last."""
+        for point in _added():
+            summary = point.dist.metadata["Summary"] if point.dist else None
+            self.commands.setdefault(point.name, TyperCommand(point.name, help=summary))
+        return super().list_commands(ctx)
+
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Return the name, the imported command, and the words behind it."""
-        if args[0] not in COMMANDS:
+        if args[0] not in COMMANDS and args[0] not in self.list_commands(ctx):
             from msgflow.query.catalogue import query_names
 
+            if args[0] == "simulate":
+                raise UsageError("the simulator is not installed", _SIMULATOR)
             if args[0] in query_names():
                 hint = f"msgflow query {args[0]}"
                 raise UsageError(f"there is no such command — {args[0]}", hint)
@@ -109,12 +128,18 @@ class RootGroup(TyperGroup):
         return value
 
 
+def _added() -> EntryPoints:
+    from importlib.metadata import entry_points
+
+    return entry_points(group="msgflow.commands")
+
+
 def _imported(name: str) -> Any:
-    module = import_module(f"msgflow.cli.{name}")
+    module = import_module(f"msgflow.cli.{name}") if name in COMMANDS else _added()[name].load()
     around = typer.Typer(add_completion=False)
     around.callback()(lambda: None)
     if hasattr(module, "app"):
-        around.add_typer(module.app, name=name, help=COMMANDS[name])
+        around.add_typer(module.app, name=name, help=COMMANDS.get(name))
     else:
         around.command(name, cls=getattr(module, "Command", None))(module.command)
     return typer.main.get_group(around).commands[name]

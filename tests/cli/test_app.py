@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
+from collections.abc import Callable
 from importlib import import_module
 from inspect import getdoc
+from pathlib import Path
 
 import pytest
+from typer.testing import Result
 
 from msgflow.cli.app import COMMANDS
+
+Msgflow = Callable[..., Result]
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -33,3 +39,57 @@ def test_the_help_lists_all_and_imports_none() -> None:
     assert [name for name in listed if name in COMMANDS] == list(COMMANDS)
     imported = {module.removeprefix("msgflow.cli.") for module in modules.split()}
     assert not imported & set(COMMANDS)
+
+
+@pytest.fixture
+def other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with a distribution that has the command `greet`, where Python looks for modules."""
+    site = tmp_path / "site"
+    (site / "other-1.0.dist-info").mkdir(parents=True)
+    (site / "other-1.0.dist-info" / "METADATA").write_text("Name: other\nSummary: Greet robots.\n")
+    (site / "other-1.0.dist-info" / "entry_points.txt").write_text(
+        "[msgflow.commands]\ngreet = other_command\nsql = other_command\n"
+    )
+    (site / "other_command.py").write_text(
+        'def command(name: str) -> None:\n    """Greet a robot."""\n    print(f"hello {name}")\n'
+    )
+    monkeypatch.syspath_prepend(site)
+    return site
+
+
+@pytest.mark.usefixtures("other")
+def test_another_distribution_adds_a_command_and_replaces_none(msgflow: Msgflow) -> None:
+    listed = [line for line in msgflow("--help").stdout.splitlines() if line.startswith("│ ")]
+    assert any(line.split()[1:4] == ["greet", "Greet", "robots."] for line in listed)
+    assert "other_command" not in sys.modules
+    assert msgflow("greet", "r1").stdout == "hello r1\n"
+    assert "Usage: msgflow greet" in msgflow("greet", "--help").stdout
+    assert "did you mean 'greet'" in msgflow("gret").stderr
+    assert msgflow("sql", "SELECT 1").exit_code == 4
+
+
+def test_its_name_is_completed(other: Path) -> None:
+    program = "import sys; sys.argv = ['msgflow']; from msgflow.__main__ import main; main()"
+    asked = {"_MSGFLOW_COMPLETE": "complete_bash", "COMP_WORDS": "msgflow gre", "COMP_CWORD": "1"}
+    run = subprocess.run(
+        [sys.executable, "-c", program],
+        env=os.environ | asked | {"PYTHONPATH": os.pathsep.join([str(other), *sys.path])},
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    assert run.stdout.split() == ["greet"]
+
+
+def test_a_simulator_that_is_missing_is_named(
+    msgflow: Msgflow, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("importlib.metadata.entry_points", lambda **_: ())
+    result = msgflow("simulate", "demo")
+    assert result.exit_code == 2
+    assert result.stderr == (
+        "error: the simulator is not installed\n\n"
+        "hint: pip install ros2-msgflow-sim; or in a checkout of msgflow:"
+        " uv tool install . --with ./simulator\n"
+    )
+    assert "simulate" not in msgflow("--help").stdout

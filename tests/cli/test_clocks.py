@@ -14,8 +14,8 @@ from msgflow import open_db
 from msgflow.cli.app import app
 from msgflow.database import Database
 from msgflow.errors import UsageError
-from msgflow.sim import Host, Simulation, simulate
-from msgflow.sim.scenario import scenarios
+from msgflow_sim import Host, Simulation, simulate
+from msgflow_sim.scenario import scenarios
 
 Msgflow = Callable[..., Result]
 

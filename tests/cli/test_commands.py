@@ -34,7 +34,6 @@ COMMANDS = (
     "db schema",
     "fleet ingest",
     "fleet compact",
-    "simulate",
 )
 
 
@@ -101,22 +100,6 @@ def test_version(msgflow: Msgflow) -> None:
         (("sql",), "give SQL, or a file with -f", "msgflow sql"),
         (("sql", "SELECT 1", "-f", "x"), "give SQL, or a file with -f", "msgflow sql"),
         (("sql", "-f", "none.sql"), "no such file or directory — none.sql", ""),
-        (("simulate", "nothing", "-o", "out"), "nothing", ""),
-        (
-            ("simulate", "pipeline", "-o", "out", "--layout", "turtle"),
-            "layout — turtle",
-            "galactic",
-        ),
-        (
-            ("simulate", "pipeline", "-o", "out", "--pause", "2", "1"),
-            "must end after",
-            "begin first",
-        ),
-        (
-            ("simulate", "pipeline", "-o", "out", "--dual-session"),
-            "needs a late start",
-            "session starts",
-        ),
     ],
 )
 def test_usage_errors(msgflow: Msgflow, arguments: tuple[str, ...], error: str, hint: str) -> None:
@@ -293,46 +276,3 @@ def test_a_trace_that_is_not_there_has_code_3(msgflow: Msgflow) -> None:
     assert result.exit_code == 3
     assert "nowhere" in result.stderr
     assert not Path("msgflow.duckdb").exists()
-
-
-def test_simulate(msgflow: Msgflow) -> None:
-    result = msgflow("simulate", "pipeline", "-o", "out", "--factor", 0.02)
-    assert result.exit_code == 0
-    assert result.stdout == ""
-    assert result.stderr.startswith("1 trace, ")
-    assert list(Path("out").rglob("metadata"))
-
-
-def test_simulate_into_a_folder_of_the_name_of_the_system(msgflow: Msgflow) -> None:
-    result = msgflow("simulate", "pipeline", "--factor", 0.02)
-    assert result.exit_code == 0
-    assert result.stderr.endswith(" written to pipeline\n")
-    assert list(Path("pipeline").rglob("metadata"))
-
-
-def test_perf_records_the_kernel_if_asked(msgflow: Msgflow) -> None:
-    msgflow("simulate", "cpu_hog", "-o", "out", "--factor", 0.02, "--perf")
-    assert (Path("out/robot/perf/metadata")).exists()
-
-
-def test_simulate_a_layout_and_a_recording_with_faults(msgflow: Msgflow) -> None:
-    arguments = ("--factor", 0.03, "--layout", "humble-fastdds", "--start-late", 0.05)
-    result = msgflow(
-        "simulate", "pipeline", "-o", "out", *arguments, "--pause", 0.1, 0.15, "--rotate", 0.2,
-        "--rotate", 0.25, "--lose-events", 0.1, "--lose-packets", 0.1, "--per-process",
-        "--cut", 1, "--slew", 20,
-    )  # fmt: skip
-    assert result.exit_code == 0, result.stderr
-    # Three processes in three chunks each.
-    assert result.stderr.startswith("9 traces, ")
-    assert len(list(Path("out").glob("alpha/archives/*/ust/pid/*/metadata"))) == 9
-    counts = msgflow("events", "out", "--count").stdout
-    assert "dds:write_pre" in counts
-    assert "rcl_init" not in counts
-
-
-def test_simulate_lists_the_systems(msgflow):
-    lines = msgflow("simulate", "--list").stdout.splitlines()
-    names = [line.split()[0] for line in lines]
-    assert {"pipeline", "demo", "intra_process", "restarts", "services"} < set(names)
-    assert all(len(line.split()) > 4 for line in lines)

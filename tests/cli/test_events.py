@@ -18,7 +18,7 @@ import pyarrow.parquet as pq
 import pytest
 from typer.testing import Result
 
-from msgflow.sim import simulate
+from msgflow_sim import simulate
 
 Msgflow = Callable[..., Result]
 

@@ -16,7 +16,7 @@ from typer.testing import Result
 
 from msgflow.database import Database
 from msgflow.ingest import IngestReport
-from msgflow.sim import simulate
+from msgflow_sim import simulate
 
 Msgflow = Callable[..., Result]
 

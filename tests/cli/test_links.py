@@ -13,7 +13,7 @@ from typer.testing import Result
 
 from msgflow.db.derivation import derive
 from msgflow.errors import UsageError
-from msgflow.sim import Recording, simulate
+from msgflow_sim import Recording, simulate
 
 Msgflow = Callable[..., Result]
 

@@ -29,7 +29,7 @@ def test_all_options_that_take_a_path_know_the_home_directory(
 ) -> None:
     monkeypatch.setenv("HOME", HOME)
     expanded = set()
-    for command in commands(get_command(app), list(COMMANDS)):
+    for command in commands(get_command(app), [*COMMANDS, "simulate"]):
         for option in command.params:
             if option.param_type_name != "option":
                 continue

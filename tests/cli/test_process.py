@@ -23,7 +23,7 @@ from typer.testing import CliRunner
 
 from msgflow.cli.app import app
 from msgflow.ingest import ingest
-from msgflow.sim import Recording, simulate
+from msgflow_sim import Recording, simulate
 
 HEAVY = ("duckdb", "pyarrow", "sqlalchemy", "alembic", "pandas", "polars", "bt2")
 NEVER_IN_QUERY = ("sqlalchemy", "alembic", "duckdb_engine", "pandas", "polars", "bt2")

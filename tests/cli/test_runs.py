@@ -21,7 +21,7 @@ from typer.testing import Result
 from msgflow.database import Database
 from msgflow.db.finding import broken_rules
 from msgflow.ingest import ingest
-from msgflow.sim import simulate
+from msgflow_sim import simulate
 
 Msgflow = Callable[..., Result]
 

@@ -12,7 +12,7 @@ from kernel_traces import TCP, UDP, Header
 from network import SECOND, Network, traffic
 
 from msgflow import open_db
-from msgflow.sim import simulate
+from msgflow_sim import simulate
 
 ADDRESSES = {"alpha": "192.168.1.1", "beta": "192.168.1.2", "gamma": "192.168.1.3"}
 SECONDS = 3.0

@@ -9,8 +9,8 @@ from clock_bounds import judge
 from thorough import few
 
 from msgflow import open_db
-from msgflow.sim import simulate
-from msgflow.sim.scenario.traffic import TRAFFIC
+from msgflow_sim import simulate
+from msgflow_sim.scenario.traffic import TRAFFIC
 
 
 @pytest.mark.parametrize("kind", few(TRAFFIC, *list(TRAFFIC)[:1]))

@@ -18,7 +18,7 @@ from msgflow.db.connection import connect
 from msgflow.errors import DatabaseError
 from msgflow.ingest import ingest
 from msgflow.links import LinksFile, apply_links
-from msgflow.sim import simulate
+from msgflow_sim import simulate
 
 # What was done to the database, and what an upgrade cannot undo.
 CHANGES = {

@@ -11,8 +11,8 @@ import pytest
 from msgflow.db import derivation, objects
 from msgflow.db.sandbox import open_file
 from msgflow.ingest import ingest
-from msgflow.sim import Recording, simulate
 from msgflow.sql.header import parse
+from msgflow_sim import Recording, simulate
 
 
 def header(name: str, *needs: str) -> objects.Header:

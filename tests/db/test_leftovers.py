@@ -17,7 +17,7 @@ from msgflow.db.sandbox import spill_directory
 from msgflow.db.workspace import creating, workspace
 from msgflow.errors import DatabaseError
 from msgflow.ingest import ingest
-from msgflow.sim import simulate
+from msgflow_sim import simulate
 
 
 def dead_mark() -> str:

@@ -14,11 +14,12 @@ from msgflow.sql.header import parse
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 NAMED = re.findall(r"`([\w./-]+)`", TEXT)
-PLACES = ("msgflow", "schema", "tests", "docs", "benchmarks", "queries")
+PLACES = ("msgflow", "schema", "tests", "docs", "benchmarks", "queries", "simulator")
 ROOMS = [
     folder
     for parent in (
         "msgflow",
+        "simulator",
         "schema",
         "schema/model",
         "schema/link",

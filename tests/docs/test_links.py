@@ -9,7 +9,11 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+PAGES = [
+    ROOT / "README.md",
+    ROOT / "simulator" / "README.md",
+    *sorted((ROOT / "docs").rglob("*.md")),
+]
 FENCE = re.compile(r"^```.*?^```", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 HEADING = re.compile(r"^#{1,6} (.+)$", re.MULTILINE)
@@ -77,7 +81,7 @@ def test_every_page_is_reachable_from_readme() -> None:
 def test_pages_named_elsewhere_exist() -> None:
     missing = [
         f"{path.relative_to(ROOT)}: {name}"
-        for folder in ("msgflow", "schema", "queries", "benchmarks", "docs")
+        for folder in ("msgflow", "schema", "queries", "benchmarks", "docs", "simulator")
         for path in sorted((ROOT / folder).rglob("*"))
         if path.suffix in {".py", ".sql", ".md", ".yaml"}
         for name in MENTION.findall(path.read_text(encoding="utf-8"))

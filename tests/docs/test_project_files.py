@@ -18,6 +18,9 @@ def test_one_version_everywhere() -> None:
     cited = YAML(typ="safe").load(ROOT / "CITATION.cff")
     package = ElementTree.parse(ROOT / "packaging" / "colcon" / "package.xml")
     assert cited["version"] == package.findtext("version") == __version__
+    simulator = tomllib.loads((ROOT / "simulator" / "pyproject.toml").read_text("utf-8"))["project"]
+    assert simulator["version"] == __version__
+    assert f"ros2-msgflow=={__version__}" in simulator["dependencies"]
 
 
 def test_workflows_start_with_the_oldest_python() -> None:

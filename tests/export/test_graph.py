@@ -16,7 +16,7 @@ from golden import fill_case
 
 from msgflow import Database, UsageError
 from msgflow.export.graph import GraphFormat, graph_format
-from msgflow.sim import simulate
+from msgflow_sim import simulate
 
 CASES = Path(__file__).resolve().parents[1] / "query" / "cases" / "path-breakdown"
 GRAPHS = CASES.with_name("graph")

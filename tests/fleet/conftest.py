@@ -14,7 +14,7 @@ from msgflow.fleet.lake import Lake
 from msgflow.fleet.layout import part_path
 from msgflow.fleet.part import Content, Part, write_part
 from msgflow.ingest import ingest
-from msgflow.sim import simulate
+from msgflow_sim import simulate
 
 _LENGTH = 0.05
 COPY = "c" * 20

@@ -31,7 +31,7 @@ from msgflow.fleet.lake import Lake
 from msgflow.fleet.part import Content, write_part
 from msgflow.fleet.workers import LOCAL, RayWorkers
 from msgflow.ingest import ingest
-from msgflow.sim import simulate
+from msgflow_sim import simulate
 
 pytest.importorskip("ray", reason="ray is not installed")
 pytest.importorskip("moto.moto_server", reason="moto[server] is not installed")

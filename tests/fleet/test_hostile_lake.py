@@ -24,8 +24,8 @@ from msgflow.fleet.lake import Lake
 from msgflow.fleet.layout import database_path, part_path, run_schema
 from msgflow.fleet.manifest import read_manifest
 from msgflow.fleet.run_database import open_run
-from msgflow.sim import simulate
 from msgflow.trace import extraction
+from msgflow_sim import simulate
 
 LARGEST = 2**63 - 1
 

@@ -29,8 +29,8 @@ from msgflow.fleet.ingest import Options, fleet_ingest
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.task import PASSING, Outcome, Task, needs, without_secrets
 from msgflow.fleet.workers import OneProcess
-from msgflow.sim import simulate
 from msgflow.sql.failure import out_of_memory
+from msgflow_sim import simulate
 
 _LENGTH = 0.05
 

@@ -31,7 +31,7 @@ from msgflow.fleet.lake_query import (
 from msgflow.fleet.part import Content, write_part
 from msgflow.ingest import ingest
 from msgflow.query.catalogue import load_query
-from msgflow.sim import simulate
+from msgflow_sim import simulate
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "fleet.md").read_text(encoding="utf-8")
 

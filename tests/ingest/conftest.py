@@ -9,7 +9,7 @@ import pytest
 from ctf_writer import Event, Packet, TraceContent, write_trace
 
 from msgflow.ingest import ingest
-from msgflow.sim import simulate
+from msgflow_sim import simulate
 
 _LENGTH = 0.01
 

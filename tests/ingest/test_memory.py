@@ -11,7 +11,7 @@ from msgflow import trace
 from msgflow.clocks import read_clock_sync
 from msgflow.db.tables import STORE
 from msgflow.ingest.memory import database_in_memory, ingest_again
-from msgflow.sim import simulate
+from msgflow_sim import simulate
 
 # It says when it was made.
 _OF_THE_MOMENT = {"run"}

@@ -16,8 +16,8 @@ from msgflow.db import objects
 from msgflow.errors import DatabaseError
 from msgflow.ingest import ingest, model, staging
 from msgflow.ingest.load import load_traces
-from msgflow.sim import Recording, simulate
 from msgflow.sql.interrupt import Interrupts
+from msgflow_sim import Recording, simulate
 
 SOMETIMES_EMPTY = [header for header in objects.load("model") if header.when]
 S = 1_000_000_000

@@ -16,8 +16,8 @@ from ctf_writer import Event, Packet, TraceContent, write_trace
 from ingested import rows
 
 from msgflow.ingest import ingest
-from msgflow.sim import simulate
 from msgflow.trace import open as open_traces
+from msgflow_sim import simulate
 
 Make = Callable[..., Path]
 # What makes it a trace of ROS 2.

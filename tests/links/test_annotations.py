@@ -16,7 +16,7 @@ from thorough import few
 
 from msgflow import Database
 from msgflow.errors import UsageError
-from msgflow.sim import scenarios, simulate
+from msgflow_sim import scenarios, simulate
 
 BOTH = """
 links:

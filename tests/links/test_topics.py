@@ -12,7 +12,7 @@ from msgflow import Database
 from msgflow.errors import UsageError
 from msgflow.ingest.ingest import ingest
 from msgflow.links import read_links
-from msgflow.sim import Recording, simulate
+from msgflow_sim import Recording, simulate
 
 LATE = Recording(start_ns=300_000_000)
 TOPICS = "SELECT DISTINCT topic_name FROM {} WHERE NOT is_internal ORDER BY ALL"

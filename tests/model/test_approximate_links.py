@@ -14,7 +14,7 @@ from ros_system import RosSystem
 from staged_events import Thread
 from thorough import few
 
-from msgflow.sim.approximate_time import ApproximateTime
+from msgflow_sim.approximate_time import ApproximateTime
 
 SOURCE, NODE = Thread(100), Thread(200)
 OUTPUT = 0x31

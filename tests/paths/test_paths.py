@@ -10,7 +10,7 @@ import pytest
 from msgflow.database import Database
 from msgflow.errors import UsageError
 from msgflow.paths import read_paths, suggest_paths
-from msgflow.sim import simulate
+from msgflow_sim import simulate
 
 GOOD = """\
 paths:

@@ -15,7 +15,7 @@ from msgflow.database import Database
 from msgflow.errors import QueryError, UsageError
 from msgflow.query.catalogue import load_queries
 from msgflow.query.selection import KINDS, PATH, columns_of, make_selection, values_of
-from msgflow.sim import simulate
+from msgflow_sim import simulate
 
 PLANNER = "/planning/planner"
 _ANSWERS: dict[str, list[dict[str, Any]]] = {}

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
-TESTS = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 # The reader itself, and what the simulator writes, are compared with Babeltrace 2.
-COMPARING = {"trace", "sim"}
+COMPARING = {"tests/trace", "simulator/tests"}
 
 
 def test_no_other_test_asks_for_them() -> None:
     asking = {
-        path.relative_to(TESTS).parts[0]
-        for path in TESTS.rglob("*.py")
+        "/".join(path.relative_to(ROOT).parts[:2])
+        for folder in ("tests", "simulator")
+        for path in (ROOT / folder).rglob("*.py")
         if path != Path(__file__) and "bt2_library.load" in path.read_text()
     }
     assert asking == COMPARING

@@ -49,10 +49,9 @@ def test_make_says_it_too(tmp_path: Path) -> None:
 
 
 def test_the_oldest_python_is_the_same_everywhere() -> None:
-    oldest = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"][
-        "requires-python"
-    ]
-    assert oldest == ">=3.11"
+    for name in ("pyproject.toml", "simulator/pyproject.toml"):
+        project = tomllib.loads((ROOT / name).read_text("utf-8"))["project"]
+        assert project["requires-python"] == ">=3.11"
     for name in ("README.md", "Makefile", "packaging/checked_hatchling.py"):
         text = (ROOT / name).read_text("utf-8")
         assert re.search(r"Python (3\.11 or newer|≥ 3\.11)", text), name

@@ -16,6 +16,7 @@ FOLDERS = (
     "docs",
     "examples",
     "benchmarks",
+    "simulator",
     ".ci",
 )
 TEXTS = {".py", ".sql", ".md", ".toml", ".csv", ".json", ".js", ".html", ".css", ".sh", ""}

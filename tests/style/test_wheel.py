@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import tarfile
 import zipfile
 from pathlib import Path
 
@@ -27,18 +28,28 @@ create(Path(sys.argv[1]))
 """
 
 
-@pytest.fixture(scope="module")
-def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The wheel, built by the build backend itself."""
-    directory = tmp_path_factory.mktemp("wheel")
+def build(project: Path, directory: Path) -> tuple[Path, Path]:
+    """Have the build backend itself make the wheel and the sources of a project."""
     subprocess.run(
-        [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(directory)],
-        cwd=ROOT,
+        [sys.executable, "-m", "hatchling", "build", "-d", str(directory)],
+        cwd=project,
         check=True,
         capture_output=True,
     )
-    (path,) = directory.glob("*.whl")
-    return path
+    (wheel,), (sources,) = directory.glob("*.whl"), directory.glob("*.tar.gz")
+    return wheel, sources
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """The wheel and the sources of msgflow."""
+    return build(ROOT, tmp_path_factory.mktemp("wheel"))
+
+
+@pytest.fixture(scope="module")
+def wheel(built: tuple[Path, Path]) -> Path:
+    """The wheel of msgflow."""
+    return built[0]
 
 
 def test_it_fits_every_machine(wheel: Path) -> None:
@@ -70,3 +81,27 @@ def test_it_works_without_the_checkout(wheel: Path, tmp_path: Path) -> None:
     )
     assert all(Path(line).is_relative_to(installed) for line in done.stdout.splitlines())
     assert (tmp_path / "new.duckdb").is_file()
+
+
+def names(sources: Path) -> set[str]:
+    """Return what lies in the folder of an archive of sources."""
+    with tarfile.open(sources) as archive:
+        return {name.partition("/")[2] for name in archive.getnames()}
+
+
+def test_nothing_of_the_simulator_is_in_it(built: tuple[Path, Path]) -> None:
+    wheel, sources = built
+    held = {*zipfile.ZipFile(wheel).namelist(), *names(sources)}
+    assert not [name for name in held if "simulator" in name or "msgflow_sim" in name]
+
+
+def test_the_simulator_is_in_a_wheel_of_its_own(tmp_path: Path) -> None:
+    wheel, sources = build(ROOT / "simulator", tmp_path)
+    held = {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
+    code = (ROOT / "simulator" / "msgflow_sim").rglob("*")
+    assert held == {"msgflow_simulate.py"} | {
+        path.relative_to(ROOT / "simulator").as_posix()
+        for path in code
+        if path.is_file() and "__pycache__" not in path.parts
+    }
+    assert held | {"LICENSE", "README.md", "tests/test_command.py"} <= names(sources)

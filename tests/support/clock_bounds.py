@@ -23,8 +23,8 @@ import duckdb
 from possible_lines import Bound, PossibleLines
 
 from msgflow.ingest import ingest
-from msgflow.sim import simulate
-from msgflow.sim.scenario.traffic import traffic
+from msgflow_sim import simulate
+from msgflow_sim.scenario.traffic import traffic
 
 if TYPE_CHECKING:
     from pathlib import Path

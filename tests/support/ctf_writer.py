@@ -1,6 +1,6 @@
 """Writes small CTF 1.8 traces of any content, so that tests know every byte of their input.
 
-Independent of `msgflow.sim`, whose traces look like LTTng's: these may look odd on purpose.
+Independent of `msgflow_sim`, whose traces look like LTTng's: these may look odd on purpose.
 """
 
 from __future__ import annotations

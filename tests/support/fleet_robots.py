@@ -8,13 +8,13 @@ import shutil
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from msgflow.sim import scenarios, simulate
-from msgflow.sim.entity import MICROSECOND, Work
+from msgflow_sim import scenarios, simulate
+from msgflow_sim.entity import MICROSECOND, Work
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from msgflow.sim.system import Scenario
+    from msgflow_sim.system import Scenario
 
 # How much the same robot differs from start to start, and robots from each other: shares.
 OF_STARTS = 0.03

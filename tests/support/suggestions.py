@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from msgflow import open_db
-from msgflow.sim.entity import (
+from msgflow_sim.entity import (
     MILLISECOND,
     SECOND,
     MessageLink,
@@ -19,7 +19,7 @@ from msgflow.sim.entity import (
     Timer,
     Work,
 )
-from msgflow.sim.system import Host, Node, Process, Scenario
+from msgflow_sim.system import Host, Node, Process, Scenario
 
 if TYPE_CHECKING:
     from pathlib import Path

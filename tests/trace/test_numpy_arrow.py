@@ -11,7 +11,6 @@ import pyarrow as pa
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from msgflow.sim import simulate
 from msgflow.trace.numpy_arrow import (
     distinct,
     empty_batch,
@@ -23,6 +22,7 @@ from msgflow.trace.numpy_arrow import (
     to_numpy,
     without,
 )
+from msgflow_sim import simulate
 
 TYPES = ["bool", "int8", "int32", "int64", "uint16", "uint64", "float32", "float64", ">u4", ">i8"]
 

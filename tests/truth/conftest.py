@@ -11,8 +11,8 @@ import pytest
 from ingested import Ingested, ingest_one, open_ingested
 from thorough import SHOWN, few
 
-from msgflow.sim import scenarios, simulate
-from msgflow.sim.entity import SECOND
+from msgflow_sim import scenarios, simulate
+from msgflow_sim.entity import SECOND
 
 _LENGTH = 0.05
 # Scenarios that are shorter than others, or in which things happen late.

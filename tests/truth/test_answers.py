@@ -9,7 +9,7 @@ import pytest
 from ingested import Ingested, ingest_one
 from scoring import compare_simulated
 
-from msgflow.sim import Buffers, Recording, simulate
+from msgflow_sim import Buffers, Recording, simulate
 
 PLACE = """
 CREATE TEMP VIEW IF NOT EXISTS place AS

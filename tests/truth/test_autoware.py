@@ -9,8 +9,8 @@ import autoware
 import pytest
 
 import msgflow
-from msgflow.sim import Simulation, simulate
-from msgflow.sim.entity import SECOND
+from msgflow_sim import Simulation, simulate
+from msgflow_sim.entity import SECOND
 
 pytestmark = pytest.mark.thorough
 _MARGIN_NS = SECOND

@@ -14,7 +14,7 @@ from thorough import few
 from msgflow.query.catalogue import load_query
 from msgflow.query.runner import run_query
 from msgflow.run.slice import Slice
-from msgflow.sim import scenarios
+from msgflow_sim import scenarios
 
 WINDOW = "-9223372036854775807, 9223372036854775807"
 RECORDINGS = [

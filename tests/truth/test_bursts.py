@@ -10,7 +10,7 @@ from ingested import ingest_one
 from scoring import compare_simulated
 from thorough import few, thorough
 
-from msgflow.sim import Recording, scenarios, simulate
+from msgflow_sim import Recording, scenarios, simulate
 
 SECOND = 1_000_000_000
 RECORDINGS = {

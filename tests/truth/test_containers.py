@@ -10,7 +10,7 @@ import pytest
 from scoring import compare_simulated
 
 from msgflow.ingest import ingest
-from msgflow.sim import scenarios, simulate
+from msgflow_sim import scenarios, simulate
 
 
 @pytest.mark.parametrize("name", ["containers_one_daemon", "containers_one_hostname"])

@@ -9,8 +9,8 @@ from ingested import ingest_one
 from scoring import compare_simulated
 from thorough import thorough
 
-from msgflow.sim import Host, Node, Process, Publisher, Scenario, Subscription, Timer, simulate
-from msgflow.sim.entity import MILLISECOND, SECOND, Work
+from msgflow_sim import Host, Node, Process, Publisher, Scenario, Subscription, Timer, simulate
+from msgflow_sim.entity import MILLISECOND, SECOND, Work
 
 
 @pytest.mark.parametrize(

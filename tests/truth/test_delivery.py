@@ -11,7 +11,7 @@ from scoring import compare_simulated
 from thorough import few
 
 from msgflow.db.finding import broken_rules
-from msgflow.sim import Recording, simulate
+from msgflow_sim import Recording, simulate
 
 TRACES = (
     "partial_sync",

@@ -13,9 +13,9 @@ from thorough import few
 
 from msgflow.query.catalogue import load_query
 from msgflow.query.runner import run_query
-from msgflow.sim import executor_thread, simulate
-from msgflow.sim.objects import TimerObject
-from msgflow.sim.transport import Middleware
+from msgflow_sim import executor_thread, simulate
+from msgflow_sim.objects import TimerObject
+from msgflow_sim.transport import Middleware
 
 SCENARIOS = ["demo", "executors", "multi_threaded", "nested", "overload"]
 _LENGTH = 0.2

@@ -10,7 +10,7 @@ from ingested import ingest_one
 from scoring import compare_simulated
 from thorough import few
 
-from msgflow.sim import Recording, simulate
+from msgflow_sim import Recording, simulate
 
 SECOND = 1_000_000_000
 SMALL = {"packet_bytes": 4096, "lost_event_share": 0.8, "longest_loss": 400}

@@ -9,7 +9,7 @@ from ingested import ingest_one
 from scoring import Score, compare_real, compare_simulated
 
 from msgflow.ingest import ingest
-from msgflow.sim import simulate
+from msgflow_sim import simulate
 
 # Kilted, Fast DDS: a server with some threads executes goals of two actions of one client.
 REAL = Path(__file__).parent / "real_actions"

@@ -8,8 +8,8 @@ import pytest
 from ingested import ingest_one
 from thorough import few
 
-from msgflow.sim import Recording, simulate
-from msgflow.sim.entity import MILLISECOND
+from msgflow_sim import Recording, simulate
+from msgflow_sim.entity import MILLISECOND
 
 # (system, layout) -> true kinds of the callbacks that nothing decides.
 CASES = {

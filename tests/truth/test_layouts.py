@@ -9,7 +9,7 @@ from ingested import Ingested, ingest_one
 from scoring import compare_simulated
 from thorough import few
 
-from msgflow.sim import layouts, simulate
+from msgflow_sim import layouts, simulate
 
 # Between rcl and DDS these have no event.
 

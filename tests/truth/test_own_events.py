@@ -9,7 +9,7 @@ import pytest
 from scoring import compare_simulated
 
 from msgflow.ingest import ingest
-from msgflow.sim import Recording, simulate
+from msgflow_sim import Recording, simulate
 
 S = 1_000_000_000
 DIFFERENT = """

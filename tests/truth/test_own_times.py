@@ -9,7 +9,7 @@ import pytest
 from ingested import Ingested
 
 from msgflow.ingest import ingest
-from msgflow.sim import Buffers, Recording, simulate
+from msgflow_sim import Buffers, Recording, simulate
 
 TIMES = {
     "publication": (

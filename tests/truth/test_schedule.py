@@ -13,9 +13,9 @@ from ingested import ingest_one
 from scoring import Score, compare_simulated
 from thorough import few
 
-from msgflow.sim import Recording, Simulation, scenarios, simulate
-from msgflow.sim.entity import MILLISECOND, SECOND
-from msgflow.sim.system import KernelTrace
+from msgflow_sim import Recording, Simulation, scenarios, simulate
+from msgflow_sim.entity import MILLISECOND, SECOND
+from msgflow_sim.system import KernelTrace
 
 # How much of each is simulated: the losses come after 0.7 s of 5 s.
 SYSTEMS = {

@@ -13,7 +13,7 @@ from ingested import ingest_one
 from scoring import compare, compare_recorded, compare_simulated
 from thorough import few, thorough
 
-from msgflow.sim import Recording, simulate
+from msgflow_sim import Recording, simulate
 
 SCRIPT = Path(__file__).parents[2] / "benchmarks" / "truth.py"
 

@@ -9,7 +9,7 @@ from scoring import compare_simulated
 from thorough import thorough
 
 from msgflow.ingest import ingest
-from msgflow.sim import Recording, simulate
+from msgflow_sim import Recording, simulate
 
 MILLISECOND = 1_000_000
 

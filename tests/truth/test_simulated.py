@@ -8,7 +8,7 @@ import pytest
 from ingested import Ingested
 from thorough import SHOWN, few
 
-from msgflow.sim import scenarios
+from msgflow_sim import scenarios
 
 # Table of truth, what is compared of it, and the same from the public views.
 CASES = {

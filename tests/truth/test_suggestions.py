@@ -8,7 +8,7 @@ import pytest
 from suggestions import compare, merges
 from thorough import few
 
-from msgflow.sim import simulate
+from msgflow_sim import simulate
 
 # Pairs of topics with links that cannot be seen: their messages also lead elsewhere.
 NOT_FOUND = {

@@ -14,7 +14,7 @@ from ingested import ingest_one
 
 from msgflow.query.catalogue import load_query
 from msgflow.query.runner import run_query
-from msgflow.sim import (
+from msgflow_sim import (
     Executor,
     Group,
     Host,
@@ -29,8 +29,8 @@ from msgflow.sim import (
     executor_thread,
     simulate,
 )
-from msgflow.sim.entity import MILLISECOND, SECOND
-from msgflow.sim.objects import TimerObject
+from msgflow_sim.entity import MILLISECOND, SECOND
+from msgflow_sim.objects import TimerObject
 
 _SOURCE = Node(
     "source",

@@ -14,10 +14,10 @@ from thorough import few
 from msgflow.database import Database
 from msgflow.errors import UsageError
 from msgflow.query.catalogue import load_query
-from msgflow.sim import simulate
 from msgflow.verify import Verification
 from msgflow.verify.metrics import SUBJECTS
 from msgflow.verify.worst_case import KEYS
+from msgflow_sim import simulate
 
 Check = Callable[..., Verification]
 # What the golden cases of the queries say of the same system.

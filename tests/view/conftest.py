@@ -20,8 +20,8 @@ from msgflow.clocks import apply_clocks, read_clock_sync
 from msgflow.database import open_db
 from msgflow.db.connection import connect
 from msgflow.ingest import ingest
-from msgflow.sim import simulate
 from msgflow.view import report as view_report
+from msgflow_sim import simulate
 
 
 @pytest.fixture(scope="session")

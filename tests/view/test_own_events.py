@@ -12,7 +12,7 @@ from served import Page
 
 from msgflow.database import open_db
 from msgflow.ingest import ingest
-from msgflow.sim import simulate
+from msgflow_sim import simulate
 
 Read = Callable[[Path], duckdb.DuckDBPyConnection]
 # An event in a callback instance whose flow goes on.

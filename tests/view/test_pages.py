@@ -13,7 +13,7 @@ from thorough import few
 
 from msgflow.database import open_db
 from msgflow.ingest import ingest
-from msgflow.sim import simulate
+from msgflow_sim import simulate
 
 Read = Callable[[Path], duckdb.DuckDBPyConnection]
 Report = Callable[..., str]

@@ -20,7 +20,6 @@ from msgflow.cli.app import app
 from msgflow.database import Database
 from msgflow.errors import UsageError
 from msgflow.run.window import Window
-from msgflow.sim import Recording, simulate
 from msgflow.trace import Continuation
 from msgflow.verify import TargetsFile, Verdict
 from msgflow.watch import FlightRecorder
@@ -28,6 +27,7 @@ from msgflow.watch.alarm import Alarm, blamed
 from msgflow.watch.chunk import Chunk
 from msgflow.watch.kept_chunk import read_chunk
 from msgflow.watch.kept_traces import KeptTraces
+from msgflow_sim import Recording, simulate
 
 SECOND = 1_000_000_000
 

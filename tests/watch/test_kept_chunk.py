@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pyarrow as pa
 
-from msgflow.sim import Recording, simulate
 from msgflow.trace import Continuation
 from msgflow.watch import finished_chunks
 from msgflow.watch.kept_chunk import KeptChunk, read_chunk
 from msgflow.watch.kept_traces import KeptTraces
+from msgflow_sim import Recording, simulate
 
 STREAM = ["trace_index", "stream_index"]
 

@@ -18,8 +18,8 @@ from msgflow.database import Database
 from msgflow.errors import UsageError
 from msgflow.query.runner import run_query
 from msgflow.run.window import Window
-from msgflow.sim import Recording, simulate
 from msgflow.watch import Exporter, Watcher, WindowReport, watch_finished
+from msgflow_sim import Recording, simulate
 
 prometheus = pytest.importorskip("prometheus_client")
 DASHBOARD = Path(__file__).resolve().parents[2] / "docs" / "grafana-dashboard.json"

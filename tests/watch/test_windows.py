@@ -17,7 +17,11 @@ from msgflow.clocks import read_clock_sync
 from msgflow.database import Database
 from msgflow.errors import TraceError
 from msgflow.links import LinksFile, read_links
-from msgflow.sim import (
+from msgflow.watch import Watcher, WindowReport, finished_chunks, watch_finished, watch_live
+from msgflow.watch import chunk as chunk_module
+from msgflow.watch.arrivals import Arrivals
+from msgflow.watch.learned_answers import LearnedAnswers
+from msgflow_sim import (
     Host,
     Node,
     Process,
@@ -29,10 +33,6 @@ from msgflow.sim import (
     Work,
     simulate,
 )
-from msgflow.watch import Watcher, WindowReport, finished_chunks, watch_finished, watch_live
-from msgflow.watch import chunk as chunk_module
-from msgflow.watch.arrivals import Arrivals
-from msgflow.watch.learned_answers import LearnedAnswers
 
 MS = 1_000_000
 SECOND = 1_000_000_000
