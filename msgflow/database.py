@@ -13,9 +13,8 @@ import duckdb
 from msgflow.db.connection import connect
 from msgflow.db.objects import public_names
 from msgflow.db.sql_guard import guarded_query, in_own_lines, require_condition
-from msgflow.default_files import DEFAULT_PATHS
 from msgflow.errors import QueryError, UsageError
-from msgflow.name_suggestions import did_you_mean
+from msgflow.files.default_files import DEFAULT_PATHS
 from msgflow.query.catalogue import choose_query, load_queries, query_names
 from msgflow.query.path_numbers import with_path_numbers
 from msgflow.query.result import QueryResult
@@ -25,6 +24,7 @@ from msgflow.run.choice import read_runs
 from msgflow.run.slice import Slice
 from msgflow.sql.failure import database_errors, first_line, in_words, out_of_memory
 from msgflow.sql.interrupt import interruptible
+from msgflow.text.name_suggestions import did_you_mean
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -287,7 +287,7 @@ class Database:
             TraceError: not a bag, or a damaged one.
             DatabaseError: the file cannot be opened.
         """
-        from msgflow.bag import join_bag
+        from msgflow.bag.join import join_bag
 
         self.close()
         return join_bag(self.path, Path(bag), run=run, memory_limit=self._memory_limit)
@@ -757,7 +757,7 @@ class Database:
             QueryError: the database could not run a query.
             DatabaseError: the file cannot be opened.
         """
-        from msgflow.verify.suggestion import QUERIES, suggest_targets
+        from msgflow.verify.suggested_targets import QUERIES, suggest_targets
 
         if not margin >= 0:
             raise UsageError(f"a margin is 0 or more — {margin}", "0.2 allows a fifth more")

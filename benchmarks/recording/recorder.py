@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow import trace
-from msgflow.live.daemon import session_daemon
-from msgflow.live.session import Channel, recording_session
+from msgflow.record.daemon import session_daemon
+from msgflow.record.session import Channel, recording_session
 from recording.tracetools import build_tracetools
 
 if TYPE_CHECKING:

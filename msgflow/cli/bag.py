@@ -15,7 +15,7 @@ from msgflow.cli.options import (
     WideOption,
     path_of,
 )
-from msgflow.default_files import DEFAULT_DATABASE
+from msgflow.files.default_files import DEFAULT_DATABASE
 
 
 def command(

@@ -17,8 +17,8 @@ from msgflow.cli.options import (
     OutputOption,
     RunOption,
 )
-from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import ExitCode
+from msgflow.files.default_files import DEFAULT_DATABASE
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence

@@ -14,7 +14,7 @@ from msgflow.cli.options import (
     WideOption,
     with_default,
 )
-from msgflow.default_files import DEFAULT_DATABASE
+from msgflow.files.default_files import DEFAULT_DATABASE
 
 app = typer.Typer(cls=with_default("show"))
 

@@ -21,9 +21,9 @@ from msgflow.cli.options import (
     WideOption,
 )
 from msgflow.cli.slice_options import set_parameters
-from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import ExitCode
 from msgflow.export.formats import Format
+from msgflow.files.default_files import DEFAULT_DATABASE
 from msgflow.sql.statement import internal_sql
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from msgflow.default_files import DEFAULT_DATABASE, DEFAULT_PATHS
+from msgflow.files.default_files import DEFAULT_DATABASE, DEFAULT_PATHS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -61,7 +61,7 @@ def complete(kind: str, *more: str) -> Callable[[typer.Context, str], list[str]]
 def complete_path(ctx: typer.Context, incomplete: str) -> list[str]:
     """Complete the name of a path from its file."""
     from msgflow.errors import MsgflowError
-    from msgflow.paths.file import read_paths
+    from msgflow.paths.paths_file import read_paths
 
     try:
         paths = read_paths(_path(ctx.params.get("paths") or DEFAULT_PATHS)).paths

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from msgflow.cli.options import DatabaseOption, FormatOption, OutputOption, WideOption
-from msgflow.default_files import DEFAULT_DATABASE
+from msgflow.files.default_files import DEFAULT_DATABASE
 
 app = typer.Typer()
 

@@ -121,11 +121,11 @@ def command(
 
 
 def _write(selection: Selection, form: EventFormat, output: Path | None) -> None:
-    from msgflow.atomic import replacing
     from msgflow.cli.output import data_stream, print_note, print_status, terminal
     from msgflow.cli.progress import reading_progress
     from msgflow.events.listing import write_events
     from msgflow.events.tables import write_event_tables
+    from msgflow.files.atomic import replacing
     from msgflow.text.values import count
 
     if output is None:

@@ -19,9 +19,9 @@ from msgflow.cli.options import (
     targets_option,
 )
 from msgflow.cli.slice_options import with_slice
-from msgflow.default_files import DEFAULT_DATABASE, DEFAULT_PATHS
 from msgflow.errors import UsageError
 from msgflow.export.series import What
+from msgflow.files.default_files import DEFAULT_DATABASE, DEFAULT_PATHS
 from msgflow.query.times import Times
 from msgflow.run.slice import ALL_RUNS, LATEST, Slice
 

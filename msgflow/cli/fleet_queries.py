@@ -133,7 +133,7 @@ def sql(
     runs that count; public views are view.publication and so on.
     """
     from msgflow.cli.output import print_result
-    from msgflow.confined_query import confined_fleet_sql
+    from msgflow.confined.query import confined_fleet_sql
 
     query = sql_of(text, file, "msgflow fleet sql 'FROM run'")
     require_lake(lake)

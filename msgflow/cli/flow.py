@@ -22,8 +22,8 @@ from msgflow.cli.options import (
     case_option,
     format_option,
 )
-from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import UsageError
+from msgflow.files.default_files import DEFAULT_DATABASE
 from msgflow.sql.statement import internal_sql
 from msgflow.text.values import format_duration
 

@@ -12,8 +12,8 @@ from msgflow.cli.options import (
     format_option,
 )
 from msgflow.cli.slice_options import with_slice
-from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.export.graph import GraphFormat
+from msgflow.files.default_files import DEFAULT_DATABASE
 from msgflow.run.slice import LATEST, Slice
 
 

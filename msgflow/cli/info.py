@@ -17,7 +17,7 @@ from msgflow.cli.sections import (
     sections_format,
     whole_sections,
 )
-from msgflow.default_files import DEFAULT_DATABASE
+from msgflow.files.default_files import DEFAULT_DATABASE
 
 SECTIONS = ("runs", "hosts", "processes", "nodes", "topics", "counts", "findings")
 

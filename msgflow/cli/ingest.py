@@ -21,8 +21,8 @@ from msgflow.cli.options import (
     memory_limit_option,
     path_of,
 )
-from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import UsageError
+from msgflow.files.default_files import DEFAULT_DATABASE
 from msgflow.sql.interrupt import noted_interrupts
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from msgflow.cli.options import (
     WideOption,
     with_default,
 )
-from msgflow.default_files import DEFAULT_DATABASE
+from msgflow.files.default_files import DEFAULT_DATABASE
 
 if TYPE_CHECKING:
     from msgflow.database import Database

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from msgflow.cli.options import DatabaseOption
-from msgflow.default_files import DEFAULT_DATABASE
+from msgflow.files.default_files import DEFAULT_DATABASE
 
 
 def command(database: DatabaseOption = DEFAULT_DATABASE) -> None:
@@ -13,7 +13,7 @@ def command(database: DatabaseOption = DEFAULT_DATABASE) -> None:
     pip install '.\\[mcp]'. The agent's program starts it, not you.
     """
     from msgflow.cli.signals import restore_default_actions
-    from msgflow.mcp_server import make_server
+    from msgflow.mcp.server import make_server
 
     server = make_server(database)
     # The server only reads. It waits for the next line in a thread that no exception ends.

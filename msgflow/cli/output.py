@@ -14,9 +14,9 @@ import typer
 from rich.cells import cell_len
 
 from msgflow.cli.show.layout import MOST_ROWS, screen_width
-from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import UsageError
 from msgflow.export.formats import Format, format_of, write_result
+from msgflow.files.default_files import DEFAULT_DATABASE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -90,7 +90,7 @@ def print_result(
     Raises:
         UsageError: Parquet on a terminal, a closed stdout, or a file that cannot be written.
     """
-    from msgflow.atomic import replacing
+    from msgflow.files.atomic import replacing
     from msgflow.text.values import count
 
     form = form or format_of(path)
@@ -192,7 +192,7 @@ def print_drawing(draw: Callable[[int | None, bool], str], path: Path | None) ->
 
 
 def _write_text(text: str, path: Path) -> None:
-    from msgflow.atomic import replacing
+    from msgflow.files.atomic import replacing
 
     with replacing(path) as temporary:
         temporary.write_text(f"{text}\n", encoding="utf-8")

@@ -24,8 +24,8 @@ from msgflow.cli.options import (
 from msgflow.cli.row_options import row_options
 from msgflow.cli.show.layout import MOST_ROWS
 from msgflow.cli.slice_options import SLICE_OPTIONS, set_parameters
-from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import UsageError
+from msgflow.files.default_files import DEFAULT_DATABASE
 from msgflow.query.catalogue import load_query
 from msgflow.query.selection import KINDS
 
@@ -178,7 +178,7 @@ def _run(header: Header, own: dict[str, Any], given: dict[str, Any]) -> None:
 def _result(name: str, given: dict[str, Any], asked: dict[str, Any]) -> QueryResult:
     # A condition is SQL of the user.
     if asked.get("where") is not None:
-        from msgflow.confined_query import confined_query
+        from msgflow.confined.query import confined_query
 
         return confined_query(given["database"], name, asked, memory_limit=given["memory_limit"])
     from msgflow.database import Database

@@ -16,13 +16,13 @@ from msgflow.cli.options import (
     OwnEventsOption,
     output_option,
 )
-from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import ExitCode
+from msgflow.files.default_files import DEFAULT_DATABASE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from msgflow.live import Status
+    from msgflow.record import Status
 
 # Of ROS 2; of an instrumented DDS; of CARET.
 EVENTS = ("ros2:*", "dds:*", "ros2_caret:*")
@@ -94,7 +94,7 @@ def command(
     from msgflow.cli.output import print_note, print_status
     from msgflow.clocks import read_clock_sync
     from msgflow.links import read_links
-    from msgflow.live import Channel, record
+    from msgflow.record import Channel, record
     from msgflow.run.choice import require_run_name
 
     name = name or time.strftime("recording-%Y%m%d-%H%M%S")
@@ -170,7 +170,7 @@ def _status_shown(*, beside_program: bool) -> Iterator[Callable[[Status], None]]
 
 
 def _words(status: Status) -> str:
-    from msgflow.live import BYTES_OF_EVENT
+    from msgflow.record import BYTES_OF_EVENT
 
     events = status.event_bytes / BYTES_OF_EVENT
     words = [

@@ -21,8 +21,8 @@ from msgflow.cli.options import (
 )
 from msgflow.cli.slice_options import with_slice
 from msgflow.cli.ui import require_no_where
-from msgflow.default_files import DEFAULT_DATABASE, DEFAULT_PATHS
 from msgflow.errors import UsageError
+from msgflow.files.default_files import DEFAULT_DATABASE, DEFAULT_PATHS
 from msgflow.run.slice import LATEST, Slice
 
 # Browsers unpack larger pages too slowly.

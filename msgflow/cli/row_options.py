@@ -9,7 +9,7 @@ import typer
 
 from msgflow.cli.completion import complete, complete_path
 from msgflow.cli.options import path_of
-from msgflow.default_files import DEFAULT_PATHS
+from msgflow.files.default_files import DEFAULT_PATHS
 from msgflow.query.selection import KINDS, PATH, columns_of
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ import typer
 
 from msgflow.cli.completion import complete
 from msgflow.cli.options import DatabaseOption, FormatOption, OutputOption, WideOption, with_default
-from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import ExitCode, UsageError
+from msgflow.files.default_files import DEFAULT_DATABASE
 
 app = typer.Typer(cls=with_default("list"))
 _RunArgument = Annotated[

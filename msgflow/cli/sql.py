@@ -16,9 +16,9 @@ from msgflow.cli.options import (
     WideOption,
     path_of,
 )
-from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import UsageError
-from msgflow.text_file import read_text
+from msgflow.files.default_files import DEFAULT_DATABASE
+from msgflow.files.text_file import read_text
 
 DEFAULT_LIMIT = 1_000
 SqlArgument = Annotated[
@@ -51,7 +51,7 @@ def command(
     `msgflow db schema` lists the views. Without a query, a terminal gets a prompt.
     """
     from msgflow.cli.output import print_result
-    from msgflow.confined_query import confined_sql
+    from msgflow.confined.query import confined_sql
 
     if text is None and file is None and output is None and sys.stdin.isatty():
         from msgflow.cli.sql_prompt import prompt

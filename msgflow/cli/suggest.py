@@ -9,8 +9,8 @@ import typer
 
 from msgflow.cli.options import DatabaseOption, OutputOption, RunOption
 from msgflow.cli.slice_options import with_slice
-from msgflow.default_files import DEFAULT_DATABASE, DEFAULT_LINKS, DEFAULT_PATHS
 from msgflow.errors import UsageError
+from msgflow.files.default_files import DEFAULT_DATABASE, DEFAULT_LINKS, DEFAULT_PATHS
 from msgflow.run.slice import LATEST, Slice
 
 app = typer.Typer()
@@ -38,7 +38,6 @@ def links(
     Without --apply nothing is applied. With it, the file is written and its links
     are declared, or nothing happens.
     """
-    from msgflow.atomic import replacing
     from msgflow.cli.links import print_applied
     from msgflow.cli.output import (
         database_option,
@@ -49,6 +48,7 @@ def links(
         print_text,
     )
     from msgflow.database import Database
+    from msgflow.files.atomic import replacing
     from msgflow.text.values import count
 
     if run == "all":

@@ -9,8 +9,8 @@ from typing import Annotated
 import typer
 
 from msgflow.cli.options import DatabaseOption, LakePageOption, LakeWhereOption, memory_limit_option
-from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import UsageError
+from msgflow.files.default_files import DEFAULT_DATABASE
 
 
 def command(
@@ -43,7 +43,7 @@ def command(
     database, and write to it when no page has asked for some seconds.
     """
     from msgflow.cli.output import print_note, print_status
-    from msgflow.confined_query import WarmSql
+    from msgflow.confined.query import WarmSql
     from msgflow.view.server import serve, serve_single
     from msgflow.view.sql_page import MOST_SECONDS
 

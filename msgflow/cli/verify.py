@@ -18,8 +18,8 @@ from msgflow.cli.options import (
     format_option,
 )
 from msgflow.cli.slice_options import with_slice
-from msgflow.default_files import DEFAULT_DATABASE, DEFAULT_PATHS
 from msgflow.errors import ExitCode
+from msgflow.files.default_files import DEFAULT_DATABASE, DEFAULT_PATHS
 from msgflow.run.slice import LATEST, Slice
 
 

@@ -25,13 +25,13 @@ from msgflow.cli.options import (
     targets_option,
 )
 from msgflow.cli.record import EVENTS
-from msgflow.default_files import DEFAULT_PATHS
 from msgflow.errors import ExitCode, TraceError, UsageError
+from msgflow.files.default_files import DEFAULT_PATHS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from msgflow.live import Status
+    from msgflow.record import Status
     from msgflow.watch import Alarm, WindowDatabase, WindowReport
 
 _START = "starts, records and watches a program"
@@ -300,8 +300,8 @@ def _pages(port: int | None, clock_sync: str) -> Iterator[WindowDatabase | None]
         yield None
         return
     from msgflow.cli.output import print_status
-    from msgflow.confined_query import WarmSql
-    from msgflow.live import temporary_directory
+    from msgflow.confined.query import WarmSql
+    from msgflow.record import temporary_directory
     from msgflow.view.server import serving
     from msgflow.view.sql_page import MOST_SECONDS
     from msgflow.watch import WindowDatabase
@@ -351,7 +351,7 @@ def _record(
         Whether the program failed.
     """
     from msgflow.cli.output import print_note
-    from msgflow.live import Channel, record, temporary_directory
+    from msgflow.record import Channel, record, temporary_directory
 
     name = f"watch-{time.strftime('%Y%m%d-%H%M%S')}-{os.getpid()}"
     # A file, since the program would stop if it wrote to a full pipe.

@@ -19,7 +19,7 @@ from msgflow.cli.sections import (
     whole_sections,
 )
 from msgflow.cli.slice_options import with_slice
-from msgflow.default_files import DEFAULT_DATABASE
+from msgflow.files.default_files import DEFAULT_DATABASE
 from msgflow.run.slice import LATEST, Slice
 
 if TYPE_CHECKING:

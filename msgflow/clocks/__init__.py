@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
+from msgflow.clocks.clocks_file import ClockSync, read_clock_sync
 from msgflow.clocks.correction import apply_clocks, set_clocks
-from msgflow.clocks.file import ClockSync, read_clock_sync
 
 __all__ = ["ClockSync", "apply_clocks", "read_clock_sync", "set_clocks"]

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     import duckdb
 
-    from msgflow.clocks.file import ClockSync, GivenClock
+    from msgflow.clocks.clocks_file import ClockSync, GivenClock
     from msgflow.run.choice import Run
 
 # Columns of a correction.

@@ -29,7 +29,7 @@ from msgflow.db.sandbox import open_file
 from msgflow.db.transaction import transaction
 from msgflow.db.workspace import workspace
 from msgflow.errors import DatabaseError
-from msgflow.resources import resource_directory
+from msgflow.files.resources import resource_directory
 from msgflow.sql.failure import database_errors
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.db.finding import composed
-from msgflow.resources import resource_directory
+from msgflow.files.resources import resource_directory
 from msgflow.sql.header import Header, HeaderError, read
 from msgflow.sql.quoting import identifier, literal
 from msgflow.version import __version__

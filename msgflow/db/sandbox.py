@@ -20,8 +20,8 @@ from msgflow.db.lock_holder import lock_holder
 from msgflow.db.memory import limit_threads, set_memory_limit
 from msgflow.db.workspace import remove_abandoned_workspaces
 from msgflow.errors import DatabaseError, DatabaseInUseError
+from msgflow.files.temporary_owner import is_abandoned, mark
 from msgflow.sql.failure import in_words
-from msgflow.temporary_owner import is_abandoned, mark
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from msgflow.atomic_directory import replacing_entries
 from msgflow.export.formats import csv_batch
 from msgflow.export.views import ExportedView, Selection
+from msgflow.files.atomic_directory import replacing_entries
 
 if TYPE_CHECKING:
     from pathlib import Path

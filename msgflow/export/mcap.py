@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from msgflow.atomic import replacing
 from msgflow.errors import UsageError
+from msgflow.files.atomic import replacing
 from msgflow.sql.statement import internal_sql
 from msgflow.version import __version__
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from msgflow.atomic import replacing
 from msgflow.export.otlp_batch import BATCH_AS_JSON, BATCH_AS_MESSAGE
 from msgflow.export.otlp_receiver import Receiver
+from msgflow.files.atomic import replacing
 from msgflow.query.names import require_places
 from msgflow.sql.statement import internal_sql
 from msgflow.version import __version__

@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
-from msgflow.atomic_directory import replacing_entries
 from msgflow.export.views import ExportedView, Selection
+from msgflow.files.atomic_directory import replacing_entries
 from msgflow.version import __version__
 
 if TYPE_CHECKING:

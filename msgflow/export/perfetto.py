@@ -6,8 +6,8 @@ import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from msgflow.atomic import replacing
 from msgflow.errors import UsageError
+from msgflow.files.atomic import replacing
 from msgflow.sql.statement import internal_sql
 
 if TYPE_CHECKING:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
-from msgflow.name_suggestions import did_you_mean
 from msgflow.run.window import WHOLE, Window
+from msgflow.text.name_suggestions import did_you_mean
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

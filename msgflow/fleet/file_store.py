@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from urllib.parse import urlsplit
 
 from msgflow.errors import DatabaseError, UsageError
-from msgflow.temporary_owner import mark
+from msgflow.files.temporary_owner import mark
 from msgflow.trace.regular_file import open_regular
 
 if TYPE_CHECKING:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from msgflow.db.sandbox import open_memory
 from msgflow.errors import DatabaseError, UsageError
+from msgflow.files.text_file import MOST_BYTES
 from msgflow.fleet.file_store import Store
 from msgflow.fleet.layout import (
     ABOUT,
@@ -28,7 +29,6 @@ from msgflow.fleet.layout import (
     run_schema,
 )
 from msgflow.fleet.parquet import read_parquet
-from msgflow.text_file import MOST_BYTES
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence

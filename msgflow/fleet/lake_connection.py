@@ -23,9 +23,9 @@ from msgflow.fleet.answers import answers
 from msgflow.fleet.compact import PACK
 from msgflow.fleet.lake import visible
 from msgflow.fleet.layout import RUN, VIEWS, part_path
-from msgflow.name_suggestions import meant_or, nearest
 from msgflow.sql.failure import first_line
 from msgflow.sql.quoting import identifier
+from msgflow.text.name_suggestions import meant_or, nearest
 from msgflow.version import __version__
 
 if TYPE_CHECKING:

@@ -26,7 +26,6 @@ from msgflow.fleet.lake_connection import (
     what_there_is,
 )
 from msgflow.fleet.layout import VIEWS
-from msgflow.name_suggestions import did_you_mean
 from msgflow.query.catalogue import choose_query, load_query
 from msgflow.query.result import QueryResult
 from msgflow.query.runner import bind, shown_rows
@@ -36,6 +35,7 @@ from msgflow.sql.header import Column, relations_of
 from msgflow.sql.interrupt import interruptible
 from msgflow.sql.quoting import identifier
 from msgflow.sql.statement import Statements
+from msgflow.text.name_suggestions import did_you_mean
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

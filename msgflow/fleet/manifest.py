@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 from msgflow.db.runs import require_label
 from msgflow.errors import UsageError
+from msgflow.files.text_file import MOST_BYTES
 from msgflow.fleet.file_store import Store, normal_url
 from msgflow.fleet.parquet import read_parquet
 from msgflow.fleet.recording import Recording
-from msgflow.text_file import MOST_BYTES
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

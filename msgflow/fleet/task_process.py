@@ -16,9 +16,9 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from msgflow.files.temporary_owner import is_abandoned, mark
 from msgflow.fleet.child_process import RESULT, STAGE
 from msgflow.fleet.task import Outcome, Reason, Task, without_secrets
-from msgflow.temporary_owner import is_abandoned, mark
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

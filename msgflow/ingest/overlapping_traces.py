@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from msgflow.files.resources import resource_directory
 from msgflow.ingest.catalogue import USER_EVENT, load
-from msgflow.resources import resource_directory
 from msgflow.sql.statement import Statements
 from msgflow.trace.numpy_arrow import is_valid, to_arrow, to_numpy
 

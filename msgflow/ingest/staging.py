@@ -22,7 +22,7 @@ from __future__ import annotations
 import contextlib
 from typing import TYPE_CHECKING
 
-from msgflow.atomic_directory import replacing_entries
+from msgflow.files.atomic_directory import replacing_entries
 from msgflow.ingest.catalogue import (
     COMMON_COLUMNS,
     Origin,

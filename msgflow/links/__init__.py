@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from msgflow.links.annotations import AppliedLinks, apply_links, declare_links
-from msgflow.links.file import DeclaredLink, LinksFile, read_links
-from msgflow.links.suggestion import LinkSuggestions
+from msgflow.links.links_file import DeclaredLink, LinksFile, read_links
+from msgflow.links.suggested_links import LinkSuggestions
 
 __all__ = [
     "AppliedLinks",

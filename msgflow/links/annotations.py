@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import duckdb
 
     from msgflow.errors import UsageError
-    from msgflow.links.file import DeclaredLink, LinksFile
+    from msgflow.links.links_file import DeclaredLink, LinksFile
     from msgflow.links.matching import MatchedLink
     from msgflow.run.choice import Run
 

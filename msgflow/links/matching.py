@@ -9,16 +9,16 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, NoReturn
 
 from msgflow.errors import UsageError
-from msgflow.links.file import INDIRECT_KINDS, SYNCHRONOUS_KINDS
-from msgflow.name_suggestions import meant_or, nearest
+from msgflow.links.links_file import INDIRECT_KINDS, SYNCHRONOUS_KINDS
+from msgflow.text.name_suggestions import meant_or, nearest
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     import duckdb
 
-    from msgflow.links.file import DeclaredLink, LinksFile
-    from msgflow.yaml_file import Text
+    from msgflow.files.yaml_file import Text
+    from msgflow.links.links_file import DeclaredLink, LinksFile
 
 _NODES = """
 SELECT n.node_id, n.full_name, n.process_id, p.name, p.pid, h.hostname

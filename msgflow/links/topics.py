@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     import duckdb
 
-    from msgflow.links.file import DeclaredTopic, LinksFile
+    from msgflow.links.links_file import DeclaredTopic, LinksFile
 
 
 @dataclass(frozen=True)

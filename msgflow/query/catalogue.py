@@ -11,10 +11,10 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
-from msgflow.name_suggestions import nearest
-from msgflow.resources import resource_directory
+from msgflow.files.resources import resource_directory
 from msgflow.sql.header import Header, HeaderError, read
 from msgflow.sql.value import parse_text
+from msgflow.text.name_suggestions import nearest
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from msgflow.atomic import replacing
 from msgflow.errors import UsageError
-from msgflow.name_suggestions import column_named
+from msgflow.files.atomic import replacing
+from msgflow.text.name_suggestions import column_named
 from msgflow.version import __version__
 
 if TYPE_CHECKING:

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import duckdb
 
 from msgflow.errors import UsageError
-from msgflow.name_suggestions import did_you_mean
 from msgflow.query.clock_notes import clock_notes
 from msgflow.query.names import PLACE_PARAMETERS, require_ids, require_names, require_places
 from msgflow.query.result import QueryResult
@@ -29,6 +28,7 @@ from msgflow.run.window import format_epoch
 from msgflow.sql.failure import first_line, query_errors
 from msgflow.sql.statement import internal_sql
 from msgflow.sql.value import described_type, parse_text
+from msgflow.text.name_suggestions import did_you_mean
 from msgflow.text.values import format_duration
 
 if TYPE_CHECKING:

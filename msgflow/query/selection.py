@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
-from msgflow.name_suggestions import column_named
+from msgflow.text.name_suggestions import column_named
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

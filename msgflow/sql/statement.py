@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from msgflow.resources import resource_directory
+from msgflow.files.resources import resource_directory
 from msgflow.sql.header import Header, read
 
 if TYPE_CHECKING:

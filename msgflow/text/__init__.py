@@ -1,1 +1,1 @@
-"""Text: values as people and JSON read them, and where lines are broken."""
+"""Text: values as people and JSON read them, where lines are broken, and names that were meant."""

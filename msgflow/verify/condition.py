@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 from enum import StrEnum
 
-from msgflow.name_suggestions import meant_or, nearest
+from msgflow.text.name_suggestions import meant_or, nearest
 from msgflow.text.values import format_duration
 
 OPERATORS = ("<", "<=", ">", ">=")

@@ -9,14 +9,14 @@ from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from msgflow.default_files import DEFAULT_PATHS
-from msgflow.name_suggestions import did_you_mean
+from msgflow.files.default_files import DEFAULT_PATHS
 from msgflow.query.catalogue import load_query
 from msgflow.query.result import QueryResult
 from msgflow.query.runner import run_query
 from msgflow.query.selection import Selection, conditions_of
 from msgflow.run.slice import Slice
 from msgflow.sql.header import Column, Header, Param
+from msgflow.text.name_suggestions import did_you_mean
 from msgflow.verify.condition import format_value
 from msgflow.verify.metrics import PATH, SUBJECTS
 from msgflow.verify.worst_case import KEYS, LOST_FLOW, WorstCase, find_worst_case, worst_case_of
@@ -26,12 +26,12 @@ if TYPE_CHECKING:
 
     import duckdb
 
+    from msgflow.files.yaml_file import Text
     from msgflow.run.choice import Run
     from msgflow.run.window import Window
     from msgflow.sql.value import Value
-    from msgflow.verify.file import Requirement, Target, TargetsFile
     from msgflow.verify.metrics import Metric
-    from msgflow.yaml_file import Text
+    from msgflow.verify.targets_file import Requirement, Target, TargetsFile
 
 
 class Verdict(StrEnum):

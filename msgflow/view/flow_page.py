@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import pyarrow as pa
 from pyarrow import compute
 
-from msgflow.atomic import replacing
+from msgflow.files.atomic import replacing
 from msgflow.query.flow import STEPS_PER_MESSAGE
 from msgflow.run.window import Window
 from msgflow.view.critical_path import critical_path

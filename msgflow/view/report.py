@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 import pyarrow as pa
 from pyarrow import compute
 
-from msgflow.atomic import replacing
 from msgflow.db.finding import read_findings
 from msgflow.errors import UsageError
+from msgflow.files.atomic import replacing
 from msgflow.query.compare import compare as compare_runs
 from msgflow.run.slice import Slice
 from msgflow.run.window import WHOLE, Window

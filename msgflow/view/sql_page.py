@@ -10,7 +10,7 @@ import pyarrow as pa
 from pyarrow import compute
 
 from msgflow.errors import UsageError
-from msgflow.resources import resource_directory
+from msgflow.files.resources import resource_directory
 from msgflow.text.json_value import json_value
 from msgflow.view.table_encoding import encode
 

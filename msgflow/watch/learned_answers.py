@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from msgflow.files.yaml_file import quoted
 from msgflow.links import LinksFile, read_links
-from msgflow.yaml_file import quoted
 
 if TYPE_CHECKING:
     import duckdb

@@ -9,14 +9,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.errors import RecordingError, UsageError
-from msgflow.live import rotated, sessions
-from msgflow.name_suggestions import did_you_mean
+from msgflow.record import rotated, sessions
+from msgflow.text.name_suggestions import did_you_mean
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from types import TracebackType
 
-    from msgflow.live.lttng import Session
+    from msgflow.record.lttng import Session
 
 # Seconds between two looks which sessions are there.
 _BETWEEN_LOOKS = 1.0

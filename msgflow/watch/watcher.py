@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from msgflow.clocks import ClockSync
 from msgflow.errors import TraceError, UsageError
-from msgflow.ingest.memory import database_in_memory, ingest_again, link_again
+from msgflow.ingest.repeated_in_memory import database_in_memory, ingest_again, link_again
 from msgflow.run.window import Window
 from msgflow.trace import Continuation
 from msgflow.watch.history import History

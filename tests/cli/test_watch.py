@@ -9,7 +9,7 @@ import pytest
 from typer.testing import Result
 
 from msgflow.errors import ExitCode, RecordingError
-from msgflow.live.lttng import Session
+from msgflow.record.lttng import Session
 from msgflow.watch import watched_sessions
 
 Msgflow = Callable[..., Result]
@@ -35,7 +35,7 @@ def _nothing_starts(monkeypatch: pytest.MonkeyPatch, there_are: object) -> None:
     def fail(*_: object, **__: object) -> None:
         raise AssertionError("a program is started")
 
-    monkeypatch.setattr("msgflow.live.record", fail)
+    monkeypatch.setattr("msgflow.record.record", fail)
 
 
 def refused(result: Result, *words: str) -> None:

@@ -9,10 +9,10 @@ import pytest
 
 from msgflow.clocks import read_clock_sync
 from msgflow.errors import UsageError
+from msgflow.files.text_file import MOST_BYTES
 from msgflow.links import read_links
 from msgflow.run.choice import choose_runs
 from msgflow.run.window import time_point
-from msgflow.text_file import MOST_BYTES
 
 MANY = 20_000
 

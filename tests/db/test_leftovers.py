@@ -10,19 +10,19 @@ from pathlib import Path
 import pytest
 
 import msgflow
-from msgflow import temporary_owner
-from msgflow.atomic import replacing
 from msgflow.db.connection import connect
 from msgflow.db.sandbox import spill_directory
 from msgflow.db.workspace import creating, workspace
 from msgflow.errors import DatabaseError
+from msgflow.files import temporary_owner
+from msgflow.files.atomic import replacing
 from msgflow.ingest import ingest
 from msgflow_sim import simulate
 
 
 def dead_mark() -> str:
     """Return the mark of a process that has ended."""
-    program = "from msgflow.temporary_owner import mark; print(mark())"
+    program = "from msgflow.files.temporary_owner import mark; print(mark())"
     done = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, check=True
     )

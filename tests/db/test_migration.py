@@ -18,7 +18,7 @@ from msgflow.db.connection import connect, recorded_revision
 from msgflow.db.empty_database import write_empty
 from msgflow.db.sandbox import open_file
 from msgflow.errors import DatabaseError
-from msgflow.resources import resource_directory
+from msgflow.files.resources import resource_directory
 
 REVISIONS = sorted(objects.known_revisions())
 FIRST_AND_OTHERS = few(REVISIONS, REVISIONS[0], REVISIONS[len(REVISIONS) // 2], REVISIONS[-1])

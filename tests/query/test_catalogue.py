@@ -7,7 +7,6 @@ import pytest
 from msgflow.database import open_db
 from msgflow.db.objects import public_names
 from msgflow.errors import UsageError
-from msgflow.name_suggestions import meant_or, nearest
 from msgflow.query.catalogue import (
     QUERIES_BY_WORD,
     choose_query,
@@ -16,6 +15,7 @@ from msgflow.query.catalogue import (
     query_names,
 )
 from msgflow.sql.value import Value
+from msgflow.text.name_suggestions import meant_or, nearest
 
 
 def test_the_catalogue_is_the_folder() -> None:

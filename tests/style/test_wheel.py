@@ -13,7 +13,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = """
 import sys
-from msgflow.resources import resource_directory
+from msgflow.files.resources import resource_directory
 from msgflow.query.catalogue import load_queries
 import msgflow
 print(msgflow.__file__)

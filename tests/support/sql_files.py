@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from msgflow.db import objects
-from msgflow.resources import resource_directory
+from msgflow.files.resources import resource_directory
 from msgflow.sql.header import Header, read
 
 # From left to right: an object reads only its own layer and those to its left.

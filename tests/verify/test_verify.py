@@ -264,7 +264,7 @@ def test_a_run_with_a_kernel_trace_meets_what_is_suggested_from_it(
     targets = tmp_path / "targets.yaml"
     with Database(traced) as database:
         assert "preempted" not in database.suggest_targets()  # Of so few values.
-        monkeypatch.setattr("msgflow.verify.suggestion.LEAST_VALUES", 1)
+        monkeypatch.setattr("msgflow.verify.suggested_targets.LEAST_VALUES", 1)
         for margin in (0.2, 0):
             targets.write_text(database.suggest_targets(margin=margin), encoding="utf-8")
             found = rows(database.verify(targets))

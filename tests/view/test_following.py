@@ -10,7 +10,7 @@ import pytest
 from served import Page, colors
 
 from msgflow.clocks import read_clock_sync
-from msgflow.confined_query import WarmSql
+from msgflow.confined.query import WarmSql
 from msgflow.view.server import serving
 from msgflow.watch import Watcher, WindowDatabase, WindowReport, watch_finished
 

@@ -23,7 +23,7 @@ import pytest
 from served import Served
 from tables import decoded
 
-from msgflow.confined_query import WarmSql
+from msgflow.confined.query import WarmSql
 from msgflow.errors import QueryError, UsageError
 from msgflow.view import pages
 from msgflow.view.connection import timed

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from msgflow.errors import RecordingError
-from msgflow.live.lttng import Session
+from msgflow.record.lttng import Session
 from msgflow.watch import watched_sessions
 from msgflow.watch.watched_sessions import WatchedSessions
 

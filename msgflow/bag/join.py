@@ -1,0 +1,93 @@
+"""Bags: messages of a rosbag2 of the same run, joined to their publications.
+
+A trace has neither the size nor the content of a message. A bag has both, and says when the
+recorder received each message. It does not name the publication: `schema/internal/bag` finds it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from msgflow.bag.messages import read_bag
+from msgflow.db.runs import change_runs
+from msgflow.errors import UsageError
+from msgflow.query.result import QueryResult
+from msgflow.sql.statement import internal_sql
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import duckdb
+
+    from msgflow.run.choice import Run
+
+_CLOCKS_APART = """
+SELECT count(*) > 1
+    AND (count(reference_clock_id) < count(*) OR count(DISTINCT reference_clock_id) > 1)
+FROM main.clock
+WHERE run_id = ?
+"""
+_STORED = """
+INSERT INTO store.bag_message BY NAME
+SELECT $run_id AS run_id, publication_id, topic_name, type_name, received_ns, size_bytes, stamp_ns,
+    frame_id
+FROM bag_joined
+WHERE publication_id IS NOT NULL
+ORDER BY publication_id
+"""
+
+
+def join_bag(
+    path: Path, bag: Path, *, run: str | int | None, memory_limit: str | None = None
+) -> QueryResult:
+    """Store which publications the messages of a bag are of, in one transaction.
+
+    What an earlier bag gave to the run is removed.
+
+    Args:
+        path: the database.
+        bag: directory of a rosbag2, or one of its files (.mcap, .db3).
+        run: a name or an id; the latest run when None.
+        memory_limit: most memory that the database takes, such as '2GB'.
+
+    Returns:
+        A row per topic of the bag: how many messages were joined, and why others were not.
+
+    Raises:
+        UsageError: no such run or several, clocks that are not synchronised, or the package rosbags
+            is not installed.
+        TraceError: not a bag, or a damaged one.
+        DatabaseError: the database is missing, locked, foreign, or of another schema revision.
+    """
+    batches = read_bag(bag)
+    first = next(batches)  # the database is opened for a bag that can be read
+
+    def join(con: duckdb.DuckDBPyConnection, runs: tuple[Run, ...]) -> QueryResult:
+        if len(runs) > 1:
+            raise UsageError("a bag is of one run", "give its name with --run")
+        (one,) = runs
+        _require_one_time(con, one)
+        given: dict[str, Any] = {"run_id": one.run_id}
+        con.register("bag_batch", first)
+        con.execute("CREATE OR REPLACE TEMP TABLE bag_read AS FROM bag_batch")
+        for batch in batches:
+            con.register("bag_batch", batch)
+            con.execute("INSERT INTO bag_read FROM bag_batch")
+        con.unregister("bag_batch")
+        internal_sql().keep(con, "bag_joined", given)
+        con.execute("DELETE FROM store.bag_message WHERE run_id = $run_id", given)
+        con.execute(_STORED, given)
+        table = internal_sql().run(con, "bag_topic", {}).to_arrow_table()
+        con.execute("DROP TABLE temp.bag_read")
+        con.execute("DROP TABLE temp.bag_joined")
+        return QueryResult(table, internal_sql().header("bag_topic"), runs)
+
+    return change_runs(path, run, join, memory_limit=memory_limit)
+
+
+def _require_one_time(con: duckdb.DuckDBPyConnection, run: Run) -> None:
+    if con.execute(_CLOCKS_APART, [run.run_id]).fetchall() == [(True,)]:
+        raise UsageError(
+            f"the run has hosts whose clocks are not synchronised — {run.name}",
+            f"msgflow clocks apply messages --run {run.name}",
+        )

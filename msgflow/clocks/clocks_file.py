@@ -1,0 +1,209 @@
+"""File of clock offsets, and the other ways to correct clocks: by messages, or not at all.
+
+robot-b: {offset_ns: -350000000, drift_ppb: 20, reference_ns: 1795149267363524269}
+robot-c: -12500
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from bisect import bisect_left
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from msgflow.errors import UsageError
+from msgflow.files.text_file import read_text
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+METHODS = ("none", "messages")
+_FIELDS = ("offset_ns", "drift_ppb", "reference_ns", "uncertainty_ns")
+_EXAMPLE = "robot-b: {offset_ns: -350000000, drift_ppb: 20}"
+# Digits may stand in groups, as in YAML and TOML. No time has more of them.
+_INTEGER = re.compile(r"[-+]?[0-9]+(_[0-9]+)*")
+_MOST_DIGITS = 40
+_MOST_SHOWN = 60
+_TOML_KEY = re.compile(
+    r"""\s*(\[\s*["']?(?P<table>[^"'\]]*?)["']?\s*\]|["']?(?P<key>[^"'.=\s]+)["']?\s*[.=])"""
+)
+_LARGEST_NS = 2**62
+# One thousandth: every clock is better.
+_LARGEST_DRIFT_PPB = 1_000_000
+
+
+@dataclass(frozen=True)
+class GivenClock:
+    """The correction of one clock in a file.
+
+    Attributes:
+        name: hostname, or uuid of the clock.
+        line: its line, from 1.
+        offset_ns: to add to its times [ns].
+        drift_ppb: to add per time since the reference [1e-9].
+        reference_ns: the moment when offset_ns alone is right [epoch ns, as recorded]; None: the
+            begin of its traces.
+        uncertainty_ns: bound of the error [ns]; None: not known.
+    """
+
+    name: str
+    line: int
+    offset_ns: int
+    drift_ppb: int = 0
+    reference_ns: int | None = None
+    uncertainty_ns: int | None = None
+
+
+@dataclass(frozen=True)
+class ClockSync:
+    """A way to correct clocks.
+
+    Attributes:
+        method: 'none', 'messages' or 'file'.
+        path: the file.
+        clocks: its entries, in order.
+    """
+
+    method: str
+    path: Path | None = None
+    clocks: tuple[GivenClock, ...] = ()
+
+    def fail(self, line: int, what: str, hint: str | None = None) -> NoReturn:
+        """Raise the error of a line of the file."""
+        raise UsageError(f"{self.path}, line {line}: {what}", hint)
+
+
+def read_clock_sync(given: str | Path) -> ClockSync:
+    """Return the way that 'none', 'messages' or the path of a file means.
+
+    The file is TOML if its name ends with .toml, else YAML. A run decides later whether its hosts
+    exist.
+
+    Raises:
+        UsageError: the file cannot be read, or is not of the form above.
+    """
+    if isinstance(given, str) and given in METHODS:
+        return ClockSync(given)
+    path = Path(given)
+    text = read_text(path, f"neither {' nor '.join(METHODS)} nor a file that can be read", _EXAMPLE)
+    sync = ClockSync("file", path)
+    entries = _toml(text, sync) if _is_toml(path) else _yaml(text, sync)
+    clocks = tuple(_clock(sync, *entry) for entry in entries)
+    if not clocks:
+        sync.fail(1, "the file names no clock", _EXAMPLE)
+    return ClockSync("file", path, clocks)
+
+
+# Both yield: name, its line, and its fields with their lines; a number alone is the offset.
+_Entry = tuple[str, int, dict[str, tuple[str, int]]]
+
+
+def _is_toml(path: Path | None) -> bool:
+    return path is not None and path.suffix == ".toml"
+
+
+def _toml(text: str, sync: ClockSync) -> Iterator[_Entry]:
+    try:
+        root = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        where = re.search(r"\(at line (\d+)", str(error))
+        line = int(where[1]) if where else text.count("\n") + 1
+        sync.fail(line, str(error).partition(" (at ")[0].lower())
+    except (RecursionError, ValueError) as error:  # the latter: a number of thousands of digits
+        raise UsageError(f"not a TOML file of clocks — {sync.path}", _EXAMPLE) from error
+    lines = _toml_lines(text)
+    for name, value in root.items():
+        line = next(iter(lines.get(name, ())), 1)
+        fields = value if isinstance(value, dict) else {"offset_ns": value}
+        yield (
+            name,
+            line,
+            {
+                key: (_toml_scalar(field), _at_or_after(lines.get(key, ()), line))
+                for key, field in fields.items()
+            },
+        )
+
+
+def _toml_lines(text: str) -> dict[str, list[int]]:
+    """Return the lines that may define each key, in order: the parser does not return them."""
+    found: dict[str, list[int]] = {}
+    for number, line in enumerate(text.splitlines(), start=1):
+        if match := _TOML_KEY.match(line):
+            found.setdefault(match["table"] or match["key"], []).append(number)
+    return found
+
+
+def _at_or_after(lines: Sequence[int], first: int) -> int:
+    at = bisect_left(lines, first)
+    return lines[at] if at < len(lines) else first
+
+
+def _toml_scalar(value: object) -> str:
+    if isinstance(value, int) and not isinstance(value, bool):
+        # Python refuses to write out numbers that no clock has.
+        return str(value) if abs(value) < _LARGEST_NS else "9" * _MOST_DIGITS
+    return "a mapping" if isinstance(value, dict) else str(value)
+
+
+def _yaml(text: str, sync: ClockSync) -> Iterator[_Entry]:
+    from ruamel.yaml import YAML
+    from ruamel.yaml.error import MarkedYAMLError, YAMLError
+
+    try:
+        root: Any = YAML(typ="safe", pure=True).compose(text)
+    except MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        what = " ".join(str(error.problem or error.context or "not YAML").split())
+        sync.fail(1 if mark is None else mark.line + 1, what, _EXAMPLE)
+    except (YAMLError, RecursionError, ValueError) as error:
+        raise UsageError(f"not a YAML file — {sync.path}", _EXAMPLE) from error
+    if root is None:
+        return
+    for name, value in _pairs(sync, root, "the file is not a mapping from hosts to offsets"):
+        fields = {"offset_ns": (_scalar(value), _line(value if _scalar(value) else name))}
+        if value.id == "mapping":
+            fields = {}
+            for key, field in _pairs(sync, value, ""):
+                if _scalar(key) in fields:
+                    sync.fail(_line(key), f"{_scalar(key)} is given twice")
+                fields[_scalar(key)] = (_scalar(field), _line(field if _scalar(field) else key))
+        yield _scalar(name), _line(name), fields
+
+
+def _pairs(sync: ClockSync, node: Any, what: str) -> list[tuple[Any, Any]]:
+    if node.id != "mapping":
+        sync.fail(_line(node), what, _EXAMPLE)
+    return list(node.value)
+
+
+def _scalar(node: Any) -> str:
+    return str(node.value) if node.id == "scalar" else f"a {node.id}"
+
+
+def _line(node: Any) -> int:
+    return int(node.start_mark.line) + 1
+
+
+def _clock(sync: ClockSync, name: str, line: int, fields: dict[str, tuple[str, int]]) -> GivenClock:
+    numbers: dict[str, int] = {}
+    for key, (text, field_line) in fields.items():
+        if key not in _FIELDS:
+            quoted = "; a name with dots stands in quotes" if _is_toml(sync.path) else ""
+            sync.fail(field_line, f"a clock has no {key}", f"it has {', '.join(_FIELDS)}{quoted}")
+        if not text:
+            sync.fail(field_line, f"{key} has no value", _EXAMPLE)
+        shown = text if len(text) <= _MOST_SHOWN else f"{text[:_MOST_SHOWN]}…"
+        if not _INTEGER.fullmatch(text):
+            sync.fail(field_line, f"{key} is not a whole number — {shown}", _EXAMPLE)
+        if len(text) > _MOST_DIGITS:
+            sync.fail(field_line, f"{key} is beyond what clocks have — {shown}", _EXAMPLE)
+        numbers[key] = int(text)
+        limit = _LARGEST_DRIFT_PPB if key == "drift_ppb" else _LARGEST_NS
+        if abs(numbers[key]) >= limit or (key == "uncertainty_ns" and numbers[key] < 0):
+            sync.fail(field_line, f"{key} is beyond what clocks have — {text}", _EXAMPLE)
+    if "offset_ns" not in numbers:
+        sync.fail(line, f"{name} has no offset_ns", _EXAMPLE)
+    return GivenClock(name, line, **numbers)

@@ -1,0 +1,171 @@
+"""File of links and topics, which a user declares or reviews: YAML; errors name the line.
+
+links:
+  - kind: periodic_async
+    node: /fusion
+    inputs: [/lidar, /camera]
+    outputs: [/objects]
+  - kind: independent
+    node: /filter
+    inputs: [/scan]
+    outputs: [/tick]
+topics:
+  - name: /scan
+    publisher: 0x55bb52684970
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from msgflow.files.yaml_file import Text, YamlFile, line_of
+
+if TYPE_CHECKING:
+    from pathlib import Path
+    from typing import NoReturn
+
+# Links to what a node publishes later, from messages that it keeps.
+# The synchronous ones need a message of every input.
+SYNCHRONOUS_KINDS = ("partial_sync", "approximate_sync")
+INDIRECT_KINDS = ("periodic_async", *SYNCHRONOUS_KINDS)
+# Whether the publications that come after a message are its effects.
+KINDS = (*INDIRECT_KINDS, "direct", "independent")
+_REQUIRED = ("kind", "node", "inputs", "outputs")
+_OPTIONAL = ("inputs_of", "process", "host")
+_ENDPOINTS = ("publisher", "subscription")
+_EXAMPLE = "links: [{kind: periodic_async, node: /fusion, inputs: [/lidar], outputs: [/objects]}]"
+_TOPIC_EXAMPLE = "topics: [{name: /scan, publisher: 0x55bb52684970}], as in msgflow check"
+_QUOTING = "quote patterns that begin with *, as in '*_raw'"
+
+
+@dataclass(frozen=True)
+class DeclaredLink:
+    """One entry of the file.
+
+    Attributes:
+        kind: 'periodic_async', 'partial_sync' or 'approximate_sync'; 'direct': the node publishes
+            on the outputs because of the message before; 'independent': not because of messages of
+            the inputs.
+        node: full name of a node, or a pattern.
+        inputs: topics that the node receives, or patterns.
+        inputs_of: name or pattern of another node of its process that receives the inputs for it.
+        outputs: topics that it publishes, or patterns.
+        process: name or pid of its process, if several nodes have the name.
+        host: its host, likewise.
+        line: where the entry begins.
+    """
+
+    kind: str
+    node: Text
+    inputs: tuple[Text, ...]
+    outputs: tuple[Text, ...]
+    inputs_of: Text | None
+    process: Text | None
+    host: Text | None
+    line: int
+
+
+@dataclass(frozen=True)
+class DeclaredTopic:
+    """The name of a topic for which the trace has none.
+
+    Attributes:
+        name: the topic.
+        kind: 'publisher' or 'subscription'.
+        handle: handle of one of its publishers or subscriptions.
+        handle_text: the same, as the file has it.
+        process: name or pid of its process, if several have the handle.
+        host: its host, likewise.
+    """
+
+    name: Text
+    kind: str
+    handle: int
+    handle_text: Text
+    process: Text | None
+    host: Text | None
+
+
+@dataclass(frozen=True)
+class LinksFile:
+    """A file with declared links.
+
+    Attributes:
+        path: the file.
+        links: its links, in order.
+        topics: its topics, in order.
+    """
+
+    path: Path
+    links: tuple[DeclaredLink, ...]
+    topics: tuple[DeclaredTopic, ...] = ()
+
+    def fail(self, line: int, what: str, hint: str | None = None) -> NoReturn:
+        """Raise the error of a line."""
+        YamlFile(self.path, _EXAMPLE, _QUOTING).fail(line, what, hint)
+
+
+def read_links(path: Path, content: str | None = None) -> LinksFile:
+    """Read a file with declared links; whether its names exist is for a run to say.
+
+    Args:
+        path: the file.
+        content: of the file, if it is not written yet.
+
+    Raises:
+        UsageError: the file cannot be read, is not YAML, or not of the form above.
+    """
+    file = YamlFile(path, _EXAMPLE, _QUOTING, content)
+    links, topics = file.entries("links", "topics")
+    return LinksFile(
+        path,
+        tuple(_link(file, entry) for entry in links),
+        tuple(_topic(file, entry) for entry in topics),
+    )
+
+
+def _link(file: YamlFile, node: Any) -> DeclaredLink:
+    fields = file.mapping(node, "a link", _REQUIRED, _OPTIONAL)
+    kind = file.text(fields["kind"], "kind")
+    if kind.value not in KINDS:
+        file.fail(
+            kind.line, f"no such kind of link — {kind.value}", f"the kinds are {', '.join(KINDS)}"
+        )
+    return DeclaredLink(
+        kind.value,
+        file.text(fields["node"], "node"),
+        file.texts(fields["inputs"], "inputs"),
+        file.texts(fields["outputs"], "outputs"),
+        file.optional(fields, "inputs_of"),
+        file.optional(fields, "process"),
+        file.optional(fields, "host"),
+        line_of(node),
+    )
+
+
+def _topic(file: YamlFile, node: Any) -> DeclaredTopic:
+    fields = file.mapping(node, "a topic", ("name",), (*_ENDPOINTS, "process", "host"))
+    name = file.text(fields["name"], "name", "a topic")
+    if not name.value.startswith("/"):
+        file.fail(name.line, f"a topic begins with / — {name.value}", _TOPIC_EXAMPLE)
+    kinds = [kind for kind in _ENDPOINTS if kind in fields]
+    if len(kinds) != 1:
+        file.fail(
+            line_of(node),
+            f"a topic has a publisher or a subscription — {name.value}",
+            _TOPIC_EXAMPLE,
+        )
+    text = file.text(fields[kinds[0]], kinds[0], "a handle")
+    try:
+        handle = int(text.value, 16)
+    except ValueError:
+        file.fail(text.line, f"{kinds[0]} is not a handle — {text.value}", _TOPIC_EXAMPLE)
+    return DeclaredTopic(
+        name,
+        kinds[0],
+        handle,
+        text,
+        file.optional(fields, "process"),
+        file.optional(fields, "host"),
+    )

@@ -1,0 +1,84 @@
+"""Suggestion of named paths: a file with the paths of a run, to choose from."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter, defaultdict
+from typing import TYPE_CHECKING, Any
+
+from msgflow.files.yaml_file import list_lines, quoted
+from msgflow.text.values import format_duration, printable
+from msgflow.text.wrapping import ARROW, wrap_path
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+_HEAD = """\
+# Paths of a run by name, for --path: keep those that matter, and call them as
+# you like.
+#   msgflow query e2e-latency --path NAME"""
+# With its indent, no comment is wider than a terminal of 80 columns.
+_WIDTH = 76
+
+
+def suggest_paths(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Return a file with a named path for each path of a run.
+
+    Paths with the same begin and end differ by topics and nodes that only some of them visit.
+
+    Args:
+        rows: of the query `e2e-latency`.
+    """
+    texts = list(dict.fromkeys(row["path"] for row in rows))
+    if not texts:
+        return f"{_HEAD}\n# There are none.\npaths: []"
+    evidence = {row["path"]: row for row in rows}
+    steps = {text: text.split(ARROW) for text in texts}
+    alike: dict[tuple[str, str], list[str]] = defaultdict(list)
+    for text in texts:
+        # A path begins with its first topic: a node may publish several.
+        alike[steps[text][1], steps[text][-1]].append(text)
+    taken: Counter[str] = Counter()
+    lines = [_HEAD, "paths:"]
+    for text in texts:
+        first, last = steps[text][1], steps[text][-1]
+        siblings = [set(steps[other]) for other in alike[first, last]]
+        name = f"{_slug(first)}-to-{_slug(last)}"
+        taken[name] += 1
+        lines += _entry(
+            name if taken[name] == 1 else f"{name}-{taken[name]}",
+            first,
+            last,
+            [step for step in dict.fromkeys(steps[text]) if not all(step in s for s in siblings)],
+            sorted(set().union(*siblings) - set(steps[text])),
+            evidence[text],
+        )
+    return "\n".join(lines)
+
+
+def _entry(
+    name: str,
+    first: str,
+    last: str,
+    via: Sequence[str],
+    without: Sequence[str],
+    row: Mapping[str, Any],
+) -> list[str]:
+    seen = f"{row['reached']} of {row['roots']} arrived"
+    if row["p99_ns"] is not None:
+        seen += f", p99 {format_duration(row['p99_ns'])}"
+    lines = [
+        *(f"  # {line}" for line in wrap_path(printable(row["path"]), _WIDTH)),
+        f"  # {seen}",
+        f"  - name: {quoted(name)}",
+        f"    from: {quoted(first)}",
+        f"    to: {quoted(last)}",
+    ]
+    for word, places in (("via", via), ("without", without)):
+        if places:
+            lines += list_lines(f"    {word}", [quoted(place) for place in places])
+    return lines
+
+
+def _slug(name: str) -> str:
+    return re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-").lower() or "unnamed"

@@ -1,0 +1,18 @@
+"""Recordings that are made now: LTTng sessions, from checks before to the last packet."""
+
+from __future__ import annotations
+
+from msgflow.record.lttng import sessions
+from msgflow.record.recording import BYTES_OF_EVENT, Recorded, Status, record
+from msgflow.record.session import Channel, rotated, temporary_directory
+
+__all__ = [
+    "BYTES_OF_EVENT",
+    "Channel",
+    "Recorded",
+    "Status",
+    "record",
+    "rotated",
+    "sessions",
+    "temporary_directory",
+]

@@ -1,0 +1,289 @@
+"""Records a ROS 2 system: from the checks before to the last packet on the disk."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import shutil
+import time
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, replace
+from typing import IO, TYPE_CHECKING
+
+from msgflow.errors import RecordingError
+from msgflow.record.daemon import session_daemon
+from msgflow.record.lttng import losses, providers, sessions
+from msgflow.record.program import Program, require_program
+from msgflow.record.scheduling import recorded_with_perf, why_perf_cannot_record
+from msgflow.record.session import (
+    Channel,
+    can_trace_kernel,
+    is_there,
+    record_snapshot,
+    recording_session,
+    remove_leftovers,
+    require_name,
+    require_new,
+    require_snapshot,
+)
+from msgflow.record.written import recorded_bytes
+from msgflow.sql.interrupt import noted_interrupts, until_interrupted
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+    from pathlib import Path
+
+BYTES_OF_EVENT = 45
+"""The usual size of an event of ROS 2 with its contexts."""
+
+_LEAST_FREE_BYTES = 100_000_000
+# 100,000 events per second, for ten minutes.
+_USUAL_BYTES_PER_SECOND = 100_000 * BYTES_OF_EVENT
+_USUAL_SECONDS = 600.0
+# Seconds.
+_BETWEEN_LOOKS = 0.5
+_UNTIL_FIRST_NODE = 5.0
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """How a recording goes.
+
+    Attributes:
+        seconds: since it began.
+        event_bytes: bytes of all events on the disk; others are still in the buffers.
+        discarded: events for which the buffers were too small.
+        free_bytes: of the disk.
+    """
+
+    seconds: float
+    event_bytes: int
+    discarded: int
+    free_bytes: int
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """What was recorded.
+
+    Attributes:
+        directory: of the trace.
+        last: how it was at the last look.
+        exit_code: of the program that was recorded, if it ended by itself; None without one.
+    """
+
+    directory: Path
+    last: Status
+    exit_code: int | None
+
+
+def record(
+    directory: Path,
+    *,
+    name: str,
+    channel: Channel,
+    program: Sequence[str] = (),
+    log: Path | None = None,
+    seconds: float | None = None,
+    kernel: bool = False,
+    snapshot: str | None = None,
+    note: Callable[[str], None],
+    show: Callable[[Status], None],
+) -> Recorded:
+    """Record until Ctrl-C, until the program ends, or for some seconds.
+
+    Args:
+        directory: to write to; it must not exist, or be empty.
+        name: of the LTTng session.
+        channel: which events, in which buffers.
+        program: to start once all is ready, and to end afterwards; with its arguments.
+        log: file that gets what the program prints, if it prints anything; None: our stderr.
+        seconds: how long to record; None: without a limit.
+        kernel: also record what the scheduler does.
+        snapshot: a snapshot session that has the initialisation of nodes that run already; what it
+            has is written too.
+        note: gets sentences about what is wrong with the recording.
+        show: gets the status twice a second; what it raises ends the recording.
+
+    Raises:
+        UsageError: there is no such program.
+        RecordingError: LTTng is missing or refuses, the directory is in use, or the disk is full.
+        KeyboardInterrupt: Ctrl-C before it began; or Terminated: SIGTERM at any time. Nothing of
+            the recording stays but what is written.
+    """
+    if program:
+        require_program(program[0])
+    require_name(name)
+    _require_room(directory, note, seconds)
+    with noted_interrupts() as interrupts, ExitStack() as stack:
+        stack.enter_context(session_daemon(with_kernel=kernel, note=note))
+        for left in remove_leftovers():
+            note(f"the session of a recording that was killed is removed: {left}")
+        require_new(name)
+        if snapshot is None:
+            _note_running(note)
+        else:
+            require_snapshot(snapshot)
+        directory.mkdir(parents=True, exist_ok=True)
+        if snapshot is not None:
+            record_snapshot(snapshot, directory / "snapshot")
+        by_lttng = kernel and can_trace_kernel()
+        if kernel and not by_lttng:
+            if (reason := why_perf_cannot_record()) is None:
+                stack.enter_context(recorded_with_perf(directory, note))
+            else:
+                note(
+                    f"the scheduler is not recorded: LTTng cannot trace this kernel (it"
+                    f" needs its modules, and root or the group tracing), and {reason}"
+                )
+        output = None
+        if log is not None:
+            output = stack.enter_context(_written(log))
+            note(f"what {program[0]} prints goes to {log}")
+        watch = _Watch(name, directory, channel, note, show, expects_nodes=bool(program))
+        with ExitStack() as running:
+            started = None
+            with recording_session(name, directory, channel, with_kernel=by_lttng):
+                interrupts.check()
+                if program:
+                    started = Program(program, output)
+                    # Behind the session: what happens while nodes end is not recorded.
+                    running.callback(started.end, note)
+                with until_interrupted():
+                    while not watch.is_over(started, seconds):
+                        interrupts.check()
+                        time.sleep(_BETWEEN_LOOKS)
+            ended_with = None if started is None else started.exit_code
+        # All buffers are written now.
+        last = replace(watch.status, event_bytes=recorded_bytes(directory))
+    return Recorded(directory, last, ended_with)
+
+
+@contextmanager
+def _written(log: Path) -> Iterator[IO[bytes]]:
+    """Yield the file while a program may write to it; an empty one does not stay."""
+    try:
+        stream = log.open("wb")
+    except OSError as error:
+        raise RecordingError(
+            f"cannot write {log}: {(error.strerror or str(error)).lower()}", "another place: -o DIR"
+        ) from None
+    with stream:
+        try:
+            yield stream
+        finally:
+            if not log.stat().st_size:
+                log.unlink()
+
+
+class _Watch:
+    """Looks at a recording that runs, and says what goes wrong as soon as it does."""
+
+    def __init__(
+        self,
+        name: str,
+        directory: Path,
+        channel: Channel,
+        note: Callable[[str], None],
+        show: Callable[[Status], None],
+        *,
+        expects_nodes: bool,
+    ) -> None:
+        self._name = name
+        self._directory = directory
+        self._channel = channel
+        self._note = note
+        self._show = show
+        self._expects_nodes = expects_nodes
+        self._begin = time.monotonic()
+        self.status = Status(0.0, 0, 0, shutil.disk_usage(directory).free)
+
+    def is_over(self, program: Program | None, seconds: float | None) -> bool:
+        """Look, and tell whether the recording has to end."""
+        try:
+            self._look()
+        except RecordingError:
+            if is_there(self._name):
+                raise
+            self._note(
+                f"the session {self._name} was destroyed by another program, or its daemon ended:"
+                " the recording ends here"
+            )
+            return True
+        if self.status.free_bytes < _LEAST_FREE_BYTES:
+            self._note("the disk is full: the recording ends here; remove files, or use -o DIR")
+            return True
+        if program is not None and program.exit_code is not None:
+            return True
+        return seconds is not None and self.status.seconds >= seconds
+
+    def _look(self) -> None:
+        before = self.status
+        passed = time.monotonic() - self._begin
+        self.status = Status(
+            passed,
+            recorded_bytes(self._directory),
+            losses(self._name),
+            shutil.disk_usage(self._directory).free,
+        )
+        self._show(self.status)
+        if self.status.discarded and not before.discarded:
+            self._note(
+                "events are being discarded, the buffers are too small: record again with a"
+                f" --subbuf-size several times as large as {self._channel.sub_buffer_size}"
+            )
+        if self._expects_nodes and passed >= _UNTIL_FIRST_NODE:
+            self._expects_nodes = False
+            if not any(provider.is_ros for provider in providers()):
+                self._note(
+                    f"after {passed:.0f} s no process has the tracepoints of ROS 2: is tracing"
+                    " built in (ros2 run tracetools status), are nodes running?"
+                )
+
+
+def _require_room(directory: Path, note: Callable[[str], None], seconds: float | None) -> None:
+    try:
+        if directory.exists() and (not directory.is_dir() or any(directory.iterdir())):
+            raise RecordingError(f"the directory is in use — {directory}", "another one: -o DIR")
+        existing = next(
+            path for path in (directory, *directory.absolute().parents) if path.exists()
+        )
+    except PermissionError as error:
+        raise RecordingError(
+            f"cannot write to {directory}: permission denied: {error.filename}",
+            "another directory: -o DIR",
+        ) from None
+    if not existing.is_dir() or not os.access(existing, os.W_OK | os.X_OK):
+        reason = "permission denied" if existing.is_dir() else "no directory"
+        raise RecordingError(
+            f"cannot write to {directory}: {reason}: {existing}", "another directory: -o DIR"
+        )
+    free = shutil.disk_usage(existing).free
+    if free < _LEAST_FREE_BYTES:
+        raise RecordingError(
+            f"the disk of {existing} is full: {free / 1e6:.0f} MB are free",
+            "remove files, or name a directory on another disk: -o DIR",
+        )
+    needed = _USUAL_BYTES_PER_SECOND * (_USUAL_SECONDS if seconds is None else seconds)
+    if free < needed:
+        note(
+            f"{free / 1e9:.1f} GB are free on the disk of {existing}: a robot with 100,000 events"
+            f" per second fills them in {free / _USUAL_BYTES_PER_SECOND / 60:.0f} min"
+        )
+
+
+def _note_running(note: Callable[[str], None]) -> None:
+    running = [provider for provider in providers() if provider.is_ros]
+    if running:
+        first = f"{running[0].program} ({running[0].pid})"
+        others = f" and {len(running) - 1} more" if len(running) > 1 else ""
+        kept = next((session.name for session in sessions() if session.is_snapshot), None)
+        cure = (
+            "begin to record before they start"
+            if kept is None
+            else f"--dual {shlex.quote(kept)} has them"
+        )
+        note(
+            f"{first}{others} of ROS 2 run already: the names of their nodes and topics are not"
+            f" recorded; {cure}"
+        )

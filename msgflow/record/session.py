@@ -1,0 +1,255 @@
+"""A recording session of LTTng that is ours: from its first event to its last packet."""
+
+from __future__ import annotations
+
+import shlex
+import shutil
+import tempfile
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from msgflow.errors import RecordingError, UsageError
+from msgflow.files.temporary_owner import is_abandoned, mark
+from msgflow.record.kernel_events import KERNEL_EVENTS
+from msgflow.record.lttng import is_daemon_running, lttng, sessions
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+CONTEXTS = ("vpid", "vtid", "procname")
+KERNEL_CONTEXTS = ("pid", "vpid", "vtid", "procname")
+# LTTng has it since 2.12.
+_LATER_CONTEXT = "pid_ns"
+_CHANNEL = "ros2"
+# In the directory of a recording while it is made: the mark of its process.
+_OWNER = ".msgflow-record"
+_TEMPORARY = "msgflow-watch-"
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """How a session records events of programs.
+
+    Attributes:
+        events: names, or patterns of them, such as `ros2:*`.
+        sub_buffer_size: of each CPU, in the words of LTTng, such as `1M`.
+        sub_buffers: their number.
+        rotation_ns: length of the chunks that the recording is cut into; None: it is not.
+    """
+
+    events: tuple[str, ...]
+    sub_buffer_size: str
+    sub_buffers: int
+    rotation_ns: int | None = None
+
+
+@contextmanager
+def recording_session(
+    name: str, directory: Path, channel: Channel, *, with_kernel: bool
+) -> Iterator[None]:
+    """Record into a directory during the block; afterwards everything is written.
+
+    Args:
+        name: of the session; no other may have it.
+        directory: an empty directory.
+        channel: what to record of programs.
+        with_kernel: also record scheduling, with LTTng.
+
+    Raises:
+        RecordingError: LTTng refuses.
+    """
+    owner = directory / _OWNER
+    try:
+        owner.write_text(mark())
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise RecordingError(
+            f"cannot write to {directory}: {reason}", "another directory: -o DIR"
+        ) from None
+    try:
+        lttng("create", name, f"--output={directory}")
+    except RecordingError:
+        owner.unlink()
+        raise
+    try:
+        _set_up(name, channel)
+        if with_kernel:
+            _set_up_kernel(name, channel)
+        if channel.rotation_ns is not None:
+            _rotate(name, channel.rotation_ns)
+        lttng("start", name)
+        yield
+    finally:
+        # It stops the session, and waits until all is written. Where it fails, the owner stays
+        # named: the next recording removes the session.
+        if is_there(name):
+            lttng("destroy", name)
+        owner.unlink()
+
+
+@contextmanager
+def temporary_directory() -> Iterator[Path]:
+    """Yield a directory, and remove it afterwards; after SIGKILL, `remove_leftovers` does."""
+    prefix = f"{_TEMPORARY}{mark()}."
+    with tempfile.TemporaryDirectory(prefix=prefix) as directory:
+        yield Path(directory)
+
+
+@contextmanager
+def rotated(name: str, length_ns: int) -> Iterator[Callable[[], None]]:
+    """Let a session cut its recording into chunks during the block; one that does so goes on.
+
+    Yields:
+        A function to call now and then: it starts the rotation anew if another program ended it.
+
+    Raises:
+        RecordingError: it cannot, as one with a live connection or a snapshot session.
+    """
+    is_ours = _is_first_to_rotate(name, length_ns)
+
+    def go_on() -> None:
+        nonlocal is_ours
+        # It may have ended.
+        with suppress(RecordingError):
+            is_ours = _is_first_to_rotate(name, length_ns) or is_ours
+
+    try:
+        yield go_on
+    finally:
+        if is_ours:
+            with suppress(RecordingError):
+                lttng("disable-rotation", f"--session={name}", "--timer")
+
+
+def require_snapshot(name: str) -> None:
+    """Refuse a name that no snapshot session has.
+
+    Raises:
+        RecordingError: there is no such snapshot session.
+    """
+    known = [session.name for session in sessions() if session.is_snapshot]
+    if name not in known:
+        raise RecordingError(
+            f"LTTng has no snapshot session of this name — {name}",
+            f"one of: {', '.join(known)}" if known else "lttng create --snapshot makes one",
+        )
+
+
+def record_snapshot(name: str, directory: Path) -> None:
+    """Write what a snapshot session has in its buffers into a new directory.
+
+    Raises:
+        RecordingError: LTTng refuses.
+    """
+    lttng("snapshot", "record", f"--session={name}", f"file://{directory}")
+
+
+def remove_leftovers() -> list[str]:
+    """Remove what recordings leave whose process is gone: sessions, temporary directories.
+
+    Returns:
+        The names of the sessions.
+    """
+    left = [session for session in sessions() if _is_left(session.directory)]
+    for session in left:
+        lttng("destroy", session.name)
+        assert session.directory is not None
+        (session.directory / _OWNER).unlink()
+    for directory in Path(tempfile.gettempdir()).glob(f"{_TEMPORARY}*"):
+        if is_abandoned(directory.name.removeprefix(_TEMPORARY).rpartition(".")[0]):
+            shutil.rmtree(directory, ignore_errors=True)
+    return [session.name for session in left]
+
+
+def is_there(name: str) -> bool:
+    """Tell whether a session daemon runs that has a session of this name."""
+    return is_daemon_running() and any(session.name == name for session in sessions())
+
+
+def require_name(name: str) -> None:
+    """Refuse a name that LTTng does not take.
+
+    Raises:
+        UsageError: it has a slash, or begins like an option.
+    """
+    if "/" in name or name.startswith("-"):
+        raise UsageError(
+            f"a session cannot have a name with a slash, or with - in front — {name}",
+            "another --name; -o DIR names the directory",
+        )
+
+
+def require_new(name: str) -> None:
+    """Refuse the name of a session that exists.
+
+    Raises:
+        RecordingError: there is one.
+    """
+    if is_there(name):
+        raise RecordingError(
+            f"LTTng has a session of this name — {name}",
+            f"choose another --name, or end that session: lttng destroy {shlex.quote(name)}",
+        )
+
+
+def can_trace_kernel() -> bool:
+    """Tell whether the session daemon can trace the kernel."""
+    try:
+        lttng("list", "--kernel")
+    except RecordingError:
+        return False
+    return True
+
+
+def _set_up(name: str, channel: Channel) -> None:
+    to_channel = ("--userspace", f"--session={name}", f"--channel={_CHANNEL}")
+    _enable_channel("--userspace", name, channel)
+    for event in channel.events:
+        lttng("enable-event", *to_channel, event)
+    lttng("add-context", *to_channel, *(f"--type={context}" for context in CONTEXTS))
+
+
+def _set_up_kernel(name: str, channel: Channel) -> None:
+    to_channel = ("--kernel", f"--session={name}", f"--channel={_CHANNEL}")
+    _enable_channel("--kernel", name, channel)
+    lttng("enable-event", *to_channel, ",".join(KERNEL_EVENTS))
+    lttng("add-context", *to_channel, *(f"--type={context}" for context in KERNEL_CONTEXTS))
+    with suppress(RecordingError):
+        lttng("add-context", *to_channel, f"--type={_LATER_CONTEXT}")
+
+
+def _rotate(name: str, length_ns: int) -> None:
+    lttng("enable-rotation", f"--session={name}", f"--timer={length_ns // 1000}us")
+
+
+def _is_first_to_rotate(name: str, length_ns: int) -> bool:
+    """Let a session rotate; return False if it rotates already."""
+    try:
+        _rotate(name, length_ns)
+    except RecordingError as error:
+        if "already set" not in error.message:
+            raise
+        return False
+    return True
+
+
+def _enable_channel(domain: str, name: str, channel: Channel) -> None:
+    lttng(
+        "enable-channel",
+        domain,
+        f"--session={name}",
+        f"--subbuf-size={channel.sub_buffer_size}",
+        f"--num-subbuf={channel.sub_buffers}",
+        _CHANNEL,
+    )
+
+
+def _is_left(directory: Path | None) -> bool:
+    if directory is None:
+        return False
+    try:
+        return is_abandoned((directory / _OWNER).read_text())
+    except (OSError, UnicodeDecodeError):
+        return False

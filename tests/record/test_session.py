@@ -1,0 +1,50 @@
+"""A session that records the kernel, without a kernel that can be recorded."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from msgflow.errors import RecordingError
+from msgflow.record import session
+from msgflow.record.session import Channel, recording_session
+
+
+@pytest.mark.parametrize("refused", [(), ("--type=pid_ns",)])
+def test_a_context_that_an_old_lttng_lacks_is_left_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refused: tuple[str, ...]
+) -> None:
+    said: list[tuple[str, ...]] = []
+
+    def lttng(*words: str) -> None:
+        if any(word in refused for word in words):
+            raise RecordingError("no such context", "another")
+        said.append(words)
+
+    monkeypatch.setattr(session, "lttng", lttng)
+    monkeypatch.setattr(session, "is_there", lambda name: True)
+    with recording_session("robot", tmp_path, Channel(("ros2:*",), "1M", 4), with_kernel=True):
+        pass
+    contexts = [word for words in said for word in words if word.startswith("--type=")]
+    of_kernel = contexts[3:]
+    assert of_kernel[:4] == ["--type=pid", "--type=vpid", "--type=vtid", "--type=procname"]
+    assert of_kernel[4:] == ([] if refused else ["--type=pid_ns"])
+    assert [words[0] for words in said][-2:] == ["start", "destroy"]
+
+
+def test_a_session_created_anew_rotates_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """LTTng refuses only what is set already."""
+    asked = 0
+
+    def lttng(*words: str) -> None:
+        nonlocal asked
+        asked += words[0] == "enable-rotation"
+        if asked == 2:
+            raise RecordingError("lttng enable-rotation failed: already set", "another")
+
+    monkeypatch.setattr(session, "lttng", lttng)
+    with session.rotated("drive", 1) as go_on:
+        go_on()
+        go_on()
+    assert asked == 3
