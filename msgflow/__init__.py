@@ -23,7 +23,7 @@ if TYPE_CHECKING:
         TraceError,
         UsageError,
     )
-    from msgflow.query.result import QueryResult
+    from msgflow.result.query_result import QueryResult
     from msgflow.run.slice import Slice
 
 __all__ = [
@@ -49,7 +49,7 @@ _HOME = {
     "QueryError": "msgflow.errors",
     "TraceError": "msgflow.errors",
     "UsageError": "msgflow.errors",
-    "QueryResult": "msgflow.query.result",
+    "QueryResult": "msgflow.result.query_result",
     "Slice": "msgflow.run.slice",
 }
 

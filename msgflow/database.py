@@ -17,9 +17,9 @@ from msgflow.errors import QueryError, UsageError
 from msgflow.files.default_files import DEFAULT_PATHS
 from msgflow.query.catalogue import choose_query, load_queries, query_names
 from msgflow.query.path_numbers import with_path_numbers
-from msgflow.query.result import QueryResult
 from msgflow.query.runner import run_query
 from msgflow.query.selection import make_selection
+from msgflow.result.query_result import QueryResult
 from msgflow.run.choice import read_runs
 from msgflow.run.slice import Slice
 from msgflow.sql.failure import database_errors, first_line, in_words, out_of_memory

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from msgflow.bag.messages import read_bag
 from msgflow.db.runs import change_runs
 from msgflow.errors import UsageError
-from msgflow.query.result import QueryResult
+from msgflow.result.query_result import QueryResult
 from msgflow.sql.statement import internal_sql
 
 if TYPE_CHECKING:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from msgflow.db.finding import Finding
     from msgflow.export.formats import Format
-    from msgflow.query.result import QueryResult
+    from msgflow.result.query_result import QueryResult
 
 _WIDTH = 100
 PLACES_SHOWN = 10
@@ -106,7 +106,7 @@ def _report(
     from msgflow.cli.output import print_lines, print_result, print_status
     from msgflow.db.finding import Finding
     from msgflow.export.formats import Format
-    from msgflow.query.result import QueryResult
+    from msgflow.result.query_result import QueryResult
     from msgflow.text.values import count
 
     if output is None and form in (None, Format.TABLE):

@@ -153,7 +153,7 @@ def _print_counts(selection: Selection, form: EventFormat | None, output: Path |
     import pyarrow
 
     from msgflow.cli.output import print_result
-    from msgflow.query.result import QueryResult
+    from msgflow.result.query_result import QueryResult
 
     counts = selection.counts()
     table = pyarrow.table(

@@ -22,7 +22,7 @@ from msgflow.cli.slice_options import with_slice
 from msgflow.errors import UsageError
 from msgflow.export.series import What
 from msgflow.files.default_files import DEFAULT_DATABASE, DEFAULT_PATHS
-from msgflow.query.times import Times
+from msgflow.result.times import Times
 from msgflow.run.slice import ALL_RUNS, LATEST, Slice
 
 if TYPE_CHECKING:

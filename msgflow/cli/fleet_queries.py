@@ -83,10 +83,10 @@ def query(
     than 1 %; they are never averages of those of runs.
     """
     from msgflow.cli.output import print_list, print_result
-    from msgflow.cli.show.layout import MOST_ROWS
     from msgflow.fleet.lake import Lake
     from msgflow.fleet.lake_query import fleet_query, header_of, names
     from msgflow.query.selection import values_of
+    from msgflow.result.layout import MOST_ROWS
 
     if name is None:
         listed = [(header_of(each).words, header_of(each).title) for each in names()]

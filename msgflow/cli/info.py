@@ -35,8 +35,8 @@ def command(
     Each section is a named query: `msgflow query info --section nodes`, `msgflow query topics`.
     """
     from msgflow.cli.output import is_screen, print_note, print_text
-    from msgflow.cli.show.layout import screen_width
     from msgflow.database import Database
+    from msgflow.result.layout import screen_width
 
     form = form or sections_format(output)
     with Database(database) as opened:

@@ -17,7 +17,7 @@ from typer.core import TyperGroup
 from msgflow.cli.completion import complete
 from msgflow.export.formats import Format
 from msgflow.query.selection import CASES
-from msgflow.query.times import Times
+from msgflow.result.times import Times
 
 SELECTION = "Which part of the data"
 OUTPUT = "Output"

@@ -13,15 +13,15 @@ from typing import IO, TYPE_CHECKING, cast
 import typer
 from rich.cells import cell_len
 
-from msgflow.cli.show.layout import MOST_ROWS, screen_width
 from msgflow.errors import UsageError
 from msgflow.export.formats import Format, format_of, write_result
 from msgflow.files.default_files import DEFAULT_DATABASE
+from msgflow.result.layout import MOST_ROWS, screen_width
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
-    from msgflow.query.result import QueryResult
+    from msgflow.result.query_result import QueryResult
     from msgflow.run.choice import Run
 
 
@@ -132,8 +132,8 @@ def _is_brief(result: QueryResult, columns: str | None) -> bool:
 
 
 def _print_for_screen(result: QueryResult, is_chosen: bool, most_rows: int | None) -> None:
-    from msgflow.cli.show.layout import lay_out
-    from msgflow.cli.show.screen import screen_lines
+    from msgflow.result.layout import lay_out
+    from msgflow.result.screen import screen_lines
 
     width = screen_width()
     shown = lay_out(result, width, most_rows=most_rows, is_chosen=is_chosen)

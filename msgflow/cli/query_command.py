@@ -22,17 +22,17 @@ from msgflow.cli.options import (
     WideOption,
 )
 from msgflow.cli.row_options import row_options
-from msgflow.cli.show.layout import MOST_ROWS
 from msgflow.cli.slice_options import SLICE_OPTIONS, set_parameters
 from msgflow.errors import UsageError
 from msgflow.files.default_files import DEFAULT_DATABASE
 from msgflow.query.catalogue import load_query
 from msgflow.query.selection import KINDS
+from msgflow.result.layout import MOST_ROWS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from msgflow.query.result import QueryResult
+    from msgflow.result.query_result import QueryResult
     from msgflow.sql.header import Header
 
 # Options of every query, whose names no parameter of a query may have. Via, without and slowest are

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
     from pathlib import Path
 
-    from msgflow.query.result import QueryResult
+    from msgflow.result.query_result import QueryResult
 
 
 class SectionsFormat(StrEnum):
@@ -66,8 +66,8 @@ def screen_sections(
         width: of a line.
         is_chosen: whether the results have the wanted columns only, and need no remark on others.
     """
-    from msgflow.cli.show.layout import lay_out
-    from msgflow.cli.show.screen import screen_lines
+    from msgflow.result.layout import lay_out
+    from msgflow.result.screen import screen_lines
     from msgflow.text.wrapping import wrap
 
     for position, (section, result) in enumerate(results.items()):

@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from msgflow.query.result import QueryResult
     from msgflow.query.why import Explanation
+    from msgflow.result.query_result import QueryResult
 
 _PATHS = 3
 # Titles, and the columns that answer the question.
@@ -74,8 +74,8 @@ def command(
     path-breakdown, critical-path, waits --by pair, and topics --measure delivery.
     """
     from msgflow.cli.output import print_note, print_runs, print_status, print_text
-    from msgflow.cli.show.layout import screen_width
     from msgflow.database import Database
+    from msgflow.result.layout import screen_width
 
     form = form or sections_format(output)
     with Database(database, memory_limit=memory_limit) as opened:

@@ -10,7 +10,7 @@ from msgflow.confined.process import ConfinedProcess
 from msgflow.database import Database
 from msgflow.db.memory import bound_process
 from msgflow.db.sandbox import open_memory
-from msgflow.query.result import QueryResult
+from msgflow.result.query_result import QueryResult
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     import pyarrow as pa
 
-    from msgflow.query.result import QueryResult
+    from msgflow.result.query_result import QueryResult
 
 _ROWS_AT_ONCE = 10_000
 Form = TypeVar("Form")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from msgflow.text.values import printable
 
 if TYPE_CHECKING:
-    from msgflow.query.result import QueryResult
+    from msgflow.result.query_result import QueryResult
     from msgflow.run.choice import Run
 
 Row = dict[str, Any]

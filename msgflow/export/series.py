@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
 from msgflow.query.clock_notes import clock_notes
-from msgflow.query.result import QueryResult
+from msgflow.result.query_result import QueryResult
 from msgflow.sql.header import Column
 from msgflow.sql.statement import internal_sql
 

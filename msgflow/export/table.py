@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 from rich.cells import cell_len
 
-from msgflow.query.cells import cells
+from msgflow.result.cells import cells
 from msgflow.text.markdown import markdown_line, rule_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from msgflow.query.result import QueryResult
+    from msgflow.result.query_result import QueryResult
 
 _GAP = "  "
 

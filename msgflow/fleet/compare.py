@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 from msgflow.errors import UsageError
 from msgflow.fleet.lake_connection import Choice, Reading, choose
 from msgflow.query.compare import STATISTICS, Failure, failures
-from msgflow.query.result import QueryResult
 from msgflow.query.selection import CASES, CUT_COLUMN
+from msgflow.result.query_result import QueryResult
 from msgflow.sql.statement import internal_sql
 from msgflow.text.name_suggestions import meant_or, nearest
 

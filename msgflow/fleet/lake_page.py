@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
     from msgflow.fleet.lake import Lake
-    from msgflow.query.result import QueryResult
+    from msgflow.result.query_result import QueryResult
 
 # Most labels with a table on the page; each takes a query over all flows.
 MOST_LABELS = 8

@@ -27,9 +27,9 @@ from msgflow.fleet.lake_connection import (
 )
 from msgflow.fleet.layout import VIEWS
 from msgflow.query.catalogue import choose_query, load_query
-from msgflow.query.result import QueryResult
 from msgflow.query.runner import bind, shown_rows
 from msgflow.query.selection import make_selection, selected
+from msgflow.result.query_result import QueryResult
 from msgflow.sql.failure import first_line
 from msgflow.sql.header import Column, relations_of
 from msgflow.sql.interrupt import interruptible

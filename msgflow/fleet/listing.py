@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from msgflow.fleet.failure import read_failures
-from msgflow.query.result import QueryResult
+from msgflow.result.query_result import QueryResult
 
 if TYPE_CHECKING:
     import pyarrow as pa

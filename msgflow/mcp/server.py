@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from mcp.server.mcpserver import MCPServer
 
-    from msgflow.query.result import QueryResult
+    from msgflow.result.query_result import QueryResult
     from msgflow.sql.header import Header
 
 MOST_ROWS = 1_000

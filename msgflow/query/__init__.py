@@ -1,1 +1,1 @@
-"""Named queries: catalogue of `queries/*.sql`, parameters, runner, result."""
+"""Named queries: catalogue of `queries/*.sql`, parameters, runner."""

@@ -13,10 +13,10 @@ from msgflow.errors import UsageError
 from msgflow.files.resources import resource_directory
 from msgflow.query.clock_notes import clock_notes
 from msgflow.query.names import require_places
-from msgflow.query.result import QueryResult
 from msgflow.query.runner import bind
 from msgflow.query.schedule_notes import schedule_notes
 from msgflow.query.selection import CUT_COLUMN
+from msgflow.result.query_result import QueryResult
 from msgflow.run.choice import Run, choose_one, read_runs
 from msgflow.run.window import MAXIMUM_NS
 from msgflow.sql.failure import query_errors

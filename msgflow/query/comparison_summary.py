@@ -13,7 +13,7 @@ from msgflow.sql.statement import internal_sql
 if TYPE_CHECKING:
     import pyarrow as pa
 
-    from msgflow.query.result import QueryResult
+    from msgflow.result.query_result import QueryResult
     from msgflow.sql.header import Header
 
 _NONE = "none shown"

@@ -10,7 +10,7 @@ from msgflow.query.selection import PATH
 if TYPE_CHECKING:
     import duckdb
 
-    from msgflow.query.result import QueryResult
+    from msgflow.result.query_result import QueryResult
 
 _ALL = "SELECT DISTINCT path FROM main.flow_path($runs, NULL, NULL, only_paths := true)"
 

@@ -12,7 +12,6 @@ import duckdb
 from msgflow.errors import UsageError
 from msgflow.query.clock_notes import clock_notes
 from msgflow.query.names import PLACE_PARAMETERS, require_ids, require_names, require_places
-from msgflow.query.result import QueryResult
 from msgflow.query.selection import (
     COUNTS,
     CUT_COLUMN,
@@ -23,6 +22,7 @@ from msgflow.query.selection import (
     selected,
     sorted_by,
 )
+from msgflow.result.query_result import QueryResult
 from msgflow.run.slice import LATEST, Slice
 from msgflow.run.window import format_epoch
 from msgflow.sql.failure import first_line, query_errors

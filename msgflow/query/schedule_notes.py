@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
     import duckdb
 
-    from msgflow.query.result import QueryResult
+    from msgflow.result.query_result import QueryResult
     from msgflow.sql.value import Value
 
 _MOST = 3

@@ -14,7 +14,7 @@ from msgflow.text.values import format_duration
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from msgflow.query.result import QueryResult
+    from msgflow.result.query_result import QueryResult
     from msgflow.run.choice import Run
 
     Ask = Callable[..., QueryResult]

@@ -11,7 +11,7 @@ from msgflow.text.values import format_duration, printable
 if TYPE_CHECKING:
     from typing import Any
 
-    from msgflow.query.result import QueryResult
+    from msgflow.result.query_result import QueryResult
     from msgflow.run.choice import Run
 
 

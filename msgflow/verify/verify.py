@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 from msgflow.files.default_files import DEFAULT_PATHS
 from msgflow.query.catalogue import load_query
-from msgflow.query.result import QueryResult
 from msgflow.query.runner import run_query
 from msgflow.query.selection import Selection, conditions_of
+from msgflow.result.query_result import QueryResult
 from msgflow.run.slice import Slice
 from msgflow.sql.header import Column, Header, Param
 from msgflow.text.name_suggestions import did_you_mean

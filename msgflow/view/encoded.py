@@ -9,7 +9,7 @@ from msgflow.view.table_encoding import encode
 
 if TYPE_CHECKING:
     from msgflow.query.compare import Comparison
-    from msgflow.query.result import QueryResult
+    from msgflow.result.query_result import QueryResult
     from msgflow.view.summary import Section
 
 

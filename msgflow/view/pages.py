@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
     import duckdb
 
-    from msgflow.query.result import QueryResult
+    from msgflow.result.query_result import QueryResult
     from msgflow.run.choice import Run
 
 Params = dict[str, Any]

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     import duckdb
 
     from msgflow.query.compare import Comparison
-    from msgflow.query.result import QueryResult
+    from msgflow.result.query_result import QueryResult
     from msgflow.run.choice import Run
     from msgflow.verify import Verification
     from msgflow.view.summary import Section

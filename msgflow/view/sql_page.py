@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     import duckdb
 
-    from msgflow.query.result import QueryResult
+    from msgflow.result.query_result import QueryResult
 
 # As many as `msgflow sql` prints; the most that a browser sorts and draws without a pause.
 DEFAULT_ROWS = 1_000

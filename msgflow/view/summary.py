@@ -15,9 +15,9 @@ import pyarrow as pa
 from msgflow.errors import UsageError
 from msgflow.files.default_files import DEFAULT_PATHS
 from msgflow.query.catalogue import load_query
-from msgflow.query.result import QueryResult
 from msgflow.query.runner import run_query
 from msgflow.query.selection import Selection
+from msgflow.result.query_result import QueryResult
 from msgflow.sql.quoting import literal
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ import shlex
 from itertools import groupby
 from typing import TYPE_CHECKING
 
-from msgflow.query.cells import cells
+from msgflow.result.cells import cells
 from msgflow.text.markdown import code, code_lines, markdown_line, rule_line
 from msgflow.text.values import format_cell
 

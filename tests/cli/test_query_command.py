@@ -11,7 +11,7 @@ import pytest
 from typer.testing import Result
 
 from msgflow.database import Database
-from msgflow.query.result import QueryResult
+from msgflow.result.query_result import QueryResult
 from msgflow.sql.header import parse
 
 Msgflow = Callable[..., Result]

@@ -6,7 +6,7 @@ from rich.cells import cell_len
 
 from msgflow.cli.sections import screen_sections
 from msgflow.query.catalogue import load_query
-from msgflow.query.result import QueryResult
+from msgflow.result.query_result import QueryResult
 from msgflow.run.choice import Run
 
 WAITS = {

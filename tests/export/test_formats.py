@@ -12,7 +12,7 @@ import pytest
 from rich.cells import cell_len
 
 from msgflow.export.formats import Format, format_of, write_result
-from msgflow.query.result import QueryResult
+from msgflow.result.query_result import QueryResult
 from msgflow.sql.header import parse
 
 BIG = 9_007_199_254_740_993

@@ -17,7 +17,7 @@ from msgflow.fleet.lake import Lake
 from msgflow.fleet.lake_connection import Reading, choose
 from msgflow.fleet.lake_query import fleet_query, fleet_sql, fleet_worst
 from msgflow.fleet.run_database import open_run
-from msgflow.query.result import QueryResult
+from msgflow.result.query_result import QueryResult
 
 
 def chosen(lake: Lake, where: str | None) -> list[str]:

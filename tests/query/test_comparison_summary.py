@@ -7,7 +7,7 @@ from typing import Any
 import pyarrow as pa
 
 from msgflow.query.comparison_summary import changes
-from msgflow.query.result import QueryResult
+from msgflow.result.query_result import QueryResult
 from msgflow.run.choice import Run
 
 A_TO_B = "/a → /t → /b"

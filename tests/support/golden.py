@@ -46,8 +46,8 @@ from msgflow.db.finding import kinds, statement
 from msgflow.db.migration import create
 from msgflow.export.formats import Format, write_result
 from msgflow.query.catalogue import load_query
-from msgflow.query.result import QueryResult
 from msgflow.query.runner import run_query
+from msgflow.result.query_result import QueryResult
 from msgflow.run.slice import Slice
 from msgflow.sql.statement import internal_sql
 from msgflow.view.page_query import run_page_query

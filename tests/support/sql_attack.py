@@ -8,7 +8,7 @@ from pathlib import Path
 import duckdb
 
 from msgflow.errors import MsgflowError
-from msgflow.query.result import QueryResult
+from msgflow.result.query_result import QueryResult
 
 SECRET = "a secret of another file"
 # By type: statements of it, with places for a file; what is of no use outside of DuckDB is empty.

@@ -1,1 +1,1 @@
-"""Results for people: what a terminal shows of them, and how they print themselves."""
+"""What `msgflow watch` shows: a screen with its keys, or a line per window."""

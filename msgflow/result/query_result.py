@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from msgflow.errors import UsageError
 from msgflow.files.atomic import replacing
+from msgflow.result.rows import Rows
 from msgflow.text.name_suggestions import column_named
 from msgflow.version import __version__
 
@@ -16,12 +17,9 @@ if TYPE_CHECKING:
 
     import pyarrow as pa
 
-    from msgflow.run.choice import Run
-    from msgflow.sql.header import Header
-
 
 @dataclass(frozen=True, repr=False)
-class QueryResult:
+class QueryResult(Rows):
     """Rows in the order of the query. Times are integers in nanoseconds.
 
     `print` shows what a terminal shows: a table that fits its width (the variable COLUMNS decides;
@@ -37,40 +35,17 @@ class QueryResult:
         order: columns that the user sorted by.
     """
 
-    table: pa.Table
-    header: Header | None = None
-    runs: tuple[Run, ...] = ()
-    notes: list[str] = field(default_factory=list)
-    when_empty: str = "no rows"
-    path_numbers: dict[str, int] = field(default_factory=dict)
-    order: tuple[str, ...] = ()
-
-    def __len__(self) -> int:
-        return int(self.table.num_rows)
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """Names of the columns."""
-        return tuple(self.table.column_names)
-
-    @property
-    def units(self) -> dict[str, str]:
-        """Unit of each column that has one ('ns' for a duration, 'epoch ns' for a moment)."""
-        if self.header is None:
-            return {}
-        return {column.name: column.unit for column in self.header.columns if column.unit}
-
     def __repr__(self) -> str:
         name = "SQL" if self.header is None else self.header.words
         return f"<QueryResult of {name}: {len(self)} rows>"
 
     def __str__(self) -> str:
-        from msgflow.cli.show.result_text import result_text
+        from msgflow.result.result_text import result_text
 
         return result_text(self)
 
     def _repr_html_(self) -> str:
-        from msgflow.cli.show.result_text import result_html
+        from msgflow.result.result_text import result_html
 
         return result_html(self)
 
@@ -84,7 +59,7 @@ class QueryResult:
         Raises:
             UsageError: no such form, or the rows do not say which columns are times.
         """
-        from msgflow.query.times import Times, converted
+        from msgflow.result.times import Times, converted
 
         try:
             form = Times(times)

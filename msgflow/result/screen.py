@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 from rich.cells import cell_len
 
-from msgflow.cli.show.layout import GAP
+from msgflow.result.layout import GAP
 from msgflow.text.wrapping import ARROW, wrap, wrap_path
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from msgflow.cli.show.layout import Layout, ShownColumn
+    from msgflow.result.layout import Layout, ShownColumn
 
 # A path that begins or ends like an earlier one is cut if that saves more than so many steps.
 _SPARED = 4

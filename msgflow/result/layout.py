@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     import pyarrow as pa
 
-    from msgflow.query.result import QueryResult
+    from msgflow.result.rows import Rows
 
 MOST_ROWS = 50
 _NARROWEST = 40
@@ -98,7 +98,7 @@ def screen_width() -> int:
 
 
 def lay_out(
-    result: QueryResult,
+    result: Rows,
     width: int,
     *,
     most_rows: int | None = MOST_ROWS,
@@ -149,7 +149,7 @@ def lay_out(
     return Layout(headings, tuple(shown), widths, paths, tuple(notes), not_shown)
 
 
-def _without_zero_rows(result: QueryResult) -> tuple[QueryResult, int]:
+def _without_zero_rows(result: Rows) -> tuple[Rows, int]:
     """Return the rows that are not 0 throughout, and how many are; all if each of them is."""
     from pyarrow import compute
 
@@ -166,7 +166,7 @@ def _free(columns: Sequence[ShownColumn]) -> int:
     return sum(column.name in (PATH, RUN) for column in columns)
 
 
-def _that_say_something(result: QueryResult, keeps_all: bool) -> tuple[list[str], list[str]]:
+def _that_say_something(result: Rows, keeps_all: bool) -> tuple[list[str], list[str]]:
     """Return the columns with content, and the titles of those that are 0 or empty in all rows."""
     if keeps_all or not len(result):
         return list(result.columns), []
@@ -201,11 +201,11 @@ def _is_nothing(column: pa.ChunkedArray) -> bool:
     return bool(types.is_string(kind) and compute.max(column).as_py() == "")
 
 
-def _title(result: QueryResult, name: str) -> str:
+def _title(result: Rows, name: str) -> str:
     return column_title(name, result.units.get(name), result.columns)
 
 
-def _column(result: QueryResult, name: str, values: pa.ChunkedArray, lines: int) -> ShownColumn:
+def _column(result: Rows, name: str, values: pa.ChunkedArray, lines: int) -> ShownColumn:
     import pyarrow.types as types
 
     kind = values.type
@@ -248,7 +248,7 @@ def _measured(
     return ShownColumn(name, title, tuple(cells), is_number, width, least, broken)
 
 
-def _run_names(result: QueryResult) -> dict[int, str]:
+def _run_names(result: Rows) -> dict[int, str]:
     """Return the name of each run by its id; nothing if the rows themselves are runs."""
     if result.header is None or result.header.grain == "one row per run":
         return {}
@@ -256,7 +256,7 @@ def _run_names(result: QueryResult) -> dict[int, str]:
     return names if len(set(names.values())) == len(names) else {}
 
 
-def _begin(result: QueryResult) -> int | None:
+def _begin(result: Rows) -> int | None:
     """Return the start of the only run, from which times count; None if the rows are runs."""
     if len(result.runs) != 1 or result.header is None or result.header.grain == "one row per run":
         return None
@@ -289,7 +289,7 @@ def _with_numbered_paths(
 
 
 def _with_headings(
-    result: QueryResult, columns: list[ShownColumn]
+    result: Rows, columns: list[ShownColumn]
 ) -> tuple[list[ShownColumn], tuple[str, ...]]:
     """Return the columns of the table, and the headings made of the other ones."""
     by_name = {column.name: column for column in columns}
@@ -318,7 +318,7 @@ def _with_headings(
     return left, lines
 
 
-def _by_importance(result: QueryResult, columns: list[ShownColumn]) -> list[ShownColumn]:
+def _by_importance(result: Rows, columns: list[ShownColumn]) -> list[ShownColumn]:
     """Return the columns, the most important first; those alike in all rows come last."""
     header = result.header
     brief = () if header is None else header.brief
@@ -338,7 +338,7 @@ def _by_importance(result: QueryResult, columns: list[ShownColumn]) -> list[Show
     )
 
 
-def _that_fit(result: QueryResult, columns: list[ShownColumn], width: int) -> list[ShownColumn]:
+def _that_fit(result: Rows, columns: list[ShownColumn], width: int) -> list[ShownColumn]:
     """Return the most important columns that fit, in the order of the result."""
     if _least(columns) <= width:
         return columns

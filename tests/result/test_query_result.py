@@ -8,7 +8,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from msgflow.errors import UsageError
-from msgflow.query.result import QueryResult
+from msgflow.result.query_result import QueryResult
 from msgflow.sql.header import parse
 from msgflow.version import __version__
 

@@ -11,10 +11,10 @@ import pyarrow as pa
 import pytest
 from rich.cells import cell_len
 
-from msgflow.cli.show.layout import MOST_ROWS, lay_out
-from msgflow.cli.show.screen import screen_lines
 from msgflow.query.catalogue import load_query
-from msgflow.query.result import QueryResult
+from msgflow.result.layout import MOST_ROWS, lay_out
+from msgflow.result.query_result import QueryResult
+from msgflow.result.screen import screen_lines
 from msgflow.run.choice import Run
 from msgflow.sql.header import Header
 

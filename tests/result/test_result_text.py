@@ -10,7 +10,7 @@ from pathlib import Path
 import pyarrow as pa
 import pytest
 
-from msgflow.query.result import QueryResult
+from msgflow.result.query_result import QueryResult
 from msgflow.run.choice import Run
 from msgflow.sql.header import parse
 

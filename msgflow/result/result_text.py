@@ -6,19 +6,19 @@ from dataclasses import replace
 from html import escape
 from typing import TYPE_CHECKING
 
-from msgflow.cli.show.layout import MOST_ROWS, lay_out, screen_width
-from msgflow.cli.show.screen import screen_lines
-from msgflow.query.cells import cells
+from msgflow.result.cells import cells
+from msgflow.result.layout import MOST_ROWS, lay_out, screen_width
+from msgflow.result.screen import screen_lines
 from msgflow.text.values import printable
 from msgflow.text.wrapping import wrap
 
 if TYPE_CHECKING:
-    from msgflow.query.result import QueryResult
+    from msgflow.result.rows import Rows
 
 _STYLE = "text-align: {}; white-space: pre-wrap"
 
 
-def result_text(result: QueryResult) -> str:
+def result_text(result: Rows) -> str:
     """Return the text of a terminal: runs, the first rows as a table that fits, notes."""
     width = screen_width()
     shown = lay_out(result, width, remedy="to_arrow() has all")
@@ -39,7 +39,7 @@ def _labelled(label: str, text: str, width: int) -> list[str]:
     return [f"{label}{first}", *(" " * len(label) + line for line in more)]
 
 
-def result_html(result: QueryResult) -> str:
+def result_html(result: Rows) -> str:
     """Return the first rows as an HTML table; names from a trace are always text in it."""
     names, columns, right = cells(_first(result))
     styles = [_STYLE.format("right" if is_right else "left") for is_right in right]
@@ -64,11 +64,11 @@ def result_html(result: QueryResult) -> str:
     return "".join(parts)
 
 
-def _first(result: QueryResult) -> QueryResult:
+def _first(result: Rows) -> Rows:
     return replace(result, table=result.table.slice(0, MOST_ROWS))
 
 
-def _notes(result: QueryResult) -> list[str]:
+def _notes(result: Rows) -> list[str]:
     count = len(result)
     if not count:
         return [result.when_empty, *result.notes]

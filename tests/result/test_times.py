@@ -8,7 +8,7 @@ import pyarrow as pa
 import pytest
 
 from msgflow.errors import UsageError
-from msgflow.query.result import QueryResult
+from msgflow.result.query_result import QueryResult
 from msgflow.run.choice import Run
 from msgflow.sql.header import parse
 

@@ -10,10 +10,10 @@ from msgflow.text.values import column_title, format_cell
 if TYPE_CHECKING:
     import pyarrow as pa
 
-    from msgflow.query.result import QueryResult
+    from msgflow.result.rows import Rows
 
 
-def cells(result: QueryResult) -> tuple[list[str], list[list[str]], list[bool]]:
+def cells(result: Rows) -> tuple[list[str], list[list[str]], list[bool]]:
     """Return the titles, the cells of each column, and whether each column has numbers."""
     import pyarrow.types
 

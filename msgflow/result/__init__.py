@@ -1,0 +1,1 @@
+"""Results of queries: rows, how people read them on a terminal, how they print themselves."""
