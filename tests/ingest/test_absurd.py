@@ -12,7 +12,8 @@ from ingested import rows
 from mutations import packet_begins, streams
 from thorough import few
 
-from msgflow import open_db, sim
+import msgflow_sim as sim
+from msgflow import open_db
 from msgflow.errors import TraceError
 from msgflow.ingest import ingest
 

@@ -22,7 +22,7 @@ def thorough(*values: Any, **options: Any) -> Any:
     return pytest.param(*values, marks=pytest.mark.thorough, **options)
 
 
-# Whether thorough tests are left out; told by tests/conftest.py.
+# Whether thorough tests are left out; told by conftest.py.
 is_quick = False
 
 
