@@ -604,7 +604,7 @@ class Database:
         skip_first: float | None = None,
         internal: bool = False,
     ) -> Graph:
-        """Return the graph of nodes, topics, services and actions, for DOT, Mermaid, SVG or JSON.
+        """Return the graph of nodes, topics, services and actions, for DOT, Mermaid or JSON.
 
         Args:
             run, start, end, skip_first: what to read, see `msgflow.Slice`; one run.
@@ -1067,8 +1067,7 @@ class Database:
         it is a flow that reached the end of its path.
 
         Args:
-            target: a file (OTLP/JSON, a request per line), which is replaced; or the address of a
-                receiver, 'http://HOST:4318', that takes OTLP/HTTP.
+            target: a file (OTLP/JSON, a request per line), which is replaced.
             run, start, end, skip_first: what to read, see `msgflow.Slice`; one run.
             from_: topics or nodes where flows start: globs, with commas between.
             to: topics or nodes where flows end.
@@ -1079,9 +1078,8 @@ class Database:
             paths: that file.
 
         Raises:
-            UsageError: not exactly one run, a name or time that does not exist, a file that cannot
-                be written, a receiver that does not take the traces, or the package
-                opentelemetry-proto is not installed, which a receiver needs.
+            UsageError: not exactly one run, a name or time that does not exist, or a file that
+                cannot be written.
             DatabaseError: the file cannot be opened.
         """
         from msgflow.export.otlp import write_otlp
@@ -1096,12 +1094,7 @@ class Database:
             choice |= self._ask(lambda: self._words_of_path(path, Path(paths), part))
         if slowest is not None:
             choice["slowest"] = slowest
-        is_address = isinstance(target, str) and "://" in target
-        return self._ask(
-            lambda: write_otlp(
-                connection, str(target) if is_address else Path(target), part, choice or None
-            )
-        )
+        return self._ask(lambda: write_otlp(connection, Path(target), part, choice or None))
 
     def export_csv(
         self,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import traceback
 
 import typer
@@ -12,8 +13,16 @@ from msgflow.cli.output import discard_stdout, print_error
 from msgflow.errors import ExitCode, MsgflowError
 from msgflow.version import __version__
 
-# Results go to `-o FILE` everywhere. An ingest has none: it writes to the database.
-_OUTPUT = ("-o", "--output")
+# What to do in place of an option or a value that a command does not have.
+_INSTEAD = {
+    # Results go to `-o FILE` everywhere. An ingest has none: it writes to the database.
+    ("msgflow ingest", "-o"): "--db FILE names the database",
+    ("msgflow ingest", "--output"): "--db FILE names the database",
+    ("msgflow export otlp", "--endpoint"): (
+        "write a file with -o: Jaeger opens it, and a collector sends it on (docs/export.md)"
+    ),
+    ("msgflow graph", "svg"): "msgflow graph | dot -Tsvg; or msgflow ui, page Graph",
+}
 _CANNOT_WRITE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)
 # What Python says of it, in a RuntimeError.
 _NO_THREAD = "can't start new thread"
@@ -67,9 +76,10 @@ def _usage(error: typer.TyperException) -> tuple[str, str | None]:
     hint = None if context is None else f"{context.command_path} --help"
     if suggestion:
         hint = f"did you mean {suggestion}"
-    is_output = getattr(error, "option_name", None) in _OUTPUT
-    if is_output and context is not None and context.command_path.endswith("msgflow ingest"):
-        hint = "--db FILE names the database"
+    words = re.findall(r"[\w-]+", message)
+    for (command, word), instead in _INSTEAD.items():
+        if word in words and context is not None and context.command_path.endswith(command):
+            hint = instead
     return message[:1].lower() + message[1:].rstrip("."), hint
 
 

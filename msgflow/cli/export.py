@@ -197,18 +197,7 @@ def mcap(
 @app.command("otlp")
 @with_slice()
 def otlp(
-    output: Annotated[
-        Path | None, output_option("FILE.json", show_default="msgflow-traces.json")
-    ] = None,
-    endpoint: Annotated[
-        str | None,
-        typer.Option(
-            "--endpoint",
-            metavar="URL",
-            help="Send the traces there instead: a receiver of OTLP/HTTP, http://HOST:4318",
-            rich_help_panel=OUTPUT,
-        ),
-    ] = None,
+    output: Annotated[Path, output_option("FILE.json")] = Path("msgflow-traces.json"),
     from_: Annotated[
         list[str] | None,
         _place_option("--from", "Flows that start at this topic or node"),
@@ -256,21 +245,18 @@ def otlp(
     requests and responses are spans, and further causes are links. If flows are
     chosen, a trace is a flow that reached the end of its path.
 
-    --endpoint needs the package opentelemetry-proto: pip install
-    opentelemetry-proto, or in a checkout '.\\[otlp]'.
+    The file is OTLP/JSON, a request per line: Jaeger opens it, and a collector sends
+    it to others, see docs/export.md.
     """
     from msgflow.cli.output import print_runs, print_status
     from msgflow.database import Database
     from msgflow.text.values import count
 
-    if output is not None and endpoint is not None:
-        raise UsageError("--endpoint and --output exclude each other", "give one of them")
-    target = endpoint or output or Path("msgflow-traces.json")
     places = {"from_": from_, "to": to, "via": via, "without": without}
     given: dict[str, Any] = {name: ",".join(names) for name, names in places.items() if names}
     with Database(database, memory_limit=memory_limit) as opened:
         traces = opened.export_otlp(
-            target,
+            output,
             **asdict(part),
             **given,
             slowest=slowest,
@@ -278,13 +264,10 @@ def otlp(
             paths=paths,
         )
     print_runs([traces.run])
-    done = "written" if endpoint is None else "sent"
     print_status(
         f"{count(traces.traces, 'trace')}, {count(traces.spans, 'span')},"
-        f" {count(traces.links, 'link')} {done} to {target}"
+        f" {count(traces.links, 'link')} written to {output}"
     )
-    if traces.rejected:
-        print_status(f"the receiver rejected {count(traces.rejected, 'span')}")
 
 
 @app.command("series")

@@ -1,4 +1,4 @@
-"""`msgflow graph`: the graph of nodes and topics, as a picture or for other programs."""
+"""`msgflow graph`: the graph of nodes and topics, for programs that draw it."""
 
 from __future__ import annotations
 
@@ -23,9 +23,7 @@ def command(
     internal: InternalOption = False,
     form: Annotated[
         GraphFormat | None,
-        format_option(
-            "A graph language, or a picture (svg)", show_default="by the suffix of FILE, else dot"
-        ),
+        format_option("A graph language, or JSON", show_default="by the suffix of FILE, else dot"),
     ] = None,
     output: OutputOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from msgflow.export.formats import by_suffix
 from msgflow.export.graph_vertices import GraphVertices
@@ -27,7 +27,6 @@ class GraphFormat(StrEnum):
 
     DOT = "dot"
     MERMAID = "mermaid"
-    SVG = "svg"
     JSON = "json"
 
 
@@ -36,9 +35,9 @@ _SUFFIXES = {
     ".gv": GraphFormat.DOT,
     ".mmd": GraphFormat.MERMAID,
     ".mermaid": GraphFormat.MERMAID,
-    ".svg": GraphFormat.SVG,
     ".json": GraphFormat.JSON,
 }
+_PICTURE = "; for a picture: msgflow graph | dot -Tsvg, or msgflow ui, page Graph"
 
 
 def graph_format(path: Path | None) -> GraphFormat:
@@ -47,7 +46,7 @@ def graph_format(path: Path | None) -> GraphFormat:
     Raises:
         UsageError: no format has this suffix.
     """
-    return GraphFormat.DOT if path is None else by_suffix(path, _SUFFIXES)
+    return GraphFormat.DOT if path is None else by_suffix(path, _SUFFIXES, _PICTURE)
 
 
 @dataclass(frozen=True, repr=False)
@@ -80,18 +79,11 @@ class Graph(GraphVertices):
 
         return mermaid(self)
 
-    def to_svg(self) -> str:
-        """Return it as a picture."""
-        from msgflow.export.graph_svg import svg
-
-        return svg(self)
-
     def to(self, form: GraphFormat) -> str:
         """Return it in a format."""
         write = {
             GraphFormat.DOT: self.to_dot,
             GraphFormat.MERMAID: self.to_mermaid,
-            GraphFormat.SVG: self.to_svg,
             GraphFormat.JSON: self.to_json,
         }
         return write[form]()
@@ -107,8 +99,9 @@ class Graph(GraphVertices):
             f"{kinds.count('action')} actions"
         )
 
-    def _repr_html_(self) -> str:
-        return self.to_svg()
+    def _repr_mimebundle_(self, **_: Any) -> dict[str, str]:
+        # Notebooks draw Mermaid.
+        return {"text/plain": repr(self), "text/vnd.mermaid": self.to_mermaid()}
 
 
 def read_graph(

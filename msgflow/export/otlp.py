@@ -1,12 +1,11 @@
-"""Flows as traces of OpenTelemetry: a file of OTLP/JSON, or OTLP/HTTP to a receiver."""
+"""Flows as traces of OpenTelemetry: a file of OTLP/JSON, a request per line."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from msgflow.export.otlp_batch import BATCH_AS_JSON, BATCH_AS_MESSAGE
-from msgflow.export.otlp_receiver import Receiver
+from msgflow.export.otlp_batch import BATCH_AS_JSON
 from msgflow.files.atomic import replacing
 from msgflow.query.names import require_places
 from msgflow.sql.statement import internal_sql
@@ -32,26 +31,24 @@ FROM temp.otlp_span
 
 @dataclass(frozen=True)
 class ExportedTraces:
-    """Traces that were written or sent.
+    """Traces that were written.
 
     Attributes:
         run: what they are of.
         traces: number of traces.
         spans: number of spans.
         links: number of links from a span to a further cause.
-        rejected: spans that the receiver said it did not keep.
     """
 
     run: Run
     traces: int
     spans: int
     links: int
-    rejected: int = 0
 
 
 def write_otlp(
     connection: duckdb.DuckDBPyConnection,
-    target: Path | str,
+    target: Path,
     part: Slice,
     choice: Mapping[str, Value] | None = None,
 ) -> ExportedTraces:
@@ -59,32 +56,26 @@ def write_otlp(
 
     Args:
         connection: to a database with the public views.
-        target: a file, which is replaced; or the address of a receiver, a text.
+        target: a file, which is replaced.
         part: one run, and the times to write: everything that begins there, or flows that do.
         choice: which flows, as parameters of `internal.otlp_flow`; everything when None.
 
     Raises:
-        UsageError: not exactly one run, a time that cannot be read, a file that cannot be written,
-            a receiver that does not take the traces, or the package opentelemetry-proto is not
-            installed.
+        UsageError: not exactly one run, a time that cannot be read, or a file that cannot be
+            written.
     """
     run = part.one_run(connection, "traces of OpenTelemetry")
-    receiver = Receiver(target) if isinstance(target, str) else None
     try:
         batches, traces, spans, links = _keep_spans(connection, run, part, choice)
-        rejected = 0
-        if receiver is not None:
+        values = {"run": run.name, "version": __version__}
+        with replacing(target) as temporary, temporary.open("w", encoding="utf-8") as file:
             for batch in range(batches):
-                rows = _read(connection, BATCH_AS_MESSAGE, run, batch)
-                rejected += receiver.send(rows.to_arrow_table().to_pylist())
-        elif not isinstance(target, str):
-            with replacing(target) as temporary, temporary.open("w", encoding="utf-8") as file:
-                for batch in range(batches):
-                    ((text,),) = _read(connection, BATCH_AS_JSON, run, batch).fetchall()
-                    file.write(f"{text}\n")
+                rows = connection.sql(BATCH_AS_JSON, params={**values, "batch": batch})
+                ((text,),) = rows.fetchall()
+                file.write(f"{text}\n")
     finally:
         connection.execute("DROP TABLE IF EXISTS temp.otlp_span")
-    return ExportedTraces(run, traces, spans, links, rejected)
+    return ExportedTraces(run, traces, spans, links)
 
 
 def _keep_spans(
@@ -101,10 +92,3 @@ def _keep_spans(
     internal_sql().keep(connection, "otlp_span", values)
     (counts,) = connection.sql(_COUNTS).fetchall()
     return counts
-
-
-def _read(
-    connection: duckdb.DuckDBPyConnection, statement: str, run: Run, batch: int
-) -> duckdb.DuckDBPyRelation:
-    values = {"run": run.name, "batch": batch, "version": __version__}
-    return connection.sql(statement, params=values)

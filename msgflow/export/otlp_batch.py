@@ -1,4 +1,4 @@
-"""SQL that makes requests of OTLP out of batches of `internal.otlp_span`, kept as a table."""
+"""SQL that makes a request of OTLP/JSON out of a batch of `internal.otlp_span`, kept as a table."""
 
 from __future__ import annotations
 
@@ -46,18 +46,20 @@ WITH span AS (
     )
 )
 """
-_KNOWN = "list_filter({}, lambda each: each.text IS NOT NULL OR each.number IS NOT NULL)"
 # A value is text or a number. 64-bit integers are text in JSON, ids are hexadecimal.
-_JSON_ATTRIBUTES = """list_transform({}, lambda each: json_object(
-    'key', each.key,
-    'value', CASE WHEN each.number IS NULL THEN json_object('stringValue', each.text)
-        ELSE json_object('intValue', each.number::VARCHAR) END
-))"""
+_ATTRIBUTES = """list_transform(
+    list_filter({}, lambda each: each.text IS NOT NULL OR each.number IS NOT NULL),
+    lambda each: json_object(
+        'key', each.key,
+        'value', CASE WHEN each.number IS NULL THEN json_object('stringValue', each.text)
+            ELSE json_object('intValue', each.number::VARCHAR) END
+    )
+)"""
 # One row with one text.
 BATCH_AS_JSON = f"""{_SPANS_OF_BATCH},
 resource_span AS (
     SELECT json_object(
-        'resource', json_object('attributes', {_JSON_ATTRIBUTES.format(_KNOWN.format("resource"))}),
+        'resource', json_object('attributes', {_ATTRIBUTES.format("resource")}),
         'scopeSpans', [json_object(
             'scope', json_object('name', 'msgflow', 'version', $version),
             'spans', list(json_object(
@@ -68,7 +70,7 @@ resource_span AS (
                 'kind', span_kind,
                 'startTimeUnixNano', from_ns::VARCHAR,
                 'endTimeUnixNano', to_ns::VARCHAR,
-                'attributes', {_JSON_ATTRIBUTES.format(_KNOWN.format("attributes"))},
+                'attributes', {_ATTRIBUTES.format("attributes")},
                 'links', list_transform(links, lambda each: json_object(
                     'traceId', each[1],
                     'spanId', each[2],
@@ -85,37 +87,4 @@ resource_span AS (
     GROUP BY resource
 )
 SELECT json_object('resourceSpans', list(json ORDER BY json))::VARCHAR FROM resource_span
-"""
-_MESSAGE_ATTRIBUTES = """list_transform({}, lambda each: {{
-    'key': each.key, 'value': {{'string_value': each.text, 'int_value': each.number}}
-}})"""
-# A row is a `ResourceSpans` of the package opentelemetry-proto.
-BATCH_AS_MESSAGE = f"""{_SPANS_OF_BATCH}
-SELECT
-    {{'attributes': {_MESSAGE_ATTRIBUTES.format(_KNOWN.format("resource"))}}} AS resource,
-    [{{
-        'scope': {{'name': 'msgflow', 'version': $version}},
-        'spans': list({{
-            'trace_id': unhex(trace_id),
-            'span_id': unhex(span_id),
-            'parent_span_id': unhex(coalesce(parent_span_id, '')),
-            'name': name,
-            'kind': span_kind,
-            'start_time_unix_nano': from_ns,
-            'end_time_unix_nano': to_ns,
-            'attributes': {_MESSAGE_ATTRIBUTES.format(_KNOWN.format("attributes"))},
-            'links': list_transform(links, lambda each: {{
-                'trace_id': unhex(each[1]),
-                'span_id': unhex(each[2]),
-                'attributes': [{{'key': 'msgflow.link', 'value': {{'string_value': each[3]}}}}]
-            }}),
-            'status': {{
-                'code': CASE WHEN not_delivered IS NULL THEN 0 ELSE 2 END,
-                'message': not_delivered
-            }}
-        }} ORDER BY from_ns, kind, id)
-    }}] AS scope_spans
-FROM span
-GROUP BY resource
-ORDER BY resource
 """

@@ -32,10 +32,11 @@ def test_several_places_may_be_given(msgflow: Msgflow, demo: Path) -> None:
     assert result.stderr != one.stderr
 
 
-def test_traces_go_to_one_place(msgflow: Msgflow, demo: Path) -> None:
-    result = msgflow("export", "otlp", "-o", "a.json", "--endpoint", "http://x", "--db", demo)
+def test_who_would_send_traces_learns_what_sends_a_file(msgflow: Msgflow, demo: Path) -> None:
+    result = msgflow("export", "otlp", "--endpoint", "http://localhost:4318", "--db", demo)
     assert result.exit_code == 2
-    assert "--endpoint and --output exclude each other" in result.stderr
+    assert "no such option: --endpoint" in result.stderr
+    assert "a collector sends it on (docs/export.md)" in result.stderr
 
 
 def test_values_and_warnings_are_counted(msgflow: Msgflow, demo: Path) -> None:

@@ -20,7 +20,7 @@ def test_the_suffix_or_the_option_chooses_the_format(
     assert (result.exit_code, result.stdout) == (0, f"{graph.to_dot()}\n")
     assert result.stderr.startswith("run: noon (2)\n")
     for name, text in (
-        ("a.svg", graph.to_svg()),
+        ("a.json", graph.to_json()),
         ("a.mmd", graph.to_mermaid()),
         ("a.gv", graph.to_dot()),
     ):
@@ -36,9 +36,11 @@ def test_mistakes_have_code_2(msgflow: Msgflow, small_database: Path, tmp_path: 
         (("-o", tmp_path / "a.png"), "a.png"),
         (("--run", "all"), "one run"),
         (("--format", "png"), "--format"),
+        (("--format", "svg"), "dot -Tsvg"),
+        (("-o", tmp_path / "a.svg"), "dot -Tsvg"),
     ):
         result = msgflow("graph", *options, "--db", small_database)
         assert result.exit_code == 2
         assert message in result.stderr
         assert "\n\nhint: " in result.stderr
-    assert not (tmp_path / "a.png").exists()
+    assert not list(tmp_path.glob("a.*"))

@@ -86,7 +86,7 @@ def test_from_the_trace_to_every_kind_of_file(tmp_path: Path) -> None:
             ["flow", "/camera/image"],
             ["check"],
             ["query", "e2e-latency", "-o", "latency.csv"],
-            ["graph", "-o", "graph.svg"],
+            ["graph", "-o", "graph.mmd"],
             ["flow", "/camera/image", "-o", "flow.html"],
             ["report", "-o", "report.html"],
             ["links"],

@@ -50,7 +50,7 @@ def test_the_notebook_shows_tables_a_tree_and_plots() -> None:
     shown = ["".join(data.get("text/html", "")) for data in outputs]
     assert sum("<table>" in text for text in shown) == 2
     assert any("publish to take" in text for text in shown)
-    assert any("<svg" in text for text in shown)
+    assert sum("text/vnd.mermaid" in data for data in outputs) == 1
     plots = [base64.b64decode(data["image/png"]) for data in outputs if "image/png" in data]
     assert len(plots) == 3
     assert all(plot.startswith(b"\x89PNG") and len(plot) > 5_000 for plot in plots)

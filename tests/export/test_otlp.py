@@ -4,12 +4,8 @@ from __future__ import annotations
 
 import base64
 import json
-import socket
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
-from threading import Thread
 from typing import Any
 
 import duckdb
@@ -17,7 +13,6 @@ import pytest
 from golden import fill_case
 
 from msgflow import Database, UsageError
-from msgflow.export import otlp_receiver
 
 trace_service_pb2 = pytest.importorskip("opentelemetry.proto.collector.trace.v1.trace_service_pb2")
 json_format = pytest.importorskip("google.protobuf.json_format")
@@ -70,45 +65,6 @@ def spans_of(requests: list[Any]) -> list[dict[str, Any]]:
 
 def values(attributes: Any) -> dict[str, Any]:
     return {each.key: getattr(each.value, each.value.WhichOneof("value")) for each in attributes}
-
-
-@contextmanager
-def receiver(*answers: tuple[int, bytes]) -> Iterator[tuple[str, list[Any], list[Any]]]:
-    """Run a receiver; yield its address, the requests that it got, and their headers.
-
-    Args:
-        answers: status and body of the first answers; then it takes everything.
-    """
-    requests: list[Any] = []
-    headers: list[Any] = []
-    ahead = list(answers)
-
-    class Handler(BaseHTTPRequestHandler):
-        def do_POST(self) -> None:
-            body = self.rfile.read(int(self.headers["Content-Length"]))
-            status, answer = ahead.pop(0) if ahead else (200, b"")
-            if self.path != "/v1/traces":
-                status = 404
-            if status == 200:
-                requests.append(trace_service_pb2.ExportTraceServiceRequest.FromString(body))
-                headers.append(self.headers)
-            self.send_response(status)
-            self.send_header("Content-Length", str(len(answer)))
-            self.end_headers()
-            self.wfile.write(answer)
-
-        def log_message(self, *_: Any) -> None:
-            pass
-
-    server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
-    thread = Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
-    thread.start()
-    try:
-        yield f"http://127.0.0.1:{server.server_port}", requests, headers
-    finally:
-        server.shutdown()
-        thread.join()
-        server.server_close()
 
 
 @pytest.fixture
@@ -207,23 +163,6 @@ def test_spans_say_what_they_are_in_the_words_of_opentelemetry(
     assert len(takes) > 5
 
 
-def test_what_is_sent_is_what_a_file_has(
-    database: Database, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("OTEL_EXPORTER_OTLP_HEADERS", "key=a%20secret,tenant=robots")
-    database.export_otlp(tmp_path / "traces.json")
-    with receiver() as (address, requests, headers):
-        sent = database.export_otlp(address)
-
-    def sorted_spans(requests: list[Any]) -> list[dict[str, Any]]:
-        return sorted(spans_of(requests), key=lambda span: str(span["id"]))
-
-    assert sorted_spans(requests) == sorted_spans(read_file(tmp_path / "traces.json"))
-    assert sent.spans == len(spans_of(requests))
-    assert headers[0]["Content-Type"] == "application/x-protobuf"
-    assert (headers[0]["key"], headers[0]["tenant"]) == ("a secret", "robots")
-
-
 def test_further_causes_are_links(simulated: Callable[..., Path], tmp_path: Path) -> None:
     with Database(simulated("partial_sync", 0.1)) as database:
         written = database.export_otlp(tmp_path / "traces.json")
@@ -300,75 +239,6 @@ def test_a_message_that_was_lost_is_an_error(fresh_database: Path, tmp_path: Pat
     errors = {span["msgflow.publication_id"]: span for span in spans if span["status"][0] == 2}
     assert set(errors) == {publication for (publication,) in expected} != set()
     assert any(": overwritten" in span["status"][1] for span in errors.values())
-
-
-def test_a_receiver_may_reject_spans(database: Database) -> None:
-    answer = trace_service_pb2.ExportTraceServiceResponse()
-    answer.partial_success.rejected_spans = 7
-    with receiver((200, answer.SerializeToString())) as (address, _, _):
-        assert database.export_otlp(address).rejected == 7
-
-
-def test_what_fails_only_now_is_sent_again(
-    database: Database, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(otlp_receiver.time, "sleep", lambda _: None)
-    with receiver((503, b""), (429, b"")) as (address, requests, _):
-        sent = database.export_otlp(address)
-        assert len(spans_of(requests)) == sent.spans
-    always = [(503, b"")] * 5
-    with (
-        receiver(*always) as (address, _, _),
-        pytest.raises(UsageError, match="does not take traces: 503"),
-    ):
-        database.export_otlp(address)
-
-
-@pytest.mark.parametrize(
-    ("path", "message"),
-    [("/elsewhere", "does not take traces: 404"), (":1", "cannot be reached")],
-)
-def test_a_receiver_that_is_none_is_an_error(database: Database, path: str, message: str) -> None:
-    with receiver() as (address, _, _):
-        wrong = address + path if path.startswith("/") else f"http://127.0.0.1{path}"
-        with pytest.raises(UsageError, match=message):
-            database.export_otlp(wrong)
-
-
-@pytest.mark.parametrize(
-    "address", ["ftp://robot", "http://", "grpc://robot:4317", "http://[::1", "http://robot:abc"]
-)
-def test_an_address_is_that_of_http(database: Database, address: str) -> None:
-    with pytest.raises(UsageError, match="no address of a receiver"):
-        database.export_otlp(address)
-
-
-@pytest.mark.parametrize(
-    "answer",
-    [
-        b"\x00\x00\x12\x04\x00\x00\x00\x00\x00\x00\n",
-        b"HTTP/1.1 200 OK\r\nContent-Length: 8\r\n\r\n<html>\n\n",
-        b"HTTP/1.1 200 OK\r\nContent-Length: 50\r\n\r\nabc",
-    ],
-    ids=["gRPC", "a page", "broken off"],
-)
-def test_what_answers_may_be_no_receiver(database: Database, answer: bytes) -> None:
-    with socket.create_server(("127.0.0.1", 0)) as server:
-
-        def serve() -> None:
-            connection, _ = server.accept()
-            with connection:
-                connection.recv(1 << 24)
-                connection.sendall(answer)
-                connection.shutdown(socket.SHUT_WR)
-                while connection.recv(1 << 24):
-                    pass
-
-        thread = Thread(target=serve)
-        thread.start()
-        with pytest.raises(UsageError, match="no receiver of OTLP/HTTP"):
-            database.export_otlp(f"http://127.0.0.1:{server.getsockname()[1]}")
-        thread.join()
 
 
 def test_nothing_is_left_in_the_connection(database: Database, tmp_path: Path) -> None:

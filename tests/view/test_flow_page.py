@@ -78,18 +78,12 @@ def test_the_limit_is_of_the_direction(
 
 def test_hostile_names_are_inert(systems: Path, tmp_path: Path, page: Page) -> None:
     path = renamed(systems, tmp_path / "hostile.duckdb", HOSTILE)
-    target, picture = tmp_path / "flow.html", tmp_path / "graph.svg"
+    target = tmp_path / "flow.html"
     with open_db(path) as opened:
         ((number,),) = opened.connection.execute(
             "SELECT min(publication_id) FROM publication WHERE run_id = 3"
         ).fetchall()
         opened.flow_page(opened.flow(publication_id=number), target)
-        picture.write_text(opened.graph(run=3).to_svg(), encoding="utf-8")
     page.open(target.as_uri())
     assert page.flow()
     assert page.page.evaluate("typeof hacked") == "undefined"
-    page.page.goto(picture.as_uri())
-    assert page.page.evaluate("typeof hacked") == "undefined"
-    assert page.page.evaluate("document.documentElement.tagName") == "svg"
-    assert page.page.locator("text").count() > 20
-    assert page.page.locator("script, image, a, foreignObject").count() == 0

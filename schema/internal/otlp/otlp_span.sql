@@ -12,7 +12,7 @@
 --     window
 -- param: identity VARCHAR = ''  What tells the run from others; ids are computed from it
 -- param: at_once BIGINT = 2000  Most spans of a request
--- column: batch BIGINT  Number of the request to the receiver that has the span
+-- column: batch BIGINT  Number of the request that has the span, a line of the file
 -- column: trace_id VARCHAR  Identity of the trace, 32 hexadecimal digits
 -- column: span_id VARCHAR  Identity of the span, 16 hexadecimal digits
 -- column: parent_span_id VARCHAR  Its parent; empty: none
