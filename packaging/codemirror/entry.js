@@ -1,9 +1,22 @@
 // What the SQL page takes from CodeMirror; `npm install && npm run build` makes one file of it.
 
-export { autocompletion, closeBrackets, closeBracketsKeymap, completionKeymap, ifNotIn } from "@codemirror/autocomplete";
+export {
+  autocompletion,
+  closeBrackets,
+  closeBracketsKeymap,
+  completionKeymap,
+  ifNotIn,
+} from "@codemirror/autocomplete";
 export { defaultKeymap, history, historyKeymap } from "@codemirror/commands";
-export { SQLDialect, keywordCompletionSource, schemaCompletionSource } from "@codemirror/lang-sql";
-export { HighlightStyle, bracketMatching, syntaxHighlighting } from "@codemirror/language";
+export { keywordCompletionSource, schemaCompletionSource, SQLDialect } from "@codemirror/lang-sql";
+export { bracketMatching, HighlightStyle, syntaxHighlighting } from "@codemirror/language";
 export { EditorState, StateEffect, StateField } from "@codemirror/state";
-export { Decoration, EditorView, drawSelection, keymap, lineNumbers, placeholder } from "@codemirror/view";
+export {
+  Decoration,
+  drawSelection,
+  EditorView,
+  keymap,
+  lineNumbers,
+  placeholder,
+} from "@codemirror/view";
 export { tags } from "@lezer/highlight";

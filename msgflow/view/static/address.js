@@ -24,7 +24,9 @@ const KEPT = ["run", "start", "end", "internal"];
 // The address of another page: of what is shown now, only that remains which holds on all pages.
 export function pageAddress(page, values = {}) {
   const known = current();
-  const cleared = Object.fromEntries(Object.keys(known).filter((name) => !KEPT.includes(name)).map((name) => [name, null]));
+  const cleared = Object.fromEntries(
+    Object.keys(known).filter((name) => !KEPT.includes(name)).map((name) => [name, null]),
+  );
   return address({ ...cleared, page, ...values });
 }
 

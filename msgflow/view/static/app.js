@@ -1,6 +1,6 @@
 // The application: it chooses where data come from, and shows the page of the address.
 
-import { h, clear, color } from "./dom.js";
+import { clear, color, h } from "./dom.js";
 import { address, current, go, onChange, pageAddress } from "./address.js";
 import { embedded } from "./report_data.js";
 import { decode, records } from "./table_decoding.js";
@@ -75,7 +75,10 @@ class ServedSource {
   async get(name, params = {}, signal = undefined) {
     let answer;
     try {
-      answer = await fetch(placeOf(name, params), { signal, headers: { "X-Generation": this.generation } });
+      answer = await fetch(placeOf(name, params), {
+        signal,
+        headers: { "X-Generation": this.generation },
+      });
     } catch (error) {
       if (error.name === "AbortError") throw error;
       throw new SourceError("the server does not answer", "is msgflow ui still running?", "gone");
@@ -113,13 +116,23 @@ class App {
   async start() {
     const runs = await this.source.fetch("run");
     this.runs = records(runs);
-    this.pages = Object.fromEntries(Object.entries(PAGES).filter(([page]) => (this.source.pages ? this.source.pages.includes(page) : !OTHER_PAGES.includes(page) && (this.source.isServed || !SERVED_PAGES.includes(page)) && !this.source.absent?.includes(page))));
+    this.pages = Object.fromEntries(
+      Object.entries(PAGES).filter((
+        [page],
+      ) => (this.source.pages
+        ? this.source.pages.includes(page)
+        : !OTHER_PAGES.includes(page) && (this.source.isServed || !SERVED_PAGES.includes(page)) &&
+          !this.source.absent?.includes(page))
+      ),
+    );
     if (!location.hash && this.source.address) history.replaceState(null, "", this.source.address);
     this.main = document.querySelector("main");
     this.nav = document.querySelector("nav");
     this.header();
     onChange(() => this.show());
-    if ("follows" in document.documentElement.dataset) this.follower = new Follower(this, document.querySelector(".bar"));
+    if ("follows" in document.documentElement.dataset) {
+      this.follower = new Follower(this, document.querySelector(".bar"));
+    }
     await this.show();
   }
 
@@ -170,12 +183,43 @@ class App {
   header() {
     this.runName = h("span", { className: "run-name" }, this.run?.name ?? "no run");
     const runs = this.runs.length > 1
-      ? h("select", { "aria-label": "run", on: { change: (event) => { location.hash = pageAddress(current().page, { run: event.target.value, start: null, end: null }); } } },
-        this.runs.map((run) => h("option", { value: String(run.run_id), selected: run === this.run }, run.name)))
+      ? h(
+        "select",
+        {
+          "aria-label": "run",
+          on: {
+            change: (event) => {
+              location.hash = pageAddress(current().page, {
+                run: event.target.value,
+                start: null,
+                end: null,
+              });
+            },
+          },
+        },
+        this.runs.map((run) =>
+          h("option", { value: String(run.run_id), selected: run === this.run }, run.name)
+        ),
+      )
       : this.runName;
-    this.tabs = Object.entries(this.pages).map(([page, [title]]) => ({ page, link: h("a", {}, title) }));
-    const theme = h("button", { type: "button", className: "theme", title: "light or dark", "aria-label": "light or dark", on: { click: () => this.theme() } }, "◐");
-    clear(this.nav, h("span", { className: "brand" }, "msgflow"), runs, h("span", { className: "tabs" }, this.tabs.map(({ link }) => link)), theme);
+    this.tabs = Object.entries(this.pages).map(([page, [title]]) => ({
+      page,
+      link: h("a", {}, title),
+    }));
+    const theme = h("button", {
+      type: "button",
+      className: "theme",
+      title: "light or dark",
+      "aria-label": "light or dark",
+      on: { click: () => this.theme() },
+    }, "◐");
+    clear(
+      this.nav,
+      h("span", { className: "brand" }, "msgflow"),
+      runs,
+      h("span", { className: "tabs" }, this.tabs.map(({ link }) => link)),
+      theme,
+    );
     if (!this.source.pages) this.bar = new Bar(this, document.querySelector(".bar"));
     const said = document.querySelector(".said");
     if (this.source.notes.length) clear(said, this.source.notes.map((text) => h("p", {}, text)));
@@ -183,7 +227,9 @@ class App {
 
   theme() {
     const root = document.documentElement;
-    const isDark = root.dataset.theme ? root.dataset.theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
+    const isDark = root.dataset.theme
+      ? root.dataset.theme === "dark"
+      : matchMedia("(prefers-color-scheme: dark)").matches;
     root.dataset.theme = isDark ? "light" : "dark";
     this.page?.recolor?.();
   }
@@ -204,7 +250,10 @@ class App {
   async show(isNext = false) {
     const asked = current();
     const [title, Page] = this.pages[asked.page] ?? [];
-    if (!Page) { go({ page: Object.keys(this.pages)[0] }); return; }
+    if (!Page) {
+      go({ page: Object.keys(this.pages)[0] });
+      return;
+    }
     this.linksMoved();
     document.title = `${title} – ${this.run?.name ?? "msgflow"}`;
     if (!isNext) {
@@ -212,19 +261,30 @@ class App {
       clear(this.main, waiting());
     }
     if (!this.run) {
-      const cure = this.follower ? "The first window comes when the nodes have sent something." : "The database holds no run yet: msgflow ingest TRACE";
+      const cure = this.follower
+        ? "The first window comes when the nodes have sent something."
+        : "The database holds no run yet: msgflow ingest TRACE";
       clear(this.main, h("section", {}, h("h2", {}, "No run"), h("p", {}, cure)));
       this.done();
       return;
     }
     if (!this.run.start_text) {
-      clear(this.main, h("section", {}, h("h2", {}, "Empty run"), h("p", {}, `The run ${this.run.name} has no events. msgflow check says why.`)));
+      clear(
+        this.main,
+        h(
+          "section",
+          {},
+          h("h2", {}, "Empty run"),
+          h("p", {}, `The run ${this.run.name} has no events. msgflow check says why.`),
+        ),
+      );
       this.done();
       return;
     }
     // A page has a place of its own: one that was left may still come to its end.
     const root = h("div", { className: isNext ? "next" : "" }, waiting());
-    if (isNext) this.main.append(root); else clear(this.main, root);
+    if (isNext) this.main.append(root);
+    else clear(this.main, root);
     const page = new Page(this, root);
     this.page = page;
     this.open.push(page);
@@ -250,12 +310,16 @@ class App {
 
   // For tests and benchmarks: when the page stands, and how long each drawing took [ms].
   done() {
-    document.documentElement.dataset.ready = String(Number(document.documentElement.dataset.ready ?? 0) + 1);
+    document.documentElement.dataset.ready = String(
+      Number(document.documentElement.dataset.ready ?? 0) + 1,
+    );
   }
 
   drawn(milliseconds) {
     this.steps.push(milliseconds);
-    if (this.steps.length === 1) document.documentElement.dataset.painted = String(performance.now());
+    if (this.steps.length === 1) {
+      document.documentElement.dataset.painted = String(performance.now());
+    }
   }
 }
 
@@ -273,7 +337,16 @@ async function start() {
   const lacking = LACKING.filter(([, has]) => !has()).map(([name]) => name);
   const main = document.querySelector("main");
   if (lacking.length) {
-    clear(main, failed(new Error(`this browser lacks ${lacking.join(", ")}: a newer one is needed (Firefox 113, Chrome 80, Safari 16.4)`)));
+    clear(
+      main,
+      failed(
+        new Error(
+          `this browser lacks ${
+            lacking.join(", ")
+          }: a newer one is needed (Firefox 113, Chrome 80, Safari 16.4)`,
+        ),
+      ),
+    );
     return;
   }
   try {

@@ -1,6 +1,6 @@
 // An area of the timeline: how long its callbacks ran, and what its threads did, in sums.
 
-import { h, clear } from "./dom.js";
+import { clear, h } from "./dom.js";
 import { duration, moment } from "./labels.js";
 import { failed, waiting } from "./notice.js";
 import { summary } from "./summary.js";
@@ -26,16 +26,33 @@ export function inArea(lanes, rows) {
 export async function showArea(place, app, { from, to, nodes, threads }) {
   const head = () => h("h3", {}, `${duration(to - from)} from ${moment(from)}`);
   if (!app.source.isServed) {
-    clear(place, head(), h("p", { className: "soft" }, "A report has no sums of a part of the timeline: msgflow ui has."));
+    clear(
+      place,
+      head(),
+      h(
+        "p",
+        { className: "soft" },
+        "A report has no sums of a part of the timeline: msgflow ui has.",
+      ),
+    );
     return;
   }
   clear(place, head(), waiting("summing up …"));
   const window = { start: Math.round(from), end: Math.round(to) };
-  const parts = [nodes.length && ["callbacks", nodes], threads.length && ["usage", threads]].filter(Boolean);
+  const parts = [nodes.length && ["callbacks", nodes], threads.length && ["usage", threads]].filter(
+    Boolean,
+  );
   try {
-    const tables = await Promise.all(parts.map(([part, of]) => app.fetch("area", { part, of: JSON.stringify(of), ...window })));
-    clear(place, head(), tables.length ? tables.map((table) => h("section", {}, h("h3", {}, table.meta.title), summary(table)))
-      : h("p", {}, "No row of a node or thread lies in it."));
+    const tables = await Promise.all(
+      parts.map(([part, of]) => app.fetch("area", { part, of: JSON.stringify(of), ...window })),
+    );
+    clear(
+      place,
+      head(),
+      tables.length
+        ? tables.map((table) => h("section", {}, h("h3", {}, table.meta.title), summary(table)))
+        : h("p", {}, "No row of a node or thread lies in it."),
+    );
   } catch (error) {
     clear(place, head(), failed(error));
   }

@@ -1,6 +1,6 @@
 // Charts by uPlot in the colours of the page, with labels as people read durations.
 
-import { h, color } from "./dom.js";
+import { color, h } from "./dom.js";
 import { duration } from "./labels.js";
 import { downloads } from "./download.js";
 
@@ -11,31 +11,70 @@ const drawn = new Set();
 // Options: height, xFormat, yFormat, title, onClick(index), xLabel, yLabel, legend (false: none),
 // xAxis (more of what uPlot takes for the axis), xName (of the first column of its CSV).
 export function chart(x, series, options = {}) {
-  const frame = h("div", { className: "chart", role: "img", "aria-label": options.title ?? "chart" });
+  const frame = h("div", {
+    className: "chart",
+    role: "img",
+    "aria-label": options.title ?? "chart",
+  });
   const place = { frame, plot: null };
   const draw = () => {
     place.plot?.destroy();
     frame.replaceChildren();
     const width = Math.max(frame.clientWidth || frame.parentElement?.clientWidth || 600, 240);
     const axis = (format, label, size, more) => ({
-      stroke: color("soft"), grid: { stroke: color("line"), width: 1 }, ticks: { stroke: color("line") },
-      values: (_, splits) => splits.map((value) => format(value)), label, labelSize: label ? 22 : 0, labelFont: "12px system-ui, sans-serif",
-      font: "11px system-ui, sans-serif", size, ...more,
+      stroke: color("soft"),
+      grid: { stroke: color("line"), width: 1 },
+      ticks: { stroke: color("line") },
+      values: (_, splits) => splits.map((value) => format(value)),
+      label,
+      labelSize: label ? 22 : 0,
+      labelFont: "12px system-ui, sans-serif",
+      font: "11px system-ui, sans-serif",
+      size,
+      ...more,
     });
-    place.plot = new globalThis.uPlot({
-      width, height: options.height ?? 240, legend: { show: options.legend ?? series.length > 1, live: false },
-      cursor: { points: { show: Boolean(options.onClick) }, drag: { x: true, y: false } },
-      scales: { x: { time: false }, y: { range: (_, low, high) => [Math.min(0, low ?? 0), (high ?? 1) * 1.05 || 1] } },
-      axes: [axis(options.xFormat ?? String, options.xLabel, 44, options.xAxis), axis(options.yFormat ?? duration, options.yLabel, 74)],
-      series: [{}, ...series.map((one) => ({
-        label: one.label, stroke: color(one.color), width: one.width ?? 1.5, spanGaps: Boolean(one.isJoined),
-        fill: one.fill ? alpha(color(one.color), 0.35) : undefined,
-        points: { show: Boolean(one.points), size: 5, fill: color(one.color), stroke: color(one.color) },
-        paths: one.points ? () => null : one.bars ? globalThis.uPlot.paths.bars({ size: [1, Infinity], align: 1 })
-          : one.stepped ? globalThis.uPlot.paths.stepped({ align: 1 }) : undefined,
-        dash: one.dash,
-      }))],
-    }, [x, ...series.map((one) => one.values)], frame);
+    place.plot = new globalThis.uPlot(
+      {
+        width,
+        height: options.height ?? 240,
+        legend: { show: options.legend ?? series.length > 1, live: false },
+        cursor: { points: { show: Boolean(options.onClick) }, drag: { x: true, y: false } },
+        scales: {
+          x: { time: false },
+          y: { range: (_, low, high) => [Math.min(0, low ?? 0), (high ?? 1) * 1.05 || 1] },
+        },
+        axes: [
+          axis(options.xFormat ?? String, options.xLabel, 44, options.xAxis),
+          axis(options.yFormat ?? duration, options.yLabel, 74),
+        ],
+        series: [
+          {},
+          ...series.map((one) => ({
+            label: one.label,
+            stroke: color(one.color),
+            width: one.width ?? 1.5,
+            spanGaps: Boolean(one.isJoined),
+            fill: one.fill ? alpha(color(one.color), 0.35) : undefined,
+            points: {
+              show: Boolean(one.points),
+              size: 5,
+              fill: color(one.color),
+              stroke: color(one.color),
+            },
+            paths: one.points
+              ? () => null
+              : one.bars
+              ? globalThis.uPlot.paths.bars({ size: [1, Infinity], align: 1 })
+              : one.stepped
+              ? globalThis.uPlot.paths.stepped({ align: 1 })
+              : undefined,
+            dash: one.dash,
+          })),
+        ],
+      },
+      [x, ...series.map((one) => one.values)],
+      frame,
+    );
     if (options.onClick) {
       place.plot.over.addEventListener("click", () => {
         const at = place.plot.cursor.idx;
@@ -47,10 +86,16 @@ export function chart(x, series, options = {}) {
   place.draw = draw;
   drawn.add(place);
   requestAnimationFrame(draw);
-  return h("div", { className: "chart-frame" }, frame, downloads({
-    name: options.title ?? "chart", canvases: () => [...frame.querySelectorAll("canvas")],
-    columns: () => [[options.xName ?? "x", x], ...series.map((one) => [one.label, one.values])],
-  }));
+  return h(
+    "div",
+    { className: "chart-frame" },
+    frame,
+    downloads({
+      name: options.title ?? "chart",
+      canvases: () => [...frame.querySelectorAll("canvas")],
+      columns: () => [[options.xName ?? "x", x], ...series.map((one) => [one.label, one.values])],
+    }),
+  );
 }
 
 function alpha(text, share) {

@@ -1,16 +1,47 @@
 // Two runs: what is longer or shorter, and the distributions of a path one over the other.
 
-import { h, clear } from "./dom.js";
+import { clear, h } from "./dom.js";
 import { current, replace } from "./address.js";
 import { count, duration, percent } from "./labels.js";
-import { dataTable, besides } from "./table.js";
+import { besides, dataTable } from "./table.js";
 import { command, failed, notes, waiting } from "./notice.js";
 import { chart, redrawCharts } from "./chart.js";
 
-const KINDS_OF = { paths: "paths (end-to-end latency)", callbacks: "callbacks (duration)", topics: "topics (from publication to take)" };
+const KINDS_OF = {
+  paths: "paths (end-to-end latency)",
+  callbacks: "callbacks (duration)",
+  topics: "topics (from publication to take)",
+};
 const ONE_OF = { paths: "path", callbacks: "callback", topics: "topic" };
-const MEASURED = ["subject", "statistic", "a_ns", "b_ns", "difference_ns", "change_percent", "separation", "a_count", "b_count", "a_share", "b_share"];
-const COMPARED = ["subject", "statistic", "a_ns", "b_ns", "difference_ns", "change_percent", "low_ns", "high_ns", "verdict", "separation", "a_count", "b_count", "a_share", "b_share"];
+const MEASURED = [
+  "subject",
+  "statistic",
+  "a_ns",
+  "b_ns",
+  "difference_ns",
+  "change_percent",
+  "separation",
+  "a_count",
+  "b_count",
+  "a_share",
+  "b_share",
+];
+const COMPARED = [
+  "subject",
+  "statistic",
+  "a_ns",
+  "b_ns",
+  "difference_ns",
+  "change_percent",
+  "low_ns",
+  "high_ns",
+  "verdict",
+  "separation",
+  "a_count",
+  "b_count",
+  "a_share",
+  "b_share",
+];
 
 export class ComparePage {
   constructor(app, root) {
@@ -23,20 +54,86 @@ export class ComparePage {
     const { app } = this;
     const others = app.runs.filter((run) => run !== app.run);
     if (!others.length) {
-      clear(this.root, h("section", {}, h("h2", {}, "Compare"), h("p", {}, "There is only one run in this database: ingest another one to compare it with.")));
+      clear(
+        this.root,
+        h(
+          "section",
+          {},
+          h("h2", {}, "Compare"),
+          h(
+            "p",
+            {},
+            "There is only one run in this database: ingest another one to compare it with.",
+          ),
+        ),
+      );
       return;
     }
     const asked = current();
-    this.other = others.find((run) => String(run.run_id) === asked.other) ?? others[others.length - 1];
+    this.other = others.find((run) => String(run.run_id) === asked.other) ??
+      others[others.length - 1];
     this.what = asked.what in KINDS_OF ? asked.what : "paths";
-    const choice = h("select", { "aria-label": "run to compare with", on: { change: () => { this.other = others.find((run) => String(run.run_id) === choice.value); this.show(); } } },
-      others.map((run) => h("option", { value: String(run.run_id), selected: run === this.other }, run.name)));
-    const what = h("select", { "aria-label": "what to compare", on: { change: () => { this.what = what.value; this.show(); } } },
-      Object.entries(KINDS_OF).map(([value, text]) => h("option", { value, selected: value === this.what }, text)));
-    const only = h("input", { type: "checkbox", checked: true, on: { change: () => { this.all = !only.checked; this.rows(); } } });
+    const choice = h(
+      "select",
+      {
+        "aria-label": "run to compare with",
+        on: {
+          change: () => {
+            this.other = others.find((run) => String(run.run_id) === choice.value);
+            this.show();
+          },
+        },
+      },
+      others.map((run) =>
+        h("option", { value: String(run.run_id), selected: run === this.other }, run.name)
+      ),
+    );
+    const what = h(
+      "select",
+      {
+        "aria-label": "what to compare",
+        on: {
+          change: () => {
+            this.what = what.value;
+            this.show();
+          },
+        },
+      },
+      Object.entries(KINDS_OF).map(([value, text]) =>
+        h("option", { value, selected: value === this.what }, text)
+      ),
+    );
+    const only = h("input", {
+      type: "checkbox",
+      checked: true,
+      on: {
+        change: () => {
+          this.all = !only.checked;
+          this.rows();
+        },
+      },
+    });
     this.body = h("div");
     this.picture = h("div");
-    clear(this.root, h("section", {}, h("h2", {}, "Compare"), h("div", { className: "tools" }, h("span", {}, "A:"), choice, h("span", {}, `B: ${app.run.name}`), what, h("label", {}, only, "only what differs")), this.body, this.picture));
+    clear(
+      this.root,
+      h(
+        "section",
+        {},
+        h("h2", {}, "Compare"),
+        h(
+          "div",
+          { className: "tools" },
+          h("span", {}, "A:"),
+          choice,
+          h("span", {}, `B: ${app.run.name}`),
+          what,
+          h("label", {}, only, "only what differs"),
+        ),
+        this.body,
+        this.picture,
+      ),
+    );
     await this.show();
   }
 
@@ -65,7 +162,8 @@ export class ComparePage {
 
   rows() {
     const { table } = this;
-    const differs = (row) => ["B is longer", "B is shorter", "only in A", "only in B"].includes(table.verdict[row]);
+    const differs = (row) =>
+      ["B is longer", "B is shorter", "only in A", "only in B"].includes(table.verdict[row]);
     const changed = new Set();
     for (let row = 0; row < table.rows; row++) if (differs(row)) changed.add(table.subject[row]);
     const subjects = new Set(table.subject);
@@ -76,14 +174,33 @@ export class ComparePage {
       most.set(table.subject[row], Math.max(most.get(table.subject[row]) ?? 0, size));
     }
     const isQuick = table.meta.is_quick;
-    clear(this.body,
-      isQuick ? waiting(`${count(subjects.size, ONE_OF[this.what])} measured; which of them differ takes confidence intervals, from resampling: these are being computed …`)
-        : h("p", {}, `${count(changed.size, ONE_OF[this.what])} of ${subjects.size} differ between ${table.meta.a} (A) and ${table.meta.b} (B): the 95 % confidence interval of B − A does not contain 0. Separation says how rarely values of one run are found among those of the other, not how far apart they are.`),
-      dataTable(table, { label: isQuick ? "measured" : "comparison", only: (row) => isQuick || this.all || differs(row), nothing: "No difference is shown.",
-        columns: isQuick ? MEASURED : COMPARED, once: "subject",
+    clear(
+      this.body,
+      isQuick
+        ? waiting(
+          `${
+            count(subjects.size, ONE_OF[this.what])
+          } measured; which of them differ takes confidence intervals, from resampling: these are being computed …`,
+        )
+        : h(
+          "p",
+          {},
+          `${
+            count(changed.size, ONE_OF[this.what])
+          } of ${subjects.size} differ between ${table.meta.a} (A) and ${table.meta.b} (B): the 95 % confidence interval of B − A does not contain 0. Separation says how rarely values of one run are found among those of the other, not how far apart they are.`,
+        ),
+      dataTable(table, {
+        label: isQuick ? "measured" : "comparison",
+        only: (row) => isQuick || this.all || differs(row),
+        nothing: "No difference is shown.",
+        columns: isQuick ? MEASURED : COMPARED,
+        once: "subject",
         order: (a, b) => most.get(table.subject[b]) - most.get(table.subject[a]) || a - b,
-        onPick: this.what === "paths" ? (row) => this.overlay(table.subject[row]) : undefined }),
-      notes(table.meta.notes), command(table.meta.command));
+        onPick: this.what === "paths" ? (row) => this.overlay(table.subject[row]) : undefined,
+      }),
+      notes(table.meta.notes),
+      command(table.meta.command),
+    );
     if (this.what === "paths" && table.rows && this.subject === null) {
       // Of those that differ, as far as that is known, the one that does so most.
       const size = (row) => (differs(row) ? 1e18 : 0) + Math.abs(table.difference_ns[row] || 0);
@@ -100,21 +217,70 @@ export class ComparePage {
       const sides = await Promise.all([this.other, this.app.run].map(async (run) => {
         const paths = await this.app.fetch("path", { run: run.run_id });
         const row = paths.path.indexOf(subject);
-        return row < 0 ? null : this.app.fetch("path_share", { run: run.run_id, path: paths.path_id[row] });
+        return row < 0
+          ? null
+          : this.app.fetch("path_share", { run: run.run_id, path: paths.path_id[row] });
       }));
       const known = sides.filter(Boolean).filter((side) => side.rows);
-      if (!known.length) { clear(this.picture, h("p", {}, `No flow reached the end of ${subject}.`)); return; }
-      const x = [...new Set(known.flatMap((side) => Array.from(side.latency)))].sort((a, b) => a - b);
-      const values = (side) => { if (!side?.rows) return x.map(() => null); let at = 0; return x.map((latency) => { while (at < side.rows && side.latency[at] <= latency) at++; return at ? side.share[at - 1] : 0; }); };
-      clear(this.picture, h("h3", { className: "path-title" }, subject), h("p", { className: "soft" }, "Share of the flows that took no longer, of both runs."),
-        chart(x, [{ label: `A: ${this.other.name}`, color: "second", values: values(sides[0]), stepped: true, dash: [6, 3], width: 2 }, { label: `B: ${this.app.run.name}`, color: "timer", values: values(sides[1]), stepped: true, width: 2 }],
-          { xFormat: duration, yFormat: (value) => percent(value, 0), height: 300, title: "distributions of both runs", xName: "latency [ns]" }),
-        besides("as a table", ["A", "B"].map((name, place) => (sides[place] ? [h("h4", {}, name), dataTable(sides[place], { label: `distribution of ${name}` })] : h("p", {}, `not in ${name}`)))));
+      if (!known.length) {
+        clear(this.picture, h("p", {}, `No flow reached the end of ${subject}.`));
+        return;
+      }
+      const x = [...new Set(known.flatMap((side) => Array.from(side.latency)))].sort((a, b) =>
+        a - b
+      );
+      const values = (side) => {
+        if (!side?.rows) return x.map(() => null);
+        let at = 0;
+        return x.map((latency) => {
+          while (at < side.rows && side.latency[at] <= latency) at++;
+          return at ? side.share[at - 1] : 0;
+        });
+      };
+      clear(
+        this.picture,
+        h("h3", { className: "path-title" }, subject),
+        h("p", { className: "soft" }, "Share of the flows that took no longer, of both runs."),
+        chart(x, [{
+          label: `A: ${this.other.name}`,
+          color: "second",
+          values: values(sides[0]),
+          stepped: true,
+          dash: [6, 3],
+          width: 2,
+        }, {
+          label: `B: ${this.app.run.name}`,
+          color: "timer",
+          values: values(sides[1]),
+          stepped: true,
+          width: 2,
+        }], {
+          xFormat: duration,
+          yFormat: (value) => percent(value, 0),
+          height: 300,
+          title: "distributions of both runs",
+          xName: "latency [ns]",
+        }),
+        besides(
+          "as a table",
+          ["A", "B"].map((
+            name,
+            place,
+          ) => (sides[place]
+            ? [h("h4", {}, name), dataTable(sides[place], { label: `distribution of ${name}` })]
+            : h("p", {}, `not in ${name}`))
+          ),
+        ),
+      );
     } catch (error) {
       clear(this.picture, failed(error));
     }
   }
 
-  recolor() { redrawCharts(); }
-  leave() { this.abort?.abort(); }
+  recolor() {
+    redrawCharts();
+  }
+  leave() {
+    this.abort?.abort();
+  }
 }

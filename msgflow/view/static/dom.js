@@ -52,6 +52,16 @@ export function color(name) {
 // Long names may be broken where their parts meet, so that they are not broken within a word.
 const LONG_WORD = 18;
 export function breakable(text) {
-  return String(text).split(" ").flatMap((word, at) => [at ? " " : "",
-    ...(word.length <= LONG_WORD ? [word] : word.split(/(?<=[^/(])(?=\/)|(?<=[(_,])(?=[^\s])|(?<=[a-z0-9])(?=[A-Z])/).flatMap((part, place) => (place ? [h("wbr"), part] : [part])))]);
+  return String(text).split(" ").flatMap((
+    word,
+    at,
+  ) => [
+    at ? " " : "",
+    ...(word.length <= LONG_WORD
+      ? [word]
+      : word.split(/(?<=[^/(])(?=\/)|(?<=[(_,])(?=[^\s])|(?<=[a-z0-9])(?=[A-Z])/).flatMap((
+        part,
+        place,
+      ) => (place ? [h("wbr"), part] : [part]))),
+  ]);
 }

@@ -1,6 +1,6 @@
 // Downloads: what a chart shows as a file of its numbers, or of its picture.
 
-import { h, color } from "./dom.js";
+import { color, h } from "./dom.js";
 
 const TITLE_HEIGHT = 30;
 
@@ -8,22 +8,41 @@ const TITLE_HEIGHT = 30;
 // functions that return what is shown at the moment of the click.
 export function downloads({ name, columns, canvases }) {
   const file = name.replaceAll(/[^\w-]+/g, "_").replaceAll(/^_+|_+$/g, "") || "chart";
-  const button = (kind, action) => h("button", { type: "button", title: `download as ${kind}`, "aria-label": `${name} as ${kind}`, on: { click: action } }, kind);
-  return h("div", { className: "downloads" },
-    button("CSV", () => saveFile(new Blob([csvText(columns())], { type: "text/csv" }), `${file}.csv`)),
-    button("PNG", () => painted(name, canvases()).toBlob((blob) => saveFile(blob, `${file}.png`), "image/png")));
+  const button = (kind, action) =>
+    h("button", {
+      type: "button",
+      title: `download as ${kind}`,
+      "aria-label": `${name} as ${kind}`,
+      on: { click: action },
+    }, kind);
+  return h(
+    "div",
+    { className: "downloads" },
+    button(
+      "CSV",
+      () => saveFile(new Blob([csvText(columns())], { type: "text/csv" }), `${file}.csv`),
+    ),
+    button(
+      "PNG",
+      () => painted(name, canvases()).toBlob((blob) => saveFile(blob, `${file}.png`), "image/png"),
+    ),
+  );
 }
 
 export function csvText(columns) {
   const lines = [columns.map(([title]) => csvField(title)).join(",")];
   const rows = Math.max(0, ...columns.map(([, values]) => values.length));
-  for (let row = 0; row < rows; row++) lines.push(columns.map(([, values]) => csvField(values[row])).join(","));
+  for (let row = 0; row < rows; row++) {
+    lines.push(columns.map(([, values]) => csvField(values[row])).join(","));
+  }
   return `${lines.join("\n")}\n`;
 }
 
 // As the command line writes CSV: text in quotes, and nothing that a spreadsheet takes for a formula.
 function csvField(value) {
-  if (value === null || value === undefined || (typeof value === "number" && Number.isNaN(value))) return "";
+  if (value === null || value === undefined || (typeof value === "number" && Number.isNaN(value))) {
+    return "";
+  }
   if (typeof value === "number" || typeof value === "boolean") return String(value);
   const safe = /^[=+\-@\t\r]/.test(value) ? `'${value}` : String(value);
   return `"${safe.replaceAll('"', '""')}"`;

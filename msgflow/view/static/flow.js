@@ -11,9 +11,15 @@ export function buildFlow(table, picked) {
     if (places.has(name)) continue;
     places.set(name, vertices.length);
     vertices.push({
-      kind: table.kind[row], id: table.id[row], row: table.row_key[row], at: table.start_at[row],
-      length: table.length[row], flags: table.flags[row], isEffect: table.is_effect[row],
-      isCause: table.is_cause[row], critical: false,
+      kind: table.kind[row],
+      id: table.id[row],
+      row: table.row_key[row],
+      at: table.start_at[row],
+      length: table.length[row],
+      flags: table.flags[row],
+      isEffect: table.is_effect[row],
+      isCause: table.is_cause[row],
+      critical: false,
       picked: KIND_NAMES[table.kind[row]] === picked.kind && table.id[row] === picked.id,
     });
   }
@@ -22,10 +28,20 @@ export function buildFlow(table, picked) {
     if (Number.isNaN(table.from_kind[row])) continue;
     const from = places.get(key(table.from_kind[row], table.from_id[row]));
     const to = places.get(key(table.kind[row], table.id[row]));
-    if (from !== undefined && to !== undefined) edges.push({ from, to, kind: table.link_kind[row], critical: false });
+    if (from !== undefined && to !== undefined) {
+      edges.push({ from, to, kind: table.link_kind[row], critical: false });
+    }
   }
   const total = table.rows ? table.vertex_count[0] : 0;
-  const flow = { vertices, edges, picked, total, leftOut: total - vertices.length, outside: table.meta.outside ?? 0, pieces: null };
+  const flow = {
+    vertices,
+    edges,
+    picked,
+    total,
+    leftOut: total - vertices.length,
+    outside: table.meta.outside ?? 0,
+    pieces: null,
+  };
   return flow;
 }
 
@@ -40,14 +56,20 @@ export function markCritical(flow, pieces) {
   }
   const last = pieces.rows ? pieces.take_id[0] : null;
   for (const vertex of vertices) {
-    vertex.critical = vertex.kind < 2 ? named[vertex.kind].has(vertex.id) : vertex.kind === 2 && vertex.id === last;
+    vertex.critical = vertex.kind < 2
+      ? named[vertex.kind].has(vertex.id)
+      : vertex.kind === 2 && vertex.id === last;
   }
   for (const edge of edges) {
     const [take, callback] = [vertices[edge.from], vertices[edge.to]];
     if (edge.kind !== "callback" || !callback.critical || take.kind !== 2) continue;
-    if (edges.some((other) => other.to === edge.from && vertices[other.from].critical)) take.critical = true;
+    if (edges.some((other) => other.to === edge.from && vertices[other.from].critical)) {
+      take.critical = true;
+    }
   }
-  for (const edge of edges) edge.critical = vertices[edge.from].critical && vertices[edge.to].critical;
+  for (const edge of edges) {
+    edge.critical = vertices[edge.from].critical && vertices[edge.to].critical;
+  }
   flow.pieces = pieces;
 }
 

@@ -12,10 +12,16 @@ export class Follower {
   constructor(app, root) {
     this.app = app;
     this.isFollowing = true;
-    this.button = h("button", { type: "button", title: "show each new window; a click into the page stops it", on: { click: () => this.set(!this.isFollowing) } }, "follow");
+    this.button = h("button", {
+      type: "button",
+      title: "show each new window; a click into the page stops it",
+      on: { click: () => this.set(!this.isFollowing) },
+    }, "follow");
     this.said = h("span", { className: "soft", role: "status" });
     root.append(h("div", { className: "follower" }, this.button, this.said));
-    for (const kind of ["pointerdown", "keydown"]) app.main.addEventListener(kind, () => this.set(false));
+    for (const kind of ["pointerdown", "keydown"]) {
+      app.main.addEventListener(kind, () => this.set(false));
+    }
     this.set(true);
     this.run();
   }
@@ -26,7 +32,14 @@ export class Follower {
     this.isFollowing = isFollowing;
     const { page, from, to } = current();
     // Numbers of flows and paths are those of one window.
-    if (isFollowing) go({ ...Object.fromEntries(Object.keys(current()).map((name) => [name, null])), page, from, to });
+    if (isFollowing) {
+      go({
+        ...Object.fromEntries(Object.keys(current()).map((name) => [name, null])),
+        page,
+        from,
+        to,
+      });
+    }
   }
 
   async run() {
@@ -40,7 +53,9 @@ export class Follower {
       }
       this.said.textContent = said;
       // At most half of the time goes into it.
-      await new Promise((done) => { setTimeout(done, Math.max(LEAST_PAUSE, performance.now() - begin)); });
+      await new Promise((done) => {
+        setTimeout(done, Math.max(LEAST_PAUSE, performance.now() - begin));
+      });
     }
   }
 

@@ -1,8 +1,25 @@
 // Labels: names that people read, for columns of queries, statistics and kinds.
 
 export const KINDS = [
-  "callback instance", "publication", "take", "request", "response", "wait", "select", "take and callback", "event", "blocked", "node active", "node not active", "untaken message",
-  "running", "preempted", "runnable", "sleeping", "uninterruptible", "not known",
+  "callback instance",
+  "publication",
+  "take",
+  "request",
+  "response",
+  "wait",
+  "select",
+  "take and callback",
+  "event",
+  "blocked",
+  "node active",
+  "node not active",
+  "untaken message",
+  "running",
+  "preempted",
+  "runnable",
+  "sleeping",
+  "uninterruptible",
+  "not known",
 ];
 export const EVENT = 8;
 export const BLOCKED = 9;
@@ -22,14 +39,26 @@ export const wakerName = (flags, name) => WAKERS[(flags >> 4) & 3] || name;
 export function stateText(state, who, wakers) {
   if (wakers) return `waits for ${who}, which is ${state}`;
   switch (state) {
-    case "preempted": return `preempted by ${who ?? "?"}`;
-    case "runnable": return `waits for a CPU${who ? `, woken by ${who}` : ""}`;
-    case "sleeping": return `sleeps${who ? `, until ${who} wakes it` : ""}`;
-    case "uninterruptible": return `waits for a page or a disk${who ? `, until ${who} wakes it` : ""}`;
-    default: return state;
+    case "preempted":
+      return `preempted by ${who ?? "?"}`;
+    case "runnable":
+      return `waits for a CPU${who ? `, woken by ${who}` : ""}`;
+    case "sleeping":
+      return `sleeps${who ? `, until ${who} wakes it` : ""}`;
+    case "uninterruptible":
+      return `waits for a page or a disk${who ? `, until ${who} wakes it` : ""}`;
+    default:
+      return state;
   }
 }
-export const STATE_COLORS = { running: "running", preempted: "preempted", runnable: "runnable", sleeping: "wait", uninterruptible: "uninterruptible", unknown: "faint" };
+export const STATE_COLORS = {
+  running: "running",
+  preempted: "preempted",
+  runnable: "runnable",
+  sleeping: "wait",
+  uninterruptible: "uninterruptible",
+  unknown: "faint",
+};
 export const KIND_NAMES = ["callback_instance", "publication", "take", "request", "response"];
 
 export const LINKS = {
@@ -43,50 +72,136 @@ export const LINKS = {
   polled: "taken in the callback, then published",
   service: "service",
 };
-export const LINK_CODES = ["transport", "direct", "periodic_async", "partial_sync", "take_adjacent", "polled", "approximate_sync"];
+export const LINK_CODES = [
+  "transport",
+  "direct",
+  "periodic_async",
+  "partial_sync",
+  "take_adjacent",
+  "polled",
+  "approximate_sync",
+];
 
 const TITLES = {
-  run_id: "run", roots: "flows", loss_affected: "touched by losses",
-  sink_event: "ends with", is_cut: "search cut", what: "what",
-  topic_name: "topic", service_name: "service", action_name: "action", is_loss_affected: "touched by losses", rate_hz: "rate",
-  callback_share: "busy", orphans: "takes without publication", cliffs_delta: "Cliff's delta",
-  start_at: "begin", length: "duration", a_ns: "A", b_ns: "B",
-  difference_ns: "B − A", change_percent: "change", low_ns: "95 % interval, from", high_ns: "to",
-  a_count: "values of A", b_count: "values of B", share: "share", affected_percent: "affected",
-  seen_ns: "seen", executor_kind: "executor", root_at: "began at",
-  publisher_count: "publishers", subscription_count: "subscriptions", publication_count: "messages published",
-  take_count: "messages taken", delayed_min: "delayed, at least", delayed_max: "delayed, at most",
-  busy_worst_ns: "busy, longest", busy_total_min_ns: "busy in all, at least", busy_total_max_ns: "busy in all, at most",
-  meanwhile_node: "kept waiting by", meanwhile_callback: "its callback", meanwhile_thread: "thread that had the CPU",
-  run_queue_worst_ns: "run queue, longest", preempted_worst_ns: "preempted, longest", cpu_taken_by: "CPU taken by", overlap_min_ns: "ran meanwhile, at least",
-  overlap_max_ns: "ran meanwhile, at most", worst_ns: "longest", a_share: "share in A", b_share: "share in B",
-  open: "not seen to end", period_deviation_ns: "jitter", first_at: "first", last_at: "last", taken_at: "taken at", subscriber: "received by",
-  not_taken: "not taken", busy_share: "executor busy", callback_instance_id: "callback instance", request_id: "request", take_id: "take",
-  usual_ns: "usual median", at_ns: "begin in the run", value: "value", to_open_it: "opens with", worst_run: "run with most", cure: "what to do",
+  run_id: "run",
+  roots: "flows",
+  loss_affected: "touched by losses",
+  sink_event: "ends with",
+  is_cut: "search cut",
+  what: "what",
+  topic_name: "topic",
+  service_name: "service",
+  action_name: "action",
+  is_loss_affected: "touched by losses",
+  rate_hz: "rate",
+  callback_share: "busy",
+  orphans: "takes without publication",
+  cliffs_delta: "Cliff's delta",
+  start_at: "begin",
+  length: "duration",
+  a_ns: "A",
+  b_ns: "B",
+  difference_ns: "B − A",
+  change_percent: "change",
+  low_ns: "95 % interval, from",
+  high_ns: "to",
+  a_count: "values of A",
+  b_count: "values of B",
+  share: "share",
+  affected_percent: "affected",
+  seen_ns: "seen",
+  executor_kind: "executor",
+  root_at: "began at",
+  publisher_count: "publishers",
+  subscription_count: "subscriptions",
+  publication_count: "messages published",
+  take_count: "messages taken",
+  delayed_min: "delayed, at least",
+  delayed_max: "delayed, at most",
+  busy_worst_ns: "busy, longest",
+  busy_total_min_ns: "busy in all, at least",
+  busy_total_max_ns: "busy in all, at most",
+  meanwhile_node: "kept waiting by",
+  meanwhile_callback: "its callback",
+  meanwhile_thread: "thread that had the CPU",
+  run_queue_worst_ns: "run queue, longest",
+  preempted_worst_ns: "preempted, longest",
+  cpu_taken_by: "CPU taken by",
+  overlap_min_ns: "ran meanwhile, at least",
+  overlap_max_ns: "ran meanwhile, at most",
+  worst_ns: "longest",
+  a_share: "share in A",
+  b_share: "share in B",
+  open: "not seen to end",
+  period_deviation_ns: "jitter",
+  first_at: "first",
+  last_at: "last",
+  taken_at: "taken at",
+  subscriber: "received by",
+  not_taken: "not taken",
+  busy_share: "executor busy",
+  callback_instance_id: "callback instance",
+  request_id: "request",
+  take_id: "take",
+  usual_ns: "usual median",
+  at_ns: "begin in the run",
+  value: "value",
+  to_open_it: "opens with",
+  worst_run: "run with most",
+  cure: "what to do",
 };
 
 // Parts of a latency, as path-breakdown names them.
 const PARTS = {
-  network_or_idle: "network, or executor idle", executor_busy: "executor busy with others",
-  undecided: "undecided: network or busy executor", until_arrival: "until the message arrived", run_queue: "woken, waiting for a CPU",
+  network_or_idle: "network, or executor idle",
+  executor_busy: "executor busy with others",
+  undecided: "undecided: network or busy executor",
+  until_arrival: "until the message arrived",
+  run_queue: "woken, waiting for a CPU",
   take_to_callback: "take to callback",
-  all_threads_busy: "all threads of the executor busy", blocked: "blocked by another callback", unpublished: "waiting for a message not published yet",
-  timer: "waiting for the timer", cache: "in a cache", stored: "stored until the subscription existed",
+  all_threads_busy: "all threads of the executor busy",
+  blocked: "blocked by another callback",
+  unpublished: "waiting for a message not published yet",
+  timer: "waiting for the timer",
+  cache: "in a cache",
+  stored: "stored until the subscription existed",
 };
 export const partTitle = (name) => PARTS[name] ?? name.replaceAll("_", " ");
 // Of these colours too light or too dull for the page's own colour as text on them.
 export const PALE = new Set(["wait", "faint"]);
 export const PART_COLORS = {
-  callback: "subscription", cache: "indirect", take_to_callback: "faint", stored: "stored", network_or_idle: "transport", undecided: "wait",
-  until_arrival: "transport", run_queue: "runnable", executor: "process", executor_busy: "process", all_threads_busy: "process", blocked: "process", unpublished: "faint", timer: "timer", service: "service", rclcpp: "publication",
-  rcl: "publication", rmw: "publication", dds: "publication", intra: "publication", publish: "publication", take: "take",
+  callback: "subscription",
+  cache: "indirect",
+  take_to_callback: "faint",
+  stored: "stored",
+  network_or_idle: "transport",
+  undecided: "wait",
+  until_arrival: "transport",
+  run_queue: "runnable",
+  executor: "process",
+  executor_busy: "process",
+  all_threads_busy: "process",
+  blocked: "process",
+  unpublished: "faint",
+  timer: "timer",
+  service: "service",
+  rclcpp: "publication",
+  rcl: "publication",
+  rmw: "publication",
+  dds: "publication",
+  intra: "publication",
+  publish: "publication",
+  take: "take",
 };
 
 // Nodes and topics take turns in a path: a topic with the name of its node is written once.
 export const PATH_HELP = "A topic with the name of the node that publishes it is written once.";
 export function pathText(path) {
-  return String(path ?? "").split(" → ").reduce((text, part, place, parts) =>
-    place % 2 && part === parts[place - 1] ? text : place ? `${text} → ${part}` : part, "");
+  return String(path ?? "").split(" → ").reduce(
+    (text, part, place, parts) =>
+      place % 2 && part === parts[place - 1] ? text : place ? `${text} → ${part}` : part,
+    "",
+  );
 }
 
 // A word of a command for a shell.
@@ -128,7 +243,9 @@ export function moment(at) {
   const negative = at < 0;
   const whole = Math.floor(Math.abs(at) / 1e9);
   const rest = Math.round(Math.abs(at) - whole * 1e9).toString().padStart(9, "0");
-  return `${negative ? "−" : ""}${whole}.${rest.slice(0, 3)} ${rest.slice(3, 6)} ${rest.slice(6)} s`;
+  return `${negative ? "−" : ""}${whole}.${rest.slice(0, 3)} ${rest.slice(3, 6)} ${
+    rest.slice(6)
+  } s`;
 }
 
 // A point in time as the command line takes it: seconds, all digits, without those that are zero.
@@ -168,7 +285,9 @@ export function wallClock(originText, at) {
 }
 
 export function cell(value, column) {
-  if (value === null || value === undefined || (typeof value === "number" && Number.isNaN(value))) return "";
+  if (value === null || value === undefined || (typeof value === "number" && Number.isNaN(value))) {
+    return "";
+  }
   if (typeof value === "boolean") return value ? "yes" : "no";
   if (Array.isArray(value)) return value.join(", ");
   if (column.unit === "epoch ns" || column.unit === "ns since origin") return moment(value);

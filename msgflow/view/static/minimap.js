@@ -1,6 +1,6 @@
 // The whole run in a strip below the timeline: how busy it was, and where the window lies.
 
-import { h, color } from "./dom.js";
+import { color, h } from "./dom.js";
 
 const HEIGHT = 34;
 
@@ -11,7 +11,11 @@ export class Minimap {
     this.move = move;
     this.shares = null;
     this.view = { from: 0, to: length };
-    this.canvas = h("canvas", { className: "minimap", role: "img", "aria-label": "the whole run; a click moves the window" });
+    this.canvas = h("canvas", {
+      className: "minimap",
+      role: "img",
+      "aria-label": "the whole run; a click moves the window",
+    });
     let grabbed = null;
     const at = (event) => {
       const box = this.canvas.getBoundingClientRect();
@@ -29,7 +33,11 @@ export class Minimap {
       const from = at(event) - grabbed;
       this.move(from, from + this.view.to - this.view.from);
     });
-    for (const name of ["pointerup", "pointercancel"]) this.canvas.addEventListener(name, () => { grabbed = null; });
+    for (const name of ["pointerup", "pointercancel"]) {
+      this.canvas.addEventListener(name, () => {
+        grabbed = null;
+      });
+    }
   }
 
   // Bars of callbacks, in as many pieces as the strip is wide; the busiest piece is as high as it.
@@ -40,7 +48,10 @@ export class Minimap {
       if (table.kind[row] !== 0) continue;
       const busy = table.busy ? table.busy[row] : table.length[row];
       const first = Math.max(Math.floor((table.start_at[row] / this.length) * pieces), 0);
-      const last = Math.min(Math.floor(((table.start_at[row] + table.length[row]) / this.length) * pieces), pieces - 1);
+      const last = Math.min(
+        Math.floor(((table.start_at[row] + table.length[row]) / this.length) * pieces),
+        pieces - 1,
+      );
       for (let piece = first; piece <= last; piece++) shares[piece] += busy / (last - first + 1);
     }
     const most = Math.max(...shares);
@@ -63,7 +74,9 @@ export class Minimap {
     if (this.shares) {
       c.fillStyle = color("subscription");
       const step = width / this.shares.length;
-      this.shares.forEach((share, piece) => c.fillRect(piece * step, HEIGHT * (1 - share), Math.max(step, 1), HEIGHT * share));
+      this.shares.forEach((share, piece) =>
+        c.fillRect(piece * step, HEIGHT * (1 - share), Math.max(step, 1), HEIGHT * share)
+      );
     }
     const x = (at) => Math.min(Math.max((at / this.length) * width, 0), width);
     const [left, right] = [x(view.from), Math.max(x(view.to), x(view.from) + 2)];

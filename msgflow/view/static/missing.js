@@ -8,7 +8,8 @@ const SIZE = 3.5;
 const LEAST_DISTANCE = 4;
 
 export function missingWords(flags) {
-  const words = [flags & DROPPED && "dropped: a queue was full", flags & LOST && "lost on the way"].filter(Boolean);
+  const words = [flags & DROPPED && "dropped: a queue was full", flags & LOST && "lost on the way"]
+    .filter(Boolean);
   return words.join(", or ") || "not taken, and the trace does not tell why";
 }
 

@@ -8,10 +8,14 @@ export function waiting(text = "reading …") {
 
 export function failed(error) {
   const reload = ["replaced", "gone", "unopened"].includes(error.code);
-  return h("div", { className: "failed", role: "alert" },
+  return h(
+    "div",
+    { className: "failed", role: "alert" },
     h("p", {}, `Error: ${error.message}`),
     error.hint && h("p", { className: "soft" }, `What to do: ${error.hint}`),
-    reload && h("button", { type: "button", on: { click: () => location.reload() } }, "reload the page"));
+    reload &&
+      h("button", { type: "button", on: { click: () => location.reload() } }, "reload the page"),
+  );
 }
 
 // What a page calls the option of commands that shows ROS's own rows.
@@ -19,7 +23,9 @@ export const INTERNAL = "what ROS does for itself";
 
 export function notes(list) {
   if (!list?.length) return null;
-  const named = document.querySelector("input.internal") ? (text) => text.replace("--internal", `“${INTERNAL}”`) : (text) => text;
+  const named = document.querySelector("input.internal")
+    ? (text) => text.replace("--internal", `“${INTERNAL}”`)
+    : (text) => text;
   return h("ul", { className: "notes" }, list.map((text) => h("li", {}, named(text))));
 }
 
@@ -36,7 +42,8 @@ export function commands(tables) {
 export const sqlText = (text) => `'${text.replaceAll("'", "''")}'`;
 
 // The mark of a duration between clocks that are not synchronised, and what it means.
-const DOUBT = "between hosts whose clocks are not synchronised: the difference of the clocks is in it";
+const DOUBT =
+  "between hosts whose clocks are not synchronised: the difference of the clocks is in it";
 export function doubt() {
   return h("abbr", { className: "doubt", title: DOUBT }, "†");
 }

@@ -1,9 +1,9 @@
 // The first page: what was recorded, what is wrong with it, and what is slow.
 
-import { h, clear, breakable } from "./dom.js";
+import { breakable, clear, h } from "./dom.js";
 import { address } from "./address.js";
-import { PATH_HELP, count, duration, pathText, wallClock } from "./labels.js";
-import { dataTable, besides } from "./table.js";
+import { count, duration, PATH_HELP, pathText, wallClock } from "./labels.js";
+import { besides, dataTable } from "./table.js";
 import { command, doubt, doubtHelp, failed, notes, waiting } from "./notice.js";
 import { blame, summary, withoutRepeated } from "./summary.js";
 
@@ -19,12 +19,19 @@ export class OverviewPage {
     const { run } = app;
     const facts = h("dl", { className: "facts" });
     const fact = (name, value) => facts.append(h("div", {}, h("dt", {}, name), h("dd", {}, value)));
-    fact("recorded", run.start_text ? wallClock(run.start_text, 0).replace("T", " ").replace(/\.\d+Z$/, " UTC") : "no events");
+    fact(
+      "recorded",
+      run.start_text
+        ? wallClock(run.start_text, 0).replace("T", " ").replace(/\.\d+Z$/, " UTC")
+        : "no events",
+    );
     fact("length", duration(run.length));
     fact("events", (run.event_count ?? 0).toLocaleString("en-US"));
     const places = h("section", {}, h("h2", {}, "What was recorded"), facts);
     // Requirements and changes: a report has them where it was given a file, or another run.
-    const given = (app.source.summary ?? []).filter((part) => part === "verdicts" || part === "change")
+    const given = (app.source.summary ?? []).filter((part) =>
+      part === "verdicts" || part === "change"
+    )
       .map((part) => ({ part, ...section(part === "verdicts" ? "Requirements" : "What changed") }));
     const next = h("p", { className: "command" });
     const wrong = section("What is wrong with it");
@@ -34,7 +41,18 @@ export class OverviewPage {
     const threads = section("Busiest threads");
     const topics = section("Topics");
     const processes = section("Processes");
-    clear(root, places, given.map((one) => one.root), wrong.root, slow.root, nodes.root, drops.root, threads.root, topics.root, processes.root);
+    clear(
+      root,
+      places,
+      given.map((one) => one.root),
+      wrong.root,
+      slow.root,
+      nodes.root,
+      drops.root,
+      threads.root,
+      topics.root,
+      processes.root,
+    );
     places.append(next);
     const hosts = app.query("info-hosts").then((table) => {
       const list = Array.from({ length: table.rows }, (_, row) => table.hostname[row]);
@@ -51,22 +69,54 @@ export class OverviewPage {
       }
       const list = [...kinds.values()].map((rows) => {
         const first = rows[0];
-        return h("article", { className: `finding ${table.severity[first]}` },
-          h("h3", {}, h("span", { className: "severity" }, table.severity[first]), " ", table.title[first]),
-          h("ul", {}, rows.slice(0, 5).map((row) => h("li", {}, h("b", {}, table.subject[row]), `: ${table.detail[row]}`)),
-            rows.length > 5 && h("li", {}, `… and ${rows.length - 5} more`)),
+        return h(
+          "article",
+          { className: `finding ${table.severity[first]}` },
+          h(
+            "h3",
+            {},
+            h("span", { className: "severity" }, table.severity[first]),
+            " ",
+            table.title[first],
+          ),
+          h(
+            "ul",
+            {},
+            rows.slice(0, 5).map((row) =>
+              h("li", {}, h("b", {}, table.subject[row]), `: ${table.detail[row]}`)
+            ),
+            rows.length > 5 && h("li", {}, `… and ${rows.length - 5} more`),
+          ),
           h("p", {}, table.description[first]),
           h("p", {}, h("b", {}, "Cause: "), table.cause[first]),
-          h("p", {}, h("b", {}, "Cure: "), table.cure[first]));
+          h("p", {}, h("b", {}, "Cure: "), table.cure[first]),
+        );
       });
-      return [list.length ? list : h("p", {}, "Nothing is wrong with the recording."), notes(table.meta.notes), command(table.meta.command)];
+      return [
+        list.length ? list : h("p", {}, "Nothing is wrong with the recording."),
+        notes(table.meta.notes),
+        command(table.meta.command),
+      ];
     });
     const paths = fill(slow, async () => {
       const table = await app.query("e2e-latency");
-      const order = Array.from({ length: table.rows }, (_, row) => row).filter((row) => !Number.isNaN(table.max_ns[row]))
+      const order = Array.from({ length: table.rows }, (_, row) => row).filter((row) =>
+        !Number.isNaN(table.max_ns[row])
+      )
         .sort((a, b) => table.max_ns[b] - table.max_ns[a]);
       const most = order.length ? Math.max(...order.map((row) => table.p99_ns[row])) : 1;
-      if (!order.length) return [h("p", {}, table.rows ? "No flow reached the end of a path." : "There are no paths: no message is known to have been taken."), notes(table.meta.notes)];
+      if (!order.length) {
+        return [
+          h(
+            "p",
+            {},
+            table.rows
+              ? "No flow reached the end of a path."
+              : "There are no paths: no message is known to have been taken.",
+          ),
+          notes(table.meta.notes),
+        ];
+      }
       const known = await app.fetch("path");
       const ids = pathNumbers(table, known);
       const isDoubted = doubted(table, known, ids);
@@ -78,33 +128,95 @@ export class OverviewPage {
         return h("span", { className: "path-text", title: path }, breakable(text));
       };
       return [
-        h("p", { className: "soft" }, `A path is a chain of nodes and topics that messages took. ${PATH_HELP} A click shows more.`),
-        h("div", { className: "legend" }, [["bar-median", "median: half of its flows took no longer"], ["bar-p99", "p99: 99 % of them took no longer"]].map(([shade, text]) =>
-          h("span", { className: "legend-item" }, h("span", { className: `swatch ${shade}` }), text))),
-        h("ol", { className: "slow" }, order.slice(0, 10).map((row) => h("li", {},
-          h("a", { href: address({ page: "paths", path: ids[row] }) },
-            h("span", { className: "bar-track" }, bar(table.median_ns[row] / most, "bar-median"), bar(table.p99_ns[row] / most, "bar-p99")),
-            h("span", { className: "numbers" }, `${duration(table.median_ns[row])} median · ${duration(table.p99_ns[row])} p99`, isDoubted(row) && doubt()),
-            textOf(row))))),
+        h(
+          "p",
+          { className: "soft" },
+          `A path is a chain of nodes and topics that messages took. ${PATH_HELP} A click shows more.`,
+        ),
+        h(
+          "div",
+          { className: "legend" },
+          [["bar-median", "median: half of its flows took no longer"], [
+            "bar-p99",
+            "p99: 99 % of them took no longer",
+          ]].map(([shade, text]) =>
+            h(
+              "span",
+              { className: "legend-item" },
+              h("span", { className: `swatch ${shade}` }),
+              text,
+            )
+          ),
+        ),
+        h(
+          "ol",
+          { className: "slow" },
+          order.slice(0, 10).map((row) =>
+            h(
+              "li",
+              {},
+              h(
+                "a",
+                { href: address({ page: "paths", path: ids[row] }) },
+                h(
+                  "span",
+                  { className: "bar-track" },
+                  bar(table.median_ns[row] / most, "bar-median"),
+                  bar(table.p99_ns[row] / most, "bar-p99"),
+                ),
+                h(
+                  "span",
+                  { className: "numbers" },
+                  `${duration(table.median_ns[row])} median · ${duration(table.p99_ns[row])} p99`,
+                  isDoubted(row) && doubt(),
+                ),
+                textOf(row),
+              ),
+            )
+          ),
+        ),
         order.slice(0, 10).some(isDoubted) && doubtHelp(),
-        order.length > 10 && h("p", {}, h("a", { href: address({ page: "paths" }) }, `all ${count(order.length, "path")}`)),
-        notes(table.meta.notes), command(table.meta.command),
+        order.length > 10 &&
+        h(
+          "p",
+          {},
+          h("a", { href: address({ page: "paths" }) }, `all ${count(order.length, "path")}`),
+        ),
+        notes(table.meta.notes),
+        command(table.meta.command),
       ];
     });
     const others = [
-      ...given.map((one) => fill(one, async () => summary(await app.fetch("summary", { part: one.part })))),
-      ...[[drops, "drops"], [threads, "threads"]].map(([place, part]) => fill(place, async () => summary(await app.inWindow("summary", { part })))),
+      ...given.map((one) =>
+        fill(one, async () => summary(await app.fetch("summary", { part: one.part })))
+      ),
+      ...[[drops, "drops"], [threads, "threads"]].map(([place, part]) =>
+        fill(place, async () => summary(await app.inWindow("summary", { part })))
+      ),
       fill(topics, async () => {
         const table = await app.query("topics");
-        return [dataTable(table, { label: "topics", shown: 12, nothing: "no topics" }), notes(table.meta.notes), command(table.meta.command)];
+        return [
+          dataTable(table, { label: "topics", shown: 12, nothing: "no topics" }),
+          notes(table.meta.notes),
+          command(table.meta.command),
+        ];
       }),
       fill(processes, async () => {
         const table = await app.query("info-processes");
-        return [besides(`${count(table.rows, "process")}`.replace("processs", "processes"), dataTable(table, { label: "processes" }), command(table.meta.command))];
+        return [
+          besides(
+            `${count(table.rows, "process")}`.replace("processs", "processes"),
+            dataTable(table, { label: "processes" }),
+            command(table.meta.command),
+          ),
+        ];
       }),
     ];
     // The page stands without what takes longest.
-    this.complete = fill(nodes, async () => blame(await app.inWindow("summary", { part: "blame" })));
+    this.complete = fill(
+      nodes,
+      async () => blame(await app.inWindow("summary", { part: "blame" })),
+    );
     await Promise.all([hosts, findings, paths, ...others]);
   }
 
@@ -132,7 +244,9 @@ export async function fill(place, make) {
 
 // Whether the hosts of a path, a row of `table`, have clocks that are not synchronised.
 export function doubted(table, paths, ids) {
-  const apart = new Set(Array.from(paths.path_id).filter((_, row) => paths.is_comparable[row] === false));
+  const apart = new Set(
+    Array.from(paths.path_id).filter((_, row) => paths.is_comparable[row] === false),
+  );
   return (row) => apart.has(ids[row]);
 }
 

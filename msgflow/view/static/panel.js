@@ -1,6 +1,6 @@
 // The panel below a table: what the chosen row did over time, and its longest instances.
 
-import { h, clear } from "./dom.js";
+import { clear, h } from "./dom.js";
 import { current, pageAddress, replace } from "./address.js";
 import { duration, momentAxis } from "./labels.js";
 import { besides, dataTable } from "./table.js";
@@ -20,13 +20,26 @@ export class Chooser {
     this.order = {};
     this.list = h("div");
     this.detail = h("div", { className: "panel" });
-    this.search = options.search && h("input", { type: "search", placeholder: options.search.placeholder, "aria-label": options.search.label, value: current().q ?? "",
-      on: { input: () => { replace({ q: this.search.value }); app.linksMoved(); this.show(this.table); } } });
+    this.search = options.search &&
+      h("input", {
+        type: "search",
+        placeholder: options.search.placeholder,
+        "aria-label": options.search.label,
+        value: current().q ?? "",
+        on: {
+          input: () => {
+            replace({ q: this.search.value });
+            app.linksMoved();
+            this.show(this.table);
+          },
+        },
+      });
   }
 
   isFound(row) {
     const text = this.search?.value.trim().toLowerCase();
-    return !text || this.options.search.texts(this.table, row).some((one) => one?.toLowerCase().includes(text));
+    return !text ||
+      this.options.search.texts(this.table, row).some((one) => one?.toLowerCase().includes(text));
   }
 
   show(table) {
@@ -34,14 +47,24 @@ export class Chooser {
     const isFirst = !this.table;
     this.table = table;
     const asked = current()[key];
-    this.row = asked === undefined ? -1 : Array.from({ length: table.rows }, (_, row) => identity(table, row)).indexOf(asked);
+    this.row = asked === undefined
+      ? -1
+      : Array.from({ length: table.rows }, (_, row) => identity(table, row)).indexOf(asked);
     this.fill();
     if (isFirst && this.row >= 0) this.open();
   }
 
   fill() {
-    clear(this.list, dataTable(this.table, { ...this.options, state: this.order, only: (row) => this.isFound(row),
-      picked: (row) => row === this.row, onPick: (row) => this.pick(row) }));
+    clear(
+      this.list,
+      dataTable(this.table, {
+        ...this.options,
+        state: this.order,
+        only: (row) => this.isFound(row),
+        picked: (row) => row === this.row,
+        onPick: (row) => this.pick(row),
+      }),
+    );
     this.list.classList.toggle("is-short", this.row >= 0);
   }
 
@@ -55,7 +78,9 @@ export class Chooser {
     this.open().then(() => this.detail.scrollIntoView({ block: "nearest", behavior: "smooth" }));
   }
 
-  recolor() { redrawCharts(); }
+  recolor() {
+    redrawCharts();
+  }
 
   async open() {
     const { row } = this;
@@ -72,40 +97,118 @@ export class Chooser {
 // Longest and median of pieces of time; a click leads to the longest. Options: title, values and
 // median (columns of points), target(row): an address.
 export function overTime(points, { title, values, median, target }) {
-  const known = (column) => Array.from(points[column], (value) => (value === null || Number.isNaN(value) ? null : value));
-  return h("section", {}, h("h3", {}, title[0].toUpperCase() + title.slice(1)),
-    h("p", { className: "soft" }, `The longest of each ${duration(points.length[0])}, and the median. Click a point to see it on the timeline.`),
+  const known = (column) =>
+    Array.from(points[column], (value) => (value === null || Number.isNaN(value) ? null : value));
+  return h(
+    "section",
+    {},
+    h("h3", {}, title[0].toUpperCase() + title.slice(1)),
+    h(
+      "p",
+      { className: "soft" },
+      `The longest of each ${
+        duration(points.length[0])
+      }, and the median. Click a point to see it on the timeline.`,
+    ),
     chart(Array.from(points.start_at), [
       { label: "longest", color: "process", values: known(values), points: true },
-      { label: "median", color: "timer", values: known(median), width: 1.5, isJoined: true }],
-    { title, xFormat: momentAxis, xName: "begin [ns since begin of run]", onClick: (row) => { location.hash = target(row); } }),
-    besides("as a table", dataTable(points, { label: title, columns: ["start_at", "length", "count", "published", "taken", "answered", values, median], onPick: (row) => { location.hash = target(row); } })));
+      { label: "median", color: "timer", values: known(median), width: 1.5, isJoined: true },
+    ], {
+      title,
+      xFormat: momentAxis,
+      xName: "begin [ns since begin of run]",
+      onClick: (row) => {
+        location.hash = target(row);
+      },
+    }),
+    besides(
+      "as a table",
+      dataTable(points, {
+        label: title,
+        columns: ["start_at", "length", "count", "published", "taken", "answered", values, median],
+        onPick: (row) => {
+          location.hash = target(row);
+        },
+      }),
+    ),
+  );
 }
 
 // How many began in each piece of time. Series: {label, color, values}.
 export function ratesOverTime(points, title, series) {
-  return h("section", {}, h("h3", {}, title[0].toUpperCase() + title.slice(1)),
+  return h(
+    "section",
+    {},
+    h("h3", {}, title[0].toUpperCase() + title.slice(1)),
     h("p", { className: "soft" }, `How many in each ${duration(points.length[0])}.`),
-    chart(Array.from(points.start_at), series.map((one) => ({ stepped: true, ...one })),
-      { title, xFormat: momentAxis, yFormat: (value) => value.toLocaleString("en-US"), xName: "begin [ns since begin of run]", legend: true }));
+    chart(Array.from(points.start_at), series.map((one) => ({ stepped: true, ...one })), {
+      title,
+      xFormat: momentAxis,
+      yFormat: (value) => value.toLocaleString("en-US"),
+      xName: "begin [ns since begin of run]",
+      legend: true,
+    }),
+  );
 }
 
 // The longest instances; the first of them is offered in words.
 export function slowestOnes(slowest, { title, values, target, columns }) {
   if (!slowest.rows) return null;
-  return h("section", {}, h("h3", {}, title),
-    h("p", {}, h("a", { className: "longest", href: target(0) }, `the longest, ${duration(slowest[values][0])}, on the timeline`)),
-    dataTable(slowest, { columns, label: title, onPick: (row) => { location.hash = target(row); } }));
+  return h(
+    "section",
+    {},
+    h("h3", {}, title),
+    h(
+      "p",
+      {},
+      h(
+        "a",
+        { className: "longest", href: target(0) },
+        `the longest, ${duration(slowest[values][0])}, on the timeline`,
+      ),
+    ),
+    dataTable(slowest, {
+      columns,
+      label: title,
+      onPick: (row) => {
+        location.hash = target(row);
+      },
+    }),
+  );
 }
 
 // What a callback did, by its identity.
 export async function callbackPanel(app, callback, name) {
-  const [points, slowest] = await Promise.all(["callback_point", "callback_slowest"].map((query) => app.inWindow(query, { callback })));
+  const [points, slowest] = await Promise.all(
+    ["callback_point", "callback_slowest"].map((query) => app.inWindow(query, { callback })),
+  );
   const head = h("h2", { className: "path-title" }, name);
   if (!points.rows) return [head, h("p", {}, "No instance of it began in the window of time.")];
-  const target = (table) => (row) => onTimeline("callback_instance", table.callback_instance_id[row]);
-  return [head, h("div", { className: "charts" },
-    overTime(points, { title: "duration over time", values: "duration", median: "median", target: target(points) }),
-    ratesOverTime(points, "instances over time", [{ label: "instances", color: "timer", values: Array.from(points.count), fill: true }]),
-    slowestOnes(slowest, { title: "Longest instances", values: "duration", target: target(slowest), columns: ["start_at", "duration", "callback_instance_id"] }))];
+  const target = (table) => (row) =>
+    onTimeline("callback_instance", table.callback_instance_id[row]);
+  return [
+    head,
+    h(
+      "div",
+      { className: "charts" },
+      overTime(points, {
+        title: "duration over time",
+        values: "duration",
+        median: "median",
+        target: target(points),
+      }),
+      ratesOverTime(points, "instances over time", [{
+        label: "instances",
+        color: "timer",
+        values: Array.from(points.count),
+        fill: true,
+      }]),
+      slowestOnes(slowest, {
+        title: "Longest instances",
+        values: "duration",
+        target: target(slowest),
+        columns: ["start_at", "duration", "callback_instance_id"],
+      }),
+    ),
+  ];
 }

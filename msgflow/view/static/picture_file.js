@@ -2,7 +2,15 @@
 
 import { h } from "./dom.js";
 
-const STYLED = ["fill", "stroke", "stroke-width", "stroke-dasharray", "font", "text-anchor", "paint-order"];
+const STYLED = [
+  "fill",
+  "stroke",
+  "stroke-width",
+  "stroke-dasharray",
+  "font",
+  "text-anchor",
+  "paint-order",
+];
 const SCALE = 2;
 
 // The SVG on its own: what the style sheet says of its elements is written into them.
@@ -33,7 +41,10 @@ export async function savePng(svg, name) {
   const image = new Image();
   image.src = dataAddress(standalone(svg));
   await image.decode();
-  const canvas = h("canvas", { width: Math.ceil(width * SCALE), height: Math.ceil(height * SCALE) });
+  const canvas = h("canvas", {
+    width: Math.ceil(width * SCALE),
+    height: Math.ceil(height * SCALE),
+  });
   const context = canvas.getContext("2d");
   context.fillStyle = getComputedStyle(document.body).backgroundColor;
   context.fillRect(0, 0, canvas.width, canvas.height);

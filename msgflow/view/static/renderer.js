@@ -3,7 +3,24 @@
 import { color } from "./dom.js";
 import { lowerBound } from "./timeline_rows.js";
 import { Crosses } from "./missing.js";
-import { ACTIVE, BLOCKED, EVENT, INACTIVE, MISSING, PALE, PART_COLORS, PREEMPTED, RUNNABLE, RUNNING, SLEEPING, STATE_COLORS, UNINTERRUPTIBLE, duration, partTitle, stateText } from "./labels.js";
+import {
+  ACTIVE,
+  BLOCKED,
+  duration,
+  EVENT,
+  INACTIVE,
+  MISSING,
+  PALE,
+  PART_COLORS,
+  partTitle,
+  PREEMPTED,
+  RUNNABLE,
+  RUNNING,
+  SLEEPING,
+  STATE_COLORS,
+  stateText,
+  UNINTERRUPTIBLE,
+} from "./labels.js";
 
 export const AXIS = 30;
 const BAR_TOP = 3;
@@ -11,10 +28,38 @@ const LEAST_WIDTH = 1;
 
 export function palette() {
   const names = [
-    "ink", "soft", "faint", "page", "panel", "line", "stripe", "timer", "subscription", "service",
-    "publication", "take", "call", "wait", "process", "execute", "blocked", "event", "active", "stored",
-    "running", "preempted", "runnable", "uninterruptible", "transport", "direct", "indirect",
-    "critical", "gap", "pick", "focus", "error",
+    "ink",
+    "soft",
+    "faint",
+    "page",
+    "panel",
+    "line",
+    "stripe",
+    "timer",
+    "subscription",
+    "service",
+    "publication",
+    "take",
+    "call",
+    "wait",
+    "process",
+    "execute",
+    "blocked",
+    "event",
+    "active",
+    "stored",
+    "running",
+    "preempted",
+    "runnable",
+    "uninterruptible",
+    "transport",
+    "direct",
+    "indirect",
+    "critical",
+    "gap",
+    "pick",
+    "focus",
+    "error",
   ];
   return Object.fromEntries(names.map((name) => [name, color(name)]));
 }
@@ -50,16 +95,25 @@ export class Renderer {
     this.colors = palette();
   }
 
-  get plotWidth() { return Math.max(this.width - this.labelWidth, 10); }
-  x(at) { return this.labelWidth + ((at - this.view.from) / (this.view.to - this.view.from)) * this.plotWidth; }
-  time(x) { return this.view.from + ((x - this.labelWidth) / this.plotWidth) * (this.view.to - this.view.from); }
+  get plotWidth() {
+    return Math.max(this.width - this.labelWidth, 10);
+  }
+  x(at) {
+    return this.labelWidth +
+      ((at - this.view.from) / (this.view.to - this.view.from)) * this.plotWidth;
+  }
+  time(x) {
+    return this.view.from +
+      ((x - this.labelWidth) / this.plotWidth) * (this.view.to - this.view.from);
+  }
   laneAt(y) {
     const inside = y - AXIS + this.scroll;
     if (y < AXIS || inside < 0 || inside >= this.height) return null;
     let [low, high] = [0, this.lanes.length - 1];
     while (low < high) {
       const middle = (low + high + 1) >> 1;
-      if (this.lanes[middle].y <= inside) low = middle; else high = middle - 1;
+      if (this.lanes[middle].y <= inside) low = middle;
+      else high = middle - 1;
     }
     return this.lanes[low];
   }
@@ -88,7 +142,10 @@ export class Renderer {
     c.clip();
     for (const lane of shown) {
       if (lane.type !== "row") continue;
-      c.globalAlpha = this.flow && !["thread", "event", "state", "schedule", "core"].includes(lane.kind) ? 0.22 : 1;
+      c.globalAlpha =
+        this.flow && !["thread", "event", "state", "schedule", "core"].includes(lane.kind)
+          ? 0.22
+          : 1;
       this.drawRow(lane);
     }
     if (this.links && !this.flow) this.drawLinks();
@@ -108,8 +165,9 @@ export class Renderer {
     const { context: c, colors } = this;
     const y = AXIS + lane.y - this.scroll;
     if (lane.type === "host") c.fillStyle = colors.stripe;
-    else if (lane.type === "row") c.fillStyle = this.hover?.lane === lane ? colors.stripe : colors.page;
-    else c.fillStyle = colors.panel;
+    else if (lane.type === "row") {
+      c.fillStyle = this.hover?.lane === lane ? colors.stripe : colors.page;
+    } else c.fillStyle = colors.panel;
     c.fillRect(0, y, this.width, lane.height);
     c.fillStyle = colors.line;
     c.fillRect(0, y + lane.height - 0.5, this.width, 0.5);
@@ -118,7 +176,11 @@ export class Renderer {
   drawLabel(lane) {
     const { context: c, colors } = this;
     const y = AXIS + lane.y - this.scroll;
-    c.fillStyle = lane.type === "host" ? colors.stripe : lane.type === "row" ? colors.page : colors.panel;
+    c.fillStyle = lane.type === "host"
+      ? colors.stripe
+      : lane.type === "row"
+      ? colors.page
+      : colors.panel;
     c.fillRect(0, y, this.labelWidth, lane.height - 0.5);
     const indent = { critical: 6, host: 6, process: 14, node: 22, row: 34 }[lane.type];
     c.font = `${lane.type === "row" ? "" : "600 "}12px system-ui, sans-serif`;
@@ -138,41 +200,87 @@ export class Renderer {
       mark(c, lane.kind, left - 8, y + lane.height / 2);
       left += 2;
     }
-    c.fillStyle = lane.type === "row" && (lane.isInternal || lane.isBeside) ? colors.soft : colors.ink;
+    c.fillStyle = lane.type === "row" && (lane.isInternal || lane.isBeside)
+      ? colors.soft
+      : colors.ink;
     const room = this.labelWidth - left - 6;
-    c.fillText(fit(c, lane.label, room, lane.type !== "process" && !["thread", "schedule"].includes(lane.kind)), left, y + lane.height / 2);
+    c.fillText(
+      fit(
+        c,
+        lane.label,
+        room,
+        lane.type !== "process" && !["thread", "schedule"].includes(lane.kind),
+      ),
+      left,
+      y + lane.height / 2,
+    );
     c.fillStyle = colors.line;
     c.fillRect(this.labelWidth - 1, y, 1, lane.height);
   }
 
   laneColor(kind) {
     const { colors } = this;
-    return { timer: colors.timer, subscription: colors.subscription, service: colors.service,
-      client: colors.call, publisher: colors.publication, callback: colors.timer,
-      thread: colors.execute, schedule: colors.running, core: colors.running, event: colors.event, state: colors.active, middleware: colors.soft }[kind] ?? colors.soft;
+    return {
+      timer: colors.timer,
+      subscription: colors.subscription,
+      service: colors.service,
+      client: colors.call,
+      publisher: colors.publication,
+      callback: colors.timer,
+      thread: colors.execute,
+      schedule: colors.running,
+      core: colors.running,
+      event: colors.event,
+      state: colors.active,
+      middleware: colors.soft,
+    }[kind] ?? colors.soft;
   }
 
   barColor(kind, laneKind) {
     const { colors } = this;
     switch (kind) {
-      case 0: return laneKind === "timer" ? colors.timer : laneKind === "service" ? colors.service
-        : laneKind === "subscription" ? colors.subscription : colors.timer;
-      case 1: return colors.publication;
-      case 2: return colors.take;
-      case 3: case 4: return colors.call;
-      case 5: case INACTIVE: return colors.wait;
-      case 6: return colors.process;
-      case BLOCKED: return colors.blocked;
-      case EVENT: return colors.event;
-      case ACTIVE: return colors.active;
-      case MISSING: return colors.error;
-      case RUNNING: return colors.running;
-      case PREEMPTED: return colors.preempted;
-      case RUNNABLE: return colors.runnable;
-      case SLEEPING: return colors.wait;
-      case UNINTERRUPTIBLE: return colors.uninterruptible;
-      case UNINTERRUPTIBLE + 1: return colors.faint;
-      default: return colors.execute;
+      case 0:
+        return laneKind === "timer"
+          ? colors.timer
+          : laneKind === "service"
+          ? colors.service
+          : laneKind === "subscription"
+          ? colors.subscription
+          : colors.timer;
+      case 1:
+        return colors.publication;
+      case 2:
+        return colors.take;
+      case 3:
+      case 4:
+        return colors.call;
+      case 5:
+      case INACTIVE:
+        return colors.wait;
+      case 6:
+        return colors.process;
+      case BLOCKED:
+        return colors.blocked;
+      case EVENT:
+        return colors.event;
+      case ACTIVE:
+        return colors.active;
+      case MISSING:
+        return colors.error;
+      case RUNNING:
+        return colors.running;
+      case PREEMPTED:
+        return colors.preempted;
+      case RUNNABLE:
+        return colors.runnable;
+      case SLEEPING:
+        return colors.wait;
+      case UNINTERRUPTIBLE:
+        return colors.uninterruptible;
+      case UNINTERRUPTIBLE + 1:
+        return colors.faint;
+      default:
+        return colors.execute;
     }
   }
 
@@ -183,7 +291,8 @@ export class Renderer {
     if (!range) return;
     const { context: c, colors } = this;
     const { table, reach } = this.bars;
-    const { start_at: starts, length: lengths, kind: kinds, count: counts, busy, flags, id } = table;
+    const { start_at: starts, length: lengths, kind: kinds, count: counts, busy, flags, id } =
+      table;
     const { from, to } = this.view;
     const scale = this.plotWidth / (to - from);
     const top = AXIS + lane.y - this.scroll + BAR_TOP;
@@ -219,7 +328,11 @@ export class Renderer {
       const x0 = (begin - from) * scale;
       const wide = length * scale;
       if (kind === MISSING) {
-        crosses.draw(this.labelWidth + x0 + (several ? wide / 2 : 0), top + full / 2, flags ? flags[at] : 0);
+        crosses.draw(
+          this.labelWidth + x0 + (several ? wide / 2 : 0),
+          top + full / 2,
+          flags ? flags[at] : 0,
+        );
         this.drawn.bars++;
       } else if (several) {
         // A bin: as high as the share of its time that is busy.
@@ -236,12 +349,32 @@ export class Renderer {
         const x = Math.max(x0, -2);
         const width = Math.min(x0 + wide, this.plotWidth + 2) - x;
         c.fillStyle = this.barColor(kind, lane.kind);
-        const inset = kind >= RUNNING ? (1 - STATE_SHARE[kind - RUNNING]) * full : flags && flags[at] & 8 ? 4 : 0;
+        const inset = kind >= RUNNING
+          ? (1 - STATE_SHARE[kind - RUNNING]) * full
+          : flags && flags[at] & 8
+          ? 4
+          : 0;
         c.fillRect(this.labelWidth + x, top + inset, width, full - inset);
-        if (flags && flags[at] & 1 && width > 3) hatch(c, this.labelWidth + x, top, width, full, this.colors.page);
-        if (kind === PREEMPTED && width > 3) hatch(c, this.labelWidth + x, top + inset, width, full - inset, this.colors.page);
-        if (wide > 46 && kind < 5) this.nameBar(duration(length), this.labelWidth + x, top, width, full);
-        else if (wide > 46 && (kind === PREEMPTED || (kind === RUNNING && lane.kind === "core"))) this.nameBar(this.names.get(id[at]) ?? "", this.labelWidth + x, top, width, full, kind === PREEMPTED ? colors.preempted : undefined);
+        if (flags && flags[at] & 1 && width > 3) {
+          hatch(c, this.labelWidth + x, top, width, full, this.colors.page);
+        }
+        if (kind === PREEMPTED && width > 3) {
+          hatch(c, this.labelWidth + x, top + inset, width, full - inset, this.colors.page);
+        }
+        if (wide > 46 && kind < 5) {
+          this.nameBar(duration(length), this.labelWidth + x, top, width, full);
+        } else if (
+          wide > 46 && (kind === PREEMPTED || (kind === RUNNING && lane.kind === "core"))
+        ) {
+          this.nameBar(
+            this.names.get(id[at]) ?? "",
+            this.labelWidth + x,
+            top,
+            width,
+            full,
+            kind === PREEMPTED ? colors.preempted : undefined,
+          );
+        }
         this.drawn.bars++;
       } else {
         const own = Math.max(Math.floor(x0), 0);
@@ -260,8 +393,12 @@ export class Renderer {
   binOffset(kind, table, at, full) {
     if (kind < 5) return 0;
     let offset = 0;
-    for (let other = at - 1; other >= 0 && table.start_at[other] === table.start_at[at]
-      && table.row_key[other] === table.row_key[at]; other--) {
+    for (
+      let other = at - 1;
+      other >= 0 && table.start_at[other] === table.start_at[at] &&
+      table.row_key[other] === table.row_key[at];
+      other--
+    ) {
       if (table.kind[other] < 5 || table.length[other] !== table.length[at]) break;
       offset += Math.min(table.busy[other] / table.length[other], 1) * full;
     }
@@ -278,7 +415,11 @@ export class Renderer {
     const { width: needed } = c.measureText(text);
     if (left + needed >= x + width - 2) return;
     // Text on a hatched bar stands on a plain one.
-    if (plate) { c.fillStyle = plate; c.fillRect(left - 2, y, needed + 4, height); c.fillStyle = this.colors.page; }
+    if (plate) {
+      c.fillStyle = plate;
+      c.fillRect(left - 2, y, needed + 4, height);
+      c.fillStyle = this.colors.page;
+    }
     c.fillText(text, left, y + height / 2 + 0.5);
   }
 
@@ -288,7 +429,14 @@ export class Renderer {
   }
 
   drawLinks() {
-    const { link_kind: kinds, from_row: fromRows, to_row: toRows, from_at: froms, to_at: tos, rows } = this.links;
+    const {
+      link_kind: kinds,
+      from_row: fromRows,
+      to_row: toRows,
+      from_at: froms,
+      to_at: tos,
+      rows,
+    } = this.links;
     const { from, to } = this.view;
     const visible = [];
     for (let at = 0; at < rows; at++) {
@@ -322,7 +470,9 @@ export class Renderer {
         const end = table.start_at[at] + table.length[at];
         const waker = table.id[at];
         if (table.start_at[at] > to) break;
-        if (table.kind[at] !== SLEEPING || end < from || end > to || !(waker > 0) || waker % 2) continue;
+        if (table.kind[at] !== SLEEPING || end < from || end > to || !(waker > 0) || waker % 2) {
+          continue;
+        }
         const y = this.center(-2 * waker - 2);
         if (y !== null && y !== undefined) found.push([this.x(end), y, this.center(lane.key)]);
       }
@@ -365,8 +515,14 @@ export class Renderer {
       const [at0, at1] = edgeTimes(edge, a, b);
       const style = EDGE_STYLE[edge.kind] ?? EDGE_STYLE.direct;
       const critical = edge.critical;
-      this.arrow(this.x(at0), y0, this.x(at1), y1,
-        critical ? { ...style, color: "critical" } : style, critical ? 2.2 : 1.3);
+      this.arrow(
+        this.x(at0),
+        y0,
+        this.x(at1),
+        y1,
+        critical ? { ...style, color: "critical" } : style,
+        critical ? 2.2 : 1.3,
+      );
     }
     for (const vertex of flow.vertices) {
       const lane = laneKinds.get(vertex.row);
@@ -397,7 +553,8 @@ export class Renderer {
   // One piece of the critical path after the other, with a line below that makes them one.
   drawPieces(lane) {
     const { context: c, colors } = this;
-    const { rows, from_ns: froms, duration_ns: lengths, activity, state, who, wakers } = this.flow.pieces;
+    const { rows, from_ns: froms, duration_ns: lengths, activity, state, who, wakers } =
+      this.flow.pieces;
     const y = AXIS + lane.y - this.scroll + 4;
     const high = lane.height - 10;
     for (let row = 0; row < rows; row++) {
@@ -411,7 +568,10 @@ export class Renderer {
       const shade = colors[name] ?? colors.faint;
       c.fillStyle = shade;
       c.fillRect(left, y, width, high);
-      if (width > 3) { c.fillStyle = colors.page; c.fillRect(left + width - 0.75, y, 0.75, high); }
+      if (width > 3) {
+        c.fillStyle = colors.page;
+        c.fillRect(left + width - 0.75, y, 0.75, high);
+      }
       c.fillStyle = colors.critical;
       c.fillRect(left, y + high + 1, width, 2);
       if (width < 40) continue;
@@ -420,8 +580,23 @@ export class Renderer {
       c.textBaseline = "middle";
       c.fillStyle = PALE.has(name) ? colors.ink : colors.page;
       const took = duration(lengths[row]);
-      for (const said of [...(isStill ? [`${stateText(state[row], who[row], wakers?.[row])} ${took}`, stateText(state[row], who[row], wakers?.[row])] : []), `${partTitle(activity[row])} ${took}`, `${activity[row].replaceAll("_", " ")} ${took}`, took]) {
-        if (c.measureText(said).width < width - 8) { c.fillText(said, left + 4, y + high / 2 + 0.5); break; }
+      for (
+        const said of [
+          ...(isStill
+            ? [
+              `${stateText(state[row], who[row], wakers?.[row])} ${took}`,
+              stateText(state[row], who[row], wakers?.[row]),
+            ]
+            : []),
+          `${partTitle(activity[row])} ${took}`,
+          `${activity[row].replaceAll("_", " ")} ${took}`,
+          took,
+        ]
+      ) {
+        if (c.measureText(said).width < width - 8) {
+          c.fillText(said, left + 4, y + high / 2 + 0.5);
+          break;
+        }
       }
     }
   }
@@ -429,7 +604,9 @@ export class Renderer {
   pieceAt(x) {
     const { rows, from_ns: froms, duration_ns: lengths } = this.flow.pieces;
     const at = this.time(x);
-    for (let row = 0; row < rows; row++) if (froms[row] <= at && at < froms[row] + lengths[row]) return row;
+    for (let row = 0; row < rows; row++) {
+      if (froms[row] <= at && at < froms[row] + lengths[row]) return row;
+    }
     return undefined;
   }
 
@@ -442,7 +619,8 @@ export class Renderer {
       if (lane.type === "host") {
         host = { top: lane.y, bottom: lane.y + lane.height };
         const known = hosts.get(lane.label);
-        if (known) known.push(host); else hosts.set(lane.label, [host]);
+        if (known) known.push(host);
+        else hosts.set(lane.label, [host]);
       } else if (host) host.bottom = lane.y + lane.height;
     }
     for (const gap of this.gaps) {
@@ -469,9 +647,12 @@ export class Renderer {
     const span = this.view.to - this.view.from;
     const wanted = span / Math.max(this.plotWidth / 120, 2);
     const power = 10 ** Math.floor(Math.log10(Math.max(wanted, 1)));
-    const step = [1, 2, 5, 10].map((factor) => factor * power).find((size) => size >= wanted) ?? power * 10;
+    const step = [1, 2, 5, 10].map((factor) => factor * power).find((size) => size >= wanted) ??
+      power * 10;
     const ticks = [];
-    for (let at = Math.ceil(this.view.from / step) * step; at <= this.view.to; at += step) ticks.push(at);
+    for (let at = Math.ceil(this.view.from / step) * step; at <= this.view.to; at += step) {
+      ticks.push(at);
+    }
     return { ticks, step };
   }
 
@@ -503,7 +684,11 @@ export class Renderer {
     c.fillRect(0, 0, this.labelWidth, AXIS - 1);
     c.fillStyle = colors.soft;
     c.textAlign = "left";
-    c.fillText(fit(c, `${duration(this.view.to - this.view.from)} shown`, this.labelWidth - 12, true), 8, AXIS / 2);
+    c.fillText(
+      fit(c, `${duration(this.view.to - this.view.from)} shown`, this.labelWidth - 12, true),
+      8,
+      AXIS / 2,
+    );
   }
 
   drawMeasure() {
@@ -524,7 +709,10 @@ export class Renderer {
     const text = duration(Math.abs(this.measure.to - this.measure.from));
     c.font = "600 13px system-ui, sans-serif";
     const width = c.measureText(text).width + 12;
-    const left = Math.min(Math.max((x0 + x1) / 2 - width / 2, this.labelWidth + 4), this.width - width - 4);
+    const left = Math.min(
+      Math.max((x0 + x1) / 2 - width / 2, this.labelWidth + 4),
+      this.width - width - 4,
+    );
     c.fillRect(left, AXIS + 6, width, 20);
     c.fillStyle = colors.page;
     c.textAlign = "left";
@@ -548,7 +736,15 @@ export class Renderer {
         .sort((a, b) => a.far - b.far || a.vertex.length - b.vertex.length);
       if (near.length) {
         const { vertex } = near[0];
-        return { lane, kind: vertex.kind, id: vertex.id, at: vertex.at, length: vertex.length, flags: vertex.flags, count: 1 };
+        return {
+          lane,
+          kind: vertex.kind,
+          id: vertex.id,
+          at: vertex.at,
+          length: vertex.length,
+          flags: vertex.flags,
+          count: 1,
+        };
       }
     }
     const range = this.bars?.ranges.get(lane.key);
@@ -573,33 +769,69 @@ export class Renderer {
     if (!best) return { lane };
     const { place } = best;
     return {
-      lane, kind: table.kind[place], id: table.id[place], at: table.start_at[place],
-      length: table.length[place], flags: table.flags?.[place] ?? 0,
-      count: table.count ? table.count[place] : 1, busy: table.busy?.[place] ?? table.length[place],
-      isBin: Boolean(best.several), together,
+      lane,
+      kind: table.kind[place],
+      id: table.id[place],
+      at: table.start_at[place],
+      length: table.length[place],
+      flags: table.flags?.[place] ?? 0,
+      count: table.count ? table.count[place] : 1,
+      busy: table.busy?.[place] ?? table.length[place],
+      isBin: Boolean(best.several),
+      together,
     };
   }
 }
 
 // Waiting may be nothing; an event has no length, and no other bar beside it.
-const leastHeight = (kind, full) => (kind === 5 || kind === SLEEPING ? 0 : kind === EVENT ? full : 4);
+const leastHeight = (
+  kind,
+  full,
+) => (kind === 5 || kind === SLEEPING ? 0 : kind === EVENT ? full : 4);
 const HEIGHT_HALF = 10;
 // Drawn from below: what an executor does for callbacks first.
 // Messages that were not taken are crosses, not columns.
-const ORDER = [7, BLOCKED, 6, 0, 1, 2, 3, 4, 5, EVENT, ACTIVE, INACTIVE, RUNNING, PREEMPTED, RUNNABLE, UNINTERRUPTIBLE, SLEEPING, 18];
+const ORDER = [
+  7,
+  BLOCKED,
+  6,
+  0,
+  1,
+  2,
+  3,
+  4,
+  5,
+  EVENT,
+  ACTIVE,
+  INACTIVE,
+  RUNNING,
+  PREEMPTED,
+  RUNNABLE,
+  UNINTERRUPTIBLE,
+  SLEEPING,
+  18,
+];
 // States differ by height, not by colour alone.
 const STATE_SHARE = [1, 1, 0.6, 0.2, 0.4, 0.4];
 const MOST_WAKINGS = 400;
 const LINK_STYLE = [
-  { color: "transport" }, { color: "direct" }, { color: "indirect", dash: [6, 3] },
-  { color: "indirect", dash: [2, 3] }, { color: "direct", dash: [4, 2] },
-  { color: "direct", dash: [4, 2] }, { color: "indirect", dash: [2, 3] },
+  { color: "transport" },
+  { color: "direct" },
+  { color: "indirect", dash: [6, 3] },
+  { color: "indirect", dash: [2, 3] },
+  { color: "direct", dash: [4, 2] },
+  { color: "direct", dash: [4, 2] },
+  { color: "indirect", dash: [2, 3] },
 ];
 const EDGE_STYLE = {
-  transport: { color: "transport" }, callback: { color: "transport" }, direct: { color: "direct" },
-  periodic_async: { color: "indirect", dash: [6, 3] }, partial_sync: { color: "indirect", dash: [2, 3] },
+  transport: { color: "transport" },
+  callback: { color: "transport" },
+  direct: { color: "direct" },
+  periodic_async: { color: "indirect", dash: [6, 3] },
+  partial_sync: { color: "indirect", dash: [2, 3] },
   approximate_sync: { color: "indirect", dash: [2, 3] },
-  take_adjacent: { color: "direct", dash: [4, 2] }, polled: { color: "direct", dash: [4, 2] },
+  take_adjacent: { color: "direct", dash: [4, 2] },
+  polled: { color: "direct", dash: [4, 2] },
   service: { color: "direct", dash: [4, 2] },
 };
 
@@ -620,7 +852,8 @@ function fit(c, text, room, keepEnd) {
   while (low < high) {
     const middle = (low + high + 1) >> 1;
     const part = keepEnd ? `…${text.slice(text.length - middle)}` : `${text.slice(0, middle)}…`;
-    if (c.measureText(part).width <= room) low = middle; else high = middle - 1;
+    if (c.measureText(part).width <= room) low = middle;
+    else high = middle - 1;
   }
   return keepEnd ? `…${text.slice(text.length - low)}` : `${text.slice(0, low)}…`;
 }
@@ -629,14 +862,33 @@ function fit(c, text, room, keepEnd) {
 function mark(c, kind, x, y) {
   c.beginPath();
   if (kind === "timer") c.arc(x, y, 3.5, 0, 7);
-  else if (kind === "publisher") { c.moveTo(x - 3, y - 4); c.lineTo(x + 4, y); c.lineTo(x - 3, y + 4); }
-  else if (kind === "service" || kind === "client") { c.moveTo(x, y - 4); c.lineTo(x + 4, y); c.lineTo(x, y + 4); c.lineTo(x - 4, y); }
-  else if (kind === "event") { c.moveTo(x - 4, y - 4); c.lineTo(x + 4, y - 4); c.lineTo(x, y + 4); }
-  else if (kind === "state") c.rect(x - 4, y - 2, 8, 4);
-  else if (kind === "core") { c.rect(x - 4, y - 4, 8, 8); c.rect(x - 1.5, y - 1.5, 3, 3); c.fill("evenodd"); return; }
-  else if (kind === "schedule") { c.rect(x - 4, y - 3, 8, 1.5); c.rect(x - 4, y - 0.75, 5, 1.5); c.rect(x - 4, y + 1.5, 8, 1.5); }
-  else if (kind === "thread") { c.rect(x - 4, y - 3, 8, 2); c.rect(x - 4, y + 1, 8, 2); }
-  else c.rect(x - 3.5, y - 3.5, 7, 7);
+  else if (kind === "publisher") {
+    c.moveTo(x - 3, y - 4);
+    c.lineTo(x + 4, y);
+    c.lineTo(x - 3, y + 4);
+  } else if (kind === "service" || kind === "client") {
+    c.moveTo(x, y - 4);
+    c.lineTo(x + 4, y);
+    c.lineTo(x, y + 4);
+    c.lineTo(x - 4, y);
+  } else if (kind === "event") {
+    c.moveTo(x - 4, y - 4);
+    c.lineTo(x + 4, y - 4);
+    c.lineTo(x, y + 4);
+  } else if (kind === "state") c.rect(x - 4, y - 2, 8, 4);
+  else if (kind === "core") {
+    c.rect(x - 4, y - 4, 8, 8);
+    c.rect(x - 1.5, y - 1.5, 3, 3);
+    c.fill("evenodd");
+    return;
+  } else if (kind === "schedule") {
+    c.rect(x - 4, y - 3, 8, 1.5);
+    c.rect(x - 4, y - 0.75, 5, 1.5);
+    c.rect(x - 4, y + 1.5, 8, 1.5);
+  } else if (kind === "thread") {
+    c.rect(x - 4, y - 3, 8, 2);
+    c.rect(x - 4, y + 1, 8, 2);
+  } else c.rect(x - 3.5, y - 3.5, 7, 7);
   c.fill();
 }
 

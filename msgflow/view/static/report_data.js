@@ -93,23 +93,39 @@ export class EmbeddedSource {
     const place = stretches.findIndex((one) => start >= one.start - 1 && end <= one.end + 1);
     if (stretches.length === 1 && stretches[0].whole) {
       const table = this.detail(0);
-      return withMeta(table, { start: stretches[0].start, end: stretches[0].end, count: table.rows, whole: true });
+      return withMeta(table, {
+        start: stretches[0].start,
+        end: stretches[0].end,
+        count: table.rows,
+        whole: true,
+      });
     }
     if (place >= 0) {
       const table = this.detail(place);
-      return withMeta(table, { start: stretches[place].start, end: stretches[place].end, count: table.rows });
+      return withMeta(table, {
+        start: stretches[place].start,
+        end: stretches[place].end,
+        count: table.rows,
+      });
     }
     const inside = stretches.find((one) => end > one.start && start < one.end);
     const table = this.kept("level", {});
     return withMeta(table, {
-      start: this.head.start, end: this.head.end, count: this.head.count, bin: this.head.bin,
-      note: inside ? "Single bars are in this report only near its slowest flows." : "Here this report has no single bars; msgflow ui has.",
+      start: this.head.start,
+      end: this.head.end,
+      count: this.head.count,
+      bin: this.head.bin,
+      note: inside
+        ? "Single bars are in this report only near its slowest flows."
+        : "Here this report has no single bars; msgflow ui has.",
     });
   }
 
   links({ start, end }) {
     const stretches = this.stretches();
-    const place = stretches.length === 1 ? 0 : stretches.findIndex((one) => start >= one.start - 1 && end <= one.end + 1);
+    const place = stretches.length === 1
+      ? 0
+      : stretches.findIndex((one) => start >= one.start - 1 && end <= one.end + 1);
     if (place < 0) return { rows: 0, meta: {}, columns: [] };
     return this.kept("links", { place });
   }
@@ -192,22 +208,51 @@ export class EmbeddedSource {
     for (const vertex of held) {
       const { table: bars, row } = this.bar(vertex % KEY_KINDS, Math.floor(vertex / KEY_KINDS));
       const one = {
-        kind: vertex % KEY_KINDS, id: Math.floor(vertex / KEY_KINDS), row_key: bars.row_key[row],
-        start_at: bars.start_at[row], length: bars.length[row], flags: bars.flags[row],
-        is_effect: effects.has(vertex), is_cause: causes.has(vertex),
+        kind: vertex % KEY_KINDS,
+        id: Math.floor(vertex / KEY_KINDS),
+        row_key: bars.row_key[row],
+        start_at: bars.start_at[row],
+        length: bars.length[row],
+        flags: bars.flags[row],
+        is_effect: effects.has(vertex),
+        is_cause: causes.has(vertex),
       };
       let found = false;
       for (const place of ending(vertex, to)) {
         const cause = table.from_id[place] * KEY_KINDS + table.from_kind[place];
         if (!held.has(cause)) continue;
-        rows.push({ ...one, from_kind: table.from_kind[place], from_id: table.from_id[place], link_kind: table.link_kind[place] });
+        rows.push({
+          ...one,
+          from_kind: table.from_kind[place],
+          from_id: table.from_id[place],
+          link_kind: table.link_kind[place],
+        });
         found = true;
       }
       if (!found) rows.push({ ...one, from_kind: NaN, from_id: NaN, link_kind: null });
     }
     rows.sort((a, b) => a.start_at - b.start_at || a.kind - b.kind || a.id - b.id);
-    const result = { rows: rows.length, meta: { outside }, columns: [], vertex_count: [all.size - outside] };
-    for (const name of ["kind", "id", "row_key", "start_at", "length", "flags", "is_effect", "is_cause", "from_kind", "from_id", "link_kind"]) {
+    const result = {
+      rows: rows.length,
+      meta: { outside },
+      columns: [],
+      vertex_count: [all.size - outside],
+    };
+    for (
+      const name of [
+        "kind",
+        "id",
+        "row_key",
+        "start_at",
+        "length",
+        "flags",
+        "is_effect",
+        "is_cause",
+        "from_kind",
+        "from_id",
+        "link_kind",
+      ]
+    ) {
       result[name] = rows.map((row) => row[name]);
     }
     return result;
@@ -218,9 +263,21 @@ export class EmbeddedSource {
     const none = { rows: 0, meta: {}, columns: [] };
     if (!found) return none;
     const { table } = found;
-    for (let place = found.row + step; place >= 0 && place < table.rows && table.row_key[place] === row; place += step) {
+    for (
+      let place = found.row + step;
+      place >= 0 && place < table.rows && table.row_key[place] === row;
+      place += step
+    ) {
       if (table.kind[place] !== kind) continue;
-      return { rows: 1, meta: {}, columns: [], kind: [kind], id: [table.id[place]], start_at: [table.start_at[place]], length: [table.length[place]] };
+      return {
+        rows: 1,
+        meta: {},
+        columns: [],
+        kind: [kind],
+        id: [table.id[place]],
+        start_at: [table.start_at[place]],
+        length: [table.length[place]],
+      };
     }
     return none;
   }
@@ -234,7 +291,8 @@ function* ending(vertex, { order, sorted }) {
   let [low, high] = [0, sorted.length];
   while (low < high) {
     const middle = (low + high) >> 1;
-    if (sorted[middle] < vertex) low = middle + 1; else high = middle;
+    if (sorted[middle] < vertex) low = middle + 1;
+    else high = middle;
   }
   for (let at = low; at < sorted.length && sorted[at] === vertex; at++) yield order[at];
 }

@@ -1,13 +1,49 @@
 // Services and actions: how long calls and goals took, and which were not answered.
 
-import { h, clear } from "./dom.js";
+import { clear, h } from "./dom.js";
 import { dataTable } from "./table.js";
 import { commands, notes } from "./notice.js";
 import { fill, section } from "./overview.js";
 import { Chooser, onTimeline, overTime, ratesOverTime, slowestOnes } from "./panel.js";
 
-const COLUMNS_OF_SERVICES = ["service_name", "client", "server", "requests", "answered", "not_taken", "not_answered", "not_received", "round_trip_median_ns", "round_trip_p95_ns", "round_trip_p99_ns", "round_trip_max_ns", "request_median_ns", "wait_median_ns", "callback_median_ns", "reply_median_ns", "response_median_ns"];
-const OF_ACTIONS = ["action_name", "client", "server", "goals", "accepted", "rejected", "not_answered", "finished", "cancelled", "result_median_ns", "result_p95_ns", "result_max_ns", "accept_median_ns", "first_feedback_median_ns", "execution_median_ns", "feedback", "doubtful"];
+const COLUMNS_OF_SERVICES = [
+  "service_name",
+  "client",
+  "server",
+  "requests",
+  "answered",
+  "not_taken",
+  "not_answered",
+  "not_received",
+  "round_trip_median_ns",
+  "round_trip_p95_ns",
+  "round_trip_p99_ns",
+  "round_trip_max_ns",
+  "request_median_ns",
+  "wait_median_ns",
+  "callback_median_ns",
+  "reply_median_ns",
+  "response_median_ns",
+];
+const OF_ACTIONS = [
+  "action_name",
+  "client",
+  "server",
+  "goals",
+  "accepted",
+  "rejected",
+  "not_answered",
+  "finished",
+  "cancelled",
+  "result_median_ns",
+  "result_p95_ns",
+  "result_max_ns",
+  "accept_median_ns",
+  "first_feedback_median_ns",
+  "execution_median_ns",
+  "feedback",
+  "doubtful",
+];
 
 export class ServicesPage {
   constructor(app, root) {
@@ -19,17 +55,50 @@ export class ServicesPage {
   async build() {
     const { app } = this;
     const table = await app.query("service-latency");
-    this.chooser = new Chooser(app, { key: "call", label: "services", columns: COLUMNS_OF_SERVICES, sort: { name: "round_trip_max_ns", down: true }, nothing: "No call of a service was recorded.",
-      search: { placeholder: "service, node …", label: "show services with this text", texts: (rows, row) => [rows.service_name[row], rows.client[row], rows.server[row]] },
-      identity: (rows, row) => `${rows.service_id[row]}:${rows.client_id[row]}`, panel: (rows, row) => this.panel(rows, row) });
+    this.chooser = new Chooser(app, {
+      key: "call",
+      label: "services",
+      columns: COLUMNS_OF_SERVICES,
+      sort: { name: "round_trip_max_ns", down: true },
+      nothing: "No call of a service was recorded.",
+      search: {
+        placeholder: "service, node …",
+        label: "show services with this text",
+        texts: (rows, row) => [rows.service_name[row], rows.client[row], rows.server[row]],
+      },
+      identity: (rows, row) => `${rows.service_id[row]}:${rows.client_id[row]}`,
+      panel: (rows, row) => this.panel(rows, row),
+    });
     const actions = section("Actions");
-    clear(this.root, h("section", {}, h("h2", {}, "Services"),
-      h("p", { className: "soft" }, "From the request that the client sends to the response that it takes, on its own clock. A click on a row shows the calls over time, and leads to the longest."),
-      h("div", { className: "tools" }, this.chooser.search), this.chooser.list, notes(table.meta.notes), commands([table])), this.chooser.detail, actions.root);
+    clear(
+      this.root,
+      h(
+        "section",
+        {},
+        h("h2", {}, "Services"),
+        h(
+          "p",
+          { className: "soft" },
+          "From the request that the client sends to the response that it takes, on its own clock. A click on a row shows the calls over time, and leads to the longest.",
+        ),
+        h("div", { className: "tools" }, this.chooser.search),
+        this.chooser.list,
+        notes(table.meta.notes),
+        commands([table]),
+      ),
+      this.chooser.detail,
+      actions.root,
+    );
     this.chooser.show(table);
     await fill(actions, async () => {
       const rows = await app.query("action-latency");
-      const table = rows.rows ? dataTable(rows, { label: "actions", columns: OF_ACTIONS, sort: { name: "result_max_ns", down: true } }) : h("p", {}, "No goal of an action was recorded.");
+      const table = rows.rows
+        ? dataTable(rows, {
+          label: "actions",
+          columns: OF_ACTIONS,
+          sort: { name: "result_max_ns", down: true },
+        })
+        : h("p", {}, "No goal of an action was recorded.");
       return [table, notes(rows.meta.notes), commands([rows])];
     });
   }
@@ -37,16 +106,52 @@ export class ServicesPage {
   async panel(rows, row) {
     const { app } = this;
     const asked = { client: Number.isNaN(rows.client_id[row]) ? null : rows.client_id[row] };
-    const [points, slowest] = await Promise.all(["service_point", "service_slowest"].map((name) => app.inWindow(name, asked)));
+    const [points, slowest] = await Promise.all(
+      ["service_point", "service_slowest"].map((name) => app.inWindow(name, asked)),
+    );
     const target = (table) => (at) => onTimeline("request", table.request_id[at]);
-    const head = h("h2", { className: "path-title" }, `${rows.service_name[row] ?? "service not known"}, called by ${rows.client[row] ?? "a client not known"}`);
+    const head = h(
+      "h2",
+      { className: "path-title" },
+      `${rows.service_name[row] ?? "service not known"}, called by ${
+        rows.client[row] ?? "a client not known"
+      }`,
+    );
     if (!points.rows) return [head, h("p", {}, "No call began in the window of time.")];
-    return [head, h("div", { className: "charts" },
-      slowest.rows > 0 && overTime(points, { title: "round trip over time", values: "duration", median: "median", target: target(points) }),
-      ratesOverTime(points, "calls over time", [{ label: "calls", color: "call", values: Array.from(points.count) }, { label: "answered", color: "service", values: Array.from(points.answered), dash: [4, 3] }]),
-      slowestOnes(slowest, { title: "Longest calls", values: "duration", target: target(slowest), columns: ["start_at", "duration", "request_id"] }))];
+    return [
+      head,
+      h(
+        "div",
+        { className: "charts" },
+        slowest.rows > 0 &&
+          overTime(points, {
+            title: "round trip over time",
+            values: "duration",
+            median: "median",
+            target: target(points),
+          }),
+        ratesOverTime(points, "calls over time", [{
+          label: "calls",
+          color: "call",
+          values: Array.from(points.count),
+        }, {
+          label: "answered",
+          color: "service",
+          values: Array.from(points.answered),
+          dash: [4, 3],
+        }]),
+        slowestOnes(slowest, {
+          title: "Longest calls",
+          values: "duration",
+          target: target(slowest),
+          columns: ["start_at", "duration", "request_id"],
+        }),
+      ),
+    ];
   }
 
-  recolor() { this.chooser?.recolor(); }
+  recolor() {
+    this.chooser?.recolor();
+  }
   leave() {}
 }

@@ -1,6 +1,6 @@
 // SQL: any query that only reads, its rows as a table or a chart, and where they are on the timeline.
 
-import { h, clear } from "./dom.js";
+import { clear, h } from "./dom.js";
 import { current, pageAddress, replace } from "./address.js";
 import { count, duration, KIND_NAMES, shellQuoted } from "./labels.js";
 import { dataTable } from "./table.js";
@@ -8,7 +8,7 @@ import { redrawCharts } from "./chart.js";
 import { csvText, saveFile } from "./download.js";
 import { failed, waiting } from "./notice.js";
 import { sqlEditor } from "./editor.js";
-import { DRAWINGS, drawingOf, Figures } from "./figures.js";
+import { drawingOf, DRAWINGS, Figures } from "./figures.js";
 import { queryFile } from "./query_file.js";
 
 const FIRST_QUERY = "SELECT *\nFROM callback_label\nORDER BY node, label";
@@ -28,22 +28,77 @@ export class SqlPage {
   async build() {
     const { app } = this;
     const asked = current();
-    const [library, words, examples] = await Promise.all([import("./codemirror.min.js"), app.source.fetch("word"), app.source.fetch("example")]);
+    const [library, words, examples] = await Promise.all([
+      import("./codemirror.min.js"),
+      app.source.fetch("word"),
+      app.source.fetch("example"),
+    ]);
     this.words = words;
     typed = asked.text ?? typed ?? FIRST_QUERY;
-    this.editor = sqlEditor(library, words, { text: typed, run: () => this.run(), changed: () => { typed = this.editor.text(); } });
-    const button = (text, action, more) => h("button", { type: "button", on: { click: action }, ...more }, text);
+    this.editor = sqlEditor(library, words, {
+      text: typed,
+      run: () => this.run(),
+      changed: () => {
+        typed = this.editor.text();
+      },
+    });
+    const button = (text, action, more) =>
+      h("button", { type: "button", on: { click: action }, ...more }, text);
     this.runButton = button("Run", () => this.run(), { className: "run", title: "Ctrl and Enter" });
     this.stopButton = button("Stop", () => this.leave(), { hidden: true });
-    const example = h("select", { "aria-label": "examples", on: { change: () => { const sql = examples.sql[example.selectedIndex - 1]; example.selectedIndex = 0; this.editor.set(sql); this.run(); } } },
-      h("option", {}, "examples …"), Array.from(examples.title, (title) => h("option", {}, title)));
-    this.rows = h("select", { "aria-label": "most rows" }, ROW_LIMITS.map((number) => h("option", { value: String(number), selected: asked.rows === String(number) }, count(number, "row"))));
+    const example = h(
+      "select",
+      {
+        "aria-label": "examples",
+        on: {
+          change: () => {
+            const sql = examples.sql[example.selectedIndex - 1];
+            example.selectedIndex = 0;
+            this.editor.set(sql);
+            this.run();
+          },
+        },
+      },
+      h("option", {}, "examples …"),
+      Array.from(examples.title, (title) => h("option", {}, title)),
+    );
+    this.rows = h(
+      "select",
+      { "aria-label": "most rows" },
+      ROW_LIMITS.map((number) =>
+        h(
+          "option",
+          { value: String(number), selected: asked.rows === String(number) },
+          count(number, "row"),
+        )
+      ),
+    );
     this.result = h("div", { className: "sql-result" });
-    clear(this.root, h("section", {}, h("h2", {}, "SQL"),
-      h("p", { className: "soft" }, "One query on the public views. It can change nothing and reach no other file. Ctrl and Enter runs it; Ctrl and Space completes names."),
-      this.editor.root,
-      h("div", { className: "tools sql-tools" }, this.runButton, button("EXPLAIN", () => this.run("EXPLAIN ")), this.stopButton, example,
-        h("label", {}, "at most ", this.rows), button("Save as named query", () => this.save()))), this.result);
+    clear(
+      this.root,
+      h(
+        "section",
+        {},
+        h("h2", {}, "SQL"),
+        h(
+          "p",
+          { className: "soft" },
+          "One query on the public views. It can change nothing and reach no other file. Ctrl and Enter runs it; Ctrl and Space completes names.",
+        ),
+        this.editor.root,
+        h(
+          "div",
+          { className: "tools sql-tools" },
+          this.runButton,
+          button("EXPLAIN", () => this.run("EXPLAIN ")),
+          this.stopButton,
+          example,
+          h("label", {}, "at most ", this.rows),
+          button("Save as named query", () => this.save()),
+        ),
+      ),
+      this.result,
+    );
     // Who has opened a link sees its rows. Only this page's own links come here: others have no cookie.
     if (asked.text !== undefined) await this.run();
   }
@@ -51,20 +106,30 @@ export class SqlPage {
   // Asks the server; what is wrong with the query is shown and marked. Returns the rows, or null.
   async ask(text) {
     if (!text.trim()) return this.said("There is no SQL to run.");
-    if (encodeURIComponent(text).length > MOST_OF_ADDRESS) return this.said("This query is too long for the page.", "msgflow sql -f FILE");
+    if (encodeURIComponent(text).length > MOST_OF_ADDRESS) {
+      return this.said("This query is too long for the page.", "msgflow sql -f FILE");
+    }
     this.leave();
     const asking = this.asking = new AbortController();
     this.stopButton.hidden = false;
     clear(this.result, waiting("asking …"));
     try {
-      const table = await this.app.source.ask("sql", { text, rows: this.rows.value }, asking.signal);
+      const table = await this.app.source.ask(
+        "sql",
+        { text, rows: this.rows.value },
+        asking.signal,
+      );
       this.editor.mark(null);
       if (table.meta.error === undefined) return rowsOf(table, this.app);
       const line = /^LINE (\d+): /m.exec(table.meta.error);
       this.editor.mark(line ? Number(line[1]) : null);
       return this.said(table.meta.error, table.meta.hint);
     } catch (error) {
-      if (error.name === "AbortError") { if (asking === this.asking) clear(this.result, h("p", { className: "soft", role: "status" }, "stopped")); } else clear(this.result, failed(error));
+      if (error.name === "AbortError") {
+        if (asking === this.asking) {
+          clear(this.result, h("p", { className: "soft", role: "status" }, "stopped"));
+        }
+      } else clear(this.result, failed(error));
       return null;
     } finally {
       if (asking === this.asking) this.stopButton.hidden = true;
@@ -72,7 +137,15 @@ export class SqlPage {
   }
 
   said(message, hint) {
-    clear(this.result, h("div", { className: "failed", role: "alert" }, h("pre", {}, message), hint && h("p", { className: "soft" }, hint)));
+    clear(
+      this.result,
+      h(
+        "div",
+        { className: "failed", role: "alert" },
+        h("pre", {}, message),
+        hint && h("p", { className: "soft" }, hint),
+      ),
+    );
     return null;
   }
 
@@ -88,27 +161,84 @@ export class SqlPage {
 
   show(rows, milliseconds, text) {
     const plan = rows.columns.find((column) => column.label === "explain_value");
-    const said = h("p", { className: "soft", role: "status" }, `${count(rows.rows, "row")} in ${duration(milliseconds * 1e6)}`);
+    const said = h(
+      "p",
+      { className: "soft", role: "status" },
+      `${count(rows.rows, "row")} in ${duration(milliseconds * 1e6)}`,
+    );
     if (plan) {
-      clear(this.result, h("section", {}, said, h("pre", { className: "plan", tabIndex: 0 }, rows[plan.name].join("\n"))));
+      clear(
+        this.result,
+        h(
+          "section",
+          {},
+          said,
+          h("pre", { className: "plan", tabIndex: 0 }, rows[plan.name].join("\n")),
+        ),
+      );
       return;
     }
     const leads = leadsOf(rows);
-    const table = dataTable(rows, { label: "rows", columns: rows.columns.map((column) => column.name), nothing: "no rows", onPick: leads && ((row) => this.lead(rows, leads, row)) });
+    const table = dataTable(rows, {
+      label: "rows",
+      columns: rows.columns.map((column) => column.name),
+      nothing: "no rows",
+      onPick: leads && ((row) => this.lead(rows, leads, row)),
+    });
     const figures = new Figures(rows);
     const body = h("div");
     const draw = (drawing) => {
       replace({ draw: drawing === DRAWINGS[0] ? null : drawing });
-      for (const one of choices.children) one.setAttribute("aria-pressed", String(one.textContent === drawing));
+      for (const one of choices.children) {
+        one.setAttribute("aria-pressed", String(one.textContent === drawing));
+      }
       clear(body, drawing === DRAWINGS[0] ? table : figures.drawn(drawing));
     };
-    const choices = h("div", { className: "group", role: "group", "aria-label": "shown as" }, DRAWINGS.map((drawing) => h("button", { type: "button", on: { click: () => draw(drawing) } }, drawing)));
-    const csv = h("button", { type: "button", title: "download as CSV", on: { click: () => saveFile(new Blob([csvText(rows.columns.map((column) => [column.label, column.exact]))], { type: "text/csv" }), "rows.csv") } }, "CSV");
-    clear(this.result, h("section", {}, said,
-      rows.meta.is_cut && h("p", { className: "notes" }, `Only the first ${count(rows.rows, "row")}: there are more, which tables and charts leave out.`),
-      h("div", { className: "tools" }, choices, csv),
-      leads && h("p", { className: "soft" }, "A click on a row leads to it on the timeline."), body,
-      h("p", { className: "command" }, "the same rows: ", h("code", {}, `msgflow sql ${shellQuoted(text)}`))));
+    const choices = h(
+      "div",
+      { className: "group", role: "group", "aria-label": "shown as" },
+      DRAWINGS.map((drawing) =>
+        h("button", { type: "button", on: { click: () => draw(drawing) } }, drawing)
+      ),
+    );
+    const csv = h("button", {
+      type: "button",
+      title: "download as CSV",
+      on: {
+        click: () =>
+          saveFile(
+            new Blob([csvText(rows.columns.map((column) => [column.label, column.exact]))], {
+              type: "text/csv",
+            }),
+            "rows.csv",
+          ),
+      },
+    }, "CSV");
+    clear(
+      this.result,
+      h(
+        "section",
+        {},
+        said,
+        rows.meta.is_cut &&
+          h(
+            "p",
+            { className: "notes" },
+            `Only the first ${
+              count(rows.rows, "row")
+            }: there are more, which tables and charts leave out.`,
+          ),
+        h("div", { className: "tools" }, choices, csv),
+        leads && h("p", { className: "soft" }, "A click on a row leads to it on the timeline."),
+        body,
+        h(
+          "p",
+          { className: "command" },
+          "the same rows: ",
+          h("code", {}, `msgflow sql ${shellQuoted(text)}`),
+        ),
+      ),
+    );
     draw(drawingOf(current().draw));
   }
 
@@ -124,32 +254,80 @@ export class SqlPage {
       run = app.runs.find(({ run_id }) => run_id === found.run_id[0]) ?? run;
     }
     const other = run === app.run ? {} : { start: null, end: null };
-    if (kind !== undefined) { location.hash = pageAddress("timeline", { run: run.run_id, ...other, flow: `${kind}:${id}` }); return; }
+    if (kind !== undefined) {
+      location.hash = pageAddress("timeline", { run: run.run_id, ...other, flow: `${kind}:${id}` });
+      return;
+    }
     const around = Math.max(Math.round(run.length / 200), 1000);
     const at = rows[time.name][row];
-    location.hash = pageAddress("timeline", { run: run.run_id, ...other, from: Math.max(at - around, 0), to: at + around });
+    location.hash = pageAddress("timeline", {
+      run: run.run_id,
+      ...other,
+      from: Math.max(at - around, 0),
+      to: at + around,
+    });
   }
 
   async save() {
-    const name = h("input", { type: "text", value: "my-query", pattern: "[a-z][a-z0-9]*(-[a-z0-9]+)*", "aria-label": "name of the query" });
-    const title = h("input", { type: "text", value: "What it answers", "aria-label": "title of the query" });
+    const name = h("input", {
+      type: "text",
+      value: "my-query",
+      pattern: "[a-z][a-z0-9]*(-[a-z0-9]+)*",
+      "aria-label": "name of the query",
+    });
+    const title = h("input", {
+      type: "text",
+      value: "What it answers",
+      "aria-label": "title of the query",
+    });
     const text = this.editor.text();
     const described = await this.ask(`DESCRIBE ${text}`);
     if (!described) return;
     const shown = h("pre", { className: "plan query-file", tabIndex: 0 });
-    const file = () => queryFile(text, { name: name.value, title: title.value }, described, this.words);
+    const file = () =>
+      queryFile(text, { name: name.value, title: title.value }, described, this.words);
     const fill = () => clear(shown, file());
     name.addEventListener("input", fill);
     title.addEventListener("input", fill);
     fill();
-    clear(this.result, h("section", {}, h("h3", {}, "A named query"),
-      h("div", { className: "tools" }, h("label", {}, "name ", name), h("label", {}, "title ", title),
-        h("button", { type: "button", on: { click: () => { if (name.reportValidity()) saveFile(new Blob([file()], { type: "application/sql" }), `${name.value}.sql`); } } }, "Download")),
-      h("p", { className: "soft" }, "msgflow sql -f FILE runs it. In the folder queries/ of a checkout of msgflow it is a command; CONTRIBUTING.md says what else a query there needs."), shown));
+    clear(
+      this.result,
+      h(
+        "section",
+        {},
+        h("h3", {}, "A named query"),
+        h(
+          "div",
+          { className: "tools" },
+          h("label", {}, "name ", name),
+          h("label", {}, "title ", title),
+          h("button", {
+            type: "button",
+            on: {
+              click: () => {
+                if (name.reportValidity()) {
+                  saveFile(new Blob([file()], { type: "application/sql" }), `${name.value}.sql`);
+                }
+              },
+            },
+          }, "Download"),
+        ),
+        h(
+          "p",
+          { className: "soft" },
+          "msgflow sql -f FILE runs it. In the folder queries/ of a checkout of msgflow it is a command; CONTRIBUTING.md says what else a query there needs.",
+        ),
+        shown,
+      ),
+    );
   }
 
-  recolor() { redrawCharts(); }
-  leave() { this.asking?.abort(); }
+  recolor() {
+    redrawCharts();
+  }
+  leave() {
+    this.asking?.abort();
+  }
 }
 
 // Rows as the page shows them: columns have labels, numbers of a run's time count from its begin, and
@@ -158,10 +336,28 @@ function rowsOf(table, app) {
   const { names, integers } = table.meta;
   const rows = { rows: table.rows, meta: { is_cut: table.meta.is_cut }, columns: [] };
   table.columns.forEach((column, at) => {
-    const exact = Array.from(table[column.name], (value) => (typeof value === "number" && Number.isNaN(value) && column.type === "integer" ? null : value));
+    const exact = Array.from(
+      table[column.name],
+      (
+        value,
+      ) => (typeof value === "number" && Number.isNaN(value) && column.type === "integer"
+        ? null
+        : value),
+    );
     const run = integers[at] && column.type === "text" ? runOf(exact, app) : null;
-    rows[column.name] = run ? exact.map((value) => (value === null ? NaN : Number(BigInt(value) - BigInt(run.start_text)))) : table[column.name];
-    rows.columns.push({ name: column.name, label: names[at], type: run ? "integer" : column.type, run, exact, shown: (row) => exactText(exact[row]) });
+    rows[column.name] = run
+      ? exact.map((
+        value,
+      ) => (value === null ? NaN : Number(BigInt(value) - BigInt(run.start_text))))
+      : table[column.name];
+    rows.columns.push({
+      name: column.name,
+      label: names[at],
+      type: run ? "integer" : column.type,
+      run,
+      exact,
+      shown: (row) => exactText(exact[row]),
+    });
   });
   return rows;
 }
@@ -174,7 +370,9 @@ function exactText(value) {
 function runOf(values, app) {
   const known = values.filter((value) => value !== null).map(BigInt);
   if (!known.length) return null;
-  const isInside = ({ start_text: start, length }) => start && known.every((value) => value >= BigInt(start) && value <= BigInt(start) + BigInt(length));
+  const isInside = ({ start_text: start, length }) =>
+    start &&
+    known.every((value) => value >= BigInt(start) && value <= BigInt(start) + BigInt(length));
   return [app.run, ...app.runs].find(isInside) ?? null;
 }
 
@@ -182,11 +380,17 @@ function runOf(values, app) {
 function leadsOf(rows) {
   const column = (label) => rows.columns.find((one) => one.label === label);
   const value = (one, row) => one?.exact[row] ?? undefined;
-  const pairs = [["root_kind", "root_id"], ["kind", "id"]].map((pair) => pair.map(column)).filter(([kind, id]) => kind && id);
+  const pairs = [["root_kind", "root_id"], ["kind", "id"]].map((pair) => pair.map(column)).filter((
+    [kind, id],
+  ) => kind && id);
   const single = KIND_NAMES.map((kind) => [kind, column(`${kind}_id`)]).filter(([, id]) => id);
   const time = rows.columns.find((one) => one.run);
   if (!pairs.length && !single.length && !time) return null;
-  const thing = (row) => [...pairs.map(([kind, id]) => [value(kind, row), value(id, row)]), ...single.map(([kind, id]) => [kind, value(id, row)])]
-    .find(([kind, id]) => KIND_NAMES.includes(kind) && Number.isInteger(id));
+  const thing = (row) =>
+    [
+      ...pairs.map(([kind, id]) => [value(kind, row), value(id, row)]),
+      ...single.map(([kind, id]) => [kind, value(id, row)]),
+    ]
+      .find(([kind, id]) => KIND_NAMES.includes(kind) && Number.isInteger(id));
   return { thing, time };
 }

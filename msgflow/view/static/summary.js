@@ -1,6 +1,6 @@
 // Sections of the summary: the first rows of an answer, with the command that prints them.
 
-import { h, breakable } from "./dom.js";
+import { breakable, h } from "./dom.js";
 import { address } from "./address.js";
 import { duration, pathText, percent } from "./labels.js";
 import { dataTable } from "./table.js";
@@ -8,10 +8,22 @@ import { command, notes } from "./notice.js";
 
 export function summary(table, options = {}) {
   const { reading, when_empty: nothing, shown, commands } = table.meta;
-  if (!table.rows) return [h("p", {}, reading ? `${reading}.` : nothing), notes(table.meta.notes), commands.map(command)];
-  const columns = shown.filter((name) => Array.from(table[name]).some((value) => value !== null && value !== "" && !Number.isNaN(value)));
-  return [reading && h("p", {}, `${reading}.`), dataTable(table, { columns, label: table.meta.title, ...options }),
-    notes(table.meta.notes), commands.map(command)];
+  if (!table.rows) {
+    return [
+      h("p", {}, reading ? `${reading}.` : nothing),
+      notes(table.meta.notes),
+      commands.map(command),
+    ];
+  }
+  const columns = shown.filter((name) =>
+    Array.from(table[name]).some((value) => value !== null && value !== "" && !Number.isNaN(value))
+  );
+  return [
+    reading && h("p", {}, `${reading}.`),
+    dataTable(table, { columns, label: table.meta.title, ...options }),
+    notes(table.meta.notes),
+    commands.map(command),
+  ];
 }
 
 // Of each flow how long each of its nodes took: a bar of nodes, and their names.
@@ -25,20 +37,52 @@ export function blame(table) {
   const list = [...flows.entries()].map(([rank, rows]) => {
     const [first] = rows;
     const path = pathText(table.path[first]);
-    const item = h("li", {},
-      h("p", { title: path }, h("a", { href: address({ page: "timeline", from: null, to: null, path: null, flow: `take:${table.take_id[first]}`, source: null }) }, duration(table.latency_ns[first])),
-        " ", h("span", { className: "path-text" }, breakable(withoutRepeated(path, before)))),
-      h("ul", { className: "blame-nodes" }, rows.map((row) => {
-        const bar = h("span", { className: "blame-bar" });
-        bar.style.width = `${Math.max(100 * (table.share[row] ?? 0), 0.3)}%`;
-        return h("li", {}, h("span", { className: "blame-node" }, breakable(table.node[row] ?? "not known")),
-          h("span", { className: "numbers" }, `${duration(table.duration_ns[row])} · ${percent(table.share[row])}`), h("span", { className: "bar-track" }, bar));
-      })),
-      command(table.meta.commands[rank - 1]));
+    const item = h(
+      "li",
+      {},
+      h(
+        "p",
+        { title: path },
+        h("a", {
+          href: address({
+            page: "timeline",
+            from: null,
+            to: null,
+            path: null,
+            flow: `take:${table.take_id[first]}`,
+            source: null,
+          }),
+        }, duration(table.latency_ns[first])),
+        " ",
+        h("span", { className: "path-text" }, breakable(withoutRepeated(path, before))),
+      ),
+      h(
+        "ul",
+        { className: "blame-nodes" },
+        rows.map((row) => {
+          const bar = h("span", { className: "blame-bar" });
+          bar.style.width = `${Math.max(100 * (table.share[row] ?? 0), 0.3)}%`;
+          return h(
+            "li",
+            {},
+            h("span", { className: "blame-node" }, breakable(table.node[row] ?? "not known")),
+            h(
+              "span",
+              { className: "numbers" },
+              `${duration(table.duration_ns[row])} · ${percent(table.share[row])}`,
+            ),
+            h("span", { className: "bar-track" }, bar),
+          );
+        }),
+      ),
+      command(table.meta.commands[rank - 1]),
+    );
     before = path;
     return item;
   });
-  return list.length ? [h("ol", { className: "blame" }, list), notes(table.meta.notes)] : [h("p", {}, table.meta.when_empty), notes(table.meta.notes)];
+  return list.length
+    ? [h("ol", { className: "blame" }, list), notes(table.meta.notes)]
+    : [h("p", {}, table.meta.when_empty), notes(table.meta.notes)];
 }
 
 // A path without the steps at its begin that the one above it has too, as far as these are several.

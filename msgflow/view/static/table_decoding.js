@@ -22,8 +22,10 @@ function values(column, body, rows) {
     case "json":
       return JSON.parse(new TextDecoder().decode(body));
     case "boolean":
-      return Array.from(integers(column, body, rows), (value) =>
-        Number.isNaN(value) ? null : value === 1);
+      return Array.from(
+        integers(column, body, rows),
+        (value) => Number.isNaN(value) ? null : value === 1,
+      );
     case "text": {
       const words = [null, ...JSON.parse(new TextDecoder().decode(body.subarray(0, column.words)))];
       const codes = integers(column, body.subarray(column.words), rows);

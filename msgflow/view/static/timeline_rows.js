@@ -4,9 +4,16 @@ export const HEIGHTS = { critical: 26, host: 22, process: 20, node: 20, row: 20 
 
 // Kinds of rows that may be hidden, and what the boxes for that say.
 export const ROW_KINDS = {
-  timer: "timers", subscription: "subscriptions", service: "services", client: "clients",
-  publisher: "publishers", event: "events of your own", state: "states of managed nodes", thread: "executors",
-  schedule: "threads to the kernel", core: "cores",
+  timer: "timers",
+  subscription: "subscriptions",
+  service: "services",
+  client: "clients",
+  publisher: "publishers",
+  event: "events of your own",
+  state: "states of managed nodes",
+  thread: "executors",
+  schedule: "threads to the kernel",
+  core: "cores",
 };
 // Kinds of rows that only recordings with a kernel trace have.
 export const KERNEL_KINDS = new Set(["schedule", "core"]);
@@ -30,7 +37,16 @@ export function layout(rows, options) {
   };
   const isPinned = (row) => options.pinned?.has(rows.row_key[row]);
   for (let row = 0; row < rows.rows; row++) {
-    if (isPinned(row)) push({ type: "row", key: rows.row_key[row], kind: rows.kind[row], label: `${rows.label[row]} · ${rows.node[row] ?? rows.process[row]}`, isPinned: true, row });
+    if (isPinned(row)) {
+      push({
+        type: "row",
+        key: rows.row_key[row],
+        kind: rows.kind[row],
+        label: `${rows.label[row]} · ${rows.node[row] ?? rows.process[row]}`,
+        isPinned: true,
+        row,
+      });
+    }
   }
   if (options.critical) push({ type: "critical", key: "critical", label: "critical path" });
   for (let row = 0; row < rows.rows; row++) {
@@ -39,9 +55,18 @@ export function layout(rows, options) {
     const isAsked = options.only ? options.only.has(key) : true;
     if (!isAsked || isPinned(row)) continue;
     if (!options.only) {
-      if (rows.is_internal[row] && !options.internal) { hiddenCount++; continue; }
-      if (options.hidden.has(key) || options.kinds.has(kind)) { hiddenCount++; continue; }
-      if (found && !found.has(row)) { hiddenCount++; continue; }
+      if (rows.is_internal[row] && !options.internal) {
+        hiddenCount++;
+        continue;
+      }
+      if (options.hidden.has(key) || options.kinds.has(kind)) {
+        hiddenCount++;
+        continue;
+      }
+      if (found && !found.has(row)) {
+        hiddenCount++;
+        continue;
+      }
     }
     const hostKey = `host:${rows.host[row]}`;
     const processKey = `process:${rows.process_id[row]}`;
@@ -58,7 +83,13 @@ export function layout(rows, options) {
       process = processKey;
       node = null;
       processFolded = options.folded.has(processKey);
-      push({ type: "process", key: processKey, label: rows.process[row], folded: processFolded, row });
+      push({
+        type: "process",
+        key: processKey,
+        label: rows.process[row],
+        folded: processFolded,
+        row,
+      });
     }
     if (processFolded) continue;
     if (nodeKey !== node) {
@@ -68,7 +99,15 @@ export function layout(rows, options) {
       if (nodeKey !== null) push({ type: "node", key: nodeKey, label, folded: nodeFolded, row });
     }
     if (nodeFolded) continue;
-    push({ type: "row", key, kind, label: rows.label[row], isInternal: rows.is_internal[row], isBeside: found?.get(row) === "beside", row });
+    push({
+      type: "row",
+      key,
+      kind,
+      label: rows.label[row],
+      isInternal: rows.is_internal[row],
+      isBeside: found?.get(row) === "beside",
+      row,
+    });
   }
   return { lanes, height: y, hiddenCount };
 }
@@ -87,7 +126,8 @@ export function search(rows, query) {
     if (rows.node[row] && rows.label[row]?.toLowerCase().includes(query)) nodes.add(nodeOf(row));
   }
   for (let row = 0; row < rows.rows; row++) {
-    const isBeside = (EXCHANGED.has(rows.kind[row]) && names.has(rows.label[row])) || (rows.node[row] && nodes.has(nodeOf(row)));
+    const isBeside = (EXCHANGED.has(rows.kind[row]) && names.has(rows.label[row])) ||
+      (rows.node[row] && nodes.has(nodeOf(row)));
     if (isBeside && !found.has(row)) found.set(row, "beside");
   }
   return found;

@@ -23,7 +23,9 @@ export class Zoom {
     const { width, height } = svg.viewBox.baseVal;
     const tall = innerHeight * HIGHEST;
     this.least = Math.min(1, this.frame.clientWidth / width, tall / height);
-    this.frame.style.height = `${Math.ceil(Math.min(Math.max(height * this.least, LOWEST), tall)) + 2}px`;
+    this.frame.style.height = `${
+      Math.ceil(Math.min(Math.max(height * this.least, LOWEST), tall)) + 2
+    }px`;
     this.set(this.least);
   }
 
@@ -32,16 +34,24 @@ export class Zoom {
     if (this.svg && this.scale === this.least) this.fit(this.svg);
   }
 
-  in() { this.by(STEP); }
-  out() { this.by(1 / STEP); }
-  all() { if (this.svg) this.set(this.least); }
+  in() {
+    this.by(STEP);
+  }
+  out() {
+    this.by(1 / STEP);
+  }
+  all() {
+    if (this.svg) this.set(this.least);
+  }
 
   // What is under the pointer, or in the middle, stays there.
   by(factor, event = null) {
     if (!this.svg) return;
     const { frame } = this;
     const box = frame.getBoundingClientRect();
-    const [x, y] = event ? [event.clientX - box.left, event.clientY - box.top] : [frame.clientWidth / 2, frame.clientHeight / 2];
+    const [x, y] = event
+      ? [event.clientX - box.left, event.clientY - box.top]
+      : [frame.clientWidth / 2, frame.clientHeight / 2];
     const [left, top] = [(frame.scrollLeft + x) / this.scale, (frame.scrollTop + y) / this.scale];
     this.set(Math.min(Math.max(this.scale * factor, Math.min(this.least, 0.1)), MOST));
     frame.scrollLeft = left * this.scale - x;
