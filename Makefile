@@ -55,6 +55,7 @@ demo: $(VENV)/.installed
 quick: $(VENV)/.developed
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/deno fmt --check --quiet
 	$(BIN)/mypy --num-workers auto
 	$(BIN)/pytest -n auto --dist worksteal --assert=plain $(wildcard tests/*/cases) \
 		tests/style/test_generated.py tests/style/test_headers.py tests/style/test_sql_style.py
@@ -63,6 +64,7 @@ test: SELECTED := -m 'not thorough'
 test test-all: $(VENV)/.developed babeltrace chromium ros
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/deno fmt --check --quiet
 	$(BIN)/mypy --num-workers auto
 	$(BIN)/lint-imports
 	@# To show the values of a failed assert, each worker compiles all tests for ten seconds in a
