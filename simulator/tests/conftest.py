@@ -12,7 +12,7 @@ from typing import Any
 
 import duckdb
 import pytest
-from thorough import SHOWN, few
+from thorough import few
 
 from msgflow.errors import TraceError
 from msgflow.trace import bt2_library
@@ -150,7 +150,7 @@ def recordings(bt2: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> dic
 _KNOWN_BY_IDS = [name for name in scenarios() if not name.startswith("containers_")]
 
 
-@pytest.fixture(params=few(_KNOWN_BY_IDS, *SHOWN))
+@pytest.fixture(params=few(_KNOWN_BY_IDS, "demo", "mixed_intra_process"))
 def recording(request: pytest.FixtureRequest, recordings: dict[str, Recording]) -> Recording:
     """Each built-in scenario in turn whose processes have ids of their own."""
     return recordings[request.param]

@@ -14,6 +14,7 @@ import duckdb
 import pytest
 from ctf_writer import Event, Packet, TraceContent, write_trace
 from ingested import rows
+from thorough import few
 
 from msgflow.ingest import ingest
 from msgflow.trace import open as open_traces
@@ -54,7 +55,7 @@ def fields_of(database: Path) -> list[dict[str, Any]]:
     return [json.loads(text) for (text,) in found]
 
 
-@pytest.mark.parametrize("reader", READERS)
+@pytest.mark.parametrize("reader", few(READERS, "msgflow"))
 def test_events_that_match_a_pattern_are_loaded(
     make_trace: Make, new_database: Path, reader: str
 ) -> None:
@@ -180,7 +181,7 @@ LOW = {f"i{bits}": -(1 << (bits - 1)) for bits in (8, 16, 32, 64)}
 HIGH = {f"u{bits}": (1 << bits) - 1 for bits in (8, 16, 32, 64)}
 
 
-@pytest.mark.parametrize("reader", READERS)
+@pytest.mark.parametrize("reader", few(READERS, "msgflow"))
 def test_every_type_of_field_becomes_json(tmp_path: Path, reader: str) -> None:
     """Integers to the last digit; bytes that are no UTF-8 get replacement characters."""
     values: dict[str, Any] = {
@@ -222,7 +223,7 @@ LABELLED = {
 }
 
 
-@pytest.mark.parametrize("reader", READERS)
+@pytest.mark.parametrize("reader", few(READERS, "msgflow"))
 def test_an_enumeration_is_its_label(make_trace: Make, new_database: Path, reader: str) -> None:
     """The number where no label or several belong to it, and inside an array."""
     made = [
@@ -247,7 +248,7 @@ def test_an_enumeration_is_its_label(make_trace: Make, new_database: Path, reade
     assert [fields["each"] for fields in found] == [[0, 1]] * len(made)
 
 
-@pytest.mark.parametrize("reader", READERS)
+@pytest.mark.parametrize("reader", few(READERS, "msgflow"))
 def test_labels_of_several_programs_count_together(
     make_trace: Make, new_database: Path, reader: str
 ) -> None:

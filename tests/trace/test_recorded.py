@@ -91,7 +91,7 @@ def test_counts_of_the_real_trace(shared_traces: Path, open_traces: Open) -> Non
     assert len(info.event_names) == 35
 
 
-@pytest.mark.parametrize("name", few(RECORDED, "services", "periodic_async_jazzy24"))
+@pytest.mark.parametrize("name", few(RECORDED, "periodic_async_jazzy24"))
 def test_order_and_packets(shared_traces: Path, open_traces: Open, name: str) -> None:
     with open_traces(shared_traces / name) as traces:
         tables = tables_of(traces)
@@ -172,7 +172,7 @@ def test_hosts_stay_apart(shared_traces: Path, open_traces: Open) -> None:
 @pytest.mark.parametrize(
     ("folder", "names"),
     [
-        ("services", None),
+        thorough("services", None),
         thorough("partial_sync", {"ros2:message_link_partial_sync", "dds:create_writer"}),
         ("periodic_async_jazzy24", {"ros2:message_link_periodic_async", "ros2:rmw_publisher_init"}),
     ],

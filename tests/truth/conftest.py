@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack
-from functools import cache
+from collections.abc import Callable
+from functools import lru_cache
 from pathlib import Path
 
 import pytest
-from ingested import Ingested, ingest_one, open_ingested
+from ingested import Ingested, made_once, open_ingested
 from thorough import SHOWN, few
 
+from msgflow.ingest import ingest
 from msgflow_sim import scenarios, simulate
 from msgflow_sim.entity import SECOND
 
@@ -44,27 +44,28 @@ _WITH_GAPS = (
 _WITHOUT_FLOWS = ("timers", "actions")
 # Which run filled a cache, and so which flow a message is on, is a guess in these.
 _DOUBTFUL = ("reentrant",)
+# An open database has threads and memory of its own: those before the last few are closed.
+_MOST_OPEN = 3
 
 
 @pytest.fixture(scope="session")
-def simulations(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[str], Ingested]]:
+def simulations(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Ingested]:
     """Simulates and ingests a scenario; what is true of it are the views truth_<table>."""
-    directory = tmp_path_factory.mktemp("simulated")
-    with ExitStack() as opened:
 
-        @cache
-        def get(name: str) -> Ingested:
+    @lru_cache(_MOST_OPEN)
+    def get(name: str) -> Ingested:
+        def make(path: Path) -> None:
             is_long = scenarios()[name].duration_ns >= 10 * SECOND
             factor = _LENGTHS.get(name, _LENGTH if is_long else _SHORT)
-            simulation = simulate(name, directory / name, factor=factor)
-            path = directory / f"{name}.duckdb"
-            ingested = ingest_one(simulation.directory, path)
-            opened.callback(ingested.connection.close)
-            for table, file in simulation.truth.items():
-                ingested.connection.execute(f"CREATE TEMP VIEW truth_{table} AS FROM '{file}'")
-            return ingested
+            ingest([simulate(name, path.parent / name, factor=factor).directory], path)
 
-        yield get
+        path = made_once(tmp_path_factory, f"true_{name}", make)
+        ingested = open_ingested(path)
+        for file in (path.parent / name / "truth").glob("*.parquet"):
+            ingested.connection.execute(f"CREATE TEMP VIEW truth_{file.stem} AS FROM '{file}'")
+        return ingested
+
+    return get
 
 
 @pytest.fixture(params=few(scenarios(), *SHOWN))
@@ -83,14 +84,6 @@ def complete(request: pytest.FixtureRequest, simulations: Callable[[str], Ingest
 
 
 @pytest.fixture(scope="session")
-def recordings(real: Callable[[str], Path]) -> Iterator[Callable[[str], Ingested]]:
+def recordings(real: Callable[[str], Path]) -> Callable[[str], Ingested]:
     """Opens the database of one of the recorded traces, by its path in the folder of all."""
-    with ExitStack() as opened:
-
-        @cache
-        def get(name: str) -> Ingested:
-            ingested = open_ingested(real(name))
-            opened.callback(ingested.connection.close)
-            return ingested
-
-        yield get
+    return lru_cache(_MOST_OPEN)(lambda name: open_ingested(real(name)))

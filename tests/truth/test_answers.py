@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from ingested import Ingested, ingest_one
 from scoring import compare_simulated
+from thorough import few
 
 from msgflow_sim import Buffers, Recording, simulate
 
@@ -77,7 +78,7 @@ RECORDED = {
 }
 
 
-@pytest.mark.parametrize("name", RECORDED)
+@pytest.mark.parametrize("name", few(RECORDED, "real_py_mixed", "rclpy_timer"))
 def test_recorded_timers_are_doubtful_and_no_path_follows_them(
     recordings: Callable[[str], Ingested], name: str
 ) -> None:

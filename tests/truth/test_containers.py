@@ -8,12 +8,15 @@ from pathlib import Path
 import duckdb
 import pytest
 from scoring import compare_simulated
+from thorough import few
 
 from msgflow.ingest import ingest
 from msgflow_sim import scenarios, simulate
 
 
-@pytest.mark.parametrize("name", ["containers_one_daemon", "containers_one_hostname"])
+@pytest.mark.parametrize(
+    "name", few(["containers_one_daemon", "containers_one_hostname"], "containers_one_hostname")
+)
 def test_processes_with_equal_ids_are_told_apart(tmp_path: Path, name: str) -> None:
     simulation = simulate(name, tmp_path / "trace", factor=0.1)
     report = ingest([simulation.directory], tmp_path / "run.duckdb")

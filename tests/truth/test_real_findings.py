@@ -7,6 +7,7 @@ from collections.abc import Callable
 import pytest
 from fates import FATES
 from ingested import Ingested
+from thorough import few
 
 from msgflow.query.catalogue import load_query
 from msgflow.query.runner import run_query
@@ -95,12 +96,15 @@ EXPECTED: dict[str, list[tuple[str, str | None, int]]] = {
 }
 
 
-@pytest.mark.parametrize("name", EXPECTED)
+@pytest.mark.parametrize(
+    "name", few(EXPECTED, "real_container", "real_late", "real_overload", "real_py_mixed")
+)
 def test_findings(recordings: Callable[[str], Ingested], name: str) -> None:
     found = recordings(name).rows(FINDINGS)
     assert [row[:3] for row in found] == EXPECTED[name], found
 
 
+@pytest.mark.thorough
 def test_services_of_a_managed_node(recordings: Callable[[str], Ingested]) -> None:
     """rclcpp has copies of them: the order tells which is which."""
     recording = recordings("real_lifecycle")
@@ -120,6 +124,7 @@ def test_services_of_a_managed_node(recordings: Callable[[str], Ingested]) -> No
     ]
 
 
+@pytest.mark.thorough
 def test_deferred_responses_before_kilted(recordings: Callable[[str], Ingested]) -> None:
     """The callback of /outer has no end in the trace; the node says that it took 1.3 ms."""
     recording = recordings("real_jazzy_services")
@@ -131,6 +136,7 @@ def test_deferred_responses_before_kilted(recordings: Callable[[str], Ingested])
     ) == [("/inner", False, 73, False), ("/outer", True, 56, True)]
 
 
+@pytest.mark.thorough
 def test_a_join_that_the_other_input_triggers(recordings: Callable[[str], Ingested]) -> None:
     """After the first twelve, /rear_tf is always last: the node ends flows from /front."""
     recording = recordings("real_reference")

@@ -111,7 +111,7 @@ def load_truth(recording: Ingested, path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", few(RECORDINGS, "real_container", "real_intra", "real_py_mixed", "real_services")
+    "name", few(RECORDINGS, "real_container", "real_py_mixed", "real_services")
 )
 def test_links_are_right(real: Callable[[str], Path], shared_traces: Path, name: str) -> None:
     scores = compare_real(real(name), shared_traces / name / "truth.jsonl.gz")
@@ -160,6 +160,7 @@ def test_a_set_of_messages_closest_in_time(shared_traces: Path, tmp_path: Path) 
         assert recording.differences(MADE_OF, LINKED) == ([], [])
 
 
+@pytest.mark.thorough
 def test_a_set_of_messages_closest_in_time_is_suggested(real: Callable[[str], Path]) -> None:
     with open_db(real("real_filters")) as database:
         text = database.suggest_links().text("msgflow links apply FILE")

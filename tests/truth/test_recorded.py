@@ -120,7 +120,7 @@ def checker(shared_traces: Path) -> Path:
 
 @pytest.mark.parametrize(
     "name",
-    few(TRUE_TRACES, "sync_1_1", "services", "containers_one_daemon", "containers_same_name"),
+    few(TRUE_TRACES, "sync_1_1", "services", "containers_one_daemon"),
 )
 def test_scores(
     recordings: Callable[[str], Ingested],
@@ -158,7 +158,7 @@ DECIDED = {
 }
 
 
-@pytest.mark.parametrize("name", few(ONCE_WRONG, "clock_step", "untraced_rival"))
+@pytest.mark.parametrize("name", few(ONCE_WRONG, "untraced_rival"))
 def test_what_was_wrong_is_right(
     recordings: Callable[[str], Ingested], shared_traces: Path, name: str
 ) -> None:

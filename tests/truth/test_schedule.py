@@ -31,7 +31,7 @@ KINDS = {"thread_state", "preemptor", "callback_schedule", "arrival"}
 Traced = tuple[Simulation, Path]
 
 
-@pytest.fixture(scope="module", params=few(SYSTEMS, "real_time", "shared_memory", "kernel_losses"))
+@pytest.fixture(scope="module", params=few(SYSTEMS, "real_time", "shared_memory"))
 def traced(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Traced:
     return ingested(request.param, tmp_path_factory.mktemp(request.param), Recording())
 
@@ -59,9 +59,7 @@ def test_all_is_found_and_nothing_else(traced: Traced) -> None:
         assert score.misguessed < 0.05 * score.found
 
 
-@pytest.mark.parametrize(
-    "traced", few(SYSTEMS, "shared_memory", "kernel_losses"), indirect=True, scope="module"
-)
+@pytest.mark.parametrize("traced", few(SYSTEMS, "shared_memory"), indirect=True, scope="module")
 def test_perf_gives_the_same_answers(traced: Traced, tmp_path: Path) -> None:
     """But it does not tell what it has lost."""
     simulation, database = traced
@@ -165,7 +163,10 @@ def test_a_disk_ends_waits_that_nothing_else_does(tmp_path: Path) -> None:
     assert happened > 10
 
 
-@pytest.mark.parametrize(("system", "depth"), [("shared_map", 1), ("shared_memory", 2)])
+@pytest.mark.parametrize(
+    ("system", "depth"),
+    few([("shared_map", 1), ("shared_memory", 2)], ("shared_memory", 2)),
+)
 def test_who_waits_for_another_thread_waits_for_what_that_does(
     tmp_path: Path, system: str, depth: int
 ) -> None:
@@ -229,7 +230,7 @@ def test_who_waits_for_another_thread_waits_for_what_that_does(
     assert waits > 5
 
 
-@pytest.mark.parametrize("tracer", ["lttng", "perf"])
+@pytest.mark.parametrize("tracer", few(["lttng", "perf"], "lttng"))
 def test_what_losses_leave_open_is_not_guessed(tmp_path: Path, tracer: str) -> None:
     """Where a switch was lost, no other thread passes for the one that ran."""
     system = scenarios()["shared_memory"]

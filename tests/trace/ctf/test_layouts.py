@@ -13,14 +13,15 @@ from ctf_layouts import Style, TraceMaker
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from same_batches import differences, read
+from thorough import examples, few
 
 from msgflow.trace.ctf import batches
 
-EXAMPLES = int(os.environ.get("MSGFLOW_EXAMPLES", "6"))
+EXAMPLES = int(os.environ.get("MSGFLOW_EXAMPLES", examples(3, 6)))
 STYLES = [Style(*flags) for flags in product((False, True), repeat=4)]
 
 
-@pytest.mark.parametrize("style", STYLES, ids=str)
+@pytest.mark.parametrize("style", few(STYLES, STYLES[0], STYLES[-1]), ids=str)
 @settings(
     deadline=None,
     max_examples=EXAMPLES,

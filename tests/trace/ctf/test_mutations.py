@@ -15,10 +15,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mutations import ANYWHERE, MUTATIONS, Mutation
 from same_batches import read
+from thorough import examples
 
 from msgflow.errors import TraceError
 
-EXAMPLES = int(os.environ.get("MSGFLOW_EXAMPLES", "15"))
+EXAMPLES = int(os.environ.get("MSGFLOW_EXAMPLES", examples(5, 15)))
 SECONDS = 20
 STYLES = st.builds(Style, st.booleans(), st.booleans(), st.booleans(), st.booleans())
 

@@ -55,6 +55,7 @@ def test_as_ctf2(shared_traces: Path, copy_of: Callable[[str], Path], name: str)
     assert not differences(dataclasses.replace(original, traces=translated.traces), translated)
 
 
+@pytest.mark.thorough
 def test_perf_as_bt2(shared_kernel: Path, bt2_bindings: Any) -> None:
     path = shared_kernel / "public" / "perf-taskset2"
     ours = read(path)
