@@ -29,6 +29,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import tempfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields
@@ -39,9 +40,15 @@ from typing import Any
 import duckdb
 import pyarrow as pa
 import pytest
+from few_rows import plan_simply
 
 from msgflow.db import objects
-from msgflow.db.derivation import derive, derive_table, derived_tables
+from msgflow.db.derivation import (
+    derive_findings,
+    derive_table,
+    derived_tables,
+    learn_topics,
+)
 from msgflow.db.finding import kinds, statement
 from msgflow.db.migration import create
 from msgflow.export.formats import Format, write_result
@@ -49,8 +56,9 @@ from msgflow.query.catalogue import load_query
 from msgflow.query.runner import run_query
 from msgflow.result.query_result import QueryResult
 from msgflow.run.slice import Slice
-from msgflow.sql.statement import internal_sql
-from msgflow.view.page_query import run_page_query
+from msgflow.sql.quoting import literal
+from msgflow.sql.statement import Statements, internal_sql
+from msgflow.view.page_query import DIRECTORY, run_page_query
 from msgflow.view.scratch import Scratch
 
 Rows = list[list[str | None]]
@@ -64,7 +72,12 @@ BASE: dict[str, dict[str, str]] = {
     "thread": {"thread_id": "1", "tid": "1", "name": "thread"},
 }
 SYSTEMS = Path(__file__).parent / "systems"
-FLOW = {header.name for header in objects.load("flow")}
+# Of the tables that flows are made of, in the order in which they are derived.
+FLOW = tuple(
+    name
+    for name in derived_tables()
+    if f"derive.{name}" in {header.name for header in objects.load("flow")}
+)
 _NEUTRAL = {"VARCHAR": "", "BOOLEAN": "false", "TIMESTAMP": "1970-01-01"}
 _SLICE = tuple(field.name for field in fields(Slice))
 _PAGE_QUERY = "view."
@@ -75,6 +88,8 @@ _BENCH = pytest.StashKey["Bench"]()
 # (name, type, whether it may be NULL) of the columns of each table of the store.
 _COLUMNS: dict[str, list[tuple[str, str, bool]]] = {}
 _SECTION = "== "
+# A name without a schema is that of a public view.
+_NAME = re.compile(r"(?:\b(store|derive|main)\.)?\b([a-z_0-9]+)\b")
 _EXPECTED = "expected"
 
 
@@ -206,9 +221,9 @@ class Bench:
         path = Path(self._directory.name) / "cases.duckdb"
         create(path)
         self._connection = duckdb.connect(str(path))
-        # A few rows take longer to share out than to look at.
-        self._connection.execute("SET threads = 1")
+        plan_simply(self._connection)
         self._rows: str | None = None
+        self._derived: set[str] = set()
 
     def evaluate(self, path: Path) -> str:
         """Return the output of a case as CSV."""
@@ -216,6 +231,7 @@ class Bench:
         try:
             if self._rows is None or rows_of(path) != self._rows:
                 self._fill(path, case)
+            self._derive(path.parent.name, case)
             result = _result(self._connection, path.parent.name, case)
         except BaseException:
             self._empty()
@@ -236,10 +252,28 @@ class Bench:
         stage(self._connection, case)
         self._connection.begin()
         self._rows = rows_of(path)
-        fill_case(self._connection, path)
+        insert_case(self._connection, path)
+        self._derived.clear()
         if case.derives:
-            for (run_id,) in self._connection.execute("SELECT run_id FROM store.run").fetchall():
-                derive(self._connection, run_id)
+            for run_id in runs_of(self._connection):
+                learn_topics(self._connection, run_id)
+
+    def _derive(self, name: str, case: Case) -> None:
+        """Derive those tables that what is asked for reads, and that are not there yet."""
+        needed = needed_by(name)
+        finds = case.derives and "store.finding" in needed
+        tables = derived_tables() if case.derives else FLOW
+        missing = [
+            table
+            for table in tables
+            if table not in self._derived and (finds or f"store.{table}" in needed)
+        ]
+        for run_id in runs_of(self._connection):
+            for table in missing:
+                derive_table(self._connection, table, run_id)
+            if finds:
+                derive_findings(self._connection, run_id)
+        self._derived.update(missing)
 
     def _empty(self) -> None:
         if self._rows is not None:
@@ -258,16 +292,45 @@ def rows_of(path: Path) -> str:
 
 def fill_case(connection: duckdb.DuckDBPyConnection, path: Path) -> Case:
     """Insert the rows of a case and of its system, of BASE, and of flows; return the case."""
+    case = insert_case(connection, path)
+    if not case.derives:
+        for run_id in runs_of(connection):
+            for table in FLOW:
+                derive_table(connection, table, run_id)
+    return case
+
+
+def insert_case(connection: duckdb.DuckDBPyConnection, path: Path) -> Case:
+    """Insert the rows of a case and of its system, and of BASE; return the case."""
     case = read_case(path)
     fill(connection, case.tables)
     if case.system and (script := SYSTEMS / f"{case.system}.sql").exists():
         connection.execute(script.read_text())
-    if not case.derives:
-        for (run_id,) in connection.execute("SELECT run_id FROM store.run").fetchall():
-            for name in derived_tables():
-                if f"derive.{name}" in FLOW:
-                    derive_table(connection, name, run_id)
     return case
+
+
+@cache
+def needed_by(name: str) -> frozenset[str]:
+    """Return all objects and tables that cases of a folder may read, directly or not."""
+    words = (match.groups() for match in _NAME.finditer(_text_of(name)))
+    return objects.sources_of(f"{schema or 'main'}.{word}" for schema, word in words)
+
+
+def _text_of(name: str) -> str:
+    """Return the SQL that answers the cases of a folder."""
+    if name.startswith(_PAGE_QUERY):
+        pages = Statements(DIRECTORY)
+        page = name.removeprefix(_PAGE_QUERY)
+        return "\n".join(map(pages.text, ("window_ids", page) if page == "links" else (page,)))
+    if name.startswith(_INTERNAL):
+        return internal_sql().text(name.removeprefix(_INTERNAL))
+    if name.startswith(_FINDING):
+        return "\n".join(header.body for header in kinds() if header.name == name)
+    return name if "." in name else "\n".join(load_query(name).statements)
+
+
+def runs_of(connection: duckdb.DuckDBPyConnection) -> list[int]:
+    return [run_id for (run_id,) in connection.execute("SELECT run_id FROM store.run").fetchall()]
 
 
 def compare(expected: Rows, actual: Rows) -> str | None:
@@ -364,20 +427,22 @@ def insert(
     }
     types = {name: data_type for name, data_type, _ in columns}
     given = [str(name) for name in names]
+    same = list(map(literal, defaults.values()))
     values = [
-        f'unhex("{name}")' if types[name] == "BLOB" else f'CAST("{name}" AS {types[name]})'
-        for name in given
-    ] + [f"CAST('{text}' AS {types[name]})" for name, text in defaults.items()]
-    columns_of_text = [[row[place] for row in rows] for place in range(len(given))]
-    table_of_text = pa.table(
-        [pa.array(column, pa.string()) for column in columns_of_text], names=given
-    )
-    connection.register("given", table_of_text)
-    connection.execute(
-        f"INSERT INTO store.{table} ({', '.join(given + list(defaults))}) "
-        f"SELECT {', '.join(values)} FROM given"
-    )
-    connection.unregister("given")
+        ", ".join([*(_value(types[n], text) for n, text in zip(given, row, strict=True)), *same])
+        for row in rows
+    ]
+    if values:
+        connection.execute(
+            f"INSERT INTO store.{table} ({', '.join([*given, *defaults])}) "
+            f"VALUES ({'), ('.join(values)})"
+        )
+
+
+def _value(data_type: str, text: str | None) -> str:
+    if text is None:
+        return "NULL"
+    return f"unhex({literal(text)})" if data_type == "BLOB" else literal(text)
 
 
 def _result(connection: duckdb.DuckDBPyConnection, name: str, case: Case) -> QueryResult:
