@@ -58,7 +58,8 @@ quick: $(VENV)/.developed
 	$(BIN)/deno fmt --check --quiet
 	$(BIN)/mypy --num-workers auto
 	$(BIN)/pytest -n auto --dist worksteal --assert=plain $(wildcard tests/*/cases) \
-		tests/style/test_generated.py tests/style/test_headers.py tests/style/test_sql_style.py
+		tests/style/test_generated.py tests/style/test_headers.py tests/style/test_sql_style.py \
+		tests/style/test_weights.py
 
 test: SELECTED := -m 'not thorough'
 test test-all: $(VENV)/.developed babeltrace chromium ros

@@ -33,12 +33,15 @@ _LEFT_OUT = pytest.StashKey[int]()
 
 @pytest.fixture(scope="session", autouse=True)
 def _surroundings(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """The tests' own cache, and Ctrl-C that is not ignored, as background jobs of a shell do."""
+    """The tests' own cache, and signals that are not ignored, as `&` and `nohup` of a shell do."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
         patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
         if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
             signal.signal(signal.SIGINT, signal.default_int_handler)
+        if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
+            # Programs that are started do not inherit it, as they do what is ignored.
+            signal.signal(signal.SIGHUP, lambda *_: None)
         yield
 
 

@@ -12,6 +12,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from thorough import few, thorough
 
 from msgflow.errors import ExitCode
 
@@ -61,7 +62,7 @@ def python(program: str, *arguments: object) -> subprocess.CompletedProcess[str]
     return subprocess.run(line, capture_output=True, text=True, timeout=60, check=False)
 
 
-@pytest.mark.parametrize("number", _ENDINGS)
+@pytest.mark.parametrize("number", few(_ENDINGS, signal.SIGINT))
 def test_a_signal_ends_the_program_cleanly(small_database: Path, number: signal.Signals) -> None:
     arguments = ("query", "info", "--db", small_database)
     whole = python(_COUNTING, int(number), 0, *arguments)
@@ -90,7 +91,7 @@ main()
 """
 
 
-@pytest.mark.parametrize("number", _ENDINGS)
+@pytest.mark.parametrize("number", few(_ENDINGS, signal.SIGINT))
 def test_a_signal_in_front_of_the_handler(number: signal.Signals) -> None:
     done = python(_STARTING, int(number))
     assert (done.returncode, done.stderr) == (-number, "")
@@ -111,7 +112,7 @@ main()
 """
 
 
-@pytest.mark.parametrize("number", _ENDINGS)
+@pytest.mark.parametrize("number", few(_ENDINGS, signal.SIGINT))
 def test_a_signal_while_duckdb_is_loaded(small_database: Path, number: signal.Signals) -> None:
     """Its C++ code would abort the process at an exception."""
     done = python(_IMPORTING, int(number), small_database)
@@ -136,7 +137,7 @@ main()
 """
 
 
-@pytest.mark.parametrize("number", _ENDINGS)
+@pytest.mark.parametrize("number", few(_ENDINGS, signal.SIGINT))
 def test_a_signal_that_an_import_would_lose(small_database: Path, number: signal.Signals) -> None:
     """Code in C forgets exceptions of the Python code that it imports."""
     done = python(_LOSING, int(number), small_database)
@@ -172,7 +173,9 @@ def failing(number: signal.Signals, body: str) -> tuple[int, str]:
     "body",
     [
         # Libraries turn it into an exception of their own.
-        "try: signal.raise_signal({0})\n    except KeyboardInterrupt: raise DatabaseError('x')",
+        thorough(
+            "try: signal.raise_signal({0})\n    except KeyboardInterrupt: raise DatabaseError('x')"
+        ),
         # A library ignores it.
         "try: signal.raise_signal({0})\n    except KeyboardInterrupt: pass",
     ],
@@ -181,13 +184,13 @@ def test_no_signal_is_lost_or_taken_for_an_error(number: signal.Signals, body: s
     assert failing(number, body) == _ENDINGS[number]
 
 
-@pytest.mark.parametrize("number", _ENDINGS)
+@pytest.mark.parametrize("number", few(_ENDINGS, signal.SIGINT))
 def test_a_signal_while_an_error_is_printed(number: signal.Signals) -> None:
     broken = "app.print_exception = lambda error: signal.raise_signal({0})\n    raise ValueError"
     assert failing(number, broken) == _ENDINGS[number]
 
 
-@pytest.mark.parametrize("number", _ENDINGS)
+@pytest.mark.parametrize("number", few(_ENDINGS, signal.SIGINT))
 @pytest.mark.parametrize(
     "body",
     [
@@ -206,7 +209,7 @@ def test_the_process_ends_at_once(number: signal.Signals, body: str) -> None:
     assert code == -(signal.SIGTERM if is_lost else number)
 
 
-@pytest.mark.parametrize("number", _ENDINGS)
+@pytest.mark.parametrize("number", few(_ENDINGS, signal.SIGINT))
 def test_after_its_end_a_signal_changes_nothing(number: signal.Signals) -> None:
     program = (
         "import atexit, signal, sys\n"
@@ -219,7 +222,7 @@ def test_after_its_end_a_signal_changes_nothing(number: signal.Signals) -> None:
     assert (done.returncode, done.stderr) == (0, "")
 
 
-@pytest.mark.parametrize("number", _ENDINGS)
+@pytest.mark.parametrize("number", few(_ENDINGS, signal.SIGINT))
 def test_what_the_caller_wants_ignored_is(number: signal.Signals) -> None:
     ignored = f"import signal; signal.signal({int(number)}, signal.SIG_IGN)\n"
     assert python(ignored + _STARTING, int(number)).returncode == 0

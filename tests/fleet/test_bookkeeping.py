@@ -127,6 +127,8 @@ def test_equal_packets_with_other_labels_are_said_where_runs_are_replaced(place:
     for replace in (True, False):
         ingest("night.csv", replace=replace)
         assert failures() == {"b": "same_packets"}
+        (failed,) = read_failures(Lake.open("lake")).to_pylist()
+        assert f"from {place / 'a'}" in failed["error"]
         assert (runs(), labels_of("first")) == ({"first": "a"}, {"robot": "A"})
     # Of different calls, the later one is meant.
     ingest("b", replace=True, labels={"robot": "B"})

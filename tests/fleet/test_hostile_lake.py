@@ -19,8 +19,8 @@ from msgflow.cli.app import app
 from msgflow.errors import DatabaseError, UsageError
 from msgflow.fleet.compact import compact
 from msgflow.fleet.file_store import Store
-from msgflow.fleet.ingest import fleet_ingest
 from msgflow.fleet.lake import Lake
+from msgflow.fleet.lake_query import fleet_sql
 from msgflow.fleet.layout import database_path, part_path, run_schema
 from msgflow.fleet.manifest import read_manifest
 from msgflow.fleet.run_database import open_run
@@ -54,16 +54,22 @@ def parquet(**columns: list[Any]) -> bytes:
 def test_no_module_of_the_current_folder_is_imported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ray: str | None
 ) -> None:
+    """Nor is anything lost there: events of one's own are in the lake."""
     folder = tmp_path / "recordings"
-    simulate("pipeline", folder / "r0", factor=0.01)
+    simulate("own_events", folder / "r0", factor=0.01)
     for name in ("duckdb", "queue", "msgflow"):
         (folder / f"{name}.py").write_text(f"open({str(tmp_path / 'run')!r}, 'a')\n")
     monkeypatch.chdir(folder)
     if ray is not None:
         pytest.importorskip("ray", reason="ray is not installed")
-    done = fleet_ingest(["r0"], tmp_path / "lake", ray=ray)
-    assert done.added == 1
+    given = ["fleet", "ingest", "r0", "--lake", str(tmp_path / "lake"), "--events", "my_pkg:*"]
+    done = CliRunner().invoke(
+        app, [*given, "--no-database", *([] if ray is None else ["--ray", ray])]
+    )
+    assert done.exit_code == 0, done.stderr
     assert not (tmp_path / "run").exists()
+    found = fleet_sql(Lake.open(tmp_path / "lake"), "SELECT DISTINCT name FROM view.user_event")
+    assert found.table["name"].to_pylist() == ["my_pkg:frame_done"]
 
 
 def test_compaction_deletes_nothing_behind_a_link(lake: Lake, tmp_path: Path) -> None:

@@ -108,6 +108,7 @@ def test_the_connection_reaches_nothing_else(night: Lake, tmp_path: Path) -> Non
     assert sorted(path.name for path in tmp_path.iterdir()) == ["other.csv"]
 
 
+@pytest.mark.thorough
 def test_sql_on_a_lake_reads_its_tables_and_changes_no_file(night: Lake, tmp_path: Path) -> None:
     lake = tmp_path / "lake"
     shutil.copytree(night.store.url, lake)

@@ -167,6 +167,7 @@ def test_reasons_and_shares_are_of_sums(night: Lake) -> None:
         assert re.findall(r"\d+", twice["reasons"] or "") == [str(2 * int(n)) for n in numbers]
 
 
+@pytest.mark.thorough
 def test_goals_of_several_runs_are_added_up(tmp_path: Path) -> None:
     """Quantiles are the largest of any run; the goals themselves are in the views of each run."""
     lake, commits, alone = Lake.open_or_create(tmp_path / "lake"), [], []

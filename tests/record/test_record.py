@@ -10,6 +10,7 @@ import socket
 import subprocess
 import sys
 import time
+import uuid
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +18,9 @@ from pathlib import Path
 import pytest
 from lttng_program import lttng
 from terminal import Terminal
+from typer.testing import CliRunner, Result
 
+from msgflow.cli.app import app
 from msgflow.database import Database
 from msgflow.record.lttng import losses
 from msgflow.record.program import Program
@@ -63,6 +66,24 @@ def record(tmp_path: Path) -> Record:
     return run
 
 
+@pytest.fixture
+def refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Result]:
+    """Runs the command where nothing starts, in an empty directory and in this process."""
+    monkeypatch.chdir(tmp_path)
+    return lambda *words: CliRunner().invoke(app, ["record", *words])
+
+
+@pytest.fixture
+def sleeping() -> Iterator[list[str]]:
+    """A program that runs for long, which no other test starts; at the end it does not run."""
+    words = ["sleep", f"1000.{uuid.uuid4().int}"]
+    yield words
+    found = ["-r", "D,R,S", "-f", f"^{' '.join(words)}$"]
+    runs = subprocess.run(["pgrep", *found]).returncode == 0
+    subprocess.run(["pkill", "-KILL", *found])
+    assert not runs
+
+
 def test_from_a_robot_to_an_answer(record: Record, robot: list[str], tmp_path: Path) -> None:
     (tmp_path / "clocks.yaml").write_text(f"{socket.gethostname()}: -12500")
     ended = record(
@@ -82,6 +103,7 @@ def test_from_a_robot_to_an_answer(record: Record, robot: list[str], tmp_path: P
     assert clock["offset_ns"] == -12_500
 
 
+@pytest.mark.thorough
 class TestKernel:
     """The scheduler, with perf: no LTTng of a virtual machine has its kernel modules."""
 
@@ -127,14 +149,15 @@ class TestKernel:
 
 @pytest.mark.parametrize("option", ["--links", "--clock-sync"])
 def test_a_file_that_is_missing_is_said_before_anything_starts(
-    record: Record, option: str, tmp_path: Path
+    refused: Callable[..., Result], option: str, tmp_path: Path
 ) -> None:
-    ended = record(option, "no-such.yaml", "--", "touch", "started")
+    ended = refused(option, "no-such.yaml", "--", "touch", "started")
     assert ended.exit_code == 2
-    assert "no-such.yaml" in ended.err
+    assert "no-such.yaml" in ended.stderr
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("program", [[], ["--", "sleep", "60"]])
 def test_a_terminal_shows_how_the_recording_goes(tmp_path: Path, program: list[str]) -> None:
     """In one line; beside a program, which writes there as well, in a line now and then."""
@@ -149,6 +172,7 @@ def test_a_terminal_shows_how_the_recording_goes(tmp_path: Path, program: list[s
     assert ("starting LTTng" in terminal.shown) != bool(program)
 
 
+@pytest.mark.thorough
 def test_discarded_events_are_said_at_once(record: Record, robot: list[str]) -> None:
     """A consumer that stands still for a second is too slow on any machine."""
     stalls = "sleep 1; pkill -STOP -x lttng-consumerd; sleep 1; pkill -CONT -x lttng-consumerd"
@@ -160,20 +184,25 @@ def test_discarded_events_are_said_at_once(record: Record, robot: list[str]) -> 
     assert "--subbuf-size several times as large as 4K" in ended.err
 
 
+@pytest.mark.thorough
 def test_a_program_without_tracepoints_is_noticed(record: Record) -> None:
     ended = record("--duration", "6", "--no-ingest", "--", "sleep", "60")
     assert ended.exit_code == 0
     assert "no process has the tracepoints of ROS 2" in ended.err
 
 
-def test_all_that_a_program_started_ends_with_it(record: Record, tmp_path: Path) -> None:
-    program = "sleep 1000 & echo $! > child; wait"
+@pytest.mark.thorough
+def test_all_that_a_program_started_ends_with_it(
+    record: Record, sleeping: list[str], tmp_path: Path
+) -> None:
+    program = f"{' '.join(sleeping)} & echo $! > child; wait"
     ended = record("--duration", "1", "--no-ingest", "--", "sh", "-c", program)
     assert ended.exit_code == 0
     child = int((tmp_path / "child").read_text())
     assert not Path(f"/proc/{child}").exists()
 
 
+@pytest.mark.thorough
 def test_what_a_program_prints_is_not_among_the_tables(record: Record) -> None:
     ended = record("--no-ingest", "--", "sh", "-c", "echo [INFO] started")
     assert ended.out == ""
@@ -211,25 +240,28 @@ def test_a_program_of_another_user_is_named(monkeypatch: pytest.MonkeyPatch) -> 
     assert len(notes) == 1
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("seconds", [0.2, 0.9, 1.4, 1.9, 3.5])
-def test_ctrl_c_leaves_nothing(record: Record, seconds: float) -> None:
+def test_ctrl_c_leaves_nothing(record: Record, sleeping: list[str], seconds: float) -> None:
     """Whether LTTng starts, the session begins, or events are recorded."""
-    ended = record("--no-ingest", "--", "sleep", "1000", after=seconds)
+    ended = record("--no-ingest", "--", *sleeping, after=seconds)
     assert ended.exit_code in (0, 130), ended.err
-    assert subprocess.run(["pgrep", "-r", "D,R,S", "-f", "^sleep 1000"]).returncode
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
-def test_a_signal_leaves_nothing(record: Record, number: signal.Signals) -> None:
-    ended = record("--", "sleep", "1000", after=4, number=number)
-    assert ended.exit_code == 143
-    assert subprocess.run(["pgrep", "-r", "D,R,S", "-f", "^sleep 1000"]).returncode
+def test_a_signal_leaves_nothing(
+    record: Record, sleeping: list[str], number: signal.Signals
+) -> None:
+    assert record("--", *sleeping, after=4, number=number).exit_code == 143
 
 
+@pytest.mark.thorough
 def test_sigkill_ends_the_daemon_too(record: Record) -> None:
     assert record(after=4, number=signal.SIGKILL).exit_code == -signal.SIGKILL
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("daemon")
 class TestForeignDaemon:
     """Another one owns the daemon: it stays, with the sessions of others."""
@@ -287,17 +319,19 @@ class TestForeignDaemon:
         assert not list(tmp_path.glob("recording*"))
 
 
-def test_a_directory_in_use_is_refused(record: Record, tmp_path: Path) -> None:
+def test_a_directory_in_use_is_refused(refused: Callable[..., Result], tmp_path: Path) -> None:
     (tmp_path / "used").mkdir()
     (tmp_path / "used" / "file").touch()
-    ended = record("-o", "used", "--duration", "0.5")
-    assert (ended.exit_code, "the directory is in use" in ended.err) == (1, True)
+    ended = refused("-o", "used", "--duration", "0.5")
+    assert (ended.exit_code, "the directory is in use" in ended.stderr) == (1, True)
 
 
-def test_a_missing_program_is_refused_before_anything_starts(record: Record) -> None:
-    ended = record("--", "no-such-program")
+def test_a_missing_program_is_refused_before_anything_starts(
+    refused: Callable[..., Result],
+) -> None:
+    ended = refused("--", "no-such-program")
     assert ended.exit_code == 2
-    assert "there is no such program — no-such-program" in ended.err
+    assert "there is no such program — no-such-program" in ended.stderr
 
 
 @pytest.mark.parametrize(
@@ -311,15 +345,16 @@ def test_a_missing_program_is_refused_before_anything_starts(record: Record) -> 
     ],
 )
 def test_what_cannot_be_is_refused_before_anything_starts(
-    record: Record, tmp_path: Path, words: tuple[str, ...], code: int, said: str
+    refused: Callable[..., Result], tmp_path: Path, words: tuple[str, ...], code: int, said: str
 ) -> None:
     (tmp_path / "file").write_text("taken")
-    ended = record(*words, "--", "touch", "started")
-    assert ended.exit_code == code, ended.err
-    assert said in ended.err
+    ended = refused(*words, "--", "touch", "started")
+    assert ended.exit_code == code, ended.stderr
+    assert said in ended.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
+@pytest.mark.thorough
 def test_a_program_that_fails_at_once_is_named(record: Record) -> None:
     ended = record("--", "false")
     assert ended.exit_code == 3
@@ -327,10 +362,13 @@ def test_a_program_that_fails_at_once_is_named(record: Record) -> None:
     assert "hint: give the directory that" in ended.err
 
 
-def test_without_lttng(record: Record, tmp_path: Path) -> None:
-    ended = record(env=os.environ | {"PATH": str(tmp_path)})
+def test_without_lttng(
+    refused: Callable[..., Result], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    ended = refused()
     assert ended.exit_code == 1
-    assert "apt-get install lttng-tools" in ended.err
+    assert "apt-get install lttng-tools" in ended.stderr
 
 
 def test_a_daemon_that_cannot_start_says_why(record: Record, tmp_path: Path) -> None:

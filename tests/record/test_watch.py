@@ -11,7 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 
@@ -43,8 +43,13 @@ def watch(tmp_path: Path) -> Iterator[Watch]:
 
     yield run
     for process in started:
-        process.kill()
-        process.wait()
+        # It ends its program as well, which a kill would leave.
+        process.send_signal(signal.SIGINT)
+        try:
+            process.wait(30)
+        finally:
+            process.kill()
+            process.wait()
 
 
 def windows(process: subprocess.Popen[str]) -> tuple[list[dict[str, Any]], str]:
@@ -63,6 +68,7 @@ def require_whole(found: list[dict[str, Any]]) -> None:
     assert not any(window["losses"] for window in found)
 
 
+@pytest.mark.thorough
 def test_a_program_is_recorded_and_watched(watch: Watch, robot: list[str], tmp_path: Path) -> None:
     # It ends the program, and says so by its exit code, which would be that of the view.
     ended = 'timeout -s INT 8 "$@" || test $? = 124'
@@ -73,6 +79,7 @@ def test_a_program_is_recorded_and_watched(watch: Watch, robot: list[str], tmp_p
     assert [path.name for path in tmp_path.iterdir()] == ["library"]
 
 
+@pytest.mark.thorough
 def test_a_program_ends_with_the_reader_of_the_view(watch: Watch, robot: list[str]) -> None:
     """As with `| head -1`."""
     process = watch("--", *robot, "0.05")
@@ -95,12 +102,14 @@ def test_a_closed_stdout_is_refused_before_anything_starts(tmp_path: Path) -> No
 SPEAKS = ["sh", "-c", "echo [INFO] started; echo [ERROR] failed >&2; sleep 9; exit 3"]
 
 
+@pytest.mark.thorough
 def test_what_a_program_prints_is_no_window(watch: Watch) -> None:
     out, err = watch("--", *SPEAKS).communicate(timeout=60)
     assert out == ""
     assert "[INFO] started\n[ERROR] failed\n" in err
 
 
+@pytest.mark.thorough
 def test_what_a_program_prints_does_not_tear_the_screen(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "msgflow", "watch", "--", *SPEAKS]
     with Terminal(command, tmp_path) as terminal:
@@ -116,6 +125,7 @@ def test_what_a_program_prints_does_not_tear_the_screen(tmp_path: Path) -> None:
     assert f"sh ended with exit code 3: {log.name} has what it printed" in said
 
 
+@pytest.mark.thorough
 def test_a_recording_with_a_name_has_what_the_program_printed_beside_it(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "msgflow", "watch", "-o", "drive", "--", *SPEAKS]
     with Terminal(command, tmp_path) as terminal:
@@ -123,6 +133,7 @@ def test_a_recording_with_a_name_has_what_the_program_printed_beside_it(tmp_path
     assert {path.name for path in tmp_path.iterdir()} == {"drive", "drive.log"}
 
 
+@pytest.mark.thorough
 def test_a_program_that_prints_nothing_leaves_nothing(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "msgflow", "watch", "--", "true"]
     with Terminal(command, tmp_path) as terminal:
@@ -138,6 +149,16 @@ def temporary(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.fixture
+def programs(tmp_path: Path) -> Iterator[Path]:
+    """The file in which SLEEPS has its numbers; at the end none of them runs."""
+    path = tmp_path / "programs"
+    yield path
+    for number in path.read_text().split() if path.exists() else ():
+        with suppress(ProcessLookupError):
+            os.kill(int(number), signal.SIGKILL)
+
+
 SLEEPS = ["sh", "-c", "echo $$ >> programs; exec sleep 1000"]
 WATCH = [sys.executable, "-m", "msgflow", "watch", "--", *SLEEPS]
 
@@ -146,18 +167,22 @@ def wait_for_words(terminal: Terminal) -> None:
     terminal.wait_for(lambda: "no process has the tracepoints" in terminal.shown)
 
 
-def test_a_terminal_that_goes_away_ends_all(tmp_path: Path, temporary: Path) -> None:
+@pytest.mark.thorough
+def test_a_terminal_that_goes_away_ends_all(
+    tmp_path: Path, temporary: Path, programs: Path
+) -> None:
     with Terminal(WATCH, tmp_path, TMPDIR=str(temporary)) as terminal:
         wait_for_words(terminal)
         assert [path.name[:14] for path in temporary.iterdir()] == ["msgflow-watch-"]
         terminal.hang_up()
         terminal.process.wait(30)
     assert not list(temporary.iterdir())
-    assert not Path("/proc", (tmp_path / "programs").read_text().strip()).exists()
+    assert not Path("/proc", programs.read_text().strip()).exists()
 
 
+@pytest.mark.thorough
 def test_what_a_killed_view_leaves_is_removed(
-    daemon: None, tmp_path: Path, temporary: Path
+    daemon: None, tmp_path: Path, temporary: Path, programs: Path
 ) -> None:
     """Its session, and its temporary directories; not those of a view that runs."""
     words = [sys.executable, "-m", "msgflow", "record", "--no-ingest", "--duration", "0.5"]
@@ -181,9 +206,8 @@ def test_what_a_killed_view_leaves_is_removed(
         second.process.send_signal(signal.SIGINT)
         assert second.wait() == 0
     # The program of the one that was killed goes on.
-    programs = [int(line) for line in (tmp_path / "programs").read_text().splitlines()]
-    (program,) = (pid for pid in programs if Path(f"/proc/{pid}").exists())
-    os.kill(program, signal.SIGKILL)
+    numbers = programs.read_text().split()
+    (_,) = (number for number in numbers if Path(f"/proc/{number}").exists())
     assert "watch-" not in lttng("list").stdout
 
 
@@ -210,6 +234,7 @@ def wait_for_window(process: subprocess.Popen[str]) -> dict[str, Any]:
     raise AssertionError(process.stderr and process.stderr.read())
 
 
+@pytest.mark.thorough
 def test_a_session_is_rotated_and_its_end_noticed(
     watch: Watch, session: Path, robot: list[str]
 ) -> None:
@@ -231,6 +256,7 @@ def test_a_session_is_rotated_and_its_end_noticed(
     assert found[-1]["end_ns"] > window["end_ns"]
 
 
+@pytest.mark.thorough
 def test_two_watchers_of_one_session(watch: Watch, session: Path, robot: list[str]) -> None:
     """The first one made it rotate, and ends; the session rotates until the second one does."""
     with subprocess.Popen([*robot, "0.05"]) as node:
@@ -254,6 +280,7 @@ def test_two_watchers_of_one_session(watch: Watch, session: Path, robot: list[st
     assert "rotat" not in lttng("list", "drive").stdout
 
 
+@pytest.mark.thorough
 def test_ctrl_c_ends_the_view_and_not_the_session(watch: Watch, session: Path) -> None:
     process = watch("drive")
     time.sleep(6)

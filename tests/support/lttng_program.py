@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import socket
 import subprocess
 import time
@@ -13,10 +14,12 @@ def lttng(*words: str) -> subprocess.CompletedProcess[str]:
 
 
 def daemons() -> list[str]:
-    """Return the numbers of session daemons, once those that end have ended."""
+    """Return the numbers of this user's session daemons, once those that end have ended."""
     end = time.monotonic() + 10
     while found := subprocess.run(
-        ["pgrep", "-x", "-r", "D,R,S", "lttng-sessiond"], capture_output=True, text=True
+        ["pgrep", "-x", "-r", "D,R,S", "-u", str(os.geteuid()), "lttng-sessiond"],
+        capture_output=True,
+        text=True,
     ).stdout.split():
         if time.monotonic() > end:
             break

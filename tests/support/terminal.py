@@ -68,6 +68,8 @@ class Terminal:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        # All of its session: nothing is left running where the test failed.
+        subprocess.run(["pkill", "-KILL", "-s", str(self.process.pid)], check=False)
         self.process.kill()
         self.process.wait()
         self.hang_up()
