@@ -137,10 +137,15 @@ def require_known(con: duckdb.DuckDBPyConnection, path: Path) -> str:
         raise DatabaseError(
             f"a DuckDB database, but not one of msgflow — {path}", "give another file with --db"
         )
+    if revision.isdecimal():
+        raise DatabaseError(
+            f"database has schema revision {revision[:40]}, from before the first release — {path}",
+            "msgflow ingest TRACE --db NEW.duckdb reads the recording again",
+        )
     if revision not in known_revisions():
         raise DatabaseError(
-            f"database has schema revision {revision[:40]!r}, this msgflow knows none after "
-            f"{head_revision()}: it is newer, or from before the first release — {path}",
+            f"database has schema revision {revision[:40]!r}, newer than this msgflow knows "
+            f"({head_revision()}) — {path}",
             "upgrade msgflow, or ingest the traces into a new file",
         )
     return revision

@@ -157,7 +157,7 @@ def _declaration() -> Iterable[str]:
 
 @cache
 def head_revision() -> str:
-    """Return the newest schema revision: the number in the name of the last migration."""
+    """Return the newest schema revision: the name of the last migration."""
     return max(known_revisions())
 
 
@@ -165,7 +165,7 @@ def head_revision() -> str:
 def known_revisions() -> frozenset[str]:
     """Return the current schema revision, and all that can be upgraded to it."""
     versions = resource_directory("migrations") / "versions"
-    return frozenset(path.name.partition("_")[0] for path in versions.glob("[0-9]*_*.py"))
+    return frozenset(path.stem for path in versions.glob("[0-9]*_*.py"))
 
 
 def apply(con: duckdb.DuckDBPyConnection) -> None:

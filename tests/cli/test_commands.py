@@ -236,6 +236,21 @@ def test_db_upgrade_of_old_views(msgflow: Msgflow, small_database: Path) -> None
     assert msgflow("info", "--db", small_database).exit_code == 0
 
 
+@pytest.mark.parametrize("command", ["info", "query info", "db upgrade"])
+def test_a_database_from_before_the_first_release(
+    msgflow: Msgflow, small_database: Path, command: str
+) -> None:
+    with duckdb.connect(str(small_database)) as connection:
+        connection.execute("UPDATE store.alembic_version SET version_num = '0011'")
+    refused = msgflow(*command.split(), "--db", small_database)
+    assert refused.exit_code == 4
+    assert f"schema revision 0011, from before the first release — {small_database}" in (
+        refused.stderr
+    )
+    hint = "msgflow ingest TRACE --db NEW.duckdb reads the recording again"
+    assert refused.stderr.endswith(f"\n\nhint: {hint}\n")
+
+
 @pytest.mark.parametrize(
     "command",
     [

@@ -162,7 +162,7 @@ def test_a_directory_that_cannot_be_written(trace: Path) -> None:
 
 def test_a_newer_database(trace: Path, database: Path) -> None:
     with duckdb.connect(str(database)) as connection:
-        connection.execute("UPDATE store.alembic_version SET version_num = '9999'")
+        connection.execute("UPDATE store.alembic_version SET version_num = '9999_more'")
     error = database_refused(trace, database)
     assert "9999" in error.message
     assert "upgrade msgflow" in (error.hint or "")

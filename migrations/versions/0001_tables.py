@@ -1,19 +1,23 @@
 """Where the history of the tables begins: all of them, as the first release has them.
 
-New databases are made of `msgflow/db/tables`, not of revisions. Tests make old files by revisions,
-upgrade them, and compare them with new ones. Each later change of a table is a revision after this
-one, with literal operations that do not follow later changes. Comments, views and macros need no
-revision: an upgrade writes them anew.
+New databases are made of `msgflow/db/tables`, not of revisions. Each later change of a table is a
+revision after this one, with literal operations that do not follow later changes. Its name is that
+of its file. Comments, views and macros need no revision: an upgrade writes them anew.
 """
 
 from alembic import op
 
-revision = "0001"
+revision = "0001_tables"
 down_revision = None
 branch_labels = None
 depends_on = None
 
 TABLES = """
+CREATE TABLE store.bag_message (
+    run_id BIGINT NOT NULL, publication_id BIGINT NOT NULL, topic_name VARCHAR NOT NULL,
+    type_name VARCHAR NOT NULL, received_ns BIGINT NOT NULL, size_bytes BIGINT NOT NULL,
+    stamp_ns BIGINT, frame_id VARCHAR
+);
 CREATE TABLE store.publication (
     publication_id BIGINT NOT NULL, run_id BIGINT NOT NULL, trace_id BIGINT NOT NULL,
     publisher_id BIGINT, process_id BIGINT NOT NULL, thread_id BIGINT NOT NULL,
@@ -83,14 +87,6 @@ CREATE TABLE store.stamp_clock (
     start_ns BIGINT NOT NULL, end_ns BIGINT NOT NULL, difference_ns BIGINT NOT NULL,
     drift_ppb BIGINT, message_count BIGINT, segment BIGINT, is_sharp BOOLEAN
 );
-CREATE TABLE store.undelivered (
-    run_id BIGINT NOT NULL, publication_id BIGINT NOT NULL, publisher_id BIGINT NOT NULL,
-    subscription_id BIGINT NOT NULL, reason VARCHAR NOT NULL
-);
-CREATE TABLE store.orphan_take (
-    run_id BIGINT NOT NULL, take_id BIGINT NOT NULL, subscription_id BIGINT,
-    reason VARCHAR NOT NULL
-);
 CREATE TABLE store.executor (
     executor_id BIGINT NOT NULL, run_id BIGINT NOT NULL, process_id BIGINT NOT NULL,
     kind VARCHAR NOT NULL, is_inferred BOOLEAN DEFAULT false NOT NULL, PRIMARY KEY (executor_id)
@@ -104,8 +100,9 @@ CREATE TABLE store.executor_state (
 );
 CREATE TABLE store.flow_call (
     run_id BIGINT NOT NULL, publication_id BIGINT NOT NULL, publisher_id BIGINT,
-    kind VARCHAR NOT NULL, callback_instance_id BIGINT NOT NULL, caller_id BIGINT NOT NULL,
-    route BIGINT[] NOT NULL, take_id BIGINT, subscription_id BIGINT
+    kind VARCHAR NOT NULL, callback_instance_id BIGINT, caller_id BIGINT NOT NULL,
+    route BIGINT[] NOT NULL, take_id BIGINT, subscription_id BIGINT, taken_request_id BIGINT,
+    taken_response_id BIGINT
 );
 CREATE TABLE store.flow_root (
     run_id BIGINT NOT NULL, publication_id BIGINT NOT NULL, publisher_id BIGINT NOT NULL,
@@ -124,7 +121,8 @@ CREATE TABLE store.host (
 CREATE TABLE store.process (
     process_id BIGINT NOT NULL, run_id BIGINT NOT NULL, host_id BIGINT NOT NULL,
     pid INTEGER NOT NULL, name VARCHAR, tracetools_version VARCHAR, first_seen_ns BIGINT,
-    last_seen_ns BIGINT, pid_namespace BIGINT, life INTEGER NOT NULL, PRIMARY KEY (process_id)
+    last_seen_ns BIGINT, pid_namespace BIGINT, life INTEGER NOT NULL, is_ambiguous BOOLEAN,
+    PRIMARY KEY (process_id)
 );
 CREATE TABLE store.thread (
     thread_id BIGINT NOT NULL, run_id BIGINT NOT NULL, process_id BIGINT NOT NULL,
@@ -182,6 +180,18 @@ CREATE TABLE store.link_request (
 CREATE TABLE store.link_response (
     run_id BIGINT NOT NULL, response_id BIGINT NOT NULL, callback_instance_id BIGINT
 );
+CREATE TABLE store.link_call (
+    run_id BIGINT NOT NULL, taken_request_id BIGINT, taken_response_id BIGINT,
+    publication_id BIGINT, publisher_id BIGINT, request_id BIGINT, response_id BIGINT,
+    candidate_count BIGINT NOT NULL
+);
+CREATE TABLE store.undelivered (
+    run_id BIGINT NOT NULL, publication_id BIGINT NOT NULL, publisher_id BIGINT NOT NULL,
+    subscription_id BIGINT NOT NULL, reason VARCHAR NOT NULL
+);
+CREATE TABLE store.orphan_take (
+    run_id BIGINT NOT NULL, take_id BIGINT NOT NULL, subscription_id BIGINT, reason VARCHAR NOT NULL
+);
 CREATE TABLE store.definition (
     name VARCHAR NOT NULL, hash VARCHAR NOT NULL, msgflow_version VARCHAR NOT NULL,
     PRIMARY KEY (name)
@@ -189,18 +199,18 @@ CREATE TABLE store.definition (
 CREATE TABLE store.run (
     run_id BIGINT NOT NULL, name VARCHAR NOT NULL, created_at TIMESTAMP NOT NULL,
     msgflow_version VARCHAR NOT NULL, derivation_hash VARCHAR NOT NULL, start_ns BIGINT,
-    end_ns BIGINT, event_count BIGINT, labels VARCHAR[], PRIMARY KEY (run_id)
+    end_ns BIGINT, event_count BIGINT, labels VARCHAR[], clock_sync VARCHAR, PRIMARY KEY (run_id)
 );
 CREATE TABLE store.trace (
     trace_id BIGINT NOT NULL, run_id BIGINT NOT NULL, host_id BIGINT NOT NULL,
     path VARCHAR NOT NULL, uuid VARCHAR, tracer VARCHAR, domain VARCHAR, start_ns BIGINT,
-    end_ns BIGINT, event_count BIGINT, discarded_event_count BIGINT, PRIMARY KEY (trace_id)
+    end_ns BIGINT, event_count BIGINT, discarded_event_count BIGINT, has_request_events BOOLEAN,
+    PRIMARY KEY (trace_id)
 );
 CREATE TABLE store.packet (
     run_id BIGINT NOT NULL, trace_id BIGINT NOT NULL, stream_class_id BIGINT,
     stream_instance_id BIGINT, cpu_id INTEGER, position BIGINT, begin_ns BIGINT, end_ns BIGINT,
-    last_event_ns BIGINT, event_count BIGINT, discarded_event_count BIGINT,
-    lost_packet_count BIGINT
+    last_event_ns BIGINT, event_count BIGINT, discarded_event_count BIGINT, lost_packet_count BIGINT
 );
 CREATE TABLE store.gap (
     run_id BIGINT NOT NULL, trace_id BIGINT NOT NULL, cpu INTEGER, kind VARCHAR NOT NULL,
@@ -215,14 +225,14 @@ CREATE TABLE store.publisher (
     node_id BIGINT, topic_name VARCHAR, publisher_handle UBIGINT, rmw_handle UBIGINT, gid BLOB,
     queue_depth BIGINT, created_ns BIGINT, is_internal BOOLEAN DEFAULT false NOT NULL,
     is_inferred BOOLEAN DEFAULT false NOT NULL, is_topic_learned BOOLEAN DEFAULT false NOT NULL,
-    PRIMARY KEY (publisher_id)
+    is_topic_declared BOOLEAN DEFAULT false NOT NULL, PRIMARY KEY (publisher_id)
 );
 CREATE TABLE store.subscription (
     subscription_id BIGINT NOT NULL, run_id BIGINT NOT NULL, process_id BIGINT NOT NULL,
     node_id BIGINT, topic_name VARCHAR, subscription_handle UBIGINT, rmw_handle UBIGINT, gid BLOB,
     queue_depth BIGINT, created_ns BIGINT, is_internal BOOLEAN DEFAULT false NOT NULL,
     is_inferred BOOLEAN DEFAULT false NOT NULL, is_topic_learned BOOLEAN DEFAULT false NOT NULL,
-    PRIMARY KEY (subscription_id)
+    is_topic_declared BOOLEAN DEFAULT false NOT NULL, PRIMARY KEY (subscription_id)
 );
 CREATE TABLE store.timer (
     timer_id BIGINT NOT NULL, run_id BIGINT NOT NULL, process_id BIGINT NOT NULL, node_id BIGINT,
@@ -237,6 +247,45 @@ CREATE TABLE store.client (
     client_id BIGINT NOT NULL, run_id BIGINT NOT NULL, process_id BIGINT NOT NULL, node_id BIGINT,
     service_name VARCHAR, client_handle UBIGINT, rmw_handle UBIGINT, gid BLOB, created_ns BIGINT,
     is_internal BOOLEAN DEFAULT false NOT NULL, PRIMARY KEY (client_id)
+);
+CREATE TABLE store.other_thread (
+    other_thread_id BIGINT NOT NULL, run_id BIGINT NOT NULL, host_id BIGINT NOT NULL,
+    tid INTEGER NOT NULL, name VARCHAR, PRIMARY KEY (other_thread_id)
+);
+CREATE TABLE store.thread_state (
+    run_id BIGINT NOT NULL, thread_id BIGINT NOT NULL, start_ns BIGINT NOT NULL,
+    end_ns BIGINT NOT NULL, state VARCHAR NOT NULL, cpu INTEGER, priority INTEGER,
+    preempted_by_thread_id BIGINT, preempted_by_other_thread_id BIGINT,
+    preempted_by_priority INTEGER, waker_kind VARCHAR, waker_thread_id BIGINT,
+    waker_other_thread_id BIGINT, is_loss_affected BOOLEAN DEFAULT false NOT NULL
+);
+CREATE TABLE store.preemptor (
+    run_id BIGINT NOT NULL, thread_id BIGINT NOT NULL, start_ns BIGINT NOT NULL,
+    end_ns BIGINT NOT NULL, state VARCHAR NOT NULL, cpu INTEGER, preemptor_thread_id BIGINT,
+    preemptor_other_thread_id BIGINT, preemptor_priority INTEGER, thread_priority INTEGER
+);
+CREATE TABLE store.callback_preemptor (
+    run_id BIGINT NOT NULL, callback_instance_id BIGINT NOT NULL, preemptor_thread_id BIGINT,
+    preemptor_other_thread_id BIGINT, preemptor_priority INTEGER, preempted_ns BIGINT NOT NULL,
+    runnable_ns BIGINT NOT NULL
+);
+CREATE TABLE store.callback_schedule (
+    run_id BIGINT NOT NULL, callback_instance_id BIGINT NOT NULL, running_ns BIGINT NOT NULL,
+    preempted_ns BIGINT NOT NULL, runnable_ns BIGINT NOT NULL, sleeping_ns BIGINT NOT NULL,
+    uninterruptible_ns BIGINT NOT NULL, unknown_ns BIGINT NOT NULL,
+    preemption_count BIGINT NOT NULL, migration_count BIGINT NOT NULL,
+    is_loss_affected BOOLEAN DEFAULT false NOT NULL, irq_ns BIGINT, softirq_ns BIGINT
+);
+CREATE TABLE store.cpu_usage (
+    run_id BIGINT NOT NULL, host_id BIGINT NOT NULL, cpu INTEGER, start_ns BIGINT NOT NULL,
+    thread_id BIGINT, tid INTEGER NOT NULL, name VARCHAR, running_ns BIGINT NOT NULL,
+    frequency_hz BIGINT
+);
+CREATE TABLE store.user_event (
+    user_event_id BIGINT NOT NULL, run_id BIGINT NOT NULL, trace_id BIGINT NOT NULL,
+    process_id BIGINT NOT NULL, thread_id BIGINT NOT NULL, cpu INTEGER, at_ns BIGINT NOT NULL,
+    name VARCHAR NOT NULL, callback_instance_id BIGINT, fields VARCHAR NOT NULL,
+    is_loss_affected BOOLEAN DEFAULT false NOT NULL
 );
 """
 
