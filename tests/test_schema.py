@@ -7,14 +7,15 @@ import io
 import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import duckdb
 import pytest
-from sqlalchemy import MetaData, create_engine, func, select
+from duckdb_engine import Dialect
+from sqlalchemy import Column, MetaData, create_engine, func, select
 from sqlalchemy.engine import Connection
 from sqlalchemy.exc import ProgrammingError
 
-from msgflow.db.table_ddl import type_name
 from msgflow.schema import public, store
 
 COOKBOOK = Path(__file__).resolve().parents[1] / "docs" / "cookbook.md"
@@ -28,6 +29,11 @@ def connection(simulated: Callable[..., Path]) -> Iterator[Connection]:
     with engine.connect() as connected:
         yield connected
     engine.dispose()
+
+
+def type_name(column: Column[Any]) -> str:
+    name = str(column.type.compile(dialect=Dialect())).upper()
+    return name.removesuffix(" WITHOUT TIME ZONE")
 
 
 @pytest.mark.parametrize(("metadata", "schema"), [(public, "main"), (store, "store")])

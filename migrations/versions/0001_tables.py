@@ -1,6 +1,6 @@
 """Where the history of the tables begins: all of them, as the first release has them.
 
-New databases are made of `msgflow/db/tables`, not of revisions. Each later change of a table is a
+New databases are made of `schema/store.sql`, not of revisions. Each later change of a table is a
 revision after this one, with literal operations that do not follow later changes. Its name is that
 of its file. Comments, views and macros need no revision: an upgrade writes them anew.
 """

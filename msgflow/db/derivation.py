@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from msgflow.db import objects
 from msgflow.db.finding import kinds_of, store_findings
-from msgflow.db.tables import STORE
+from msgflow.db.store_table import store_tables
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -86,7 +86,7 @@ def derived_tables() -> tuple[str, ...]:
         name
         for header in objects.views()
         for schema, _, name in [header.name.partition(".")]
-        if schema == "derive" and f"store.{name}" in STORE.tables
+        if schema == "derive" and name in store_tables()
     )
 
 
@@ -109,7 +109,7 @@ def derivation_hash() -> str:
 
 def derive_table(con: duckdb.DuckDBPyConnection, name: str, run_id: int) -> None:
     """Derive one of `derived_tables` anew, inside the open transaction."""
-    columns = ", ".join(STORE.tables[f"store.{name}"].columns.keys())
+    columns = ", ".join(store_tables()[name].columns)
     con.execute(f"DELETE FROM store.{name} WHERE run_id = ?", [run_id])
     whole = _header(f"derive.{name}")
     for header in (whole, *map(_header, whole.also)):
@@ -131,7 +131,7 @@ def _may_have_rows(con: duckdb.DuckDBPyConnection, header: Header, run_id: int) 
 
 def _of_run(name: str) -> str:
     """Return the FROM clause for the rows of one run, which is its only parameter."""
-    if name not in STORE.tables and _header(name).kind == "macro":
+    if not name.startswith("store.") and _header(name).kind == "macro":
         return f"{name}(?)"
     return f"{name} WHERE run_id = ?"
 

@@ -1,6 +1,6 @@
 """Empty databases: all tables, views and macros, and no run.
 
-They are made from `tables` and `schema/` without a migration, so that Alembic is not needed.
+They are made from `schema/` without a migration, so that Alembic is not needed.
 DuckDB takes long to look at each view. Hence the first empty database is kept in the user's cache,
 and later ones are copies of it. A cache that is damaged, missing or read-only costs time only.
 """
@@ -17,6 +17,7 @@ import duckdb
 
 from msgflow.db import objects
 from msgflow.db.sandbox import STORAGE_VERSION, open_file
+from msgflow.db.store_table import store_file
 from msgflow.db.transaction import transaction
 from msgflow.sql.quoting import literal
 from msgflow.version import __version__
@@ -82,9 +83,7 @@ def _cache_file() -> Path:
 
 
 def _statements() -> Iterator[str]:
-    from msgflow.db.table_ddl import create_statements
-
-    yield from create_statements()
+    yield store_file().read_text(encoding="utf-8")
     # As Alembic makes it.
     yield (
         "CREATE TABLE store.alembic_version (version_num VARCHAR(32) NOT NULL, "

@@ -1,6 +1,6 @@
 """The SQL objects of `schema/`: loaded, ordered by what they need, and applied to a database.
 
-A public view that shows a table unchanged has no file, but a declaration in `tables`.
+A public view that shows a table unchanged has no file: `store.sql` says of the table what it is.
 """
 
 from __future__ import annotations
@@ -13,15 +13,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.db.finding import composed
+from msgflow.db.store_table import store_file, store_tables
+from msgflow.db.table_view import table_views
 from msgflow.files.resources import resource_directory
 from msgflow.sql.header import Header, HeaderError, read
 from msgflow.sql.quoting import identifier, literal
 from msgflow.version import __version__
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Mapping
 
     import duckdb
+
+    from msgflow.sql.header import Column
 
 # Folders whose objects are in the database; each may need only itself and those to its left.
 PUBLIC = "public"
@@ -30,14 +34,14 @@ HEALTH = "health"
 VIEW_LAYERS = ("link", "clock", "delivery", "flow", "stat", PUBLIC)
 
 # Modules that make tables and views besides `schema/`; the hash reads them as text.
-_DECLARATION = ("tables/*.py", "table_*.py", "empty_database.py", "finding.py")
+_MODULES = ("store_table.py", "table_view.py", "empty_database.py", "finding.py")
 
 
 @cache
 def load(layer: str) -> tuple[Header, ...]:
     """Return the objects of a folder of `schema/` and its subfolders, each after those it needs.
 
-    `public` includes the views that `tables` declares, and takes from there the columns that a
+    `public` includes the views that show a table, and takes from the tables the columns that a
     header only names. Other folders include the objects that are made of all findings.
 
     Raises:
@@ -49,8 +53,6 @@ def load(layer: str) -> tuple[Header, ...]:
         raise FileNotFoundError(directory)
     headers = [read(path) for path in sorted(directory.rglob("*.sql"))]
     if layer == PUBLIC:
-        from msgflow.db.table_view import table_views
-
         headers = [*map(completed, headers), *table_views()]
     return sort([*headers, *composed(layer)])
 
@@ -63,9 +65,7 @@ def completed(header: Header) -> Header:
     """
     if all(column.type for column in header.columns):
         return header
-    from msgflow.db.table_view import declared_columns
-
-    declared = declared_columns(header.name.partition(".")[2])
+    declared = store_tables()[header.name.partition(".")[2]].columns
     try:
         columns = [column if column.type else declared[column.name] for column in header.columns]
     except KeyError as error:
@@ -123,7 +123,7 @@ def definition_hash() -> str:
 
     This reads the files without parsing them, so that a database opens quickly.
     """
-    return hash_of([*_texts((*VIEW_LAYERS, HEALTH)), *_declaration()])
+    return hash_of(_texts())
 
 
 def sources_of(names: Iterable[str]) -> frozenset[str]:
@@ -140,19 +140,14 @@ def sources_of(names: Iterable[str]) -> frozenset[str]:
     return frozenset(found)
 
 
-def _texts(layers: Sequence[str]) -> Iterable[str]:
+def _texts() -> Iterable[str]:
     root = resource_directory("schema")
-    for layer in layers:
-        for path in sorted((root / layer).rglob("*.sql")):
-            yield path.name
-            yield path.read_text(encoding="utf-8")
-
-
-def _declaration() -> Iterable[str]:
-    for pattern in _DECLARATION:
-        for path in sorted(Path(__file__).parent.glob(pattern)):
-            yield path.name
-            yield path.read_text(encoding="utf-8")
+    layers = (*VIEW_LAYERS, HEALTH)
+    in_layers = (path for layer in layers for path in sorted((root / layer).rglob("*.sql")))
+    modules = (Path(__file__).with_name(name) for name in _MODULES)
+    for path in (store_file(), *in_layers, *modules):
+        yield path.name
+        yield path.read_text(encoding="utf-8")
 
 
 @cache
@@ -173,15 +168,14 @@ def apply(con: duckdb.DuckDBPyConnection) -> None:
 
     This drops objects that are no longer in `schema/`.
     """
-    from msgflow.db.table_ddl import comment_statements
-
     drop(con)
-    for statement in comment_statements():
-        con.execute(statement)
+    for table in store_tables().values():
+        _comment(con, "TABLE", f"store.{table.name}", table.grain, table.columns.values())
     for header in views():
         con.execute(create_statement(header))
         if header.kind == "view":
-            _comment(con, header)
+            text = f"{header.description} {header.grain}"
+            _comment(con, "VIEW", header.name, text, header.columns)
     con.execute("DELETE FROM store.definition WHERE name = 'views'")
     con.execute(
         "INSERT INTO store.definition (name, hash, msgflow_version) VALUES ('views', ?, ?)",
@@ -213,13 +207,12 @@ def drop(con: duckdb.DuckDBPyConnection) -> None:
         con.execute(f"DROP MACRO {table}{identifier(schema)}.{identifier(name)}")
 
 
-def _comment(con: duckdb.DuckDBPyConnection, header: Header) -> None:
-    con.execute(
-        f"COMMENT ON VIEW {header.name} IS {literal(header.description + ' ' + header.grain)}"
-    )
-    for column in header.columns:
+def _comment(
+    con: duckdb.DuckDBPyConnection, kind: str, name: str, text: str, columns: Iterable[Column]
+) -> None:
+    con.execute(f"COMMENT ON {kind} {name} IS {literal(text)}")
+    for column in columns:
         unit = f" [{column.unit}]" if column.unit else ""
         con.execute(
-            f'COMMENT ON COLUMN {header.name}."{column.name}" IS '
-            f"{literal(column.description + unit)}"
+            f'COMMENT ON COLUMN {name}."{column.name}" IS {literal(column.description + unit)}'
         )

@@ -1,17 +1,16 @@
 """Relations between tables, and the rows that break them: they refer to a row that is missing.
 
-`tables` declares a relation as a foreign key. The databases have no foreign keys.
+`store.sql` marks the columns that refer to another table. The databases have no foreign keys.
 """
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from msgflow.db.tables import STORE
+from msgflow.db.store_table import store_tables
 
 if TYPE_CHECKING:
     import duckdb
-    from sqlalchemy import Column
 
 
 def broken_relations(
@@ -27,55 +26,43 @@ def broken_relations(
         For each run and column: `run_id`, `child` ('table.column'), `parent` (a table) and `count`.
     """
     relations = {
-        table: [
-            (column.name, key.column) for column in table.columns for key in column.foreign_keys
-        ]
-        for table in sorted(STORE.tables.values(), key=lambda table: table.name)
+        name: [(column.name, column.to) for column in table.columns.values() if column.to]
+        for name, table in sorted(store_tables().items())
     }
     blocks = _blocks(con, {parent for each in relations.values() for _, parent in each})
     of_run = "" if run_id is None else f" WHERE run_id = {run_id:d}"
     selects = [
-        f"SELECT '{table.name}', run_id, ["
+        f"SELECT '{name}', run_id, ["
         + ", ".join(_broken(column, parent, blocks[parent]) for column, parent in each)
-        + f"] FROM {table.fullname} AS child{of_run} GROUP BY run_id"
-        for table, each in relations.items()
+        + f"] FROM store.{name} AS child{of_run} GROUP BY run_id"
+        for name, each in relations.items()
         if each
     ]
-    by_name = {table.name: each for table, each in relations.items()}
     # One statement: each takes longer to plan than its few rows to count.
     rows = con.execute(" UNION ALL ".join(selects)).fetchall()
     return [
-        {
-            "run_id": found_id,
-            "child": f"{name}.{column}",
-            "parent": parent.table.name,
-            "count": count,
-        }
+        {"run_id": found_id, "child": f"{name}.{column}", "parent": parent, "count": count}
         for name, found_id, counts in rows
-        for (column, parent), count in zip(by_name[name], counts, strict=True)
+        for (column, parent), count in zip(relations[name], counts, strict=True)
         if count
     ]
 
 
-def _blocks(
-    con: duckdb.DuckDBPyConnection, keys: set[Column[Any]]
-) -> dict[Column[Any], tuple[int, int] | None]:
-    """Return the first and last of the ids that each column holds, None if some are missing."""
+def _blocks(con: duckdb.DuckDBPyConnection, names: set[str]) -> dict[str, tuple[int, int] | None]:
+    """Return the first and last of the ids that each table holds, None if some are missing."""
     rows = con.execute(
         " UNION ALL ".join(
-            f"SELECT '{key}', min({key.name}), max({key.name}), count({key.name}) "
-            f"FROM {key.table.fullname}"
-            for key in keys
+            f"SELECT '{name}', min({name}_id), max({name}_id), count({name}_id) FROM store.{name}"
+            for name in names
         )
     ).fetchall()
-    by_name = {
+    return {
         name: (first or 1, last or 0) if count == (last or 0) - (first or 1) + 1 else None
         for name, first, last, count in rows
     }
-    return {key: by_name[str(key)] for key in keys}
 
 
-def _broken(column: str, key: Column[Any], block: tuple[int, int] | None) -> str:
+def _broken(column: str, parent: str, block: tuple[int, int] | None) -> str:
     """Return the expression that counts the children without a parent.
 
     Ingests write whole blocks of ids, for which a comparison is enough. An id that is used twice
@@ -83,4 +70,4 @@ def _broken(column: str, key: Column[Any], block: tuple[int, int] | None) -> str
     """
     if block is not None:
         return f"count(*) FILTER (child.{column} < {block[0]} OR child.{column} > {block[1]})"
-    return f"count(*) FILTER (child.{column} NOT IN (SELECT {key.name} FROM {key.table.fullname}))"
+    return f"count(*) FILTER (child.{column} NOT IN (SELECT {parent}_id FROM store.{parent}))"

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from msgflow.db.tables import STORE
+from msgflow.db.store_table import store_tables
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     import duckdb
-    from sqlalchemy import Column, Table
+
+    from msgflow.db.store_table import StoreColumn, StoreTable
 
 # What a database says of itself.
 _OF_NO_RUN = ("alembic_version", "definition")
@@ -35,7 +36,7 @@ def store(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
         ).fetchall()
     }
     bases = _bases(con)
-    for table in STORE.tables.values():
+    for table in store_tables().values():
         if table.name in staged:
             _copy(con, table, run_id, bases)
 
@@ -43,9 +44,9 @@ def store(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
 def delete(con: duckdb.DuckDBPyConnection, run_ids: Iterable[int]) -> None:
     """Delete runs from every table, inside the open transaction."""
     for run_id in run_ids:
-        for table in STORE.tables.values():
+        for table in store_tables().values():
             if "run_id" in table.columns:
-                con.execute(f"DELETE FROM {table.fullname} WHERE run_id = ?", [run_id])
+                con.execute(f"DELETE FROM store.{table.name} WHERE run_id = ?", [run_id])
 
 
 def empty(con: duckdb.DuckDBPyConnection, *databases: str) -> None:
@@ -74,31 +75,29 @@ def _bases(con: duckdb.DuckDBPyConnection) -> dict[str, int]:
         ).fetchall()
     }
     bases = {}
-    for table in STORE.tables.values():
-        key = f"{table.name}_id"
-        if key in table.columns:
-            bases[key] = 0
+    for table in store_tables().values():
+        if table.key in table.columns:
+            bases[table.name] = 0
             if table.name in filled:
-                ((most,),) = con.execute(f"SELECT max({key}) FROM {table.fullname}").fetchall()
-                bases[key] = int(most or 0)
+                highest = f"SELECT max({table.key}) FROM store.{table.name}"
+                ((most,),) = con.execute(highest).fetchall()
+                bases[table.name] = int(most or 0)
     return bases
 
 
-def _copy(con: duckdb.DuckDBPyConnection, table: Table, run_id: int, bases: dict[str, int]) -> None:
-    names = ", ".join(table.columns.keys())
-    values = ", ".join(_value(table, column, run_id, bases) for column in table.columns)
-    key = f"{table.name}_id"
-    order = f" ORDER BY {key}" if key in table.columns else ""
+def _copy(
+    con: duckdb.DuckDBPyConnection, table: StoreTable, run_id: int, bases: dict[str, int]
+) -> None:
+    names = ", ".join(table.columns)
+    values = ", ".join(_value(table, column, run_id, bases) for column in table.columns.values())
+    order = f" ORDER BY {table.key}" if table.key in table.columns else ""
     con.execute(
-        f"INSERT INTO {table.fullname} ({names}) SELECT {values} FROM staging.{table.name}{order}"
+        f"INSERT INTO store.{table.name} ({names}) SELECT {values} FROM staging.{table.name}{order}"
     )
 
 
-def _value(table: Table, column: Column[Any], run_id: int, bases: dict[str, int]) -> str:
+def _value(table: StoreTable, column: StoreColumn, run_id: int, bases: dict[str, int]) -> str:
     if column.name == "run_id":
         return str(run_id)
-    if column.name == f"{table.name}_id":
-        return f"{column.name} + {bases[column.name]}"
-    for relation in column.foreign_keys:
-        return f"{column.name} + {bases[relation.column.name]}"
-    return f'"{column.name}"'
+    owner = table.name if column.name == table.key else column.to
+    return f"{column.name} + {bases[owner]}" if owner else f'"{column.name}"'

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from msgflow.db import objects
 from msgflow.db.finding import kinds_of, statement
-from msgflow.db.tables import STORE
+from msgflow.db.store_table import store_tables
 from msgflow.ingest import staging
 from msgflow.ingest.caret_initialisation import restore
 
@@ -92,7 +92,7 @@ def _last_uses(headers: tuple[Header, ...]) -> dict[str, int]:
 
     Tables that `store` copies, and what they need at that moment, are not in it.
     """
-    stored = {f"staging.{table.name}" for table in STORE.tables.values()}
+    stored = {f"staging.{name}" for name in store_tables()}
     unfolded = {header.name: header for header in headers if header.kind != "view"}
     last = dict.fromkeys(_raw_tables(), 0)
     for position, header in enumerate(headers):

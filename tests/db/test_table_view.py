@@ -9,7 +9,7 @@ import duckdb
 import pytest
 
 from msgflow.db import objects
-from msgflow.db.table_ddl import type_name
+from msgflow.db.store_table import store_tables
 from msgflow.db.table_view import table_views
 from msgflow.db.tables import STORE
 
@@ -30,7 +30,7 @@ def filled(
     path = tmp_path_factory.mktemp("filled") / "filled.duckdb"
     path.write_bytes(empty_database.read_bytes())
     with duckdb.connect(str(path)) as con:
-        for table in STORE.tables.values():
+        for table in store_tables().values():
             values = [
                 {
                     "BOOLEAN": "true",
@@ -39,17 +39,17 @@ def filled(
                     "BIGINT[]": "[1]",
                     "BLOB": "'a'::BLOB",
                 }.get(kind, "'1'" if kind == "VARCHAR" else "1")
-                for kind in map(type_name, table.columns)
+                for kind in (column.type for column in table.columns.values())
             ]
             if table.name != "definition":
-                con.execute(f"INSERT INTO {table.fullname} VALUES ({', '.join(values)})")
+                con.execute(f"INSERT INTO store.{table.name} VALUES ({', '.join(values)})")
         con.execute(f"UPDATE store.clock SET offset_ns = {AHEAD_NS}, drift_ppb = 0")
         yield con
 
 
 def test_every_table_is_seen_or_inner() -> None:
     public = set(objects.public_names())
-    assert {table.name for table in STORE.tables.values()} - public == INNER
+    assert store_tables().keys() - public == INNER
 
 
 @pytest.mark.parametrize("view", VIEWS, ids=lambda view: view.name)

@@ -9,6 +9,7 @@ from types import ModuleType
 
 import pytest
 
+from msgflow.db.store_table import store_file
 from msgflow.query.catalogue import query_names
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -34,6 +35,10 @@ def _pages() -> dict[Path, str]:
 def test_page_is_current(path: Path) -> None:
     text = path.read_text()
     assert text == _script().with_answers(_pages()[path], text), "run: python docs/generate.py"
+
+
+def test_tables_are_those_that_are_defined() -> None:
+    assert store_file().read_text() == _script().store(), "run: python docs/generate.py"
 
 
 def test_every_query_has_a_page_and_no_other() -> None:

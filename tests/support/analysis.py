@@ -18,7 +18,7 @@ from msgflow.db.connection import attach
 from msgflow.db.derivation import derive, derive_table, derived_tables, learn_topics
 from msgflow.db.sandbox import open_memory
 from msgflow.db.store import store
-from msgflow.db.tables import STORE
+from msgflow.db.store_table import store_tables
 from msgflow.ingest import model, staging
 from msgflow.ingest.caret_initialisation import restore
 
@@ -194,13 +194,13 @@ class Analysis:
         filled = {
             name
             for (name,) in self._read(
-                "SELECT 'store.' || table_name FROM duckdb_tables() "
+                "SELECT table_name FROM duckdb_tables() "
                 "WHERE schema_name = 'store' AND estimated_size > 0"
             )
         }
-        for table in STORE.tables.values():
-            if "run_id" in table.columns and table.fullname in filled:
-                self._connection.execute(f"DELETE FROM {table.fullname}")
+        for name, table in store_tables().items():
+            if "run_id" in table.columns and name in filled:
+                self._connection.execute(f"DELETE FROM store.{name}")
         self._is_kept = False
 
 

@@ -1,7 +1,8 @@
 """Tables of the schema `store`: their one definition, in SQLAlchemy Core.
 
-`STORE.tables` has them by name. New databases are made from it (`empty_database.py`), rows are
-stored by it (`store.py`), and the public views that show a table as it is are made from it too,
+`STORE.tables` has them by name. `python docs/generate.py` renders them into `schema/store.sql`.
+What runs reads that file (`store_table.py`), since SQLAlchemy takes long to import. It makes new
+databases of it, stores rows by it, and makes of it the public views that show a table as it is,
 with their comments and their page of the documentation (`table_view.py`). Other public views over a
 table are files of `schema/public`; what their columns share with the table stands only here. For
 users the module `msgflow.schema` has the tables and the public views.
