@@ -23,7 +23,7 @@ READERS = [
     and file.header.name != "main.finding"
 ]
 NAMES = {short_name(header) for header in kinds()}
-CODE = [*(ROOT / "msgflow").rglob("*.py"), *(ROOT / "schema").rglob("*.sql")]
+CODE = [*(ROOT / "msgflow").rglob("*.py"), *(ROOT / "schema").glob("*/**/*.sql")]
 
 
 @each(kinds(), name=lambda header: header.name)
