@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING
 
-from msgflow.resources import resource_directory
+from msgflow.files.resources import resource_directory
 from msgflow.sql.header import Column
 
 if TYPE_CHECKING:
