@@ -108,8 +108,7 @@ missing, `warning` where they may be, and `info`.
 - `msgflow query info --section findings`, `msgflow info` and the view
   [finding](data-model.md#finding) have all.
 - `msgflow ingest` prints the errors and warnings of a new run in short.
-- `msgflow check --detail` shows all, and which rules of the phase database are broken now. One that
-  a new run breaks is a finding of that run, too.
+- `msgflow check --detail` shows all, and which rules of the phase database are broken.
 
 An ingest stores the findings of a run. `msgflow links apply`, `clocks apply` and `db upgrade` find
 those of the phase recording anew.

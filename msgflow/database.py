@@ -893,7 +893,7 @@ class Database:
         )
         if not detail:
             return found
-        return [*self.check(), *(each for each in found if each.phase != "database")]
+        return [*self.check(), *found]
 
     def clock_verdicts(
         self, *, run: str | int | None = None, only_several: bool = False

@@ -1,8 +1,8 @@
 -- name: info-findings
 -- title: Data quality
 -- description: What to know before trusting a number: lost events, unknown events, callbacks
---     without an end, clocks that are apart, broken rules of the database. The worst comes first;
---     the view finding has the cause and cure of each.
+--     without an end, clocks that are apart. The worst comes first; the view finding has the cause
+--     and cure of each.
 -- grain: one row per place at which something was found
 -- column: run_id BIGINT      Run
 -- column: severity VARCHAR   error, warning or info
@@ -10,7 +10,7 @@
 -- column: count BIGINT       How often
 -- column: subject VARCHAR    Where: a trace, process, host, topic
 -- column: detail VARCHAR     Numbers, and what they mean
--- column: phase VARCHAR      What it is about: input, recording or database
+-- column: phase VARCHAR      What it is about: input or recording
 -- brief: severity, name, count, detail, subject
 SELECT
     run_id,

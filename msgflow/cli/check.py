@@ -49,8 +49,7 @@ def command(
 ) -> None:
     """Show what is wrong with a recording, with cause and cure; exit code 1 on errors.
 
-    With warnings only, the exit code is 0. A rule of the database that was broken
-    when the run was ingested is shown too. If a run has several clocks, the last
+    With warnings only, the exit code is 0. If a run has several clocks, the last
     line says how far their times can be compared.
     """
     from msgflow.cli.output import print_next

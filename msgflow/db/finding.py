@@ -8,11 +8,12 @@ phase, which decides when the query runs and what it reads:
 | --- | --- | --- |
 | input | once the model of an ingest is built | `staging` |
 | recording | whenever links or clocks of a run change | `store`, `derive`, `main` |
-| database | at the end of an ingest, and for `msgflow check --detail` | `store` |
+| database | for `msgflow check --detail` | `store` |
 
 A query returns `count` and `detail`, and where it applies `subject` (the place, in words) and
-`trace_id`; those that do not read `staging` return `run_id` too, and may use `$run_id`. The rows
-are stored in `store.finding`. The view `main.finding` adds what the headers say.
+`trace_id`; those that do not read `staging` return `run_id` too, and may use `$run_id`. The rows of
+the first two phases are stored in `store.finding`. The view `main.finding` adds what the headers
+say. The phase database is about msgflow itself: no ingest looks for what it can find.
 """
 
 from __future__ import annotations
@@ -52,7 +53,7 @@ _AFTER = {
 
 @dataclass(frozen=True)
 class Finding:
-    """Something worth knowing, at one place: a row of the view `main.finding`.
+    """Something worth knowing, at one place: a row of the view `main.finding`, or a broken rule.
 
     Attributes:
         run_id: the run.
@@ -113,12 +114,12 @@ def composed(layer: str) -> tuple[Header, ...]:
         rows = statement(kinds_of("input"))
         return (_object("staging.finding", description, "one row per place", rows),)
     if layer == "stat":
-        rows = "VALUES\n" + ",\n".join(map(_row, kinds()))
+        rows = "VALUES\n" + ",\n".join(map(_row, (*kinds_of("input"), *kinds_of("recording"))))
         columns = "name, phase, severity, title, description, cause, cure"
         return (
             _object(
                 "derive.finding_kind",
-                "What can be found, and what the headers in `schema/health` say about it.",
+                "What an ingest can find, and what the headers in `schema/health` say about it.",
                 "one row per kind of finding",
                 f"SELECT {columns}\nFROM (\n{rows}\n) AS kind ({columns})\n",
             ),
@@ -153,16 +154,6 @@ def store_findings(con: duckdb.DuckDBPyConnection, run_id: int, headers: Sequenc
             f"INSERT INTO store.finding BY NAME FROM (\n{statement([header])}\n) "
             "WHERE run_id = $run_id",
             {"run_id": run_id},
-        )
-
-
-def store_broken_rules(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
-    """Store the broken rules of a new run, inside the open transaction."""
-    for finding in broken_rules(con, run_id):
-        con.execute(
-            "INSERT INTO store.finding (run_id, name, subject, count, detail) "
-            "VALUES (?, ?, ?, ?, ?)",
-            [run_id, finding.name, finding.subject, finding.count, finding.detail],
         )
 
 

@@ -16,7 +16,7 @@ from msgflow.clocks import read_clock_sync, set_clocks
 from msgflow.db import migration
 from msgflow.db.connection import attach
 from msgflow.db.derivation import derive
-from msgflow.db.finding import read_findings, store_broken_rules
+from msgflow.db.finding import read_findings
 from msgflow.db.memory import (
     default_limit,
     ingest_memory_errors,
@@ -268,8 +268,6 @@ def _write_run(
         if declared is not None:
             declare_links(con, run_id, declared)
         derive(con, run_id, synchronise=lambda: set_clocks(con, run_id, clocks))
-        watch.enter("checking the database")
-        store_broken_rules(con, run_id)
         findings = tuple(read_findings(con, [run_id], info=True))
         interrupts.make_final()
     return run_id, run_name, findings

@@ -1,11 +1,11 @@
 -- name: main.finding
--- description: Things worth knowing about the input, the recording or the database before trusting
---     a number: lost events, objects not seen to be created, clocks apart, rules that are broken.
+-- description: Things worth knowing about the input or the recording before trusting a number: lost
+--     events, objects not seen to be created, clocks apart.
 -- grain: one row per place at which something was found
 -- column: run_id
 -- column: trace_id
 -- column: name
--- column: phase VARCHAR  What it is about: 'input', 'recording' or 'database'
+-- column: phase VARCHAR  What it is about: 'input' or 'recording'
 -- column: severity VARCHAR  'error' where results are wrong or missing, 'warning' where they may
 --     be, or 'info'
 -- column: subject VARCHAR  Where: a trace, process, host, topic

@@ -42,7 +42,6 @@ STAGES = (
     "building the model",
     "storing the run",
     "linking messages",
-    "checking the database",
 )
 
 

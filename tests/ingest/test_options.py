@@ -11,6 +11,7 @@ import pytest
 from ingested import rows
 from thorough import thorough
 
+from msgflow import open_db
 from msgflow.ingest import IngestProgress, ingest
 from msgflow.ingest.hostnames import hostnames_of
 from msgflow.trace import open as open_traces
@@ -134,7 +135,8 @@ def test_staging_can_be_kept_and_progress_is_told(
     assert all(0 <= fraction <= 1 for fraction in fractions)
     assert max(state.events for state in seen) <= report.event_count
     assert report.seconds == pytest.approx(sum(report.stage_seconds.values()))
-    assert [d for d in report.findings if d.phase == "database"] == []
+    with open_db(new_database) as opened:
+        assert opened.check() == []
     assert rows(new_database, "SELECT run_id, name, event_count FROM store.run") == [
         (report.run_id, report.run_name, report.event_count)
     ]

@@ -10,6 +10,7 @@ import duckdb
 import pytest
 from ingested import contents
 
+from msgflow import open_db
 from msgflow.ingest import ingest
 from msgflow.trace import open as open_traces
 
@@ -46,4 +47,5 @@ def test_nothing_is_counted_twice(database: Path, twice: Path, tmp_path: Path) -
         ((loaded,),) = connection.execute("SELECT event_count FROM store.run").fetchall()
     assert found.severity == "warning"
     assert 0 < found.count <= loaded
-    assert not [d for d in report.findings if d.phase == "database"]
+    with open_db(tmp_path / "twice.duckdb") as opened:
+        assert opened.check() == []

@@ -9,6 +9,7 @@ from fates import FATES
 from ingested import Ingested
 from thorough import few
 
+from msgflow.db.finding import broken_rules
 from msgflow.query.catalogue import load_query
 from msgflow.query.runner import run_query
 
@@ -102,6 +103,13 @@ EXPECTED: dict[str, list[tuple[str, str | None, int]]] = {
 def test_findings(recordings: Callable[[str], Ingested], name: str) -> None:
     found = recordings(name).rows(FINDINGS)
     assert [row[:3] for row in found] == EXPECTED[name], found
+
+
+@pytest.mark.parametrize(
+    "name", few(EXPECTED, "real_container", "real_late", "real_overload", "real_py_mixed")
+)
+def test_recordings_keep_every_rule(recordings: Callable[[str], Ingested], name: str) -> None:
+    assert broken_rules(recordings(name).connection) == []
 
 
 @pytest.mark.thorough
