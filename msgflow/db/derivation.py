@@ -73,7 +73,11 @@ def _derive_on_clocks(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
 def derive_findings(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
     """Find anew what a recording shows, inside the open transaction."""
     kinds = kinds_of("recording")
-    store_findings(con, run_id, [kind for kind in kinds if _may_have_rows(con, kind, run_id)])
+    # Each is asked once for all kinds.
+    sources = dict.fromkeys(source for kind in kinds for source in kind.sources)
+    filled = {source for source in sources if _has_row(con, source, run_id)}
+    found = [kind for kind in kinds if not kind.sources or filled.intersection(kind.sources)]
+    store_findings(con, run_id, found)
 
 
 @cache
@@ -123,10 +127,16 @@ def derive_table(con: duckdb.DuckDBPyConnection, name: str, run_id: int) -> None
 
 def _may_have_rows(con: duckdb.DuckDBPyConnection, header: Header, run_id: int) -> bool:
     """Tell whether an object may have rows of a run, by what `when` of its header says."""
-    return not header.when or any(
-        con.execute(f"SELECT 1 FROM {_of_run(name)} LIMIT 1", [run_id]).fetchall()
-        for name in header.when
-    )
+    return not header.sources or any(_has_row(con, source, run_id) for source in header.sources)
+
+
+def _has_row(con: duckdb.DuckDBPyConnection, source: tuple[str, str], run_id: int) -> bool:
+    """Tell whether a table, view or macro has a row of a run for which a condition holds."""
+    name, condition = source
+    rows = f"SELECT 1 FROM {_of_run(name)} LIMIT 1"
+    if condition:
+        rows = f"SELECT 1 FROM {_of_run(name)} AND ({condition}) LIMIT 1"
+    return bool(con.execute(rows, [run_id]).fetchall())
 
 
 def _of_run(name: str) -> str:

@@ -41,7 +41,7 @@ def build(con: duckdb.DuckDBPyConnection, *, keep: bool = False, findings: bool 
     last_uses = {} if keep else _last_uses(headers)
     for position, header in enumerate(headers):
         if header.name == _FINDING:
-            kinds = [kind for kind in kinds_of("input") if not _has_no_row(kind, empty)]
+            kinds = [kind for kind in kinds_of("input") if _may_be_found(con, kind, empty)]
             header = replace(header, body=statement(kinds))
         create(con, header, empty)
         for name, last_use in last_uses.items():
@@ -85,6 +85,18 @@ def _stays_empty(header: Header, empty: set[str]) -> bool:
 def _has_no_row(header: Header, empty: set[str]) -> bool:
     """Tell whether an object cannot have a row, by what `when` of its header says."""
     return bool(header.when) and empty.issuperset(header.when)
+
+
+def _may_be_found(con: duckdb.DuckDBPyConnection, kind: Header, empty: set[str]) -> bool:
+    """Tell whether a kind of finding may have a row, by what `when` of its header says."""
+    return not kind.sources or any(
+        name not in empty
+        and (
+            not condition
+            or con.execute(f"SELECT 1 FROM {name} WHERE {condition} LIMIT 1").fetchall()
+        )
+        for name, condition in kind.sources
+    )
 
 
 def _last_uses(headers: tuple[Header, ...]) -> dict[str, int]:

@@ -34,7 +34,8 @@ The header ends at the first line that is not a `--` comment. Two spaces end a p
   and an ingest does not run its SQL. In `schema/model` such an object may declare its columns, from
   which the empty table is made. One that does not is left out only where the table is there
   already: `msgflow watch` ingests into one database again and again. Only objects that take long to
-  plan declare columns.
+  plan declare columns. Outside of `schema/model` a condition may follow a name, as in
+  `store.gap WHERE kind = 'loss'`: then only such rows count.
 - `also`: objects whose rows are stored in the table of this one, too. Each has a `when` of its own,
   so that what few recordings have is planned only there.
 
@@ -79,6 +80,7 @@ _STEP = re.compile(
 _COMMENT = re.compile(r"--[^\n]*")
 _OBJECT = re.compile(r"\b(?:raw|staging|store|derive|main)\.[a-z_0-9]+\b")
 _RELATION = re.compile(r"\b(?:FROM|JOIN) ([a-z_0-9]+)\b(?![.(])")
+_NEXT_SOURCE = re.compile(r", (?=[a-z]+\.)")
 _MINIMUM = re.compile(r"(-?\d+)\.\.")
 _REPEATABLE = ("param", "column")
 _SINGLE = (
@@ -174,7 +176,8 @@ class Header:
         slowest: column by which rows are the slowest, else None.
         zero: column that is 0 in rows that a terminal leaves out, else None.
         steps: what a query makes before, in order.
-        when: tables, views and macros of a run; if none of them has a row, this has none.
+        sources: tables, views and macros of a run, each with a condition on its rows, or with an
+            empty one; if none of them has such a row, this has none.
         also: objects whose rows are stored in the same table.
         variant: parameter that chooses between this query and others; its default is this one.
         chosen: of a variant: the name of the query, and the option that chooses this one.
@@ -199,7 +202,7 @@ class Header:
     slowest: str | None = None
     zero: str | None = None
     steps: tuple[Step, ...] = ()
-    when: tuple[str, ...] = ()
+    sources: tuple[tuple[str, str], ...] = ()
     also: tuple[str, ...] = ()
     variant: Param | None = None
     chosen: str | None = None
@@ -208,6 +211,11 @@ class Header:
     def words(self) -> str:
         """What stands behind `msgflow query`: the name, and the option of a variant."""
         return self.chosen or self.name
+
+    @property
+    def when(self) -> tuple[str, ...]:
+        """The names of `sources`."""
+        return tuple(name for name, _ in self.sources)
 
     @cached_property
     def needs(self) -> tuple[str, ...]:
@@ -303,7 +311,7 @@ def parse(text: str, path: Path) -> Header:
         slowest=single.get("slowest"),
         zero=single.get("zero"),
         steps=steps,
-        when=_names(single.get("when", "")),
+        sources=_sources(single.get("when", "")),
         also=_names(single.get("also", "")),
         variant=variants[0] if variants else None,
     )
@@ -367,6 +375,11 @@ def _code(text: str) -> str:
 
 def _names(text: str) -> tuple[str, ...]:
     return tuple(part.strip() for part in text.split(",") if part.strip())
+
+
+def _sources(text: str) -> tuple[tuple[str, str], ...]:
+    parts = (part.partition(" WHERE ") for part in _NEXT_SOURCE.split(text) if part)
+    return tuple((name, condition) for name, _, condition in parts)
 
 
 def _param(field: _Field, path: Path) -> Param:

@@ -28,7 +28,7 @@ FULL = """\
 -- column: size DECIMAL(18,3)  Size
 -- column: start_ns BIGINT [epoch ns]
 --     When
--- when: main.a,
+-- when: main.a WHERE kind IN ('a', 'b'),
 --     main.b
 -- also: main.c, main.d
 -- answer: median_ns
@@ -67,6 +67,7 @@ def test_everything_is_parsed() -> None:
         Column("size", "DECIMAL(18,3)", None, "Size"),
         Column("start_ns", "BIGINT", "epoch ns", "When"),
     )
+    assert header.sources == (("main.a", "kind IN ('a', 'b')"), ("main.b", ""))
     assert header.when == ("main.a", "main.b")
     assert header.also == ("main.c", "main.d")
     assert header.severity == "warning"

@@ -392,11 +392,11 @@ def fill(connection: duckdb.DuckDBPyConnection, tables: Mapping[str, str] | None
         insert(connection, table, names, rows)
 
 
-def empty(connection: duckdb.DuckDBPyConnection, name: str) -> None:
-    """Delete the rows of a table, or let a view or macro return none."""
+def empty(connection: duckdb.DuckDBPyConnection, name: str, condition: str = "") -> None:
+    """Delete rows of a table, those of a condition if given; or let a view or macro return none."""
     headers = [header for header in objects.views() if header.name == name]
     if not headers:
-        connection.execute(f"DELETE FROM {name}")
+        connection.execute(f"DELETE FROM {name} WHERE {condition or 'true'}")
     for header in headers:
         head, body = "", header.body
         if header.kind == "macro":

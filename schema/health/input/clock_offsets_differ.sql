@@ -6,6 +6,7 @@
 -- cure: None needed.
 -- grain: one row, if there are any
 -- severity: info
+-- when: staging.source WHERE clock_correction_ns <> 0
 SELECT
     count(*) AS count,
     printf(

@@ -8,6 +8,7 @@
 --     time, and ingest both. Enable ros2:*, so that takes and executors show.
 -- grain: one row, if there are any
 -- severity: warning
+-- when: staging.callback_owner WHERE is_eliminated
 SELECT
     count(*) AS count,
     'callbacks attributed to timers or services by elimination: their initialisation was not '

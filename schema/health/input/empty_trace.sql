@@ -9,6 +9,7 @@
 --     on the recording host.
 -- grain: one row per trace
 -- severity: warning
+-- when: staging.trace WHERE event_count = 0
 SELECT
     trace_id,
     1 AS count,

@@ -8,6 +8,7 @@
 --     the ids: lttng add-context -u -t pid_ns.
 -- grain: one row, if there are any
 -- severity: info
+-- when: staging.process WHERE pid_namespace < 0
 SELECT
     count(*) AS count,
     'processes with ids that others had as well: '

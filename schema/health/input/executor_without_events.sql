@@ -9,6 +9,7 @@
 -- cure: None needed. For executor states, use a SingleThreadedExecutor or MultiThreadedExecutor.
 -- grain: one row per process with such threads
 -- severity: warning
+-- when: staging.callback_pair WHERE thread_id NOT IN (SELECT thread_id FROM staging.executor_first)
 WITH enabled AS (
     SELECT trace_index
     FROM staging.declared

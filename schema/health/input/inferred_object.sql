@@ -8,6 +8,10 @@
 -- cure: See the findings started_late and initialisation_lost, which name the processes.
 -- grain: one row per kind with such objects
 -- severity: warning
+-- when: staging.node WHERE is_inferred, staging.publisher WHERE is_inferred AND NOT is_internal,
+--     staging.subscription WHERE is_inferred, staging.timer WHERE created_ns IS NULL,
+--     staging.callback WHERE created_ns IS NULL, staging.client WHERE created_ns IS NULL,
+--     staging.service WHERE created_ns IS NULL
 WITH unseen AS (
     SELECT 'nodes' AS kind, process_id FROM staging.node WHERE is_inferred
     UNION ALL

@@ -12,6 +12,7 @@
 --     start a session daemon in each container and give each a hostname.
 -- grain: one row, if there are any
 -- severity: error
+-- when: staging.process WHERE is_ambiguous
 SELECT
     count(*) AS count,
     'processes that are several with equal ids: '

@@ -6,6 +6,7 @@
 -- cure: Enable net_dev_queue and net_if_receive_skb on every host (docs/clocks.md).
 -- grain: one row per trace
 -- severity: info
+-- when: staging.source WHERE domain = 'kernel'
 SELECT
     s.trace_index + 1 AS trace_id,
     1 AS count,

@@ -6,6 +6,7 @@
 --     others.
 -- grain: one row per trace
 -- severity: info
+-- when: staging.callback_pair WHERE end_ns IS NULL
 SELECT
     trace_index + 1 AS trace_id,
     count(*) AS count,

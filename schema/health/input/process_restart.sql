@@ -6,6 +6,7 @@
 -- cure: None needed.
 -- grain: one row, if there are any
 -- severity: info
+-- when: staging.process WHERE life > 1
 SELECT
     count(*) AS count,
     'process ids that were used again by a new process: '

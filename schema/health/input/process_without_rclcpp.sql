@@ -10,6 +10,7 @@
 -- cure: None for this recording. Measure callbacks of such nodes in the nodes themselves.
 -- grain: one row per process
 -- severity: warning
+-- when: staging.process WHERE process_id NOT IN (SELECT process_id FROM staging.callback)
 WITH enabled AS (
     SELECT trace_index FROM staging.declared WHERE name = 'ros2:callback_start'
 ),

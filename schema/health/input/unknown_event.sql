@@ -7,6 +7,7 @@
 --     your own (docs/own-events.md).
 -- grain: one row per trace with such events
 -- severity: info
+-- when: staging.event_count WHERE NOT is_known
 SELECT
     e.trace_index + 1 AS trace_id,
     sum(e.event_count) AS count,

@@ -7,6 +7,7 @@
 --     time, and ingest both. Enable ros2:*, so that takes and executors show.
 -- grain: one row, if there are any
 -- severity: warning
+-- when: staging.callback WHERE kind = 'unknown'
 SELECT
     count(*) AS count,
     'callbacks whose timer, service or subscription is not known (no executor events, takes that '

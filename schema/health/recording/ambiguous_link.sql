@@ -5,6 +5,7 @@
 -- cure: Leave out links with a candidate_count above 1 where only certain ones are to count.
 -- grain: one row per run
 -- severity: warning
+-- when: store.link_transport WHERE candidate_count > 1
 SELECT
     run_id,
     count(*) AS count,

@@ -10,6 +10,7 @@
 --     (rclcpp_executor_wait_for_work, rclcpp_executor_get_next_ready) where they fill the buffers.
 -- grain: one row per executor
 -- severity: warning
+-- when: store.executor WHERE kind LIKE 'multi_threaded%'
 WITH waited AS (
     SELECT
         s.run_id, s.executor_id, count(*) AS number, count(DISTINCT s.thread_id) AS threads

@@ -12,7 +12,7 @@
 --     the size given above; or enable fewer events, or write to a faster disk.
 -- grain: one row per trace
 -- severity: error
--- when: store.gap
+-- when: store.gap WHERE kind = 'loss'
 WITH damaged AS (
     SELECT DISTINCT trace_id FROM store.finding WHERE name = 'damaged_trace'
 ),

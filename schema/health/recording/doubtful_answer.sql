@@ -11,6 +11,7 @@
 --     it with msgflow links apply FILE; msgflow suggest links prints the entries.
 -- grain: one row per node
 -- severity: warning
+-- when: store.link_causal WHERE kind = 'take_adjacent' AND candidate_count > 1
 WITH pair AS (
     SELECT
         l.run_id, p.node_id, p.process_id, s.topic_name AS input, p.topic_name AS output,

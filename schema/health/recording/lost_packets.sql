@@ -11,7 +11,7 @@
 --     recording together.
 -- grain: one row per trace
 -- severity: error
--- when: store.gap
+-- when: store.gap WHERE kind = 'packets'
 SELECT
     run_id,
     trace_id,

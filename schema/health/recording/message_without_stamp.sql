@@ -9,7 +9,7 @@
 --     intra-process communication off.
 -- grain: one row per topic
 -- severity: warning
--- when: store.orphan_take
+-- when: store.orphan_take WHERE reason = 'no_stamp'
 SELECT
     o.run_id,
     coalesce(s.topic_name, 'unknown topic') AS subject,

@@ -6,6 +6,7 @@
 -- cure: Ask for part of them: e2e-latency with --from, --to, --max-depth or --max-paths.
 -- grain: one row, if there are any
 -- severity: warning
+-- when: derive.many_chains
 -- param: run_id BIGINT  Run
 SELECT
     $run_id AS run_id,

@@ -8,7 +8,7 @@
 -- cure: See its output, and dmesg. Callbacks without an end show what it did last.
 -- grain: one row per process
 -- severity: warning
--- when: store.undelivered
+-- when: store.undelivered WHERE reason = 'subscription_ended'
 WITH missed AS (
     SELECT s.process_id, count(DISTINCT u.publication_id) AS number
     FROM store.undelivered AS u

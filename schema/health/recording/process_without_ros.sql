@@ -7,6 +7,7 @@
 --     not, build tracetools with LTTng installed. Start the process with the events of ROS enabled.
 -- grain: one row per process
 -- severity: warning
+-- when: store.process WHERE process_id NOT IN (SELECT process_id FROM store.node)
 SELECT
     p.run_id,
     printf('%s %d on %s', coalesce(p.name, '?'), p.pid, h.hostname) AS subject,

@@ -9,7 +9,7 @@
 --     run tracetools status must say that tracing is enabled.
 -- grain: one row per topic
 -- severity: warning
--- when: store.orphan_take
+-- when: store.orphan_take WHERE reason = 'publisher_not_traced'
 SELECT
     o.run_id,
     coalesce(s.topic_name, 'unknown topic') AS subject,

@@ -7,7 +7,7 @@
 -- cure: None. Time them in the node, with a tracepoint of your own.
 -- grain: one row per process that runs other callbacks
 -- severity: info
--- when: store.request
+-- when: store.request WHERE callback_instance_id IS NULL
 WITH served AS (
     SELECT process_id, service_id, count(*) AS number
     FROM (

@@ -8,7 +8,7 @@
 --     down by themselves.
 -- grain: one row per topic
 -- severity: warning
--- when: store.orphan_take
+-- when: store.orphan_take WHERE reason = 'publisher_trace_ends'
 WITH late AS (
     SELECT o.run_id, s.topic_name, count(*) AS number, max(t.taken_ns) AS last_ns
     FROM main.stat_orphan AS o

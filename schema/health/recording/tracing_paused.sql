@@ -7,7 +7,7 @@
 --     pauses out with --start and --end.
 -- grain: one row per trace
 -- severity: warning
--- when: store.gap
+-- when: store.gap WHERE kind = 'pause'
 SELECT
     run_id,
     trace_id,

@@ -10,6 +10,7 @@
 --     exceptions.
 -- grain: one row per process
 -- severity: warning
+-- when: store.callback_instance WHERE end_ns IS NULL
 WITH unended AS (
     SELECT callback_instance_id, callback_id, process_id, thread_id, start_ns
     FROM main.callback_instance
