@@ -186,9 +186,9 @@ def have_no_row_without_their_when(
         assert built(shown[0], header.when)[header.name] == (columns, 0)
 
 
-@pytest.mark.parametrize("is_damaged", [False, True])
+@pytest.mark.parametrize("is_strange", [False, True])
 def test_findings_of_which_nothing_tells_are_not_planned(
-    lossy: Path, is_damaged: bool, monkeypatch: pytest.MonkeyPatch
+    lossy: Path, is_strange: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     planned = {}
     create = model.create
@@ -200,13 +200,15 @@ def test_findings_of_which_nothing_tells_are_not_planned(
     monkeypatch.setattr(model, "create", note)
     with duckdb.connect() as con:
         read(con, lossy)
-        if is_damaged:
+        if is_strange:
             con.execute("INSERT INTO staging.damage VALUES (0, 'stream_0', 4096, 12, 'cut off')")
+            con.execute("UPDATE staging.event_count SET is_known = false")
         model.build(con)
         found = con.execute("SELECT name FROM staging.finding").fetchall()
-    assert ("'damaged_trace'" in planned["staging.finding"]) == is_damaged
-    assert (("damaged_trace",) in found) == is_damaged
-    assert "'open_callback'" in planned["staging.finding"]
+    for name in ("damaged_trace", "unknown_event"):
+        assert (f"'{name}'" in planned["staging.finding"]) == is_strange
+        assert ((name,) in found) == is_strange
+    assert "'repeated_initialisation'" in planned["staging.finding"]
     assert "'kernel_trace_not_joined'" not in planned["staging.finding"]
 
 

@@ -10,9 +10,9 @@
 -- grain: one row per process
 -- severity: warning
 -- when: store.node WHERE is_inferred, store.publisher WHERE is_inferred AND NOT is_internal,
---     store.subscription WHERE is_inferred AND NOT is_internal, store.timer WHERE created_ns IS NULL,
---     store.service WHERE created_ns IS NULL, store.client WHERE created_ns IS NULL,
---     store.callback WHERE created_ns IS NULL
+--     store.subscription WHERE is_inferred AND NOT is_internal,
+--     store.timer WHERE created_ns IS NULL, store.service WHERE created_ns IS NULL,
+--     store.client WHERE created_ns IS NULL, store.callback WHERE created_ns IS NULL
 SELECT
     p.run_id,
     printf('%s %d on %s', coalesce(p.name, '?'), p.pid, h.hostname) AS subject,
