@@ -8,7 +8,8 @@
 --     each (docs/causes.md).
 -- grain: one row per topic
 -- severity: warning
--- when: derive.unnamed_endpoint
+-- when: store.publisher WHERE topic_name IS NULL OR is_topic_learned OR is_topic_declared,
+--     store.subscription WHERE topic_name IS NULL OR is_topic_learned OR is_topic_declared
 -- param: run_id BIGINT  Run
 SELECT
     run_id,
