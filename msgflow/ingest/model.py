@@ -1,4 +1,7 @@
-"""The model of a run: executes `schema/model`, from staged events to rows with ids from 1."""
+"""The model of a run: executes `schema/model`, from staged events to rows with ids from 1.
+
+What cannot have a row in this recording is not planned: `schema/model.sql` has its empty table.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +15,7 @@ from msgflow.db.finding import kinds_of, statement
 from msgflow.db.store_table import store_tables
 from msgflow.ingest import staging
 from msgflow.ingest.caret_initialisation import restore
+from msgflow.files.resources import resource_directory
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -22,6 +26,7 @@ if TYPE_CHECKING:
 
 
 _FINDING = "staging.finding"
+_TABLE = re.compile(r"CREATE TABLE ([a-z_.]+) \([^;]*;")
 
 
 def build(con: duckdb.DuckDBPyConnection, *, keep: bool = False, findings: bool = True) -> None:
@@ -62,10 +67,9 @@ def create(con: duckdb.DuckDBPyConnection, header: Header, empty: set[str]) -> N
         con.execute(header.body)
     elif header.kind == "inline":
         con.execute(f"CREATE OR REPLACE VIEW {header.name} AS\n{header.body}")
-    elif _stays_empty(header, empty):
+    elif _has_no_row(header, empty):
         if header.name not in empty:
-            columns = ", ".join(f"{column.name} {column.type}" for column in header.columns)
-            con.execute(f"CREATE TABLE {header.name} ({columns})")
+            con.execute(_empty_tables()[header.name])
             empty.add(header.name)
     else:
         table = f"CREATE OR REPLACE TABLE {header.name} AS\n{header.body}"
@@ -74,12 +78,6 @@ def create(con: duckdb.DuckDBPyConnection, header: Header, empty: set[str]) -> N
             empty.discard(header.name)
         else:
             empty.add(header.name)
-
-
-def _stays_empty(header: Header, empty: set[str]) -> bool:
-    """Tell whether a table needs no SQL: it has no row, and is there or declares its columns."""
-    is_known = header.name in empty or bool(header.columns)
-    return is_known and _has_no_row(header, empty)
 
 
 def _has_no_row(header: Header, empty: set[str]) -> bool:
@@ -97,6 +95,13 @@ def _may_be_found(con: duckdb.DuckDBPyConnection, kind: Header, empty: set[str])
         )
         for name, condition in kind.sources
     )
+
+
+@functools.cache
+def _empty_tables() -> Mapping[str, str]:
+    """Return the statement that makes each table of the model without a row."""
+    text = (resource_directory("schema") / "model.sql").read_text(encoding="utf-8")
+    return {match[1]: match[0] for match in _TABLE.finditer(text)}
 
 
 def _last_uses(headers: tuple[Header, ...]) -> dict[str, int]:

@@ -31,10 +31,8 @@ The header ends at the first line that is not a `--` comment. Two spaces end a p
 - `slowest`: the column that `--slowest N` goes by.
 - `zero`: the column that is 0 in rows that a terminal leaves out.
 - `when`: tables, views, or macros of a run. If none of them has a row, this object has none either,
-  and an ingest does not run its SQL. In `schema/model` such an object may declare its columns, from
-  which the empty table is made. One that does not is left out only where the table is there
-  already: `msgflow watch` ingests into one database again and again. Only objects that take long to
-  plan declare columns. Outside of `schema/model` a condition may follow a name, as in
+  and an ingest does not run its SQL. In `schema/model` only tables count, and the empty table is
+  made by its statement in `schema/model.sql`. Elsewhere a condition may follow a name, as in
   `store.gap WHERE kind = 'loss'`: then only such rows count.
 - `also`: objects whose rows are stored in the table of this one, too. Each has a `when` of its own,
   so that what few recordings have is planned only there.

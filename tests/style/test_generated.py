@@ -41,6 +41,11 @@ def test_tables_are_those_that_are_defined() -> None:
     assert store_file().read_text() == _script().store(), "run: python docs/generate.py"
 
 
+def test_tables_of_the_model_are_current() -> None:
+    script = _script()
+    assert script.MODEL.read_text() == script.model_tables(), "run: python docs/generate.py"
+
+
 def test_every_query_has_a_page_and_no_other() -> None:
     pages = {path.stem for path in (ROOT / "docs" / "queries").iterdir()}
     assert pages == set(query_names())

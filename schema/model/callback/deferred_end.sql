@@ -5,8 +5,6 @@
 --     blocked before. No gap lies between.
 -- grain: one row per callback instance of such a service that an executor event closes
 -- when: staging.callback_open
--- column: start_event_id BIGINT  callback_start
--- column: end_ns BIGINT [epoch ns]  Executor event
 WITH closed AS (
     SELECT o.start_event_id, b.callback_event_id, e.effective_end_event_id
     FROM staging.callback_open AS o

@@ -4,16 +4,6 @@
 --     was over; else the nearest one around that which was not over.
 -- grain: one row per event of a name that the user asked for
 -- when: raw.user_event
--- column: user_event_id BIGINT  Number of the event
--- column: trace_id INTEGER  Trace it was recorded in
--- column: process_id BIGINT  Its process
--- column: thread_id BIGINT  Its thread
--- column: cpu INTEGER  CPU that it happened on
--- column: at_ns BIGINT [epoch ns]  When it happened
--- column: name VARCHAR  Provider and event
--- column: callback_instance_id BIGINT  Callback instance inside which it happened
--- column: fields VARCHAR  Its fields, as JSON
--- column: is_loss_affected BOOLEAN  A gap may hide that the callback instance was over
 WITH RECURSIVE event AS MATERIALIZED (
     SELECT * FROM staging.located('user_event')
 ),

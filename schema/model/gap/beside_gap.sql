@@ -5,9 +5,6 @@
 --     part.
 -- grain: one row per such event and side
 -- when: staging.gap
--- column: event_id BIGINT  The event
--- column: thread_id BIGINT  Its thread
--- column: is_behind BOOLEAN  The gap is before the event, else after it
 WITH last_gap AS (
     SELECT recording_index, cpu_id, max(covered_until_ns) AS end_ns
     FROM staging.recording_gap

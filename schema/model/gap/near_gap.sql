@@ -5,11 +5,6 @@
 --     CPUs, which the thread may have visited meanwhile.
 -- grain: one row per event and sequence
 -- when: staging.gap
--- column: event_id BIGINT  The event
--- column: thread_index INTEGER  Its thread
--- column: sequence VARCHAR  The sequence that a gap interrupts
--- column: ts_ns BIGINT [epoch ns]  When the event was recorded
--- column: is_between BOOLEAN  The gap interrupts the record of the thread
 WITH exposed AS (
     SELECT
         e.event_id, e.thread_index, e.trace_index, e.sequence, e.ts_ns, e.cpu_id,

@@ -7,9 +7,6 @@
 --     meanwhile: those are lost.
 -- grain: one row per pause of a recording
 -- when: staging.silence
--- column: trace_id INTEGER  Trace whose packets begin again
--- column: start_ns BIGINT [epoch ns]  When the last packet before it ended
--- column: end_ns BIGINT [epoch ns]  When the first packet after it began
 
 -- When packets were ended before they were full.
 WITH ending AS (

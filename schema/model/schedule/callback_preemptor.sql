@@ -2,12 +2,6 @@
 -- description: What ran on the CPU for which callback instances waited.
 -- grain: one row per callback instance, and thread that ran meanwhile, with its priority
 -- when: staging.preemptor
--- column: callback_instance_id BIGINT  The callback instance
--- column: preemptor_thread_id BIGINT  What ran, a thread of a ROS process
--- column: preemptor_other_thread_id BIGINT  What ran, another thread
--- column: preemptor_priority INTEGER  The priority of that
--- column: preempted_ns BIGINT [ns]  For so long while the callback was preempted
--- column: runnable_ns BIGINT [ns]  For so long while the callback was woken
 WITH overlap AS (
     SELECT
         c.callback_instance_id, p.preemptor_thread_id, p.preemptor_other_thread_id,

@@ -2,18 +2,6 @@
 -- description: How the time of callback instances divides into states of their threads.
 -- grain: one row per callback instance that ended, on a thread with known states
 -- when: staging.thread_state
--- column: callback_instance_id BIGINT  The callback instance
--- column: running_ns BIGINT [ns]  On a CPU
--- column: preempted_ns BIGINT [ns]  Ready, but another thread had the CPU
--- column: runnable_ns BIGINT [ns]  Woken, waiting for a CPU
--- column: sleeping_ns BIGINT [ns]  Waiting for something
--- column: uninterruptible_ns BIGINT [ns]  Waiting for a page or a disk
--- column: unknown_ns BIGINT [ns]  Not known
--- column: irq_ns BIGINT [ns]  Of the time on a CPU, interrupts; NULL: not recorded
--- column: softirq_ns BIGINT [ns]  Of the time on a CPU, what interrupts left for later; likewise
--- column: preemption_count BIGINT  How often it lost the CPU
--- column: migration_count BIGINT  How often it went on on another CPU
--- column: is_loss_affected BOOLEAN  Kernel events were lost meanwhile
 WITH step AS (
     SELECT
         number,

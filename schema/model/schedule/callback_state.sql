@@ -2,11 +2,6 @@
 -- description: States of the thread during callback instances, cut to them.
 -- grain: one row per callback instance that ended and state that it overlaps
 -- when: staging.thread_state
--- column: callback_instance_id BIGINT  The callback instance
--- column: state_number BIGINT  The state
--- column: start_ns BIGINT [epoch ns]  Begin of the part
--- column: end_ns BIGINT [epoch ns]  End of the part
--- column: is_begin BOOLEAN  The state began during the callback instance
 WITH extent AS (
     SELECT thread_id, min(number) AS first_number FROM staging.thread_state GROUP BY thread_id
 ),

@@ -1,14 +1,9 @@
 -- name: staging.cpu_schedule
--- description: For how long a kernel trace says what ran on each CPU.
+-- description: For how long a kernel trace says what ran on each CPU: of the length from its first
+--     switch to the last, `known_ns` lie between switches that do not contradict each other, the
+--     first and last such time from `start_ns` to `end_ns`, as the trace has them.
 -- grain: one row per kernel trace and CPU
 -- when: raw.sched_switch
--- column: number INTEGER  Number of the row
--- column: trace_index INTEGER  The kernel trace
--- column: cpu INTEGER  The CPU
--- column: length_ns BIGINT [ns]  From its first switch to the last
--- column: known_ns BIGINT [ns]  Of that, between switches that do not contradict each other
--- column: start_ns BIGINT [ns]  Begin of the first time between such switches, as the trace has it
--- column: end_ns BIGINT [ns]  End of the last one, likewise
 SELECT
     row_number() OVER (ORDER BY trace_index, cpu_id)::INTEGER AS number,
     trace_index,

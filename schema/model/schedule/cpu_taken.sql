@@ -3,18 +3,6 @@
 --     next switch contradicts is not known.
 -- grain: one row per wait for a CPU and stretch of time in which another thread had it
 -- when: staging.cpu_wait
--- column: thread_id BIGINT  The thread that waited
--- column: state_start_ns BIGINT [epoch ns]  Begin of its wait
--- column: wait_start_ns BIGINT [epoch ns]  Begin of its wait for this CPU
--- column: start_ns BIGINT [epoch ns]  From here the other one ran, while it waited
--- column: end_ns BIGINT [epoch ns]  Until here
--- column: state VARCHAR  State of the thread that waited
--- column: cpu INTEGER  The CPU
--- column: clock_key VARCHAR  Clock of the host
--- column: tid INTEGER  What ran
--- column: name VARCHAR  Its name
--- column: priority INTEGER  Its priority
--- column: thread_priority INTEGER  Priority of the thread that waited
 WITH wait AS (
     SELECT w.*, s.clock_key, s.shift_ns
     FROM staging.cpu_wait AS w

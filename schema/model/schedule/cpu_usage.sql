@@ -2,14 +2,6 @@
 -- description: What ran on each CPU, second by second: all threads, also of processes without ROS.
 -- grain: one row per CPU, second and thread that ran
 -- when: staging.schedule
--- column: host_id BIGINT  Host
--- column: cpu INTEGER  CPU
--- column: start_ns BIGINT [epoch ns]  Begin of the second
--- column: thread_id BIGINT  The thread, if it is of a ROS process
--- column: tid INTEGER  Its number to the kernel; 0: idle
--- column: name VARCHAR  Its name, the latest one
--- column: running_ns BIGINT [ns]  How long it ran
--- column: frequency_hz BIGINT [Hz]  Mean frequency of the CPU in the second, as far as it is known
 WITH extent AS (
     -- Several traces of a host may overlap: what an earlier one shows counts.
     SELECT

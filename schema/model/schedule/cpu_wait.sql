@@ -4,16 +4,6 @@
 --     the CPU on which it goes on.
 -- grain: one row per wait and CPU
 -- when: staging.schedule_interval
--- column: number BIGINT  Number of the row
--- column: thread_id BIGINT  The thread
--- column: tid INTEGER  Its number
--- column: state_start_ns BIGINT [epoch ns]  Begin of the wait
--- column: start_ns BIGINT [epoch ns]  Begin of the wait for this CPU
--- column: end_ns BIGINT [epoch ns]  End of the wait for this CPU
--- column: state VARCHAR  'preempted' or 'runnable'
--- column: trace_index INTEGER  The kernel trace
--- column: cpu INTEGER  The CPU
--- column: priority INTEGER  Priority of the thread
 WITH migration AS (
     SELECT t.thread_id, t.tid, m.ts_ns + s.shift_ns AS at_ns, m.dest_cpu AS cpu
     FROM raw.sched_migrate_task AS m

@@ -1,16 +1,9 @@
 -- name: staging.declared_tid
 -- description: Ids of threads in PID namespaces, as kernel traces declare them: in contexts of
---     switches, when a recording begins, and when a thread is created.
+--     switches, when a recording begins, and when a thread is created. What was still so later has
+--     `until_ns`.
 -- grain: one row per declaration
 -- when: staging.schedule
--- column: clock_key VARCHAR  Clock of the kernel trace
--- column: tid INTEGER  Number of the thread to the kernel
--- column: vpid INTEGER  Process, in a PID namespace
--- column: vtid INTEGER  Thread, in that PID namespace
--- column: ns_inum BIGINT  The PID namespace
--- column: declared_ns BIGINT [epoch ns]  When
--- column: until_ns BIGINT [epoch ns]  It was still so then; NULL: not known how long
--- column: source VARCHAR  'context', 'state dump' or 'fork'
 WITH dump AS (
     SELECT
         trace_index, ts_ns, tid, namespace_tid AS vtid, namespace_pid AS vpid, ns_inum

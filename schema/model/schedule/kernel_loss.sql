@@ -3,9 +3,6 @@
 --     of the clock reaches as well.
 -- grain: one row per packet behind whose last event events were lost
 -- when: staging.thread_switch
--- column: clock_key VARCHAR  Clock of the host
--- column: start_ns BIGINT [epoch ns]  From here
--- column: until_ns BIGINT [epoch ns]  Until here, with all losses that began before
 WITH packet AS (
     SELECT
         s.clock_key,

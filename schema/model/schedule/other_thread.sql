@@ -3,11 +3,6 @@
 --     for it, or woke it. The kernel's idle thread of each CPU is one of them.
 -- grain: one row per host, tid and name
 -- when: staging.schedule_interval
--- column: other_thread_id BIGINT  Number of the thread
--- column: host_id BIGINT  Host
--- column: tid INTEGER  Number of the thread to the kernel
--- column: name VARCHAR  Its name
--- column: clock_key VARCHAR  Clock of the host
 WITH host AS (
     SELECT s.clock_key, min(t.host_id) AS host_id
     FROM staging.schedule AS s

@@ -2,17 +2,6 @@
 -- description: What ran on the CPU for which a thread of a ROS process waited.
 -- grain: one row per wait for a CPU and stretch of time in which another thread had it
 -- when: staging.cpu_taken
--- column: thread_id BIGINT  The thread that waited
--- column: state_start_ns BIGINT [epoch ns]  Begin of its wait
--- column: wait_start_ns BIGINT [epoch ns]  Begin of its wait for this CPU
--- column: start_ns BIGINT [epoch ns]  Begin
--- column: end_ns BIGINT [epoch ns]  End
--- column: state VARCHAR  State of the thread that waited
--- column: cpu INTEGER  The CPU
--- column: preemptor_thread_id BIGINT  What ran, a thread of a ROS process
--- column: preemptor_other_thread_id BIGINT  What ran, another thread
--- column: preemptor_priority INTEGER  The priority of that
--- column: thread_priority INTEGER  The priority of the thread that waited
 SELECT
     c.thread_id,
     c.state_start_ns,

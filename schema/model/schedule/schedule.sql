@@ -4,18 +4,11 @@
 --     until its process initialises ROS again, and no other thread has that meanwhile: any other
 --     one counts as contradiction. Where the kernel trace contradicts itself, events do not count;
 --     where it does so at nearly all, the few others may agree by chance. With the right clock all
---     events agree. 5 us beside it 2 to 47 % do not, but candidates are much further apart.
+--     events agree. 5 us beside it 2 to 47 % do not, but candidates are much further apart. Events
+--     are counted, those that agree, and those at which the kernel trace contradicts itself
+--     (`unknown_count`). `shift_ns` has to be added to its times.
 -- grain: one row per kernel trace with switches
 -- when: staging.schedule_candidate
--- column: candidate_number BIGINT  Its candidate that counts
--- column: trace_index INTEGER  The kernel trace
--- column: clock_key VARCHAR  Its clock, or the best of those it may be of
--- column: shift_ns BIGINT [ns]  What has to be added to its times
--- column: event_count BIGINT  Events of ROS processes at which it says what ran on their CPU
--- column: agreeing_count BIGINT  Those that agree with it
--- column: unknown_count BIGINT  Events at which it contradicts itself
--- column: is_joined BOOLEAN  It is of that clock
--- column: has_cpus BOOLEAN  It says on which CPU a switch was
 WITH thread AS (
     SELECT thread_index, trace_index, coalesce(pid_ns, 0) AS pid_ns, vpid, vtid FROM raw.thread
 ),

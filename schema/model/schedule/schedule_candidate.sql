@@ -4,11 +4,6 @@
 --     from the epoch.
 -- grain: one row per kernel trace, clock of a ROS process, and shift
 -- when: raw.sched_switch
--- column: candidate_number BIGINT  Number of the row
--- column: trace_index INTEGER  The kernel trace
--- column: clock_key VARCHAR  The clock
--- column: shift_ns BIGINT [ns]  What has to be added to its times
--- column: has_cpus BOOLEAN  It says on which CPU a switch was
 WITH kernel AS (
     SELECT s.trace_index, s.clock_key, s.clock_origin_ns, count(w.cpu_id) > 0 AS has_cpus
     FROM raw.sched_switch AS w

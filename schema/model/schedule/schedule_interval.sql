@@ -4,17 +4,6 @@
 --     thread that is seen on a CPU without a switch to it got it at some time since its waking.
 -- grain: one row per interval in which a thread had one state
 -- when: staging.thread_switch
--- column: thread_id BIGINT  The thread
--- column: tid INTEGER  Its number
--- column: start_ns BIGINT [epoch ns]  Begin
--- column: end_ns BIGINT [epoch ns]  End
--- column: state VARCHAR  State
--- column: trace_index INTEGER  The kernel trace
--- column: cpu INTEGER  CPU it ran on, or left
--- column: next_cpu INTEGER  CPU on which it goes on
--- column: left_ns BIGINT [epoch ns]  When it left its CPU
--- column: priority INTEGER  Its priority
--- column: waking_event_id BIGINT [event order]  Waking that ended it
 WITH extent AS (
     SELECT s.clock_key, min(w.ts_ns + s.shift_ns) AS start_ns, max(w.ts_ns + s.shift_ns) AS end_ns
     FROM raw.sched_switch AS w

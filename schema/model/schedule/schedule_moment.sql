@@ -1,15 +1,10 @@
 -- name: staging.schedule_moment
 -- description: What a kernel trace says of the CPU at each event of a ROS process: which thread
 --     ran there. The next switch tells, and the one before it has to say the same: else some switch
---     was not recorded, and what ran is not known.
+--     was not recorded, and what ran is not known (`contradiction_id`: the next switch). `tid` left
+--     the CPU there.
 -- grain: one row per event and candidate that covers it
 -- when: staging.schedule_candidate
--- column: candidate_number BIGINT  The candidate
--- column: event_id BIGINT  The event
--- column: thread_index INTEGER  Its thread
--- column: at_ns BIGINT [epoch ns]  When, as the kernel trace would have it
--- column: tid INTEGER  What left its CPU at the next switch
--- column: contradiction_id BIGINT [event order]  The next switch, if it contradicts the one before
 SELECT
     e.candidate_number, e.event_id, e.thread_index, e.at_ns, w.tid, w.contradiction_id
 FROM (

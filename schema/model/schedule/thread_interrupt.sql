@@ -2,10 +2,6 @@
 -- description: Interrupts that were handled while a thread of a ROS process had the CPU.
 -- grain: one row per interrupt
 -- when: raw.interrupt
--- column: state_number BIGINT  State in which the thread ran
--- column: kind VARCHAR  'interrupt' or 'softirq'
--- column: start_ns BIGINT [epoch ns]  Begin
--- column: end_ns BIGINT [epoch ns]  End
 SELECT
     r.number AS state_number, i.kind::VARCHAR AS kind, i.start_ns + s.shift_ns AS start_ns,
     i.end_ns + s.shift_ns AS end_ns

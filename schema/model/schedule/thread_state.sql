@@ -2,20 +2,6 @@
 -- description: States of threads of ROS processes, with what took the CPU and what woke them.
 -- grain: one row per interval in which a thread had one state
 -- when: staging.schedule_interval
--- column: number BIGINT  Number of the row
--- column: thread_id BIGINT  The thread
--- column: start_ns BIGINT [epoch ns]  Begin
--- column: end_ns BIGINT [epoch ns]  End
--- column: state VARCHAR  State
--- column: cpu INTEGER  CPU it ran on, left, or waits for
--- column: priority INTEGER  Its priority
--- column: preempted_by_thread_id BIGINT  What took the CPU, a thread of a ROS process
--- column: preempted_by_other_thread_id BIGINT  What took the CPU, another thread
--- column: preempted_by_priority INTEGER  The priority of that
--- column: waker_kind VARCHAR  What woke it
--- column: waker_thread_id BIGINT  What woke it, a thread of a ROS process
--- column: waker_other_thread_id BIGINT  What woke it, another thread
--- column: is_loss_affected BOOLEAN  Kernel events were lost meanwhile
 WITH interval AS (
     SELECT thread_id, start_ns, end_ns, state, cpu, priority, waking_event_id
     FROM staging.schedule_interval

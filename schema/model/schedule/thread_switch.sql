@@ -1,20 +1,10 @@
 -- name: staging.thread_switch
 -- description: Switches of threads of ROS processes, in their order on each thread: onto a CPU, and
 --     off it. Where the switch onto a CPU was not recorded, the first event of the thread there
---     tells that it has it. Priorities are the kernel's, which LTTng shows without the first 100.
+--     tells that it has it: it got it after the switch at `unseen_since_ns`. Priorities are the
+--     kernel's, which LTTng shows without the first 100.
 -- grain: one row per thread and switch
 -- when: staging.thread_tid
--- column: thread_id BIGINT  The thread
--- column: tid INTEGER  Its number
--- column: trace_index INTEGER  The kernel trace
--- column: event_id BIGINT [event order]  The switch, or that event
--- column: at_ns BIGINT [epoch ns]  When
--- column: cpu INTEGER  The CPU
--- column: is_on BOOLEAN  The thread got the CPU
--- column: unseen_since_ns BIGINT [epoch ns]  When it got the CPU was not recorded: after the switch
---     at this time
--- column: priority INTEGER  Its priority
--- column: prev_state BIGINT  State in which it left the CPU, as the kernel has it
 
 -- Each reader joins a part of them: a copy of all switches would take much memory.
 WITH switch AS NOT MATERIALIZED (

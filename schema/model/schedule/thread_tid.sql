@@ -2,15 +2,10 @@
 -- description: The number that the kernel has for each thread. A declaration counts: contexts of
 --     switches while its process lived, else the latest of the state dump and its creation; unless
 --     it is of several threads or the schedule contradicts it. Else it is what ran on the CPU at
---     most events of the thread.
+--     most events of the thread. It means this thread from `from_ns` until `until_ns`, where it
+--     means the next one.
 -- grain: one row per thread of a process life and number
 -- when: staging.schedule
--- column: thread_id BIGINT  The thread
--- column: clock_key VARCHAR  Clock of its host
--- column: tid INTEGER  Its number
--- column: source VARCHAR  'context', 'state dump', 'fork' or 'schedule'
--- column: from_ns BIGINT [epoch ns]  The number means this thread from here
--- column: until_ns BIGINT [epoch ns]  It means the next one from here
 WITH ran AS (
     SELECT
         x.thread_id, m.tid, count(*) AS event_count,

@@ -4,14 +4,6 @@
 --     trace contradicts itself about what ran, only a thread that is seen there is known.
 -- grain: one row per waking of such a thread
 -- when: staging.thread_tid
--- column: thread_id BIGINT  The thread
--- column: tid INTEGER  Its number
--- column: event_id BIGINT [event order]  The waking
--- column: at_ns BIGINT [epoch ns]  When
--- column: kind VARCHAR  'thread', 'timer', 'interrupt' or 'softirq'; NULL: not known
--- column: clock_key VARCHAR  Clock of the host
--- column: waker_tid INTEGER  The thread that woke it, or that was interrupted
--- column: waker_name VARCHAR  Its name
 WITH waking AS (
     SELECT trace_index, event_id, ts_ns, tid, switch_event_id, interrupt FROM raw.sched_waking
     UNION ALL

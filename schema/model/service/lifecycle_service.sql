@@ -7,8 +7,6 @@
 --     order tells nothing.
 -- grain: one row per rclcpp_service_callback_added of such a service
 -- when: raw.ros2_rcl_lifecycle_state_machine_init
--- column: event_id BIGINT  The rclcpp_service_callback_added
--- column: service_event_id BIGINT  The rcl_service_init of the service
 WITH initialised AS (
     SELECT event_id, thread_id, process_id, node_handle, service_handle
     FROM staging.located('ros2_rcl_service_init')
