@@ -119,9 +119,9 @@ def derive_table(con: duckdb.DuckDBPyConnection, name: str, run_id: int) -> None
     for header in (whole, *map(_header, whole.also)):
         if _may_have_rows(con, header, run_id):
             con.execute(
-                f"INSERT INTO store.{name} ({columns}) "
+                f"INSERT INTO store.{name} ({columns}) {_united(con, header, run_id)}"
                 f"SELECT {columns} FROM {_of_run(header.name)}",
-                [run_id],
+                {"run_id": run_id},
             )
 
 
@@ -136,14 +136,23 @@ def _has_row(con: duckdb.DuckDBPyConnection, source: tuple[str, str], run_id: in
     rows = f"SELECT 1 FROM {_of_run(name)} LIMIT 1"
     if condition:
         rows = f"SELECT 1 FROM {_of_run(name)} AND ({condition}) LIMIT 1"
-    return bool(con.execute(rows, [run_id]).fetchall())
+    return bool(con.execute(rows, {"run_id": run_id}).fetchall())
+
+
+def _united(con: duckdb.DuckDBPyConnection, header: Header, run_id: int) -> str:
+    """Return the WITH clause for what an object unites, as far as it may have rows."""
+    if not header.unites:
+        return ""
+    parts = [name for name in header.unites if _may_have_rows(con, _header(name), run_id)]
+    rows = " UNION ALL BY NAME ".join(f"FROM {_of_run(name)}" for name in parts)
+    return f"WITH united AS MATERIALIZED ({rows}) "
 
 
 def _of_run(name: str) -> str:
-    """Return the FROM clause for the rows of one run, which is its only parameter."""
-    if not name.startswith("store.") and _header(name).kind == "macro":
-        return f"{name}(?)"
-    return f"{name} WHERE run_id = ?"
+    """Return what follows FROM for the rows of the run `$run_id`."""
+    if name.startswith("store.") or _header(name).kind == "view":
+        return f"{name} WHERE run_id = $run_id"
+    return f"{name}('united', $run_id)" if _header(name).unites else f"{name}($run_id)"
 
 
 @cache
@@ -160,6 +169,9 @@ def learn_topics(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
             [run_id],
         )
     for kind in _TOPIC_OWNERS:
+        unnamed = f"SELECT 1 FROM store.{kind} WHERE run_id = ? AND topic_name IS NULL LIMIT 1"
+        if not con.execute(unnamed, [run_id]).fetchall():
+            continue
         con.execute(
             f"UPDATE store.{kind} SET topic_name = learned.topic_name, "
             "is_internal = learned.is_internal, is_topic_learned = true "

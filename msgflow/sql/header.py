@@ -15,6 +15,7 @@
     -- note: clocks
     -- when: staging.gap
     -- also: derive.a_b
+    -- unites: derive.a_c, derive.a_d
     -- variant: measure VARCHAR {latency|age} = 'latency'  What is measured
 
 The header ends at the first line that is not a `--` comment. Two spaces end a parameter's default.
@@ -36,6 +37,8 @@ The header ends at the first line that is not a `--` comment. Two spaces end a p
   `store.gap WHERE kind = 'loss'`: then only such rows count.
 - `also`: objects whose rows are stored in the table of this one, too. Each has a `when` of its own,
   so that what few recordings have is planned only there.
+- `unites`: objects whose rows a macro takes together, under the name that is its first argument; of
+  those with a `when`, the ones that have rows. The run is its second one.
 
 - `variant`: a parameter whose values are queries of their own. The default is this file, and `age`
   stands in the file of the same name with `-age` behind it; a BOOLEAN `each`, in that with `-each`.
@@ -44,7 +47,7 @@ The unit of a column may also say what the column names: 'node', 'topic', 'callb
 'path'. Options that choose rows by them use it. In a public view over the table of the same name, a
 column may stand by its name alone: the table declares the rest. Files in `schema/health` have a
 `severity`, a `cause` and a `cure`. An object is made after all objects that its statement, its
-`when` or its `also` names.
+`when`, its `also` or its `unites` names.
 
 The tables that a statement looks up stay in memory until it ends. A query may therefore go in
 steps: other statements stand before its own, each of the form
@@ -83,7 +86,7 @@ _MINIMUM = re.compile(r"(-?\d+)\.\.")
 _REPEATABLE = ("param", "column")
 _SINGLE = (
     "name", "title", "description", "cause", "cure", "grain", "kind", "severity", "note", "when",
-    "also", "brief", "answer", "heading", "slowest", "zero", "variant",
+    "also", "unites", "brief", "answer", "heading", "slowest", "zero", "variant",
 )  # fmt: skip
 _KINDS = ("view", "inline", "macro")
 _NOTES = ("clocks", "callbacks", "kernel", "requests", "goals")
@@ -177,6 +180,7 @@ class Header:
         sources: tables, views and macros of a run, each with a condition on its rows, or with an
             empty one; if none of them has such a row, this has none.
         also: objects whose rows are stored in the same table.
+        unites: objects whose rows a macro takes together.
         variant: parameter that chooses between this query and others; its default is this one.
         chosen: of a variant: the name of the query, and the option that chooses this one.
     """
@@ -202,6 +206,7 @@ class Header:
     steps: tuple[Step, ...] = ()
     sources: tuple[tuple[str, str], ...] = ()
     also: tuple[str, ...] = ()
+    unites: tuple[str, ...] = ()
     variant: Param | None = None
     chosen: str | None = None
 
@@ -222,7 +227,7 @@ class Header:
         A name in a string counts, since a table may be given to a macro by name.
         """
         named = (name for text in self.statements for name in _OBJECT.findall(_code(text)))
-        return tuple(sorted({*named, *self.when, *self.also} - {self.name}))
+        return tuple(sorted({*named, *self.when, *self.also, *self.unites} - {self.name}))
 
     @cached_property
     def relations(self) -> frozenset[str]:
@@ -311,6 +316,7 @@ def parse(text: str, path: Path) -> Header:
         steps=steps,
         sources=_sources(single.get("when", "")),
         also=_names(single.get("also", "")),
+        unites=_names(single.get("unites", "")),
         variant=variants[0] if variants else None,
     )
 

@@ -81,11 +81,14 @@ def test_an_object_needs_what_its_statements_name() -> None:
     header = parse_with(
         "-- when: staging.d, derive.f\n"
         "-- also: derive.g\n"
+        "-- unites: derive.h\n"
         "CREATE OR REPLACE TEMP TABLE step AS\nFROM store.c;\n\n"
         "WITH e AS (FROM main.b) -- not main.x\nSELECT derive.f(e.main, 'a.b') FROM e\n"
         "JOIN query_table('raw.a') USING (id)"
     )
-    assert header.needs == ("derive.f", "derive.g", "main.b", "raw.a", "staging.d", "store.c")
+    assert header.needs == (
+        "derive.f", "derive.g", "derive.h", "main.b", "raw.a", "staging.d", "store.c"
+    )  # fmt: skip
     assert header.relations == {"e"}
 
 

@@ -11,23 +11,16 @@
 --     reader of the buffer. Where a process is several with equal ids, nothing says whose messages
 --     it sent or got.
 -- grain: one row per take whose publication is known
+-- unites: derive.link_transport_exact, derive.link_transport_nearest,
+--     derive.link_transport_ring_buffer
+-- param: links VARCHAR  Name of the rows of all methods
 -- param: only_run BIGINT  Run to look at
-CREATE OR REPLACE MACRO derive.link_transport(only_run) AS TABLE
+CREATE OR REPLACE MACRO derive.link_transport(links, only_run) AS TABLE
 WITH link AS (
     SELECT
         run_id, publication_id, take_id, publisher_id, subscription_id, method, candidate_count,
-        false AS is_loss_affected
-    FROM derive.link_transport_exact(only_run)
-    UNION ALL
-    SELECT
-        run_id, publication_id, take_id, publisher_id, subscription_id, method, candidate_count,
         is_loss_affected
-    FROM derive.link_transport_nearest(only_run)
-    UNION ALL
-    SELECT
-        run_id, publication_id, take_id, publisher_id, subscription_id, method, candidate_count,
-        is_loss_affected
-    FROM derive.link_transport_ring_buffer(only_run)
+    FROM query_table(links)
 ),
 -- Most runs have none: then no publication or take need be looked up.
 doubtful AS MATERIALIZED (

@@ -112,15 +112,17 @@ ordered AS (
 )
 SELECT
     run_id, publication_id, take_id, publisher_id, subscription_id, method,
-    1::BIGINT AS candidate_count
+    1::BIGINT AS candidate_count,
+    false AS is_loss_affected
 FROM candidate
 WHERE is_topic_known AND NOT is_repeated
 UNION ALL
 SELECT
     run_id, publication_id, take_id, publisher_id, subscription_id, method,
-    greatest(known_count, take_count)
+    greatest(known_count, take_count),
+    false
 FROM ordered
 WHERE publication_position = take_position
 UNION ALL
-SELECT run_id, publication_id, take_id, publisher_id, subscription_id, 'exact_stamp', 1
+SELECT run_id, publication_id, take_id, publisher_id, subscription_id, 'exact_stamp', 1, false
 FROM unknown_topic
