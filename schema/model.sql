@@ -31,6 +31,7 @@ CREATE TABLE staging.callback_event (event_id BIGINT, ts_ns BIGINT, trace_index 
     thread_id BIGINT, process_id BIGINT, callback_handle UBIGINT, is_start BOOLEAN,
     is_intra_process BOOLEAN, previous_event_id BIGINT, previous_callback_event_id BIGINT,
     previous_executor_event_id BIGINT, executor_event_id BIGINT, segment BIGINT);
+CREATE TABLE staging.callback_executor (callback_id BIGINT, executor_event_id BIGINT);
 CREATE TABLE staging.callback_gap (event_id BIGINT, thread_id BIGINT, is_between BOOLEAN,
     segment BIGINT);
 CREATE TABLE staging.callback_group (callback_group_id BIGINT, process_id BIGINT,
@@ -39,6 +40,8 @@ CREATE TABLE staging.callback_group_entry (callback_id BIGINT, group_event_id BI
 CREATE TABLE staging.callback_group_member (callback_group_id BIGINT, callback_id BIGINT);
 CREATE TABLE staging.callback_group_owner (event_id BIGINT, process_id BIGINT,
     callback_group_addr UBIGINT, executor_event_id BIGINT, kind VARCHAR);
+CREATE TABLE staging.callback_handed (start_event_id BIGINT, process_id BIGINT,
+    callback_handle UBIGINT, callback_event_id BIGINT);
 CREATE TABLE staging.callback_known (event_id BIGINT, created_ns BIGINT, process_id BIGINT,
     callback_handle UBIGINT, kind VARCHAR, subscription_event_id BIGINT, timer_event_id BIGINT,
     service_event_id BIGINT, service_handle UBIGINT, symbol VARCHAR);
@@ -67,6 +70,8 @@ CREATE TABLE staging.callback_schedule (callback_instance_id BIGINT, running_ns 
     unknown_ns BIGINT, irq_ns BIGINT, softirq_ns BIGINT, preemption_count BIGINT,
     migration_count BIGINT, is_loss_affected BOOLEAN);
 CREATE TABLE staging.callback_segment (event_id BIGINT, segment BIGINT);
+CREATE TABLE staging.callback_service (process_id BIGINT, callback_handle UBIGINT,
+    callback_event_id BIGINT, service_id BIGINT);
 CREATE TABLE staging.callback_state (callback_instance_id BIGINT, state_number BIGINT,
     start_ns BIGINT, end_ns BIGINT, is_begin BOOLEAN);
 CREATE TABLE staging.callback_trigger (start_event_id BIGINT, process_id BIGINT,
@@ -86,7 +91,8 @@ CREATE TABLE staging.client_known (event_id BIGINT, process_id BIGINT, node_id B
 CREATE TABLE staging.clock (clock_id BIGINT, uuid VARCHAR, clock_key VARCHAR, offset_ns BIGINT,
     drift_ppb BIGINT, reference_ns BIGINT, uncertainty_ns BIGINT, method VARCHAR,
     drift_uncertainty_ppb BIGINT, reference_clock_id BIGINT);
-CREATE TABLE staging.construction (event_id BIGINT, precedes_own_node BOOLEAN);
+CREATE TABLE staging.construction (event_id BIGINT, process_id BIGINT, kind VARCHAR,
+    node_handle UBIGINT, precedes_own_node BOOLEAN);
 CREATE TABLE staging.context (thread_index INTEGER, from_event_id BIGINT, until_event_id BIGINT,
     thread_id BIGINT, process_id BIGINT);
 CREATE TABLE staging.cpu_schedule (number INTEGER, trace_index INTEGER, cpu INTEGER,
@@ -118,10 +124,15 @@ CREATE TABLE staging.failed_take (trace_id INTEGER, subscription_id BIGINT, proc
     thread_id BIGINT, failed_ns BIGINT);
 CREATE TABLE staging.finding (run_id BIGINT, trace_id BIGINT, name VARCHAR, subject VARCHAR,
     count BIGINT, detail VARCHAR);
+CREATE TABLE staging.foreign_endpoint (process BIGINT, event_id BIGINT, handle UBIGINT,
+    prefix UTINYINT[], gap_ns BIGINT);
 CREATE TABLE staging.gap (trace_id INTEGER, cpu INTEGER, kind VARCHAR, start_ns BIGINT,
     end_ns BIGINT, event_count BIGINT);
 CREATE TABLE staging.host (host_id BIGINT, clock_id BIGINT, hostname VARCHAR);
 CREATE TABLE staging.kernel_loss (clock_key VARCHAR, start_ns BIGINT, until_ns BIGINT);
+CREATE TABLE staging.later_initialisation (host_id BIGINT, pid_ns BIGINT, vpid INTEGER,
+    vtid INTEGER, event_id BIGINT, is_other_main BOOLEAN, is_same_context BOOLEAN,
+    is_repeated BOOLEAN, gap_ns BIGINT);
 CREATE TABLE staging.lifecycle_service (event_id BIGINT, service_event_id BIGINT);
 CREATE TABLE staging.lifecycle_transition (node_id BIGINT, at_ns BIGINT, start_state VARCHAR,
     goal_state VARCHAR);
@@ -154,6 +165,8 @@ CREATE TABLE staging.packet (trace_index INTEGER, trace_id INTEGER, stream_index
     begin_ns BIGINT, end_ns BIGINT, last_event_ns BIGINT, event_count BIGINT,
     discarded_event_count BIGINT, lost_packet_count BIGINT, is_numbered BOOLEAN);
 CREATE TABLE staging.pause (trace_id INTEGER, start_ns BIGINT, end_ns BIGINT);
+CREATE TABLE staging.placement (trace_index INTEGER, clock_key VARCHAR, hostname VARCHAR,
+    shift_ns BIGINT);
 CREATE TABLE staging.preemptor (thread_id BIGINT, state_start_ns BIGINT, wait_start_ns BIGINT,
     start_ns BIGINT, end_ns BIGINT, state VARCHAR, cpu INTEGER, preemptor_thread_id BIGINT,
     preemptor_other_thread_id BIGINT, preemptor_priority INTEGER, thread_priority INTEGER);
@@ -162,6 +175,7 @@ CREATE TABLE staging.process (process_id BIGINT, host_id BIGINT, pid INTEGER, na
     life INTEGER, is_ambiguous BOOLEAN);
 CREATE TABLE staging.process_life (host_id BIGINT, pid_ns BIGINT, vpid INTEGER, life BIGINT,
     from_event_id BIGINT, until_event_id BIGINT);
+CREATE TABLE staging.process_restart (host_id BIGINT, pid_ns BIGINT, vpid INTEGER, event_id BIGINT);
 CREATE TABLE staging.publication_call (start_event_id BIGINT, end_event_id BIGINT,
     trace_index INTEGER, thread_id BIGINT, process_id BIGINT, start_ns BIGINT, end_ns BIGINT,
     intra_ns BIGINT, rclcpp_ns BIGINT, rcl_ns BIGINT, rmw_ns BIGINT, dds_ns BIGINT,
@@ -172,6 +186,8 @@ CREATE TABLE staging.publication_number (start_event_id BIGINT, publication_id B
     publisher_id BIGINT);
 CREATE TABLE staging.publication_origin (start_event_id BIGINT, process_id BIGINT,
     unknown_handle UBIGINT, publisher_event_id BIGINT, is_rosout BOOLEAN);
+CREATE TABLE staging.publication_unstamped (start_event_id BIGINT, end_event_id BIGINT,
+    thread_id BIGINT);
 CREATE TABLE staging.publisher (publisher_id BIGINT, process_id BIGINT, node_id BIGINT,
     topic_name VARCHAR, publisher_handle UBIGINT, rmw_handle UBIGINT, gid BLOB, queue_depth BIGINT,
     created_ns BIGINT, is_internal BOOLEAN, is_inferred BOOLEAN, is_topic_learned BOOLEAN,
@@ -221,6 +237,8 @@ CREATE TABLE staging.service (service_id BIGINT, process_id BIGINT, node_id BIGI
 CREATE TABLE staging.service_event (event_id BIGINT, ts_ns BIGINT, thread_id BIGINT,
     process_id BIGINT, is_request BOOLEAN, rmw_handle UBIGINT, gid BLOB, sequence_number BIGINT,
     source_timestamp_ns BIGINT, service_event_id BIGINT, is_inferred BOOLEAN);
+CREATE TABLE staging.service_inferred (event_id BIGINT, process_id BIGINT, service_name VARCHAR,
+    service_handle UBIGINT, rmw_handle UBIGINT);
 CREATE TABLE staging.service_known (event_id BIGINT, process_id BIGINT, node_id BIGINT,
     service_name VARCHAR, service_handle UBIGINT, rmw_handle UBIGINT, created_ns BIGINT);
 CREATE TABLE staging.service_use (client_event_id BIGINT, service_event_id BIGINT);
@@ -259,6 +277,7 @@ CREATE TABLE staging.thread (thread_id BIGINT, process_id BIGINT, tid INTEGER, n
     first_event_id BIGINT, last_event_id BIGINT, first_seen_ns BIGINT, last_seen_ns BIGINT);
 CREATE TABLE staging.thread_break (thread_id BIGINT, resumed_event_id BIGINT, resumed_ns BIGINT,
     is_elsewhere BOOLEAN);
+CREATE TABLE staging.thread_executor (thread_id BIGINT, executor_event_id BIGINT);
 CREATE TABLE staging.thread_interrupt (state_number BIGINT, kind VARCHAR, start_ns BIGINT,
     end_ns BIGINT);
 CREATE TABLE staging.thread_life (thread_index INTEGER, host_id BIGINT, pid_ns BIGINT, vpid INTEGER,

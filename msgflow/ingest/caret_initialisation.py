@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 from msgflow.ingest.catalogue import load
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     import duckdb
 
     from msgflow.ingest.catalogue import Tracepoint
@@ -28,11 +30,19 @@ _BEFORE = -(1 << 61)
 _LEADING = ("ts_ns", "trace_index", "cpu_id", "thread_index")
 
 
-def restore(con: duckdb.DuckDBPyConnection) -> None:
-    """Add the events that were reported again to `raw`, unless the originals were recorded."""
+def restore(con: duckdb.DuckDBPyConnection, empty: Collection[str]) -> bool:
+    """Add the events that were reported again to `raw`, unless the originals were recorded.
+
+    Args:
+        con: connection with `raw` attached and filled.
+        empty: the tables of `raw` without a row, as `raw.name`.
+
+    Returns:
+        Whether there were any.
+    """
     reported = _reported()
-    if not any(con.execute(f"SELECT 1 FROM raw.{r.table} LIMIT 1").fetchall() for r, _ in reported):
-        return
+    if all(f"raw.{again.table}" in empty for again, _ in reported):
+        return False
     con.execute(
         "CREATE TEMP TABLE reported AS SELECT event_id, "
         f"{_BEFORE} + row_number() OVER (ORDER BY init_timestamp NULLS FIRST, event_id) AS place "
@@ -45,6 +55,7 @@ def restore(con: duckdb.DuckDBPyConnection) -> None:
     for again, first in reported:
         con.execute(_insert(again, first))
     con.execute("DROP TABLE reported")
+    return True
 
 
 def _reported() -> list[tuple[Tracepoint, Tracepoint]]:

@@ -37,11 +37,12 @@ def build(con: duckdb.DuckDBPyConnection, *, keep: bool = False, findings: bool 
         keep: keep all tables; else each is dropped once nothing after it needs it.
         findings: also look what is worth knowing about the input.
     """
-    restore(con)
     headers = objects.load("model")
     if not findings:
         headers = tuple(header for header in headers if header.name != _FINDING)
     empty = staging.empty_tables(con)
+    if restore(con, empty):
+        empty = staging.empty_tables(con)
     staging.narrow(con, empty)
     last_uses = {} if keep else _last_uses(headers)
     for position, header in enumerate(headers):

@@ -8,4 +8,4 @@ FROM raw.thread AS r
 JOIN session_trace AS s ON r.trace_index = s.trace_index
 WHERE r.vpid >= 0
 GROUP BY s.host, r.vpid
-HAVING count(DISTINCT r.pid_ns) = 1 AND count(*) > count(r.pid_ns)
+HAVING min(r.pid_ns) = max(r.pid_ns) AND count(*) > count(r.pid_ns)

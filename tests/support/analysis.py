@@ -63,7 +63,7 @@ class Analysis:
         """Take these events in place of those before."""
         self._clear()
         events.write(self._connection)
-        restore(self._connection)
+        restore(self._connection, staging.empty_tables(self._connection))
         self._built, self._empty = set(), None
         self._derived = frozenset()
         return self

@@ -1,6 +1,7 @@
 -- name: staging.failed_take
 -- description: Attempts to take from a subscription that took nothing.
 -- grain: one row per rmw_take without a message
+-- when: raw.ros2_rmw_take
 WITH failed AS (
     SELECT event_id, ts_ns, trace_index, thread_id, process_id, rmw_subscription_handle
     FROM staging.located('ros2_rmw_take')

@@ -5,6 +5,9 @@
 --     publisher are one call. Messages enqueued without such a publication before them are the
 --     replay of a transient-local buffer, not a call.
 -- grain: one row per publish() call
+-- when: raw.ros2_rclcpp_publish, raw.ros2_rcl_publish, raw.ros2_rmw_publish,
+--     staging.middleware_write, raw.ros2_caret_dds_write, raw.ros2_caret_dds_bind_addr_to_stamp,
+--     raw.ros2_rclcpp_intra_publish
 WITH client AS (
     SELECT
         coalesce(u.event_id, r.event_id) AS start_event_id,

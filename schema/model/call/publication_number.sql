@@ -2,6 +2,7 @@
 -- description: The number of each publication, in the order of the calls, and its publisher. A step
 --     of its own: looked up for the whole publications, both would stay in memory beside them.
 -- grain: one row per publish() call
+-- when: staging.publication_origin
 SELECT
     o.start_event_id,
     row_number() OVER (ORDER BY o.start_event_id) AS publication_id,

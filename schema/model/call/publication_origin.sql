@@ -5,6 +5,7 @@
 --     identifies, belongs to the process's only /rosout publisher. What only the middleware
 --     publishes has none.
 -- grain: one row per publish() call
+-- when: staging.publication_call
 WITH call AS NOT MATERIALIZED (
     SELECT
         start_event_id AS event_id, process_id, publisher_handle AS handle, rmw_handle, writer,

@@ -4,6 +4,8 @@
 --     itself: it has no rcl layer, although rcl takes are traced, and its reader belongs to no rcl
 --     subscription and never had an rcl layer.
 -- grain: one row per successful take, or dequeue
+-- when: raw.ros2_rmw_take, raw.ros2_rcl_take, raw.ros2_rclcpp_take,
+--     raw.ros2_dispatch_subscription_callback, raw.ros2_rclcpp_ring_buffer_dequeue
 WITH middleware AS (
     SELECT
         coalesce(d.event_id, m.event_id) AS start_event_id,

@@ -2,6 +2,7 @@
 -- description: The number of each take, in the order in which they began, with its subscription and
 --     the callback that it led to; of one that is only known by that callback, both are the same.
 -- grain: one row per message handed over to a subscription
+-- when: staging.take_origin
 WITH named AS (
     SELECT
         o.start_event_id, o.callback_start_event_id,

@@ -3,6 +3,7 @@
 --     that it led to, known or not. A subscription callback that ran without any take traced was
 --     handed its message all the same.
 -- grain: one row per message handed over to a subscription
+-- when: staging.take_subscription, staging.callback_binding
 SELECT
     c.start_event_id,
     c.process_id,

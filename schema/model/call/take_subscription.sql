@@ -3,6 +3,7 @@
 --     before the take; NULL where that was not traced. Of a ring buffer, which one it belongs to
 --     may be known (`is_known`), but not the subscription.
 -- grain: one row per successful take or dequeue
+-- when: staging.take_chain
 WITH used AS NOT MATERIALIZED (
     SELECT start_event_id AS event_id, end_event_id, process_id, rmw_handle AS handle, method
     FROM staging.take_chain

@@ -5,6 +5,7 @@
 --     the same round. An executor runs all timers that were ready at the end of its wait first, if
 --     it has one thread.
 -- grain: one row per such process
+-- when: staging.callback_announced
 WITH candidate AS (
     SELECT t.start_event_id, t.process_id, t.thread_id
     FROM staging.callback_trigger AS t

@@ -3,6 +3,7 @@
 --     learns its subscription or service from the messages that it was called with (the most
 --     frequent), else what it belongs to from the executor.
 -- grain: one row per callback object
+-- when: staging.callback_known, staging.callback_binding
 WITH learned AS (
     SELECT
         b.process_id,
@@ -12,18 +13,6 @@ WITH learned AS (
     FROM staging.callback_binding AS b
     JOIN staging.take_number AS t ON b.start_event_id = t.callback_start_event_id
     WHERE b.kind IS NULL OR b.kind IN ('unknown', 'subscription')
-    GROUP BY b.process_id, b.callback_handle, b.callback_event_id
-),
-learned_service AS (
-    SELECT
-        b.process_id,
-        b.callback_handle,
-        b.callback_event_id,
-        mode(s.service_id ORDER BY s.service_id) AS service_id
-    FROM staging.callback_binding AS b
-    JOIN staging.request_callback AS r ON b.start_event_id = r.start_event_id
-    JOIN staging.service_event AS e ON r.take_event_id = e.event_id
-    JOIN staging.service AS s ON e.service_event_id = s.event_id
     GROUP BY b.process_id, b.callback_handle, b.callback_event_id
 ),
 never_added AS (
@@ -80,7 +69,7 @@ complete AS (
         AND c.process_id = l.process_id
         AND c.callback_handle = l.callback_handle
         AND c.callback_event_id IS NOT DISTINCT FROM l.callback_event_id
-    LEFT JOIN learned_service AS v
+    LEFT JOIN staging.callback_service AS v
         ON e.service_id IS NULL
         AND c.kind IN ('unknown', 'service')
         AND c.process_id = v.process_id

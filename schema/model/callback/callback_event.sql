@@ -3,6 +3,7 @@
 --     their thread: directly, of callbacks, and of the executor (not across a gap). `segment`
 --     counts the gaps that their thread has seen.
 -- grain: one row per such callback_start or callback_end
+-- when: raw.ros2_callback_start, raw.ros2_callback_end
 WITH event AS (
     SELECT
         s.event_id, s.ts_ns, s.trace_index, s.thread_index, s.callback AS callback_handle,

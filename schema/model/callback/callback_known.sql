@@ -3,6 +3,8 @@
 --     event that initialised it. A callback that was only registered has a symbol but no owner; a
 --     service that was not seen to be initialised is known by its handle.
 -- grain: one row per callback object
+-- when: raw.ros2_rclcpp_subscription_callback_added, raw.ros2_rclcpp_timer_callback_added,
+--     raw.ros2_rclcpp_service_callback_added, raw.ros2_rclcpp_callback_register
 WITH added AS (
     SELECT
         a.event_id, a.ts_ns, a.process_id, a.callback, 'subscription' AS kind,

@@ -3,6 +3,7 @@
 --     callback and the take that it was called with. A step of its own: looked up for the whole
 --     instances at once, all three would stay in memory beside them.
 -- grain: one row per callback instance
+-- when: staging.callback_binding
 WITH never_added AS (
     SELECT process_id, callback_handle, callback_id FROM staging.callback WHERE created_ns IS NULL
 ),

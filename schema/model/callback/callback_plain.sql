@@ -2,6 +2,7 @@
 -- description: Begins of callbacks whose end is the next begin or end of any callback on their
 --     thread, with that end. No gap lies between.
 -- grain: one row per such begin and end
+-- when: raw.ros2_callback_start
 SELECT
     s.event_id AS start_event_id,
     e.event_id AS end_event_id,

@@ -2,6 +2,7 @@
 -- description: Executors. Stock traces do not name them: there they are deduced from their threads.
 --     One thread with executor events is a single-threaded executor, one without may be any.
 -- grain: one row per executor
+-- when: staging.executor_member, staging.executor_named
 WITH deduced AS (
     SELECT
         first_thread_id,

@@ -3,6 +3,7 @@
 --     a callback between the two. A step of its own, so that only these few columns are in memory
 --     when states look it up.
 -- grain: one row per executor event that a callback directly followed
+-- when: staging.callback_number
 
 -- Of those behind one event, only the first has no other callback before it.
 SELECT p.executor_event_id, n.callback_instance_id

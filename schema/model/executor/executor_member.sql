@@ -1,37 +1,18 @@
 -- name: staging.executor_member
 -- description: Which threads work for the same executor: those of a process that execute callbacks
 --     of an executor that names itself, else the same callbacks, directly or through others. The
---     smallest thread of such a group stands for it. If a thread serves several named executors,
---     it belongs to the one whose callbacks it ran most.
+--     smallest thread of such a group stands for it.
 -- grain: one row per thread that runs callbacks or emits executor events
-WITH RECURSIVE served AS (
-    SELECT e.callback_id, g.executor_event_id
-    FROM staging.callback_group_entry AS e
-    JOIN staging.callback_group_owner AS g ON e.group_event_id = g.event_id
-    WHERE g.executor_event_id IS NOT NULL
-),
-main_executor AS (
-    SELECT thread_id, executor_event_id
-    FROM (
-        SELECT r.thread_id, s.executor_event_id, count(*) AS run_count
-        FROM staging.callback_run AS r
-        JOIN staging.callback_number AS n ON r.start_event_id = n.start_event_id
-        JOIN served AS s ON n.callback_id = s.callback_id
-        WHERE r.depth = 1
-        GROUP BY r.thread_id, s.executor_event_id
-    )
-    QUALIFY row_number() OVER (
-        PARTITION BY thread_id ORDER BY run_count DESC, executor_event_id
-    ) = 1
-),
+-- when: staging.callback_number, staging.executor_first
+
 -- What ties threads: an executor by its event, or a callback by its (never negative) identity.
-runs AS (
-    SELECT thread_id, -1 - executor_event_id AS tie_id FROM main_executor
+WITH RECURSIVE runs AS (
+    SELECT thread_id, -1 - executor_event_id AS tie_id FROM staging.thread_executor
     UNION ALL
     SELECT DISTINCT r.thread_id, n.callback_id
     FROM staging.callback_pair AS r
     JOIN staging.callback_number AS n ON r.start_event_id = n.start_event_id
-    ANTI JOIN served AS s ON n.callback_id = s.callback_id
+    ANTI JOIN staging.callback_executor AS s ON n.callback_id = s.callback_id
 ),
 -- Each thread is tied to the smallest one that shares something with it, not to all.
 neighbour AS (
@@ -70,4 +51,4 @@ SELECT
 FROM labelled AS l
 JOIN staging.thread AS t ON l.thread_id = t.thread_id
 LEFT JOIN spinning AS s ON l.thread_id = s.thread_id
-LEFT JOIN main_executor AS m ON l.thread_id = m.thread_id
+LEFT JOIN staging.thread_executor AS m ON l.thread_id = m.thread_id

@@ -2,6 +2,7 @@
 -- description: Threads that poll their executor (spin_some): most of their waits have a timeout of
 --     0. How many, and of how many.
 -- grain: one row per thread
+-- when: raw.ros2_rclcpp_executor_wait_for_work
 WITH waited AS (
     SELECT
         thread_index, min(event_id) AS event_id, count(*) FILTER (WHERE timeout = 0) AS polls,

@@ -1,6 +1,7 @@
 -- name: staging.gap
 -- description: Gaps of the traces: what was lost of them, and when nothing was recorded.
 -- grain: one row per gap in a recording
+-- when: staging.loss, staging.pause
 SELECT trace_id, cpu, kind, start_ns, end_ns, event_count FROM staging.loss
 UNION ALL
 SELECT trace_id, NULL, 'pause', start_ns, end_ns, NULL FROM staging.pause

@@ -5,6 +5,7 @@
 --     with events is left out, and what comes right behind the packets that open a later chunk:
 --     these were written while the session recorded, and stopping would have written further ones.
 -- grain: one row per silence of a recording
+-- when: staging.stream_packet
 WITH covered AS (
     SELECT
         trace_id,

@@ -2,6 +2,7 @@
 -- description: Packets in the order of their stream, with when the one before ended. Kernel traces
 --     are left out: what they lost is missing from no process.
 -- grain: one row per packet of a trace of user space
+-- when: staging.packet
 SELECT
     *,
     lag(known_end_ns) OVER (

@@ -1,6 +1,7 @@
 -- name: staging.context
 -- description: Which thread and process an event is of, by where it says that it happened.
 -- grain: one row per thread of a process life
+-- when: staging.thread_life
 SELECT
     l.thread_index,
     l.from_event_id,

@@ -2,6 +2,7 @@
 -- description: Nodes. A handle that objects name but that was never initialised in the trace gets
 --     a row without a name.
 -- grain: one row per ROS node
+-- when: raw.ros2_rcl_node_init, staging.node_use
 WITH known AS (
     SELECT
         event_id,

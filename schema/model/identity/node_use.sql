@@ -3,22 +3,14 @@
 --     it, except that an object created inside its node belongs to the one right after, and that
 --     any later one is better than none.
 -- grain: one row per object or timer link that names a node
+-- when: staging.construction
 WITH use AS (
-    SELECT event_id, process_id, node_handle FROM staging.located('ros2_rcl_publisher_init')
-    UNION ALL
-    SELECT event_id, process_id, node_handle FROM staging.located('ros2_rcl_subscription_init')
-    UNION ALL
-    SELECT event_id, process_id, node_handle FROM staging.located('ros2_rcl_service_init')
-    UNION ALL
-    SELECT event_id, process_id, node_handle FROM staging.located('ros2_rcl_client_init')
-    UNION ALL
-    SELECT event_id, process_id, node_handle FROM staging.located('ros2_rclcpp_timer_link_node')
-    UNION ALL
-    SELECT event_id, process_id, node_handle
-    FROM staging.located('ros2_rcl_lifecycle_state_machine_init')
+    SELECT event_id, process_id, node_handle, precedes_own_node
+    FROM staging.construction
+    WHERE kind <> 'node'
 ),
 node_init AS (
-    SELECT event_id, process_id, node_handle FROM staging.located('ros2_rcl_node_init')
+    SELECT event_id, process_id, node_handle FROM staging.construction WHERE kind = 'node'
 ),
 earlier AS (
     SELECT u.event_id, n.event_id AS node_event_id
@@ -41,10 +33,9 @@ SELECT
     u.process_id,
     u.node_handle,
     CASE
-        WHEN c.precedes_own_node THEN l.node_event_id
+        WHEN u.precedes_own_node THEN l.node_event_id
         ELSE coalesce(e.node_event_id, l.node_event_id)
     END AS node_event_id
 FROM use AS u
 JOIN earlier AS e ON u.event_id = e.event_id
 JOIN later AS l ON u.event_id = l.event_id
-JOIN staging.construction AS c ON u.event_id = c.event_id

@@ -1,6 +1,7 @@
 -- name: staging.object_node
 -- description: The node of each object, by the event that initialised the object.
 -- grain: one row per object or timer link that names a node
+-- when: staging.node_use
 SELECT u.event_id, n.node_id
 FROM staging.node_use AS u
 JOIN staging.node AS n

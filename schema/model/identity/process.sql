@@ -2,6 +2,7 @@
 -- description: Process lives. The name is that of the main thread (tid = pid), else of the first
 --     thread seen; the version is what rcl_init stated, for display only.
 -- grain: one row per process life
+-- when: staging.thread_life
 WITH life AS (
     SELECT
         host_id,

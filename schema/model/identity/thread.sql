@@ -1,6 +1,7 @@
 -- name: staging.thread
 -- description: Threads of all processes.
 -- grain: one row per thread
+-- when: staging.thread_life
 SELECT
     row_number() OVER (ORDER BY t.first_event_id) AS thread_id,
     p.process_id,

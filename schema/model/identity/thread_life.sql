@@ -2,6 +2,7 @@
 -- description: Threads within the life of their process: what turns the contexts of an event into
 --     its thread and process.
 -- grain: one row per thread of a process life
+-- when: staging.thread_presence
 WITH lived AS (
     SELECT
         p.thread_index, l.host_id, l.pid_ns, l.vpid, p.vtid, l.life, l.from_event_id,

@@ -1,6 +1,7 @@
 -- name: staging.thread_presence
 -- description: When each thread was seen, by the name that it had then. A name may come again.
 -- grain: one row per stretch of events of a thread under one name
+-- when: raw.thread_name
 SELECT
     s.thread_index,
     s.host_id,

@@ -4,6 +4,7 @@
 --     which may be known; else it is a placeholder by the first dequeue. Where several callbacks
 --     follow on one buffer, or one on several, the owner is not known (NULL).
 -- grain: one row per process and ring buffer without a known subscription
+-- when: raw.ros2_rclcpp_ring_buffer_dequeue
 WITH dequeue AS (
     SELECT t.start_event_id, t.process_id, t.buffer_handle
     FROM staging.take_subscription AS t

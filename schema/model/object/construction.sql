@@ -1,8 +1,11 @@
 -- name: staging.construction
--- description: Whether a publisher was created inside its node, right before the node's own event:
---     before Jazzy /rosout is. Where a node handle is used again, what came first on the handle
---     tells the two orders apart.
+-- description: Nodes and what names one, and whether a publisher was created inside its node, right
+--     before the node's own event: before Jazzy /rosout is. Where a node handle is used again, what
+--     came first on the handle tells the two orders apart.
 -- grain: one row per initialisation event that names a node
+-- when: raw.ros2_rcl_node_init, raw.ros2_rcl_publisher_init, raw.ros2_rcl_subscription_init,
+--     raw.ros2_rcl_service_init, raw.ros2_rcl_client_init, raw.ros2_rclcpp_timer_link_node,
+--     raw.ros2_rcl_lifecycle_state_machine_init
 WITH initialisation AS (
     SELECT event_id, process_id, thread_id, 'node' AS kind, node_handle
     FROM staging.located('ros2_rcl_node_init')
@@ -26,7 +29,7 @@ WITH initialisation AS (
     FROM staging.located('ros2_rcl_lifecycle_state_machine_init')
 )
 SELECT
-    event_id,
+    event_id, process_id, kind, node_handle,
     kind = 'publisher'
     AND lead(kind) OVER on_thread = 'node'
     AND lead(node_handle) OVER on_thread = node_handle

@@ -2,6 +2,7 @@
 -- description: Publishers. A handle that was published on but never initialised in the trace gets a
 --     row without topic, or with /rosout where nothing else is possible.
 -- grain: one row per publisher
+-- when: staging.publisher_known, staging.publication_origin
 WITH every_publisher AS (
     SELECT
         event_id, process_id, node_id, topic_name, publisher_handle, rmw_handle, gid, queue_depth,

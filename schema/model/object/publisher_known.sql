@@ -3,6 +3,7 @@
 --     (first 16 bytes; all zeros: none) and, where DDS is instrumented, their writer: by GID, or
 --     where one of the two has none, by topic. A writer is that of one publisher.
 -- grain: one row per rcl_publisher_init
+-- when: raw.ros2_rcl_publisher_init
 WITH rmw_init AS (
     SELECT
         event_id, ts_ns, process_id, rmw_publisher_handle,

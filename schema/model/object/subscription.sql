@@ -2,6 +2,7 @@
 -- description: Subscriptions. A handle that messages were taken with but that was never
 --     initialised in the trace gets a row without topic, as does the reader of a ring buffer.
 -- grain: one row per subscription
+-- when: staging.subscription_known, staging.take_origin
 WITH every_subscription AS (
     SELECT
         event_id, process_id, node_id, topic_name, subscription_handle, rmw_handle, gid,

@@ -1,6 +1,7 @@
 -- name: staging.subscription_known
 -- description: Subscriptions whose rcl initialisation was traced, with rmw handle and GID.
 -- grain: one row per rcl_subscription_init
+-- when: raw.ros2_rcl_subscription_init
 WITH rmw_init AS (
     SELECT
         event_id, ts_ns, process_id, rmw_subscription_handle,

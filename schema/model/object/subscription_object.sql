@@ -4,6 +4,7 @@
 --     to its initialisation in the same construction (since the thread's last
 --     rcl_subscription_init), before or after; else to the latest before, else to the first after.
 -- grain: one row per event that names an rclcpp subscription object
+-- when: raw.ros2_rclcpp_subscription_callback_added, raw.ros2_rclcpp_ipb_to_subscription
 WITH construction AS (
     SELECT event_id AS construction_event_id, thread_id FROM staging.subscription_known
 ),

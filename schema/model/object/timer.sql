@@ -2,6 +2,7 @@
 -- description: Timers. The node is linked after the timer was made (since Galactic). One that was
 --     used but never initialised in the trace gets a row without period.
 -- grain: one row per timer
+-- when: raw.ros2_rcl_timer_init, staging.timer_use, staging.callback_owner
 WITH every_timer AS (
     SELECT event_id, process_id, period AS period_ns, timer_handle, ts_ns AS created_ns
     FROM staging.located('ros2_rcl_timer_init')

@@ -2,6 +2,7 @@
 -- description: Which timer each event means that names an rcl timer handle: the one initialised
 --     last before, else a placeholder by the first use of the handle.
 -- grain: one row per event that attaches a callback or a node to a timer
+-- when: raw.ros2_rclcpp_timer_callback_added, raw.ros2_rclcpp_timer_link_node
 WITH use AS (
     SELECT event_id, process_id, timer_handle
     FROM staging.located('ros2_rclcpp_timer_callback_added')

@@ -2,6 +2,7 @@
 -- description: Clocks by uuid (LTTng: the boot). A trace without one has a clock of its own, by
 --     hostname. No correction is known at ingest.
 -- grain: one row per clock
+-- when: staging.source
 SELECT
     row_number() OVER (ORDER BY min(trace_index)) AS clock_id,
     arg_min(clock_uuid, coalesce(domain = 'kernel', false)) AS uuid,

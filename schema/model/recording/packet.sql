@@ -1,6 +1,7 @@
 -- name: staging.packet
 -- description: Packets as read. What opens without a begin is taken to begin with its trace.
 -- grain: one row per packet of a trace
+-- when: raw.packet
 SELECT
     p.trace_index,
     p.trace_index + 1 AS trace_id,

@@ -1,6 +1,7 @@
 -- name: staging.trace
 -- description: Traces read, with what their packets and events say of their extent.
 -- grain: one row per CTF trace
+-- when: staging.source
 WITH extent AS (
     SELECT
         trace_index,

@@ -1,37 +1,13 @@
 -- name: staging.service
--- description: Services. One that was used but never initialised in the trace gets a row without
---     node, and the name that its clients call it by.
+-- description: Services. One that was used but never initialised in the trace has no node.
 -- grain: one row per service
-WITH learned AS (
-    SELECT u.service_event_id, mode(c.service_name ORDER BY c.service_name) AS service_name
-    FROM staging.service_use AS u
-    JOIN staging.client_known AS c ON u.client_event_id = c.event_id
-    GROUP BY u.service_event_id
-),
-attached AS (
-    SELECT e.service_event_id, mode(k.service_handle ORDER BY k.service_handle) AS service_handle
-    FROM staging.service_event AS e
-    JOIN staging.request_callback AS q ON e.event_id = q.take_event_id
-    JOIN staging.callback_binding AS b ON q.start_event_id = b.start_event_id
-    JOIN staging.callback_known AS k ON b.callback_event_id = k.event_id
-    WHERE e.is_inferred
-    GROUP BY e.service_event_id
-),
-every_service AS (
+-- when: staging.service_known, staging.service_inferred
+WITH every_service AS (
     SELECT event_id, process_id, node_id, service_name, service_handle, rmw_handle, created_ns
     FROM staging.service_known
     UNION ALL
-    SELECT
-        e.event_id, e.process_id, NULL, l.service_name, a.service_handle, e.rmw_handle, NULL
-    FROM staging.service_event AS e
-    LEFT JOIN learned AS l ON e.event_id = l.service_event_id
-    LEFT JOIN attached AS a ON e.event_id = a.service_event_id
-    WHERE e.is_inferred AND e.event_id = e.service_event_id
-    UNION ALL
-    SELECT owner_event_id, process_id, NULL, NULL, any_value(handle), NULL, NULL
-    FROM staging.callback_owner
-    WHERE kind = 'service' AND is_inferred
-    GROUP BY owner_event_id, process_id
+    SELECT event_id, process_id, NULL, service_name, service_handle, rmw_handle, NULL
+    FROM staging.service_inferred
 )
 SELECT
     row_number() OVER (ORDER BY event_id) AS service_id,

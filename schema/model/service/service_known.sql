@@ -1,6 +1,7 @@
 -- name: staging.service_known
 -- description: Services whose initialisation was traced. No tracepoint tells their GID.
 -- grain: one row per rcl_service_init
+-- when: raw.ros2_rcl_service_init
 SELECT
     s.event_id,
     s.process_id,

@@ -1,0 +1,90 @@
+-- name: staging.process_restart
+-- description: Where a pid begins a new life: at an rcl_init (1) of a context handle initialised
+--     before, (2) that is the first one recorded, if a publisher was made or a callback was seen
+--     before it, or (3) from another main thread or process name than the one before. In (1) and
+--     (2), the life goes on if a publisher or callback of it is used afterwards without being made
+--     again, or if a callback ends that began before. (Threads that seem to go on prove nothing
+--     there: containers number them alike in every life.) What is used behind a gap proves nothing:
+--     its object may have been made again in it, and a restart is likelier than a second context.
+--     In (3), the life goes on if another thread does.
+-- grain: one row per such rcl_init
+-- when: staging.later_initialisation
+
+-- A callback that starts was registered, whether that was recorded or not. A publication shows no
+-- object: what logs to /rosout publishes on a handle that is never made.
+WITH handled AS (
+    SELECT
+        thread_index, event_id, ts_ns, publisher_handle AS handle, true AS is_made,
+        true AS shows_object
+    FROM raw.ros2_rcl_publisher_init
+    UNION ALL
+    SELECT thread_index, event_id, ts_ns, callback, true, true
+    FROM raw.ros2_rclcpp_callback_register
+    UNION ALL
+    SELECT thread_index, event_id, ts_ns, publisher_handle, false, false
+    FROM raw.ros2_rcl_publish
+    UNION ALL
+    SELECT thread_index, event_id, ts_ns, callback, false, true
+    FROM raw.ros2_callback_start
+),
+-- Objects from before an initialisation: when they are first used after it, and made again.
+old AS (
+    SELECT
+        c.event_id,
+        min(h.event_id) FILTER (
+            NOT h.is_made AND h.event_id > c.event_id AND h.ts_ns <= c.gap_ns
+        ) AS used_event_id,
+        min(h.event_id) FILTER (h.is_made AND h.event_id > c.event_id) AS made_event_id
+    FROM staging.later_initialisation AS c
+    JOIN staging.thread_seen AS s
+        ON c.host_id = s.host_id AND c.pid_ns IS NOT DISTINCT FROM s.pid_ns AND c.vpid = s.vpid
+    JOIN handled AS h ON s.thread_index = h.thread_index
+    GROUP BY c.event_id, h.handle
+    HAVING min(h.event_id) FILTER (h.shows_object) < c.event_id
+),
+-- An object from before that is used afterwards without being made again, or a callback that began
+-- before and ends afterwards: the life goes on. The thread that initialises again is that of the
+-- new life. Where the first initialisation is not known, it may do so inside a callback.
+surviving AS (
+    SELECT event_id
+    FROM old
+    WHERE used_event_id < coalesce(made_event_id, 9223372036854775807)
+    UNION
+    SELECT c.event_id
+    FROM staging.later_initialisation AS c
+    JOIN staging.thread_seen AS s
+        ON c.host_id = s.host_id
+        AND c.pid_ns IS NOT DISTINCT FROM s.pid_ns
+        AND c.vpid = s.vpid
+        AND (c.vtid <> s.vtid OR NOT c.is_repeated)
+    JOIN raw.ros2_callback_end AS e
+        ON s.thread_index = e.thread_index
+        AND e.event_id > c.event_id
+        AND e.ts_ns <= c.gap_ns
+        AND e.previous_callback_event_id < c.event_id
+    JOIN raw.ros2_callback_start AS b
+        ON e.previous_callback_event_id = b.event_id AND e.callback = b.callback
+)
+SELECT i.host_id, i.pid_ns, i.vpid, i.event_id
+FROM staging.later_initialisation AS i
+WHERE (
+        CASE
+            WHEN i.is_repeated THEN i.is_same_context
+            ELSE i.event_id IN (SELECT event_id FROM old)
+        END
+        AND i.event_id NOT IN (SELECT event_id FROM surviving)
+    )
+    OR (
+        i.is_repeated
+        AND i.is_other_main
+        AND NOT EXISTS (
+            SELECT 1
+            FROM staging.thread_presence AS p
+            WHERE p.host_id = i.host_id
+                AND p.pid_ns IS NOT DISTINCT FROM i.pid_ns
+                AND p.vpid = i.vpid
+                AND p.vtid <> i.vtid
+                AND p.first_event_id < i.event_id
+                AND p.last_event_id > i.event_id
+        )
+    )
