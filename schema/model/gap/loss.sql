@@ -7,6 +7,7 @@
 --     number tells; and behind the last, where others have later events: stopping flushes a packet
 --     into every stream.
 -- grain: one row per stretch of time in which a stream lost something
+-- when: staging.stream_packet
 WITH lossy_packet AS (
     SELECT
         *,
