@@ -14,9 +14,8 @@ import textwrap
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from duckdb_engine import Dialect
-
 import duckdb
+from duckdb_engine import Dialect
 
 from msgflow.db import objects
 from msgflow.db.finding import PHASES, kinds_of, short_name

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 from msgflow.db import objects
 from msgflow.db.finding import kinds_of, statement
 from msgflow.db.store_table import store_tables
+from msgflow.files.resources import resource_directory
 from msgflow.ingest import staging
 from msgflow.ingest.caret_initialisation import restore
-from msgflow.files.resources import resource_directory
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
