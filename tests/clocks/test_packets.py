@@ -137,6 +137,7 @@ def test_what_is_known_of_ros_does_not_change(make: Make, ingest: Ingest) -> Non
     ]
 
 
+@pytest.mark.thorough
 def test_a_kernel_trace_of_an_older_tracer_lies_anywhere(
     make: Make, ingest: Ingest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -259,6 +260,7 @@ def test_a_kernel_trace_without_packets_is_said(make: Make, ingest: Ingest) -> N
     ]
 
 
+@pytest.mark.thorough
 def test_one_clock_needs_no_packets(tmp_path: Path, ingest: Ingest) -> None:
     directory = simulate("pipeline", tmp_path / "traces", factor=0.01).directory
     (host,) = (path.name for path in directory.iterdir() if (path / "ust").is_dir())

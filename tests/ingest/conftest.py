@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 from ctf_writer import Event, Packet, TraceContent, write_trace
+from ingested import made_once
 
 from msgflow.ingest import ingest
 from msgflow_sim import simulate
@@ -15,26 +16,27 @@ _LENGTH = 0.01
 
 
 @pytest.fixture(scope="session")
-def trace(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def _ingested(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    def make(path: Path) -> None:
+        ingest([simulate("pipeline", _trace_of(path, "robot"), factor=_LENGTH).directory], path)
+
+    return made_once(tmp_path_factory, "ingested", make)
+
+
+def _trace_of(database: Path, name: str) -> Path:
+    return database.parent / "traces" / name
+
+
+@pytest.fixture(scope="session")
+def trace(_ingested: Path) -> Path:
     """A very short trace, below a directory named robot."""
-    return simulate(
-        "pipeline", tmp_path_factory.mktemp("trace") / "robot", factor=_LENGTH
-    ).directory
+    return _trace_of(_ingested, "robot")
 
 
 @pytest.fixture(scope="session")
-def other_trace(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def other_trace(_both: Path) -> Path:
     """Another one, of two hosts."""
-    return simulate(
-        "two_hosts", tmp_path_factory.mktemp("trace") / "pair", factor=_LENGTH, seed=1
-    ).directory
-
-
-@pytest.fixture(scope="session")
-def _ingested(trace: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("ingested") / "msgflow.duckdb"
-    ingest([trace], path)
-    return path
+    return _trace_of(_both, "pair")
 
 
 @pytest.fixture
@@ -47,11 +49,13 @@ def database(_ingested: Path, tmp_path: Path) -> Path:
 
 
 @pytest.fixture(scope="session")
-def _both(_ingested: Path, other_trace: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("both") / "msgflow.duckdb"
-    shutil.copyfile(_ingested, path)
-    ingest([other_trace], path)
-    return path
+def _both(_ingested: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    def make(path: Path) -> None:
+        shutil.copyfile(_ingested, path)
+        pair = simulate("two_hosts", _trace_of(path, "pair"), factor=_LENGTH, seed=1)
+        ingest([pair.directory], path)
+
+    return made_once(tmp_path_factory, "both", make)
 
 
 @pytest.fixture

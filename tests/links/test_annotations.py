@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -224,7 +225,7 @@ def test_what_the_trace_declares_itself_is_not_declared_again(
     "name", few(["partial_sync", "periodic_async_jazzy24"], "periodic_async_jazzy24")
 )
 def test_declared_or_traced_the_links_are_the_same(
-    shared_traces: Path, tmp_path: Path, name: str
+    shared_traces: Path, real: Callable[[str], Path], tmp_path: Path, name: str
 ) -> None:
     """Also where they are declared by what the suggestions say.
 
@@ -233,11 +234,8 @@ def test_declared_or_traced_the_links_are_the_same(
     links = (
         "SELECT callback_instance_id, publication_id, candidate_count FROM link_causal ORDER BY ALL"
     )
-    traced, plain, declared = (
-        tmp_path / f"{name}-{kind}.duckdb" for kind in ("traced", "plain", "declared")
-    )
-    with Database(traced) as database:
-        database.ingest(shared_traces / name)
+    traced = real(name)
+    plain, declared = (tmp_path / f"{name}-{kind}.duckdb" for kind in ("plain", "declared"))
     file = tmp_path / f"{name}.yaml"
     with Database(plain) as database:
         database.ingest(shared_traces / name, ignore=["ros2:message_link_*"])

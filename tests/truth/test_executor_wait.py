@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable
-from pathlib import Path
+from functools import lru_cache
 from typing import Any
 
 import pytest
-from ingested import ingest_one
+from ingested import Ingested, ingest_one
 from thorough import few
 
 from msgflow.query.catalogue import load_query
@@ -117,26 +117,37 @@ class Witness:
         monkeypatch.setattr(executor_thread, "HANDLERS", handlers)
 
 
+@pytest.fixture(scope="module")
+def witnessed(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Ingested]:
+    """Simulates and ingests a system; what was seen is in the tables `true_arrival` and `due`."""
+
+    @lru_cache(1)
+    def get(name: str) -> Ingested:
+        directory = tmp_path_factory.mktemp(name)
+        with pytest.MonkeyPatch.context() as patch:
+            witness = Witness(patch)
+            simulation = simulate(name, directory / "trace", factor=_LENGTH)
+        ingested = ingest_one(simulation.directory, directory / "run.duckdb")
+        connection = ingested.connection
+        connection.execute(
+            "CREATE TEMP TABLE true_arrival "
+            "(hostname VARCHAR, pid INTEGER, handle UBIGINT, stamp_ns BIGINT, arrived_ns BIGINT)"
+        )
+        connection.execute(
+            "CREATE TEMP TABLE due "
+            "(hostname VARCHAR, pid INTEGER, callback UBIGINT, called_ns BIGINT, due_ns BIGINT)"
+        )
+        connection.executemany("INSERT INTO true_arrival VALUES (?, ?, ?, ?, ?)", witness.arrivals)
+        connection.executemany("INSERT INTO due VALUES (?, ?, ?, ?, ?)", witness.calls)
+        return ingested
+
+    return get
+
+
 @pytest.mark.parametrize("name", few(SCENARIOS, "executors"))
-def test_inputs_arrive_within_their_bounds(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    witness = Witness(monkeypatch)
-    simulation = simulate(name, tmp_path / name, factor=_LENGTH)
-    ingested = ingest_one(simulation.directory, tmp_path / "run.duckdb")
-    connection = ingested.connection
-    connection.execute(
-        "CREATE TEMP TABLE true_arrival "
-        "(hostname VARCHAR, pid INTEGER, handle UBIGINT, stamp_ns BIGINT, arrived_ns BIGINT)"
-    )
-    connection.execute(
-        "CREATE TEMP TABLE due "
-        "(hostname VARCHAR, pid INTEGER, callback UBIGINT, called_ns BIGINT, due_ns BIGINT)"
-    )
-    connection.executemany("INSERT INTO true_arrival VALUES (?, ?, ?, ?, ?)", witness.arrivals)
-    connection.executemany("INSERT INTO due VALUES (?, ?, ?, ?, ?)", witness.calls)
+def test_inputs_arrive_within_their_bounds(name: str, witnessed: Callable[[str], Ingested]) -> None:
+    ingested = witnessed(name)
     arrived, due = ingested.rows(_ARRIVED), ingested.rows(_DUE)
-    connection.close()
     assert len(arrived) > 50
     for earliest, moment, latest in arrived:
         assert earliest is None or earliest <= moment
@@ -149,22 +160,14 @@ def test_inputs_arrive_within_their_bounds(
 
 @pytest.mark.parametrize("name", few(["demo", "executors", "overload"], "executors"))
 def test_the_breakdown_bounds_how_long_executors_were_busy(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    name: str, witnessed: Callable[[str], Ingested]
 ) -> None:
     """What passed up to the takes is the sum of its three parts."""
-    witness = Witness(monkeypatch)
-    simulation = simulate(name, tmp_path / name, factor=_LENGTH)
-    connection = ingest_one(simulation.directory, tmp_path / "run.duckdb").connection
-    connection.execute(
-        "CREATE TEMP TABLE true_arrival "
-        "(hostname VARCHAR, pid INTEGER, handle UBIGINT, stamp_ns BIGINT, arrived_ns BIGINT)"
-    )
-    connection.executemany("INSERT INTO true_arrival VALUES (?, ?, ?, ?, ?)", witness.arrivals)
+    connection = witnessed(name).connection
     true = connection.execute(_BUSY).fetchall()
     parts: dict[tuple[int, int, str], int] = defaultdict(int)
     for row in run_query(connection, load_query("path-breakdown"), {}).to_arrow().to_pylist():
         parts[row["path_id"], row["hop"], row["part"]] += row["total_ns"]
-    connection.close()
     ever_busy = 0
     for path, hop, whole, busy, is_known in true:
         idle, undecided, certain = (
