@@ -59,7 +59,7 @@ def require_truth(clocks: list[Clock], corrections: dict[int, tuple[object, ...]
 
 
 @settings(
-    max_examples=examples(8, 25),
+    max_examples=examples(4, 25),
     deadline=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )

@@ -102,6 +102,7 @@ def test_the_cpu_of_a_frequency_is_not_that_of_its_event(tmp_path: Path, read_ro
     assert (row["cpu_id"], row["of_cpu"], row["frequency_khz"]) == (1, 2, KHZ)
 
 
+@pytest.mark.thorough
 def test_readers_agree(trace: Path, bt2_bindings: object) -> None:
     for wanted in (WANTED, None):
         ours, theirs = (read(trace, reader=name, wanted=wanted) for name in ("msgflow", "bt2"))

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 from ctf_writer import Event, Packet, TraceContent, write_index, write_trace
 from same_batches import read
+from thorough import few
 
 import msgflow.trace
 from msgflow.errors import TraceError
@@ -267,7 +268,9 @@ class TestShapes:
     @pytest.mark.parametrize(
         "field", ["_zz" + "[1000]" * 20, "_zz" + "[60000]" * 3, "_zz[4096]" + "[4096]" * 2]
     )
-    @pytest.mark.parametrize("element", ["uint8_t", "struct { }", "integer { size = 3; }"])
+    @pytest.mark.parametrize(
+        "element", few(["uint8_t", "struct { }", "integer { size = 3; }"], "struct { }")
+    )
     def test_arrays_of_arrays(self, trace: Path, field: str, element: str) -> None:
         """They do not fit into any packet, which is found without going through them."""
         text = (trace / "metadata").read_text()

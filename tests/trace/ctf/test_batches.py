@@ -38,7 +38,7 @@ def read_in_pieces(trace: Path, most_bytes: int, most_events: int) -> Content:
 
 @settings(
     deadline=None,
-    max_examples=examples(15, 60),
+    max_examples=examples(8, 60),
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
 @given(

@@ -32,7 +32,7 @@ KINDS = {
 
 @settings(
     deadline=None,
-    max_examples=examples(20, 60),
+    max_examples=examples(10, 60),
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
 @given(
@@ -73,7 +73,7 @@ def anywhere(random: Random) -> Callable[..., Any]:
 
 @settings(
     deadline=None,
-    max_examples=examples(20, 60),
+    max_examples=examples(10, 60),
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
 @given(
