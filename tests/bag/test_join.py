@@ -66,7 +66,7 @@ def write_bag(path: Path, messages: Iterable[Message], *, plugin: str = "SQLITE3
 
 @pytest.fixture
 def database(simulated: Callable[..., Path], tmp_path: Path) -> Path:
-    return Path(shutil.copyfile(simulated("pipeline", 0.3), tmp_path / "run.duckdb"))
+    return Path(shutil.copyfile(simulated("pipeline", 0.1), tmp_path / "run.duckdb"))
 
 
 def published(path: Path) -> list[Message]:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import csv
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
 import duckdb
 import pytest
 from golden import fill_case
+from ingested import made_once
 from typer.testing import Result
 
 from msgflow.db.derivation import derive
@@ -71,12 +73,21 @@ def test_what_is_doubtful_of_suggestions_is_said(msgflow: Msgflow, fresh_databas
     assert text.count("Doubtful: ") == text.count("which of its outputs use the messages") == 2
 
 
-def test_suggestions_are_written_and_applied_in_one_go(
-    msgflow: Msgflow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    trace = simulate("periodic_async", tmp_path / "trace", factor=0.1).directory
-    assert msgflow("ingest", trace, "--ignore", "ros2:message_link_*").exit_code == 0
+@pytest.fixture
+def undeclared(msgflow: Msgflow, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A database of a system whose indirect links are not declared, to change it."""
+
+    def make(path: Path) -> None:
+        trace = simulate("periodic_async", path.parent / "trace", factor=0.1).directory
+        result = msgflow("ingest", trace, "--ignore", "ros2:message_link_*", "--db", path)
+        assert result.exit_code == 0, result.stderr
+
+    made = made_once(tmp_path_factory, "undeclared", make)
+    return Path(shutil.copyfile(made, "msgflow.duckdb"))
+
+
+@pytest.mark.usefixtures("undeclared")
+def test_suggestions_are_written_and_applied_in_one_go(msgflow: Msgflow) -> None:
     Path("links.yaml").write_text("mine")
     result = msgflow("suggest", "links", "--apply")
     assert result.exit_code == 2
@@ -124,12 +135,10 @@ def test_topics_without_a_name_are_named(msgflow: Msgflow, tmp_path: Path) -> No
     assert "/scan" in answer.stdout
 
 
+@pytest.mark.usefixtures("undeclared")
 def test_a_file_that_cannot_be_applied_is_not_written(
     msgflow: Msgflow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    trace = simulate("periodic_async", tmp_path / "trace", factor=0.1).directory
-    assert msgflow("ingest", trace, "--ignore", "ros2:message_link_*").exit_code == 0
-
     def refuse(*_: object) -> None:
         raise UsageError("does not fit")
 

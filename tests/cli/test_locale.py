@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from thorough import thorough
 
 import msgflow
 
@@ -71,7 +72,8 @@ def run(commands: list[list[str]], directory: Path) -> list[str]:
 
 
 @pytest.mark.usefixtures("empty_database")
-def test_from_the_trace_to_every_kind_of_file(tmp_path: Path) -> None:
+@pytest.mark.parametrize("more", [(), thorough((["report", "-o", "report.html"],))])
+def test_from_the_trace_to_every_kind_of_file(tmp_path: Path, more: tuple[list[str], ...]) -> None:
     # Of the cache, a new database takes the most time; it is no text.
     (tmp_path / "cache" / "msgflow").mkdir(parents=True)
     for made in (Path(os.environ["XDG_CACHE_HOME"]) / "msgflow").glob("database-*"):
@@ -88,8 +90,8 @@ def test_from_the_trace_to_every_kind_of_file(tmp_path: Path) -> None:
             ["query", "e2e-latency", "-o", "latency.csv"],
             ["graph", "-o", "graph.mmd"],
             ["flow", "/camera/image", "-o", "flow.html"],
-            ["report", "-o", "report.html"],
             ["links"],
+            *more,
         ],
         tmp_path,
     )

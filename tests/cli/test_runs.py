@@ -16,6 +16,7 @@ from typing import Any
 import duckdb
 import pytest
 from ingested import contents
+from thorough import thorough
 from typer.testing import Result
 
 from msgflow.database import Database
@@ -88,9 +89,9 @@ def test_remove_leaves_the_others_as_they_were(
     ("answer", "options", "code", "left"),
     [
         (b"n\n", [], 130, ["before", "after"]),
-        (b"\n", [], 130, ["before", "after"]),
+        thorough(b"\n", [], 130, ["before", "after"]),
         (b"y\n", [], 0, ["after"]),
-        (b"", ["--yes"], 0, ["after"]),
+        thorough(b"", ["--yes"], 0, ["after"]),
     ],
 )
 def test_on_a_terminal_it_asks_before_it_removes(

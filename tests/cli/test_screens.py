@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from thorough import few
 
 from msgflow.ingest import ingest
 
@@ -76,7 +77,7 @@ def printed(commands: tuple[str, ...], columns: int, directory: Path) -> str:
     return shown
 
 
-@pytest.mark.parametrize("columns", [80, 100])
+@pytest.mark.parametrize("columns", few([80, 100], 80))
 def test_the_main_commands_look_as_they_should(place: Path, columns: int) -> None:
     """MSGFLOW_WRITE_SCREENS=1 in the environment writes them; read the difference then."""
     shown = printed(COMMANDS, columns, place)

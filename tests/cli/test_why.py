@@ -11,6 +11,7 @@ import duckdb
 import pytest
 from golden import SYSTEMS, fill_case
 from rich.cells import cell_len
+from thorough import few, thorough
 from typer.testing import Result
 
 from msgflow import Database
@@ -123,7 +124,7 @@ def test_without_a_place_it_is_the_path_of_the_slowest_flow(demo: Path) -> None:
     assert why.paths.table["max_ns"].to_pylist()[0] == longest
 
 
-@pytest.mark.parametrize("width", [80, 100])
+@pytest.mark.parametrize("width", few([80, 100], 80))
 def test_it_fits_and_its_next_steps_run(
     msgflow: Msgflow, demo: Path, monkeypatch: pytest.MonkeyPatch, width: int
 ) -> None:
@@ -159,7 +160,7 @@ def untraced(empty_database: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPat
     [
         # The message took longest, or what the node did: nothing says more of that.
         (1450, ["query topics --measure latency --topic /scan", "flow --take 2 --why"]),
-        (1200, ["flow --take 2 --why"]),
+        thorough(1200, ["flow --take 2 --why"]),
     ],
 )
 def test_callbacks_that_were_not_traced_are_not_asked_for(

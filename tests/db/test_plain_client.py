@@ -27,7 +27,7 @@ FILL = (
 def filled(simulated: Callable[..., Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
     # Of tables without rows, DuckDB expects no row of anything.
     path = tmp_path_factory.mktemp("filled") / "filled.duckdb"
-    shutil.copyfile(simulated("demo", 0.05), path)
+    shutil.copyfile(simulated("demo", 0.1), path)
     with duckdb.connect(str(path)) as con:
         for statement in FILL:
             con.execute(statement)

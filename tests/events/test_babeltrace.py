@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from thorough import thorough
 
 _LINE = re.compile(
     r"\[(?P<time>[-0-9]+ [:0-9.]+)\] (?P<host>\S+) (?P<name>\S+): \{ cpu_id = (?P<cpu>\d+) \}, "
@@ -19,7 +20,9 @@ _ELEMENT = re.compile(r"\[\d+\] = ([^, ]+)")
 _OPTIONS = ("--clock-gmt", "--clock-date", "--no-delta")
 
 
-@pytest.mark.parametrize(("name", "count"), [("tracecompass-ros2", 99_338), ("services", 14_359)])
+@pytest.mark.parametrize(
+    ("name", "count"), [thorough("tracecompass-ros2", 99_338), ("services", 14_359)]
+)
 def test_lists_what_babeltrace_lists(
     shared_traces: Path, listing: Callable[..., str], name: str, count: int
 ) -> None:

@@ -9,6 +9,7 @@ import os
 import shutil
 import signal
 from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -33,9 +34,10 @@ from msgflow.fleet.workers import LOCAL, RayWorkers
 from msgflow.ingest import ingest
 from msgflow_sim import simulate
 
-pytest.importorskip("ray", reason="ray is not installed")
-pytest.importorskip("moto.moto_server", reason="moto[server] is not installed")
-
+# Not imported to see: who runs a single test would wait for both.
+pytestmark = pytest.mark.skipif(
+    not (find_spec("ray") and find_spec("moto")), reason="ray or moto[server] is not installed"
+)
 LAKE = "s3://fleet/lake"
 GOOD = 2
 SOURCES = ("s3://fleet/night/*",)

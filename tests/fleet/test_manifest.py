@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
 
 import pyarrow as pa
@@ -17,7 +18,7 @@ from msgflow.fleet.manifest import read_manifest
 from msgflow.fleet.recording import fetch, look_at
 from msgflow.fleet.sources import find_recordings
 
-pytest.importorskip("moto.moto_server", reason="moto[server] is not installed")
+pytestmark = pytest.mark.skipif(not find_spec("moto"), reason="moto[server] is not installed")
 
 
 @pytest.fixture(scope="module")

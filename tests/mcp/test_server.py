@@ -16,6 +16,7 @@ import duckdb
 import pytest
 from mcp import Client
 from mcp.client.stdio import StdioServerParameters
+from thorough import few
 
 from msgflow.mcp import server as mcp_server
 
@@ -245,7 +246,7 @@ def test_what_takes_too_much_memory_says_so(
     assert "more memory than 20MB\nhint: " in answer.content[0].text
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", few([signal.SIGINT, signal.SIGTERM], signal.SIGTERM))
 def test_a_signal_ends_it_while_it_waits(small_database: Path, number: int) -> None:
     with subprocess.Popen(
         [sys.executable, "-m", "msgflow", "mcp", "--db", str(small_database)],

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -10,7 +10,6 @@ import pytest
 from msgflow.database import Database
 from msgflow.errors import UsageError
 from msgflow.paths import read_paths, suggest_paths
-from msgflow_sim import simulate
 
 GOOD = """\
 paths:
@@ -24,11 +23,8 @@ paths:
 
 
 @pytest.fixture(scope="module")
-def database(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Database]:
-    place = tmp_path_factory.mktemp("paths")
-    simulate("demo", place / "trace", factor=0.1)
-    with Database(place / "demo.duckdb") as opened:
-        opened.ingest(place / "trace")
+def database(simulated: Callable[..., Path]) -> Iterator[Database]:
+    with Database(simulated("demo", 0.1)) as opened:
         yield opened
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,18 +15,14 @@ from msgflow.database import Database
 from msgflow.errors import QueryError, UsageError
 from msgflow.query.catalogue import load_queries
 from msgflow.query.selection import KINDS, PATH, columns_of, make_selection, values_of
-from msgflow_sim import simulate
 
 PLANNER = "/planning/planner"
 _ANSWERS: dict[str, list[dict[str, Any]]] = {}
 
 
 @pytest.fixture(scope="module")
-def database(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Database]:
-    place = tmp_path_factory.mktemp("selection")
-    simulate("demo", place / "trace", factor=0.2)
-    with Database(place / "demo.duckdb") as opened:
-        opened.ingest(place / "trace")
+def database(simulated: Callable[..., Path]) -> Iterator[Database]:
+    with Database(simulated("demo", 0.2)) as opened:
         yield opened
 
 

@@ -245,7 +245,8 @@ def test_parameters_and_columns_of_a_public_macro_are_declared(
             if not param.has_default
         )
         with connection.cursor() as cursor:
-            for name, rows_of in TABLES.items():
+            # Of the macros, few take a table; some of the tables are made of others.
+            for name, rows_of in TABLES.items() if TABLES.keys() & set(rows[0][0]) else ():
                 cursor.execute(f"CREATE TEMP TABLE {name} AS FROM {rows_of}")
             output = described(cursor.sql(f"FROM {file.header.name}({arguments})"))
         assert output == declared(file)

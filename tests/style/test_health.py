@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import duckdb
+import pytest
 from each import each
 from sql_files import SqlFile, sql_files
 
@@ -42,12 +44,19 @@ def test_the_folder_decides_what_a_finding_reads(header: Header) -> None:
     assert all(need.startswith("staging.") == is_input for need in header.needs)
 
 
-@each([*kinds_of("recording"), *kinds_of("database")], name=lambda header: header.name)
-def test_a_finding_about_a_stored_run_says_which(header: Header, empty_database: Path) -> None:
-    """Without `run_id` it would be found, and not stored."""
+@pytest.fixture(scope="module")
+def connection(empty_database: Path) -> Iterator[duckdb.DuckDBPyConnection]:
     with duckdb.connect(str(empty_database), read_only=True) as con:
-        found = HEALTH.run(con, short_name(header), {"run_id": 1, "broken": []})
-        assert "run_id" in found.columns
+        yield con
+
+
+@each([*kinds_of("recording"), *kinds_of("database")], name=lambda header: header.name)
+def test_a_finding_about_a_stored_run_says_which(
+    header: Header, connection: duckdb.DuckDBPyConnection
+) -> None:
+    """Without `run_id` it would be found, and not stored."""
+    found = HEALTH.run(connection, short_name(header), {"run_id": 1, "broken": []})
+    assert "run_id" in found.columns
 
 
 def test_findings_are_written_in_one_place() -> None:

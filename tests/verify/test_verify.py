@@ -17,7 +17,6 @@ from msgflow.query.catalogue import load_query
 from msgflow.verify import Verification
 from msgflow.verify.metrics import SUBJECTS
 from msgflow.verify.worst_case import KEYS
-from msgflow_sim import simulate
 
 Check = Callable[..., Verification]
 # What the golden cases of the queries say of the same system.
@@ -191,12 +190,12 @@ def test_every_metric_reads_columns_that_its_query_has(
         assert all(row["verdict"] in ("passed", "failed") for row in found), found
 
 
-def test_lost_messages_are_a_share_of_those_connected(tmp_path: Path) -> None:
-    simulation = simulate("overload", tmp_path / "trace", factor=0.2)
+def test_lost_messages_are_a_share_of_those_connected(
+    simulated: Callable[..., Path], tmp_path: Path
+) -> None:
     targets = tmp_path / "targets.yaml"
     targets.write_text('targets:\n  - topic: "*"\n    loss: < 0 %\n    completeness: "> 100 %"\n')
-    with Database(tmp_path / "run.duckdb") as database:
-        database.ingest(simulation.directory)
+    with Database(simulated("overload", 0.2)) as database:
         found = rows(database.verify(targets))
         delivery = database.query("topics-delivery").to_arrow().to_pylist()
     for row in delivery:
@@ -238,11 +237,11 @@ def test_a_suggestion_says_what_was_not_delivered(overwritten: Path) -> None:
 
 
 @pytest.mark.parametrize("name", few(["demo", "services", "actions"], "services", "actions"))
-def test_a_run_meets_what_is_suggested_from_it(name: str, tmp_path: Path) -> None:
-    simulation = simulate(name, tmp_path / "trace", factor=0.5)
+def test_a_run_meets_what_is_suggested_from_it(
+    name: str, simulated: Callable[..., Path], tmp_path: Path
+) -> None:
     targets = tmp_path / "targets.yaml"
-    with Database(tmp_path / "run.duckdb") as database:
-        database.ingest(simulation.directory)
+    with Database(simulated(name, 0.5)) as database:
         targets.write_text(database.suggest_targets(), encoding="utf-8")
         verification = database.verify(targets)
         targets.write_text(database.suggest_targets(margin=0), encoding="utf-8")

@@ -50,7 +50,7 @@ def pick_on_canvas(page: Page, kind: int) -> tuple[str, int]:
     return name, number
 
 
-@pytest.mark.parametrize("way", few(["served", "file"], "file"))
+@pytest.mark.parametrize("way", few(["served", "file"], "served"))
 def test_picking_lights_up_exactly_the_flow(
     way: str, systems: Path, read: Read, serve: Serve, report: Report, page: Page
 ) -> None:
@@ -351,9 +351,9 @@ def test_a_long_run_opens_where_bars_can_be_read(systems: Path, serve: Serve, pa
 
 
 def test_a_topic_with_the_name_of_its_node_is_written_once(
-    systems: Path, report: Report, page: Page
+    systems: Path, serve: Serve, page: Page
 ) -> None:
-    page.open(report(systems))
+    page.open(serve(systems).address)
     for place in ("#/paths", "#/overview"):
         page.go(place)
         texts = page.page.locator("td.long, .path-text").all_inner_texts()
@@ -365,9 +365,9 @@ def test_a_topic_with_the_name_of_its_node_is_written_once(
 
 @pytest.mark.parametrize("is_together", [False, True])
 def test_durations_between_clocks_that_are_apart_are_marked(
-    is_together: bool, systems: Path, demo: Path, report: Report, page: Page
+    is_together: bool, systems: Path, demo: Path, serve: Serve, page: Page
 ) -> None:
-    page.open(report(demo if is_together else systems))
+    page.open(serve(demo if is_together else systems).address)
     page.go("#/paths")
     marked = page.page.locator("[data-path]:has(.doubt)").count()
     paths = page.page.locator("[data-path]").count()
@@ -378,9 +378,9 @@ def test_durations_between_clocks_that_are_apart_are_marked(
 
 
 def test_hosts_and_nodes_of_the_slowest_flow_stand_out_in_the_graph(
-    systems: Path, report: Report, page: Page
+    systems: Path, serve: Serve, page: Page
 ) -> None:
-    page.open(report(systems))
+    page.open(serve(systems).address)
     page.go("#/graph")
     with open_db(systems) as opened:
         busy = opened.query("callbacks").to_arrow().to_pylist()
@@ -428,9 +428,9 @@ def test_executors_have_a_scale_and_a_legend_above_them(
 
 
 def test_a_table_that_is_wider_says_so_and_is_cards_on_a_phone(
-    systems: Path, report: Report, page: Page
+    systems: Path, serve: Serve, page: Page
 ) -> None:
-    page.open(report(systems))
+    page.open(serve(systems).address)
     page.page.set_viewport_size({"width": 700, "height": 800})
     page.go("#/paths")
     edge = page.page.locator(".table-edge").first

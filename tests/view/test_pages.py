@@ -12,8 +12,6 @@ from served import Page, Served, shown
 from thorough import few
 
 from msgflow.database import open_db
-from msgflow.ingest import ingest
-from msgflow_sim import simulate
 
 Read = Callable[[Path], duckdb.DuckDBPyConnection]
 Report = Callable[..., str]
@@ -94,7 +92,7 @@ def test_a_point_of_the_latency_leads_to_its_flow(demo: Path, report: Report, pa
     assert page.flow()
 
 
-@pytest.mark.parametrize("way", few(["served", "file"], "file"))
+@pytest.mark.parametrize("way", few(["served", "file"], "served"))
 def test_graph(way: str, systems: Path, serve: Serve, report: Report, page: Page) -> None:
     with open_db(systems) as opened:
         rates = opened.query("topics-rate", run=3).to_arrow().to_pylist()
@@ -141,14 +139,12 @@ def test_services_in_the_graph(systems: Path, serve: Serve, page: Page) -> None:
     assert all(shown(row["round_trip_median_ns"]) in text for row in services if row["answered"])
 
 
-def test_actions_in_the_graph(tmp_path: Path, report: Report, page: Page) -> None:
+def test_actions_in_the_graph(simulated: Callable[..., Path], serve: Serve, page: Page) -> None:
     """In place of their services; their topics are topics."""
-    path = tmp_path / "run.duckdb"
-    simulate("actions", tmp_path / "trace", factor=0.2)
-    ingest([tmp_path / "trace"], path)
+    path = simulated("actions", 0.2)
     with open_db(path) as opened:
         actions = opened.query("action-latency").to_arrow().to_pylist()
-    page.open(report(path))
+    page.open(serve(path).address)
     page.go("#/graph")
     assert page.page.locator(".graph .action-shape").count() == 2
     assert page.page.locator(".graph .service-shape").count() == 0

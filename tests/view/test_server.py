@@ -22,6 +22,7 @@ import duckdb
 import pytest
 from served import Served
 from tables import decoded
+from thorough import few
 
 from msgflow.confined.query import WarmSql
 from msgflow.errors import QueryError, UsageError
@@ -314,7 +315,7 @@ class running_program:
         self.process.communicate()
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", few([signal.SIGINT, signal.SIGTERM], signal.SIGINT))
 def test_a_signal_ends_it(demo: Path, number: signal.Signals) -> None:
     with running_program(demo) as (process, address):
         assert address.startswith("http://127.0.0.1:")
