@@ -133,11 +133,12 @@ def sql(
     runs that count; public views are view.publication and so on.
     """
     from msgflow.cli.output import print_result
-    from msgflow.confined.query import confined_fleet_sql
+    from msgflow.fleet.lake import Lake
+    from msgflow.fleet.lake_query import fleet_sql
 
     query = sql_of(text, file, "msgflow fleet sql 'FROM run'")
     require_lake(lake)
-    result = confined_fleet_sql(lake, query, where=where, limit=limit or None)
+    result = fleet_sql(Lake.open(lake), query, where=where, limit=limit or None)
     print_result(result, form, output, wide=wide)
 
 

@@ -176,11 +176,6 @@ def _run(header: Header, own: dict[str, Any], given: dict[str, Any]) -> None:
 
 
 def _result(name: str, given: dict[str, Any], asked: dict[str, Any]) -> QueryResult:
-    # A condition is SQL of the user.
-    if asked.get("where") is not None:
-        from msgflow.confined.query import confined_query
-
-        return confined_query(given["database"], name, asked, memory_limit=given["memory_limit"])
     from msgflow.database import Database
 
     with Database(given["database"], memory_limit=given["memory_limit"]) as database:

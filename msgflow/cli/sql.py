@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -19,6 +19,9 @@ from msgflow.cli.options import (
 from msgflow.errors import UsageError
 from msgflow.files.default_files import DEFAULT_DATABASE
 from msgflow.files.text_file import read_text
+
+if TYPE_CHECKING:
+    from msgflow.result.query_result import QueryResult
 
 DEFAULT_LIMIT = 1_000
 SqlArgument = Annotated[
@@ -51,24 +54,20 @@ def command(
     `msgflow db schema` lists the views. Without a query, a terminal gets a prompt.
     """
     from msgflow.cli.output import print_result
-    from msgflow.confined.query import confined_sql
+    from msgflow.database import Database
+
+    def answer(query: str) -> QueryResult:
+        # Opened for each: at the prompt, others may write meanwhile.
+        with Database(database, memory_limit=memory_limit) as opened:
+            return opened.sql(query, limit=limit or None)
 
     if text is None and file is None and output is None and sys.stdin.isatty():
         from msgflow.cli.sql_prompt import prompt
 
-        prompt(
-            database,
-            lambda query: print_result(
-                confined_sql(database, query, limit=limit or None, memory_limit=memory_limit),
-                form,
-                None,
-                wide=wide,
-            ),
-        )
+        prompt(database, lambda query: print_result(answer(query), form, None, wide=wide))
         return
     query = sql_of(text, file, 'msgflow sql "SELECT * FROM run"')
-    result = confined_sql(database, query, limit=limit or None, memory_limit=memory_limit)
-    print_result(result, form, output, wide=wide)
+    print_result(answer(query), form, output, wide=wide)
 
 
 def sql_of(text: str | None, file: Path | None, example: str) -> str:

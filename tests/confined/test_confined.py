@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path
@@ -16,62 +17,62 @@ import pytest
 from processes import children_of, has_ended
 
 from msgflow.confined.process import ConfinedProcess, LateError
-from msgflow.confined.query import WarmSql, confined_query, confined_sql
+from msgflow.confined.query import WarmSql
 from msgflow.errors import DatabaseError, QueryError, UsageError
 
 SLOW = "SELECT levenshtein(repeat('a', 400000), repeat('b', 400000))"
+ASKING = """
+import sys; from msgflow.confined.query import WarmSql
+WarmSql(sys.argv[1], memory_limit=None, seconds=100)(sys.argv[2], 1)
+"""
 LARGE = "SELECT list_sum(range(700000000))"
 
 
-def test_rows_runs_and_notes_come_back(small_database: Path) -> None:
-    found = confined_sql(
-        small_database, "SELECT run_id FROM run ORDER BY ALL", limit=1, memory_limit=None
-    )
+@pytest.fixture
+def sql(small_database: Path) -> Iterator[WarmSql]:
+    with closing(WarmSql(small_database, memory_limit=None, seconds=30)) as warm:
+        yield warm
+
+
+def test_rows_and_notes_come_back(sql: WarmSql) -> None:
+    found = sql("SELECT run_id FROM run ORDER BY ALL", 1)
     assert found.table.to_pylist() == [{"run_id": 1}]
     assert found.notes == ["only the first 1 rows are shown; --limit raises that"]
-    topics = confined_query(
-        small_database, "topics", {"run": "morning", "where": "true"}, memory_limit=None
-    )
-    assert [run.title for run in topics.runs] == ["morning (1)"]
-    assert topics.header is not None
-    assert topics.header.name == "topics"
-    assert len(topics) == 1
 
 
 @pytest.mark.parametrize(
     ("kind", "text"), [(QueryError, "DELETE FROM run"), (UsageError, ""), (QueryError, "SELECT x")]
 )
-def test_errors_come_back(small_database: Path, kind: type[Exception], text: str) -> None:
+def test_errors_come_back(sql: WarmSql, kind: type[Exception], text: str) -> None:
     with pytest.raises(kind) as raised:
-        confined_sql(small_database, text, limit=None, memory_limit=None)
+        sql(text, 1)
     assert type(raised.value) is kind
 
 
 def test_a_missing_database(tmp_path: Path) -> None:
-    with pytest.raises(DatabaseError, match="no database"):
-        confined_sql(tmp_path / "x.duckdb", "SELECT 1", limit=None, memory_limit=None)
+    with (
+        closing(WarmSql(tmp_path / "x.duckdb", memory_limit=None, seconds=30)) as sql,
+        pytest.raises(DatabaseError, match="no database"),
+    ):
+        sql("SELECT 1", 1)
 
 
 def test_functions_of_duckdb_keep_to_the_memory(small_database: Path) -> None:
-    with pytest.raises(QueryError, match="more memory is needed"):
-        confined_sql(small_database, LARGE, limit=None, memory_limit="200MB")
-    with pytest.raises(QueryError, match="more memory is needed"):
-        confined_query(
-            small_database,
-            "info",
-            {"where": "list_sum(range(700000000)) > 0"},
-            memory_limit="200MB",
-        )
+    with (
+        closing(WarmSql(small_database, memory_limit="200MB", seconds=100)) as sql,
+        pytest.raises(QueryError, match="more memory is needed"),
+    ):
+        sql(LARGE, 1)
 
 
 def test_a_late_call_is_killed_and_the_next_one_works(small_database: Path) -> None:
-    asked = {"method": "sql", "path": str(small_database), "memory_limit": None, "named": {}}
+    asked = {"path": str(small_database), "memory_limit": None, "limit": None}
     with ConfinedProcess("msgflow.confined.query", seconds=4) as process:
         begin = time.monotonic()
         with pytest.raises(LateError, match="longer than 4 s"):
-            process.call("answer", asked | {"given": [SLOW]})
+            process.call("answer", asked | {"text": SLOW})
         assert time.monotonic() - begin < 60
-        assert b"one" in process.call("answer", asked | {"given": ["SELECT 1 AS one"]})
+        assert b"one" in process.call("answer", asked | {"text": "SELECT 1 AS one"})
 
 
 def test_one_child_answers_query_after_query(small_database: Path) -> None:
@@ -104,13 +105,13 @@ def test_another_thread_ends_a_query_and_the_next_one_works(small_database: Path
 
 
 def test_a_child_killed_before_it_begins_fails_no_call(small_database: Path) -> None:
-    asked = {"method": "sql", "path": str(small_database), "memory_limit": None, "named": {}}
+    asked = {"path": str(small_database), "memory_limit": None, "limit": None}
     before = set(children_of(os.getpid()))
     with ConfinedProcess("msgflow.confined.query") as process, ThreadPoolExecutor(1) as pool:
-        process.call("answer", asked | {"given": ["SELECT 1 AS one"]})
+        process.call("answer", asked | {"text": "SELECT 1 AS one"})
         (child,) = set(children_of(os.getpid())) - before
         os.kill(child, signal.SIGSTOP)
-        answer = pool.submit(process.call, "answer", asked | {"given": ["SELECT 2 AS two"]})
+        answer = pool.submit(process.call, "answer", asked | {"text": "SELECT 2 AS two"})
         time.sleep(0.5)  # the call waits
         os.kill(child, signal.SIGKILL)
         assert b"two" in answer.result(60)
@@ -158,7 +159,7 @@ def test_a_child_that_ends_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 
 def test_the_child_ends_with_its_parent(small_database: Path) -> None:
     parent = subprocess.Popen(
-        [sys.executable, "-m", "msgflow", "sql", SLOW, "--db", str(small_database)],
+        [sys.executable, "-c", ASKING, str(small_database), SLOW],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
@@ -173,12 +174,12 @@ def test_the_child_ends_with_its_parent(small_database: Path) -> None:
 
 
 def test_nothing_is_imported_from_the_current_folder(
-    small_database: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    sql: WarmSql, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder = tmp_path / "folder"
     folder.mkdir()
     for name in ("duckdb", "queue", "msgflow"):
         (folder / f"{name}.py").write_text(f"open({str(tmp_path / 'run')!r}, 'a')\n")
     monkeypatch.chdir(folder)
-    assert len(confined_sql(small_database, "SELECT 1", limit=None, memory_limit=None)) == 1
+    assert len(sql("SELECT 1", 1)) == 1
     assert not os.path.exists(tmp_path / "run")
