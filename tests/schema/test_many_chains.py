@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import duckdb
@@ -22,7 +22,8 @@ def connection(
     """Random graphs of hops, some with circles, each of a run of its own."""
     path = Path(shutil.copy(empty_database, tmp_path_factory.mktemp("chains") / "chains.duckdb"))
     random.seed(1)
-    hops, places = set(), set()
+    hops: set[tuple[object, ...]] = set()
+    places: set[tuple[object, ...]] = set()
     for run in range(1, RUNS + 1):
         size = random.randint(1, 6)
         places |= {(run, run * 10 + place) for place in range(size)}
@@ -48,7 +49,7 @@ def connection(
         yield opened
 
 
-def csv(head: str, rows: object) -> str:
+def csv(head: str, rows: Iterable[tuple[object, ...]]) -> str:
     return "\n".join([head, *(",".join(map(str, row)) for row in sorted(rows, key=str))]) + "\n"
 
 
