@@ -7,6 +7,8 @@ SELECT
     l.run_id,
     x.recording_id,
     l.start_ns,
-    max(l.end_ns) OVER (PARTITION BY x.recording_id ORDER BY l.start_ns) AS covered_until_ns
+    max(l.end_ns) OVER (
+        PARTITION BY l.run_id, x.recording_id ORDER BY l.start_ns
+    ) AS covered_until_ns
 FROM store.gap AS l
 JOIN derive.exposed_trace AS x ON l.trace_id = x.trace_id

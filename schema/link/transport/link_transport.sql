@@ -51,6 +51,11 @@ guess AS (
     JOIN store.process AS tp ON t.process_id = tp.process_id
     JOIN store.host AS th ON tp.host_id = th.host_id
 ),
+gap AS NOT MATERIALIZED (
+    SELECT recording_id, start_ns, covered_until_ns
+    FROM derive.recording_gap
+    WHERE run_id = only_run
+),
 exposed AS (
     SELECT u.run_id, u.take_id
     FROM (
@@ -58,7 +63,7 @@ exposed AS (
         FROM guess AS q
         JOIN derive.exposed_trace AS x ON q.sender_trace_id = x.trace_id
     ) AS u
-    ASOF JOIN derive.recording_gap AS g
+    ASOF JOIN gap AS g
         ON u.recording_id = g.recording_id
         AND u.sent_until_ns >= g.start_ns
     WHERE g.covered_until_ns >= u.sent_ns
@@ -69,7 +74,7 @@ exposed AS (
         FROM guess AS q
         JOIN derive.exposed_trace AS x ON q.receiver_trace_id = x.trace_id
     ) AS u
-    ASOF JOIN derive.recording_gap AS g
+    ASOF JOIN gap AS g
         ON u.recording_id = g.recording_id
         AND u.taken_ns >= g.start_ns
     WHERE g.covered_until_ns >= u.received_from_ns
