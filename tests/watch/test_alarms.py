@@ -14,6 +14,7 @@ from typing import Any
 
 import pyarrow as pa
 import pytest
+from thorough import few
 from typer.testing import CliRunner, Result
 
 from msgflow.cli.app import app
@@ -72,14 +73,11 @@ def test_a_violation_names_the_culprit_and_is_kept(watched, tmp_path: Path) -> N
     assert f"kept: msgflow why --db {directory}" in result.stderr
 
 
-@pytest.mark.parametrize(
-    ("condition", "exit_code"), [("max < 1 s", 0), ("max < 80 ms", 1)], ids=["met", "failed"]
-)
-def test_the_exit_code_is_that_of_verify(watched, condition: str, exit_code: int) -> None:
-    text = TARGETS.replace("max < 80 ms", condition)
-    result = watched(text, "--window", "8s", "--step", "8s")
-    assert result.exit_code == exit_code
-    assert ("violation: /scan → /filtered: latency 99.343 ms" in result.stdout) == bool(exit_code)
+def test_a_target_that_is_met(watched) -> None:
+    """The exit code is that of verify."""
+    result = watched(TARGETS.replace("80 ms", "1 s"), "--window", "8s", "--step", "8s")
+    assert result.exit_code == 0
+    assert "violation" not in result.stdout
 
 
 def test_what_was_never_measured(watched) -> None:
@@ -121,7 +119,7 @@ def test_a_target_on_part_of_a_path_names_the_culprit(tmp_path: Path) -> None:
 
 def test_what_was_kept_before_stays(watched, tmp_path: Path) -> None:
     """The same recording is watched twice: the name of its violation is taken."""
-    options = ("--window", "3s", "--step", "3s", "--keep-on-violation", tmp_path / "kept")
+    options = ("--window", "8s", "--step", "8s", "--keep-on-violation", tmp_path / "kept")
     for count in (1, 2, 2):
         watched(TARGETS, *options, "--keep-most", 2)
         kept = list((tmp_path / "kept").iterdir())
@@ -161,7 +159,7 @@ def test_what_came_before_is_kept_of_violations_only(watched) -> None:
     assert "--keep-on-violation DIR --keep-before 2s" in result.stderr
 
 
-@pytest.mark.parametrize("kilobytes", [100, 2_000])
+@pytest.mark.parametrize("kilobytes", few([100, 2_000], 2_000))
 def test_a_full_disk_ends_no_view(watched, tmp_path: Path, kilobytes: int) -> None:
     """There is room for nothing, or for the chunks but not for the database."""
     kept = tmp_path / "kept"
@@ -176,6 +174,7 @@ def test_a_full_disk_ends_no_view(watched, tmp_path: Path, kilobytes: int) -> No
     finally:
         subprocess.run(["umount", str(kept)], check=True)
     assert result.exit_code == 1
+    assert "violation: /scan → /filtered: latency 99.343 ms" in result.stdout
     assert len([line for line in result.stdout.splitlines() if " paths, " in line]) > 1
     said = " ".join(result.stderr.split())
     assert f"the violation is not kept in {kept}/violation-" in said

@@ -78,7 +78,8 @@ def test_keys_sort_and_pick_a_path(terminal: Terminal) -> None:
 def test_a_terminal_that_controls_no_session_has_no_keys(shared_traces: Path) -> None:
     side, other = pty.openpty()
     directory = str(shared_traces / "real_rotate")
-    command = [sys.executable, "-m", "msgflow", "watch", "--once", directory]
+    length = ("--window", "8s", "--step", "8s")
+    command = [sys.executable, "-m", "msgflow", "watch", "--once", *length, directory]
     with subprocess.Popen(command, stdin=other, stdout=other, start_new_session=True) as run:
         os.close(other)
         # The terminal fails when its program has ended.

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import duckdb
 import pytest
+from thorough import thorough
 
 from msgflow.clocks import read_clock_sync
 from msgflow.database import Database
@@ -58,11 +59,16 @@ def test_what_most_windows_have_shown_counts_where_one_doubts_it() -> None:
 @pytest.mark.parametrize(
     "of_user",
     [
-        None,
-        "links: [{kind: direct, node: /filter, inputs: [/scan], outputs: [/rosout]}]",
-        "links: [{kind: direct, node: /later, inputs: [/scan], outputs: [/filtered]}]",
+        thorough(None, id="alone"),
+        pytest.param(
+            "links: [{kind: direct, node: /filter, inputs: [/scan], outputs: [/rosout]}]",
+            id="beside_others",
+        ),
+        thorough(
+            "links: [{kind: direct, node: /later, inputs: [/scan], outputs: [/filtered]}]",
+            id="beside_others_that_do_not_fit",
+        ),
     ],
-    ids=["alone", "beside_others", "beside_others_that_do_not_fit"],
 )
 def test_what_is_learned_is_declared(
     shared_traces: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, of_user: str | None
