@@ -397,6 +397,7 @@ def live(directory: Path, watcher: Watcher) -> list[WindowReport]:
     return found
 
 
+@pytest.mark.thorough
 def test_a_node_that_hangs_for_longer_than_a_window(hang: Path, tmp_path: Path) -> None:
     """What waits for it is counted once it is known."""
     found = reports(hang, window=0.4, step=0.2)
