@@ -378,9 +378,9 @@ def test_durations_between_clocks_that_are_apart_are_marked(
 
 
 def test_hosts_and_nodes_of_the_slowest_flow_stand_out_in_the_graph(
-    systems: Path, serve: Serve, page: Page
+    systems: Path, report: Report, page: Page
 ) -> None:
-    page.open(serve(systems).address)
+    page.open(report(systems))
     page.go("#/graph")
     with open_db(systems) as opened:
         busy = opened.query("callbacks").to_arrow().to_pylist()
