@@ -133,15 +133,14 @@ _OPTIONS = {
     "links": " --run declared",
     "objects": " --limit 8",
     "path-breakdown": " --limit 12",
-    "preemption": " --limit 5",
+    "scheduling --measure preemption": " --limit 5",
     "topics --measure unmatched": " --limit 5",
     "waits": " --limit 5",
     "waits --by instance": " --limit 5",
     "waits --by pair": " --limit 5",
 }
-_OF_THE_KERNEL = ("callback-schedule", "cpu-usage", "preemption", "thread-states", "wakeup-latency")
 _SETUPS = {
-    **dict.fromkeys(_OF_THE_KERNEL, "msgflow simulate cpu_hog -o trace\nmsgflow ingest trace\n"),
+    "scheduling": "msgflow simulate cpu_hog -o trace\nmsgflow ingest trace\n",
     "links": (
         "msgflow simulate periodic_async -o declared\n"
         "msgflow simulate demo -o undeclared\n"

@@ -38,7 +38,7 @@ QUERIES_BY_WORD = {
     "blocking": ("waits-pair",),
     "blocked": ("waits-pair", "waits"),
     "interference": ("waits-pair",),
-    "preemption": ("waits-pair",),
+    "preemption": ("scheduling-preemption", "waits-pair"),
     "latency": ("e2e-latency", "topics-latency", "service-latency", "action-latency"),
     "latencie": ("e2e-latency", "topics-latency", "service-latency", "action-latency"),
     "end-to-end": ("e2e-latency",),
@@ -69,6 +69,11 @@ QUERIES_BY_WORD = {
     "run": ("info",),
     "proces": ("info-processes",),
     "diagnostic": ("info-findings",),
+    # What queries were called.
+    "callback-schedule": ("scheduling",),
+    "thread-state": ("scheduling-threads",),
+    "cpu-usage": ("scheduling-cpu",),
+    "wakeup-latency": ("scheduling-wakeup",),
 }
 """Words that people use, without the s of a plural, and the queries that answer them."""
 

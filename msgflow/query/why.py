@@ -32,7 +32,7 @@ _BY_NODE = {
     "timer": ("timers",),
     "service": ("service-latency",),
 }
-_BY_STATE = {"preempted": "preemption", "runnable": "wakeup-latency"}
+_BY_STATE = {"preempted": "preemption", "runnable": "wakeup"}
 _BY_TOPIC = dict.fromkeys(("network_or_idle", "undecided"), ("topics", "--measure", "latency"))
 _LINKS = ("suggest", "links")
 # What a path has in place of a topic without a name.
@@ -259,7 +259,7 @@ def _steps(
         yield _LINKS
     longest = max(pieces, key=lambda row: row["duration_ns"])
     if of_state := _BY_STATE.get(longest["state"] or ""):
-        yield ("query", of_state)
+        yield ("query", "scheduling", "--measure", of_state)
     # What the trace has no name for cannot be asked for.
     elif (
         longest["node"] is not None

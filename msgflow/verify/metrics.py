@@ -146,26 +146,26 @@ SUBJECTS: dict[str, Subject] = {
             ),
             "wait": Metric("waits", "wait_{}_ns", Dimension.TIME, ("median", "max")),
             "cpu": Metric(
-                "callback-schedule", "running_{}_ns", Dimension.TIME, ("median", "p99", "max"),
+                "scheduling", "running_{}_ns", Dimension.TIME, ("median", "p99", "max"),
                 lacking=_NOT_TRACED,
             ),
             "preempted": Metric(
-                "callback-schedule", "preempted_ns / nullif(total_ns, 0)", Dimension.SHARE,
+                "scheduling", "preempted_ns / nullif(total_ns, 0)", Dimension.SHARE,
                 worst="preemption", lacking=_NOT_TRACED,
             ),
         },
-        dict.fromkeys(("callbacks", "waits", "callback-schedule"), "node || ' ' || callback"),
+        dict.fromkeys(("callbacks", "waits", "scheduling"), "node || ' ' || callback"),
         {
             "callback": Filter(
                 {
                     "callbacks": ("callback", "symbol"),
                     "waits": ("callback",),
-                    "callback-schedule": ("callback",),
+                    "scheduling": ("callback",),
                 },
                 _CALLBACKS, "callback",
             ),
             "node": Filter(
-                dict.fromkeys(("callbacks", "waits", "callback-schedule"), ("node",)),
+                dict.fromkeys(("callbacks", "waits", "scheduling"), ("node",)),
                 _NODES, "node",
             ),
         },
@@ -249,19 +249,19 @@ SUBJECTS: dict[str, Subject] = {
                 "executor-usage", "callback_share", Dimension.SHARE, (), "callbacks"
             ),
             "wakeup": Metric(
-                "wakeup-latency", "{}_ns", Dimension.TIME, ("median", "p99", "max"),
+                "scheduling-wakeup", "{}_ns", Dimension.TIME, ("median", "p99", "max"),
                 lacking=_NOT_TRACED,
             ),
         },
         {
             "executor-usage": "printf('%s, thread %d', nodes, tid)",
-            "wakeup-latency": "printf('%s, thread %d', nodes, tid)",
+            "scheduling-wakeup": "printf('%s, thread %d', nodes, tid)",
         },
         {
             "process": Filter(
                 {
                     "executor-usage": ("process", "nodes"),
-                    "wakeup-latency": ("process", "nodes"),
+                    "scheduling-wakeup": ("process", "nodes"),
                 },
                 _PROCESSES, "process",
             ),

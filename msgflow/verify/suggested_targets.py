@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 Row = dict[str, Any]
 QUERIES = (
-    "e2e-latency", "timers", "callback-schedule", "topics-rate", "topics-delivery",
-    "service-latency", "action-latency", "wakeup-latency",
+    "e2e-latency", "timers", "scheduling", "topics-rate", "topics-delivery",
+    "service-latency", "action-latency", "scheduling-wakeup",
 )  # fmt: skip
 # Of a good run nearly all messages are delivered.
 _DELIVERED_PERCENT = 99
@@ -44,11 +44,11 @@ def suggest_targets(run: Run, results: Mapping[str, Sequence[Row]], margin: floa
     entries = [
         *_paths(results["e2e-latency"], margin),
         *_timers(results["timers"], margin),
-        *_callbacks(results["callback-schedule"], margin),
+        *_callbacks(results["scheduling"], margin),
         *_topics(results["topics-rate"]),
         *_calls(results["service-latency"], "service", "round_trip", "round_trip", margin),
         *_calls(results["action-latency"], "action", "goal", "result", margin),
-        *_processes(results["wakeup-latency"], margin),
+        *_processes(results["scheduling-wakeup"], margin),
     ]
     lines = [
         f"# What run {json.dumps(run.name)} met, and {100 * margin:.4g} % more: review it, keep"

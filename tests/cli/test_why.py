@@ -91,7 +91,7 @@ def test_it_names_what_took_the_cpu(
     assert (
         "of the slowest flow another thread had the CPU: stress (priority 100, taken from" in said
     )
-    assert f"next: msgflow query preemption --db {path}" in said
+    assert f"next: msgflow query scheduling --measure preemption --db {path}" in said
     assert "preempted stress" in " ".join(result.stdout.split())
 
 

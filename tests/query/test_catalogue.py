@@ -118,6 +118,14 @@ def test_what_may_be_meant_comes_before_what_there_is() -> None:
         ("executor_wait", "it is a view: msgflow sql 'FROM executor_wait'"),
         ("take", "it is a view: msgflow sql 'FROM take'"),
         ("../x/../node.", "msgflow query --list"),
+        ("callback-schedule", "msgflow query scheduling"),
+        ("thread-states", "msgflow query scheduling --measure threads"),
+        ("cpu-usage", "msgflow query scheduling --measure cpu"),
+        (
+            "preemption",
+            "msgflow query scheduling --measure preemption or msgflow query waits --by pair",
+        ),
+        ("wakeup-latency", "msgflow query scheduling --measure wakeup"),
     ],
 )
 def test_words_for_what_a_query_answers(name: str, hint: str) -> None:

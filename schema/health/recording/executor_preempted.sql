@@ -7,7 +7,7 @@
 --     like any other one.
 -- cure: Give the executor a real-time priority (chrt --fifo), or a CPU of its own (taskset,
 --     cpusets); make what takes the CPU nicer (nice, cgroups) or move it away. msgflow query
---     preemption says what that is.
+--     scheduling --measure preemption says what that is.
 -- grain: one row per thread of an executor
 -- severity: warning
 -- when: store.thread_state

@@ -1,9 +1,12 @@
--- name: callback-schedule
+-- name: scheduling
 -- title: CPU time of callbacks, and what kept them from the CPU
 -- description: How the time of callbacks divides into what their thread did, as a kernel trace
 --     shows it (docs/scheduling.md). The parts add up to the durations. Without kernel traces there
 --     are no rows. Callbacks that were kept from the CPU longest come first.
 -- grain: one row per callback object
+-- variant: measure VARCHAR {callbacks|threads|cpu|preemption|wakeup} = 'callbacks'  What is
+--     measured: the states of callbacks, those of threads, the CPU time of threads of all
+--     processes, who took the CPU from which thread, or how long woken threads waited for one
 -- column: run_id BIGINT             Run
 -- column: node VARCHAR [node]  Node of the callback
 -- column: callback VARCHAR [callback]  What triggers it
