@@ -44,11 +44,11 @@ The first rows show; `to_arrow`, `to_pandas` and `to_polars` have all of them, i
     ["db.graph()"],
     """## pandas
 
-Latency of the longest path over time: `series` has a column per path.""",
+Latency of the longest path over time: `flows` has a row per flow.""",
     [
-        """series = db.series("paths").with_times("relative").to_pandas()
-path = max(series.columns[1:], key=lambda name: name.count("→"))
-latency = series.set_index("at_s")[path].dropna().astype(float) * 1e3
+        """flows = db.query("flows").with_times("relative").to_pandas()
+path = max(flows["path"], key=lambda name: name.count("→"))
+latency = flows[flows["path"] == path].set_index("root_s")["latency_s"].dropna().astype(float) * 1e3
 axes = latency.plot(style=".", figsize=(8, 3), ylabel="ms", title="end to end")
 latency.rolling(10).median().plot(ax=axes, xlabel="s");"""
     ],

@@ -943,35 +943,6 @@ class Database:
         part = Slice(run, start, end, skip_first)
         return self._export(export_parquet, directory, views, part, force)
 
-    def series(
-        self,
-        what: str = "paths",
-        *,
-        run: str | int | None = None,
-        start: str | int | None = None,
-        end: str | int | None = None,
-        skip_first: float | None = None,
-    ) -> QueryResult:
-        """Return measured values side by side: a row per moment, a column per thing [ns].
-
-        Args:
-            what: 'paths' (latency of first arrivals), 'callbacks' (duration) or 'topics' (latency
-                from publication to take).
-            run, start, end, skip_first: what to read, see `msgflow.Slice`; one run.
-
-        Raises:
-            UsageError: not exactly one run, a time that cannot be read, or nothing of that kind.
-            QueryError: the database could not run it.
-            DatabaseError: the file cannot be opened.
-        """
-        from msgflow.export.series import What, read_series
-
-        if what not in set(What):
-            raise UsageError(f"there are no series of that — {what}", f"one of {', '.join(What)}")
-        connection = self.connection
-        part = Slice(run, start, end, skip_first)
-        return self._ask(lambda: read_series(connection, What(what), part))
-
     def export_perfetto(
         self,
         path: str | Path,

@@ -21,6 +21,9 @@ _INSTEAD = {
     ("msgflow export otlp", "--endpoint"): (
         "write a file with -o: Jaeger opens it, and a collector sends it on (docs/export.md)"
     ),
+    ("msgflow export", "series"): (
+        "msgflow query flows --times relative -o FILE.csv; for PlotJuggler msgflow export mcap"
+    ),
     ("msgflow graph", "svg"): "msgflow graph | dot -Tsvg; or msgflow ui, page Graph",
 }
 _CANNOT_WRITE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)

@@ -10,7 +10,6 @@ import typer
 
 from msgflow.cli.completion import complete, complete_path
 from msgflow.cli.options import (
-    OUTPUT,
     SELECTION,
     DatabaseOption,
     MemoryLimitOption,
@@ -19,10 +18,7 @@ from msgflow.cli.options import (
     targets_option,
 )
 from msgflow.cli.slice_options import with_slice
-from msgflow.errors import UsageError
-from msgflow.export.series import What
 from msgflow.files.default_files import DEFAULT_DATABASE, DEFAULT_PATHS
-from msgflow.result.times import Times
 from msgflow.run.slice import ALL_RUNS, LATEST, Slice
 
 if TYPE_CHECKING:
@@ -268,50 +264,6 @@ def otlp(
         f"{count(traces.traces, 'trace')}, {count(traces.spans, 'span')},"
         f" {count(traces.links, 'link')} written to {output}"
     )
-
-
-@app.command("series")
-@with_slice()
-def series(
-    output: Annotated[
-        Path, output_option(help="FILE.csv or FILE.parquet, to write or replace")
-    ] = Path("msgflow-series.csv"),
-    what: Annotated[
-        What,
-        typer.Option(
-            "--what",
-            help="Latency of paths, duration of callbacks, or time from publication to take of"
-            " topics",
-            rich_help_panel=SELECTION,
-        ),
-    ] = What.PATHS,
-    part: Slice = LATEST,
-    times: Annotated[
-        Times,
-        typer.Option(
-            "--times",
-            help="First column: seconds since the start of the run (relative), seconds or ns since"
-            " the epoch, or UTC as text (iso); with all but ns, values are in seconds",
-            rich_help_panel=OUTPUT,
-        ),
-    ] = Times.RELATIVE,
-    memory_limit: MemoryLimitOption = None,
-    database: DatabaseOption = DEFAULT_DATABASE,
-) -> None:
-    """Write measured values side by side: one row per moment, one column per path.
-
-    PlotJuggler and spreadsheets draw such files: the first column is the time.
-    """
-    from msgflow.cli.output import print_result
-    from msgflow.database import Database
-    from msgflow.export.formats import Format, format_of
-
-    form = format_of(output)
-    if form not in (Format.CSV, Format.PARQUET):
-        raise UsageError(f"series are written as CSV or Parquet — {output}", "FILE.csv")
-    with Database(database, memory_limit=memory_limit) as opened:
-        result = opened.series(what, **asdict(part))
-    print_result(result.with_times(times), form, output)
 
 
 def _report(exported: Sequence[ExportedView], directory: Path) -> None:

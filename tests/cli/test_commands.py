@@ -59,7 +59,6 @@ def test_every_command_has_help(msgflow: Msgflow, command: str) -> None:
         "export otlp -o traces.json",
         "export mcap -o run.mcap",
         "export csv -o rows",
-        "export series -o series.csv",
         "ui --no-browser",
     ],
 )
