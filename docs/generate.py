@@ -103,6 +103,9 @@ one, or between commas. On every query `--where CONDITION` takes SQL on its colu
 `--sort COLUMN[:desc]` and `--limit N` order and cut; `--slowest N` is there where rows take time.
 `Database.query` has keywords of the same names.
 
+`msgflow clocks`, `graph`, `info` and `links` are commands: they take the same options, and
+`Database.query` asks for their rows, as `db.query("info", section="nodes")`.
+
 """
 
 _HEALTH = """\
@@ -115,7 +118,7 @@ A *finding* is something worth knowing before you trust a number, with its cause
 missing, `warning` where they may be, and `info`.
 
 - `msgflow check`, the page Overview and agents show the errors and warnings of a run.
-- `msgflow query info --section findings`, `msgflow info` and the view
+- `msgflow info`, `msgflow info --section findings` and the view
   [finding](data-model.md#finding) have all.
 - `msgflow ingest` prints the errors and warnings of a new run in short.
 - `msgflow check --detail` shows all, and which rules of the phase database are broken.
@@ -129,7 +132,8 @@ _OPTIONS = {
     "callbacks --each": " --slowest 5",
     "critical-path": " --to /control/cmd",
     "flows": " --slowest 5",
-    "graph": " --limit 8",
+    "graph": " --format table --limit 8",
+    "info": " --section runs",
     "links": " --run declared",
     "objects": " --limit 8",
     "path-breakdown": " --limit 12",
@@ -238,9 +242,10 @@ def data_model() -> str:
 def queries() -> str:
     """Return the text of queries.md."""
     index = "".join(
-        f"| [{header.words}](queries/{base}.md) | {header.title} |\n"
+        f"| [{name}](queries/{base}.md) | {header.title} |\n"
         for base in query_names()
         for header in _variants(base)
+        if (name := header.command.removeprefix("msgflow query "))
     )
     return _QUERIES.format(index=index).rstrip() + "\n"
 
@@ -256,7 +261,7 @@ def query_page(base: str) -> str:
         if header.words != base:
             parts.append(f"\n## {header.words}\n")
         options = _OPTIONS.get(header.words, "")
-        example = f"\n```console\n$ msgflow query {header.words}{options}\n```\n"
+        example = f"\n```console\n$ {header.command}{options}\n```\n"
         parts.append(f"\n**{header.title}.** {_body(header, example)}")
     return "".join(parts)
 

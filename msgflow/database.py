@@ -537,7 +537,10 @@ class Database:
         take_id: int | None = None,
         callback_instance_id: int | None = None,
         run: str | int | None = None,
+        from_: str | None = None,
         case: str = "every_pair",
+        by: str = "piece",
+        detail: str = "short",
         internal: bool = False,
     ) -> QueryResult:
         """Return what a message waited for: the query critical-path for the flow up to its take.
@@ -547,7 +550,9 @@ class Database:
         Args:
             place, at, publication_id, take_id, callback_instance_id, run: the message, as `flow`
                 takes them.
+            from_: topic or node where the flow starts; any when None.
             case: the flows to the take that count; the longest of them is shown.
+            by, detail: rows, as the query has them.
             internal: count messages on ROS's own topics, too.
 
         Raises:
@@ -563,8 +568,9 @@ class Database:
             lambda: find_take(connection, _start(connection, place, given, at, run))
         )
         return self.query(
-            "critical-path", run=run_id, take=number, to=topic, case=case, internal=internal
-        )
+            "critical-path", run=run_id, take=number, to=topic, internal=internal,
+            **{"from": from_, "case": case, "by": by, "detail": detail},
+        )  # fmt: skip
 
     def flow_page(self, flow: Flow, path: str | Path) -> int:
         """Write the timeline of a flow into one file that any browser opens; return its bytes.

@@ -13,7 +13,8 @@
 -- param: slowest BIGINT {1..} = 1  Number of flows
 -- param: quantile VARCHAR {median|p90|p95|p99|max} = NULL  Instead, the flow at this quantile of
 --     the latency
--- param: take BIGINT = NULL  Instead, the longest flow to this take_id
+-- param: take BIGINT = NULL  Instead, the longest flow to this take_id; on the command line:
+--     msgflow flow --take ID --why
 -- param: case VARCHAR {first|last|newest|every_pair} = 'first'  Arrivals that count: the
 --     first or last of each root, that of the newest root, or all
 -- param: by VARCHAR {piece|node|part} = 'piece'  Rows by piece, by node, or by activity

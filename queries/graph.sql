@@ -1,8 +1,8 @@
 -- name: graph
 -- title: Which node sends what to which, how often and how fast
 -- description: The computation graph: nodes, and the topics, services and actions between them,
---     with rates and latencies. The services of an action are no rows of their own. `msgflow graph`
---     draws it.
+--     with rates and latencies. The services of an action are no rows of their own. As dot,
+--     mermaid and json it is for programs that draw it.
 -- grain: one row per node, topic, service or action, and what the node does with it
 -- column: run_id BIGINT            Run
 -- column: kind VARCHAR             What the node does: 'publish', 'receive', 'call', 'serve', or

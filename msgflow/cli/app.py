@@ -59,7 +59,8 @@ COMMANDS = {
 """The commands in the order in which a user needs them, with their summaries in the help.
 
 Each is a module of `msgflow.cli` with a function `command`, or a group `app`. Its class `Command`,
-if it has one, reads the words of the function.
+if it has one, reads the words of the function. Its function `asked` returns the command of a query
+if the words behind the name ask that.
 """
 _SIMULATOR = (
     "pip install ros2-msgflow-sim; or in a checkout of msgflow:"
@@ -94,7 +95,7 @@ class RootGroup(TyperGroup):
                 hint = f"msgflow query {args[0]}"
                 raise UsageError(f"there is no such command — {args[0]}", hint)
         name, summary, rest = super().resolve_command(ctx, args)
-        return name, summary and _imported(str(name)), rest
+        return name, summary and _imported(str(name), rest), rest
 
     def main(self, *args: Any, **options: Any) -> None:
         """Run a command line; an exception becomes a message and an exit code."""
@@ -134,8 +135,10 @@ def _added() -> EntryPoints:
     return entry_points(group="msgflow.commands")
 
 
-def _imported(name: str) -> Any:
+def _imported(name: str, words: list[str]) -> Any:
     module = import_module(f"msgflow.cli.{name}") if name in COMMANDS else _added()[name].load()
+    if (asked := getattr(module, "asked", None)) and (found := asked(words)):
+        return found
     around = typer.Typer(add_completion=False)
     around.callback()(lambda: None)
     if hasattr(module, "app"):

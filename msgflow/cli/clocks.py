@@ -2,21 +2,36 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from msgflow.cli.options import (
-    DatabaseOption,
-    FormatOption,
-    OutputOption,
-    RunOption,
-    WideOption,
-    with_default,
-)
+from msgflow.cli.options import DatabaseOption, RunOption
+from msgflow.cli.query_command import AskingGroup, print_rows
 from msgflow.files.default_files import DEFAULT_DATABASE
 
-app = typer.Typer(cls=with_default("show"))
+if TYPE_CHECKING:
+    from msgflow.result.query_result import QueryResult
+
+
+class _ClocksGroup(AskingGroup):
+    query = "clocks"
+    default = "show"
+
+    def write(self, result: QueryResult, form: Any, given: dict[str, Any]) -> None:
+        """Write the clocks, and say whether times compare."""
+        from msgflow.cli.output import print_status
+        from msgflow.database import Database
+
+        print_rows(result, form, given)
+        if given["own_by"] != "pair":
+            with Database(given["database"]) as opened:
+                verdicts = opened.clock_verdicts(run=given["run"])
+            for verdict in verdicts:
+                print_status(verdict)
+
+
+app = typer.Typer(cls=_ClocksGroup)
 
 
 @app.command("apply")
@@ -49,47 +64,10 @@ def apply(
                 packets = sum(pair["packet_count"] for pair in pairs)
                 print_status(
                     f"by {messages:,} messages and {packets:,} network packets:"
-                    " msgflow clocks pairs"
+                    " msgflow clocks --by pair"
                 )
             findings = opened.query(
                 "info-findings", run=one.run_id, where="starts_with(name, 'clock_')"
             )
             for finding in findings.to_arrow().to_pylist():
                 print_note(f"{finding['name']}: {finding['detail']}")
-
-
-@app.command("show")
-def show(
-    run: RunOption = None,
-    form: FormatOption = None,
-    wide: WideOption = False,
-    output: OutputOption = None,
-    database: DatabaseOption = DEFAULT_DATABASE,
-) -> None:
-    """List the clocks and their corrections (the query clocks), and say whether times compare."""
-    from msgflow.cli.output import print_result, print_status
-    from msgflow.database import Database
-
-    with Database(database) as opened:
-        result = opened.query("clocks", run=run)
-        verdicts = opened.clock_verdicts(run=run)
-    print_result(result, form, output, wide=wide)
-    for verdict in verdicts:
-        print_status(verdict)
-
-
-@app.command("pairs")
-def pairs(
-    run: RunOption = None,
-    form: FormatOption = None,
-    wide: WideOption = False,
-    output: OutputOption = None,
-    database: DatabaseOption = DEFAULT_DATABASE,
-) -> None:
-    """Count the messages and packets that clocks are corrected by (the query clocks --by pair)."""
-    from msgflow.cli.output import print_result
-    from msgflow.database import Database
-
-    with Database(database) as opened:
-        result = opened.query("clocks-pair", run=run)
-    print_result(result, form, output, wide=wide)

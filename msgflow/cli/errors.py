@@ -24,6 +24,8 @@ _INSTEAD = {
     ("msgflow export", "series"): (
         "msgflow query flows --times relative -o FILE.csv; for PlotJuggler msgflow export mcap"
     ),
+    ("msgflow query critical-path", "--take"): "msgflow flow --take ID --why",
+    ("msgflow clocks", "pairs"): "msgflow clocks --by pair",
     ("msgflow graph", "svg"): "msgflow graph | dot -Tsvg; or msgflow ui, page Graph",
 }
 _CANNOT_WRITE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)

@@ -24,6 +24,7 @@ from msgflow.cli.options import (
 )
 from msgflow.errors import UsageError
 from msgflow.files.default_files import DEFAULT_DATABASE
+from msgflow.query.catalogue import load_query
 from msgflow.sql.statement import internal_sql
 from msgflow.text.values import format_duration
 
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from msgflow.database import Database
 
 _START = "Which message"
+_WHY = "With --why"
 
 
 class FlowFormat(StrEnum):
@@ -50,6 +52,7 @@ _SUFFIXES = {
 
 
 _DECLARED = {param.name: param for param in internal_sql().header("flow_steps").params}
+_OF_WHY = {param.name: param for param in load_query("critical-path").params}
 
 
 def command(
@@ -117,16 +120,18 @@ def command(
             rich_help_panel=OUTPUT,
         ),
     ] = False,
+    by: Annotated[str | None, header_option(_OF_WHY["by"], _WHY)] = None,
+    detail: Annotated[str | None, header_option(_OF_WHY["detail"], _WHY)] = None,
     case: Annotated[
         str | None,
-        case_option("With --slowest: flows that count", rich_help_panel=_START),
+        case_option("With --slowest or --why: flows that count", rich_help_panel=_START),
     ] = None,
     from_: Annotated[
         list[str] | None,
         typer.Option(
             "--from",
             metavar="NAME",
-            help="With --slowest: topics or nodes where flows start; globs",
+            help="With --slowest or --why: topics or nodes where flows start; globs",
             autocompletion=complete("place"),
             rich_help_panel=_START,
         ),
@@ -188,7 +193,7 @@ def command(
         form = by_suffix(output, _SUFFIXES)
     if form is FlowFormat.HTML and output is None:
         output = Path("flow.html")
-    if slowest is None and (from_ or to or case):
+    if slowest is None and (to or ((from_ or case) and not why)):
         raise UsageError("--from, --to and --case choose among the slowest flows", "--slowest 1")
     if why:
         unfit: dict[str, object] = {"direction": direction, "depth": depth, "limit": limit}
@@ -197,6 +202,8 @@ def command(
             raise UsageError(f"--why goes without --{refused[0]}", "leave out one of them")
         if form is FlowFormat.HTML:
             raise UsageError("--why writes rows, no page", "--format table or json")
+    elif by or detail:
+        raise UsageError("--by and --detail are about rows; a flow is a tree", "add --why")
     elif wide:
         raise UsageError("--wide shows all columns of a table; a flow is a tree", "--why --wide")
     if slowest is not None and slowest > 1 and why:
@@ -229,7 +236,10 @@ def command(
             ids = ("request_id", "response_id")
             start = {name: value for name, value in found[0].items() if name not in ids}
             counted = case or ("every_pair" if slowest is None else "first")
-            result = opened.flow_why(**start, case=counted, internal=internal)
+            begin = ",".join(from_ or []) if slowest is None else ""
+            words = {"from_": begin, "by": by, "detail": detail}
+            chosen: dict[str, Any] = {name: value for name, value in words.items() if value}
+            result = opened.flow_why(**start, case=counted, internal=internal, **chosen)
             shown = None if form is None else Format(form.value)
             print_result(result, shown, output, wide=wide)
             return

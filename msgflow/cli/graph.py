@@ -1,50 +1,70 @@
-"""`msgflow graph`: the graph of nodes and topics, for programs that draw it."""
+"""`msgflow graph`: the graph of nodes and topics, for programs that draw it, or as rows."""
 
 from __future__ import annotations
 
-from dataclasses import asdict
-from typing import Annotated
+from enum import StrEnum
+from typing import TYPE_CHECKING, Annotated, Any
 
-from msgflow.cli.options import (
-    DatabaseOption,
-    InternalOption,
-    OutputOption,
-    format_option,
-)
-from msgflow.cli.slice_options import with_slice
-from msgflow.export.graph import GraphFormat
-from msgflow.files.default_files import DEFAULT_DATABASE
-from msgflow.run.slice import LATEST, Slice
+from msgflow.cli.options import format_option
+from msgflow.cli.query_command import build_command, chosen_by, print_rows
+from msgflow.export.formats import Format
+from msgflow.export.graph import Graph, GraphFormat, graph_format
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from msgflow.result.query_result import QueryResult
 
 
-@with_slice()
-def command(
-    part: Slice = LATEST,
-    internal: InternalOption = False,
-    form: Annotated[
-        GraphFormat | None,
-        format_option("A graph language, or JSON", show_default="by the suffix of FILE, else dot"),
-    ] = None,
-    output: OutputOption = None,
-    database: DatabaseOption = DEFAULT_DATABASE,
-) -> None:
-    """Write the graph of nodes, topics, services and actions, with rates and latencies.
+class AnyFormat(StrEnum):
+    """A format of graphs, or of rows."""
 
-    Topics show their rate. Arrows to receivers show median and p95 from
-    publication to take, arrows to services those of the round trip. Dashed
-    (periodic_async) and dotted (partial_sync, approximate_sync) arrows lead to what
-    an indirect link causes. Nodes of one executor stand together.
-    """
+    DOT = "dot"
+    MERMAID = "mermaid"
+    JSON = "json"
+    TABLE = "table"
+    CSV = "csv"
+    CSV_SAFE = "csv-safe"
+    JSONL = "jsonl"
+    PARQUET = "parquet"
+    MARKDOWN = "markdown"
+
+
+_FormatOption = Annotated[
+    AnyFormat | None,
+    format_option(
+        "The graph as dot, mermaid or json; its rows as table, csv, csv-safe, jsonl, parquet,"
+        " markdown",
+        metavar="FORMAT",
+        show_default="by the suffix of FILE, else dot",
+    ),
+]
+
+
+def asked(words: list[str]) -> Any:
+    """Return the command of the query."""
+    return build_command(
+        chosen_by("graph", words), option=_FormatOption, form_of=_form, write=_write
+    )
+
+
+def _form(form: AnyFormat | None, path: Path | None) -> GraphFormat | Format:
+    if form is None:
+        return graph_format(path)
+    return GraphFormat(form) if form in set(GraphFormat) else Format(form)
+
+
+def _write(result: QueryResult, form: Any, given: dict[str, Any]) -> None:
     from msgflow.cli.output import print_note, print_runs, print_text
-    from msgflow.database import Database
-    from msgflow.export.graph import graph_format
+    from msgflow.run.choice import choose_one
 
-    form = form or graph_format(output)
-    with Database(database) as opened:
-        graph = opened.graph(**asdict(part), internal=internal)
-    print_runs([graph.run])
-    print_text(graph.to(form), output)
-    if not graph.rows:
+    if isinstance(form, Format):
+        print_rows(result, form, given)
+        return
+    run = choose_one(result.runs, given["run"], "a graph")
+    print_runs([run])
+    print_text(Graph(run, result, result.notes).to(form), given["output"])
+    if not len(result):
         print_note("nothing was sent or received")
-    for note in graph.notes:
+    for note in result.notes:
         print_note(note)

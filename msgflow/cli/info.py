@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Annotated, Any
+
+from msgflow.cli.header_options import header_option
 from msgflow.cli.options import (
+    SELECTION,
     DatabaseOption,
     InternalOption,
     OutputOption,
     RunOption,
     WideOption,
 )
+from msgflow.cli.query_command import build_command, choice_of, chosen_by
 from msgflow.cli.sections import (
     SectionsFormat,
     SectionsFormatOption,
@@ -18,11 +23,22 @@ from msgflow.cli.sections import (
     whole_sections,
 )
 from msgflow.files.default_files import DEFAULT_DATABASE
+from msgflow.query.catalogue import load_query
 
 SECTIONS = ("runs", "hosts", "processes", "nodes", "topics", "counts", "findings")
+_SECTION = load_query("info").variant
+
+
+def asked(words: list[str]) -> Any:
+    """Return the command of the query, where a section is chosen."""
+    return build_command(chosen_by("info", words)) if choice_of(_SECTION, words) else None
 
 
 def command(
+    section: Annotated[
+        str | None,
+        header_option(_SECTION, SELECTION),
+    ] = None,
     run: RunOption = None,
     internal: InternalOption = False,
     form: SectionsFormatOption = None,
@@ -32,7 +48,7 @@ def command(
 ) -> None:
     """Print what a database holds: runs, hosts, processes, nodes, topics, counts, data quality.
 
-    Each section is a named query: `msgflow query info --section nodes`, `msgflow query topics`.
+    With --section it takes the options of queries: msgflow info --section nodes --help.
     """
     from msgflow.cli.output import is_screen, print_note, print_text
     from msgflow.database import Database

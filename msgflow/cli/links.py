@@ -7,21 +7,20 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from msgflow.cli.options import (
-    DatabaseOption,
-    FormatOption,
-    OutputOption,
-    RunOption,
-    WideOption,
-    with_default,
-)
+from msgflow.cli.options import DatabaseOption, RunOption
+from msgflow.cli.query_command import AskingGroup
 from msgflow.files.default_files import DEFAULT_DATABASE
 
 if TYPE_CHECKING:
     from msgflow.database import Database
     from msgflow.links import AppliedLinks
 
-app = typer.Typer(cls=with_default("list"))
+
+class _LinksGroup(AskingGroup):
+    query = "links"
+
+
+app = typer.Typer(cls=_LinksGroup)
 
 
 @app.command("apply")
@@ -62,20 +61,3 @@ def print_applied(opened: Database, one: AppliedLinks) -> None:
     )
     for finding in findings.to_arrow().to_pylist():
         print_note(f"{finding['name']} ({finding['count']}): {finding['detail']}")
-
-
-@app.command("list")
-def list_links(
-    run: RunOption = None,
-    form: FormatOption = None,
-    wide: WideOption = False,
-    output: OutputOption = None,
-    database: DatabaseOption = DEFAULT_DATABASE,
-) -> None:
-    """List the declared links and what they explain (the query links)."""
-    from msgflow.cli.output import print_result
-    from msgflow.database import Database
-
-    with Database(database) as opened:
-        result = opened.query("links", run=run)
-    print_result(result, form, output, wide=wide)

@@ -26,22 +26,16 @@ _SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*(?:([kKMGT]?)B)?")
 _UNITS = {"": 1, "K": 1e3, "M": 1e6, "G": 1e9, "T": 1e12}
 
 
-def with_default(name: str) -> type[TyperGroup]:
-    """Return the class of a group that runs its command `name` when the user names none.
+class DefaultGroup(TyperGroup):
+    """A group with a default command: `msgflow runs` means `msgflow runs list`."""
 
-    `msgflow runs` means `msgflow runs list`.
-    """
+    default = "list"
 
-    class DefaultGroup(TyperGroup):
-        """A group with a default command."""
-
-        def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-            """Put the default command in front, unless a command or --help comes first."""
-            if not args or (args[0].startswith("-") and args[0] not in _HELP):
-                args = [name, *args]
-            return super().parse_args(ctx, args)
-
-    return DefaultGroup
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Put the default command in front, unless a command or --help comes first."""
+        if not args or (args[0].startswith("-") and args[0] not in _HELP):
+            args = [self.default, *args]
+        return super().parse_args(ctx, args)
 
 
 def bytes_of(size: str) -> int:

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from msgflow.cli.query_command import build_command, print_options_of_every_query, refuse_list
-from msgflow.query.catalogue import choose_query, load_queries, load_query, query_names
-
-if TYPE_CHECKING:
-    from msgflow.sql.header import Param
-    from msgflow.sql.value import Value
+from msgflow.cli.query_command import (
+    build_command,
+    chosen_by,
+    print_options_of_every_query,
+    refuse_list,
+)
+from msgflow.errors import UsageError
+from msgflow.query.catalogue import COMMANDS, load_queries, load_query, query_names
 
 
 def _view_names() -> tuple[str, ...]:
@@ -26,8 +27,8 @@ class QueryGroup(TyperGroup):
     """The named queries as commands; a command gets its options when it runs."""
 
     def list_commands(self, ctx: Any) -> list[str]:
-        """Return the names of all queries."""
-        return list(query_names())
+        """Return the names of the queries without a command of their own."""
+        return [name for name in query_names() if name not in COMMANDS]
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Print the help of Typer, then the options that every query has."""
@@ -42,21 +43,10 @@ class QueryGroup(TyperGroup):
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Return the name, the command with the options of the query, and the words behind it."""
         name, found, rest = super().resolve_command(ctx, args)
-        chosen = choose_query(str(name), _choice(load_query(str(name)).variant, rest))
-        return name, found and build_command(chosen), rest
-
-
-def _choice(variant: Param | None, words: list[str]) -> dict[str, Value]:
-    """Return the value of the option that chooses a variant: the command depends on it."""
-    found: dict[str, Value] = {}
-    if variant is not None:
-        option = f"--{variant.name}"
-        for word, following in pairwise([*words, ""]):
-            if word == option:
-                found[variant.name] = True if variant.type == "BOOLEAN" else following
-            elif word.startswith(f"{option}="):
-                found[variant.name] = word.removeprefix(f"{option}=")
-    return found
+        header = chosen_by(str(name), rest)
+        if header.is_command:
+            raise UsageError(f"there is no such query — {name}", header.command)
+        return name, found and build_command(header), rest
 
 
 app = typer.Typer(cls=QueryGroup, subcommand_metavar="[NAME] [OPTIONS]")
@@ -76,4 +66,5 @@ def group(
         return
     from msgflow.cli.output import print_list
 
-    print_list([(header.words, header.title) for header in load_queries()], ("query", "title"))
+    listed = [(each.words, each.title) for each in load_queries() if not each.is_command]
+    print_list(listed, ("query", "title"))

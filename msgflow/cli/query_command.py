@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from inspect import Parameter
+from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -14,6 +15,7 @@ from msgflow.cli.options import (
     OUTPUT,
     ColumnsOption,
     DatabaseOption,
+    DefaultGroup,
     FormatOption,
     InternalOption,
     MemoryLimitOption,
@@ -24,16 +26,19 @@ from msgflow.cli.options import (
 from msgflow.cli.row_options import row_options
 from msgflow.cli.slice_options import SLICE_OPTIONS, set_parameters
 from msgflow.errors import UsageError
+from msgflow.export.formats import Format, format_of
 from msgflow.files.default_files import DEFAULT_DATABASE
-from msgflow.query.catalogue import load_query
+from msgflow.query.catalogue import choose_query, load_query
 from msgflow.query.selection import KINDS
 from msgflow.result.layout import MOST_ROWS
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
+    from pathlib import Path
 
     from msgflow.result.query_result import QueryResult
-    from msgflow.sql.header import Header
+    from msgflow.sql.header import Header, Param
+    from msgflow.sql.value import Value
 
 # Options of every query, whose names no parameter of a query may have. Via, without and slowest are
 # missing: a query with such a parameter chooses its rows before it adds them up.
@@ -59,6 +64,8 @@ COMMON_OPTIONS = frozenset(
         "wide",
     )
 )
+# Parameters of queries without an option: msgflow flow --take ID --why asks for one flow.
+_WITHOUT_OPTION = frozenset(("take",))
 # Options that `Database.query` takes under the same names.
 _SELECTING = (*KINDS, "via", "without", "path", "paths", "where", "sort", "limit", "slowest")
 # Their help stands once, in that of `msgflow query`.
@@ -97,8 +104,85 @@ _ListOption = Annotated[
 ]
 
 
-def build_command(header: Header) -> Any:
-    """Return the command that runs the query of `header`."""
+def choice_of(variant: Param | None, words: list[str]) -> dict[str, Value]:
+    """Return the value of the option that chooses a variant: the command depends on it."""
+    found: dict[str, Value] = {}
+    if variant is not None:
+        option = f"--{variant.name}"
+        for word, following in pairwise([*words, ""]):
+            if word == option:
+                found[variant.name] = True if variant.type == "BOOLEAN" else following
+            elif word.startswith(f"{option}="):
+                found[variant.name] = word.removeprefix(f"{option}=")
+    return found
+
+
+def chosen_by(name: str, words: list[str]) -> Header:
+    """Return the query, or the variant of it that the words behind its name choose."""
+    return choose_query(name, choice_of(load_query(name).variant, words))
+
+
+def chosen_format(form: Format | None, path: Path | None) -> Format:
+    """Return the format for the values of `--format` and `-o`."""
+    return form or format_of(path)
+
+
+def print_rows(result: QueryResult, form: Any, given: dict[str, Any]) -> None:
+    """Write the rows as the options of a query say."""
+    from msgflow.cli.output import print_result
+
+    print_result(
+        result,
+        form,
+        given["output"],
+        wide=given["wide"],
+        columns=given["columns"],
+        most_rows=given.get("limit") or given.get("slowest") or MOST_ROWS,
+    )
+
+
+class AskingGroup(DefaultGroup):
+    """A group whose default command asks the query that is called like the group."""
+
+    query: str
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Return the names of all commands, the default one last."""
+        return [*super().list_commands(ctx), self.default]
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """Return a command; the default one has no options yet."""
+        if cmd_name != self.default:
+            return super().get_command(ctx, cmd_name)
+        return TyperCommand(cmd_name, short_help=load_query(self.query).title)
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Return the name, the command with the options of the query, and the words behind it."""
+        name, found, rest = super().resolve_command(ctx, args)
+        if name == self.default:
+            found = build_command(chosen_by(self.query, rest), write=self.write)
+        return name, found, rest
+
+    def write(self, result: QueryResult, form: Any, given: dict[str, Any]) -> None:
+        """Write what the query answers."""
+        print_rows(result, form, given)
+
+
+def build_command(
+    header: Header,
+    *,
+    option: Any = FormatOption,
+    form_of: Callable[[Any, Any], Any] = chosen_format,
+    write: Callable[[QueryResult, Any, dict[str, Any]], None] = print_rows,
+) -> Any:
+    """Return the command that runs the query of `header`.
+
+    Args:
+        header: the query.
+        option: the option `--format`.
+        form_of: returns the format for the values of `--format` and `-o`.
+        write: writes the result in a format, by the options of the command.
+    """
 
     def command(**given: Any) -> None:
         own = given_of(given)
@@ -107,10 +191,20 @@ def build_command(header: Header) -> Any:
 
             print_lines(header.path.read_text(encoding="utf-8").splitlines())
             return
-        _run(header, own, given)
+        form = form_of(given["form"], given["output"])
+        times, people = given["times"], (Format.TABLE, Format.MARKDOWN)
+        if times is not None and (not isinstance(form, Format) or form in people):
+            raise UsageError(
+                "tables for people have times with their units — --times",
+                "--format csv, json, jsonl or parquet, or a file with such a suffix",
+            )
+        result = _result(header.name, own, given)
+        write(result if times is None else result.with_times(times), form, given)
 
     own_names = {param.name for param in header.params}
-    parameters = [header_parameter(param) for param in header.params]
+    parameters = [
+        header_parameter(param) for param in header.params if param.name not in _WITHOUT_OPTION
+    ]
     for name, annotation, default in (
         *(
             (name, annotation, None)
@@ -119,7 +213,7 @@ def build_command(header: Header) -> Any:
         ),
         *((name, annotation, None) for name, annotation in SLICE_OPTIONS.items()),
         ("internal", InternalOption, False),
-        ("form", FormatOption, None),
+        ("form", option, None),
         ("output", OutputOption, None),
         ("columns", ColumnsOption, None),
         ("wide", WideOption, False),
@@ -142,40 +236,13 @@ def build_command(header: Header) -> Any:
     return typer.main.get_command(single)
 
 
-def _run(header: Header, own: dict[str, Any], given: dict[str, Any]) -> None:
-    from msgflow.cli.output import print_result
-    from msgflow.export.formats import Format, format_of
-
-    times = given["times"]
-    form = given["form"] or format_of(given["output"])
-    if times is not None and form in (Format.TABLE, Format.MARKDOWN):
-        raise UsageError(
-            "tables for people have times with their units — --times",
-            "--format csv, json, jsonl or parquet, or a file with such a suffix",
-        )
-    result = _result(
-        header.name,
-        given,
-        {
-            **{name: given[name] for name in SLICE_OPTIONS},
-            "internal": given["internal"],
-            **{word: given[word] for word in _SELECTING if given.get(word)},
-            **own,
-        },
-    )
-    if times is not None:
-        result = result.with_times(times)
-    print_result(
-        result,
-        form,
-        given["output"],
-        wide=given["wide"],
-        columns=given["columns"],
-        most_rows=given.get("limit") or given.get("slowest") or MOST_ROWS,
-    )
-
-
-def _result(name: str, given: dict[str, Any], asked: dict[str, Any]) -> QueryResult:
+def _result(name: str, own: dict[str, Any], given: dict[str, Any]) -> QueryResult:
+    asked: dict[str, Any] = {
+        **{option: given[option] for option in SLICE_OPTIONS},
+        "internal": given["internal"],
+        **{word: given[word] for word in _SELECTING if given.get(word)},
+        **own,
+    }
     from msgflow.database import Database
 
     with Database(given["database"], memory_limit=given["memory_limit"]) as database:
@@ -229,7 +296,7 @@ def _print_common(params: Sequence[TyperOption]) -> None:
 
 def print_options_of_every_query() -> None:
     """Print the options that every query has, with their help."""
-    params = build_command(load_query("info")).params
+    params = build_command(load_query("topics")).params
     _print_panel(
         "Options of every query",
         [(", ".join(param.opts), param.help) for param in params if param.name in _OF_EVERY_QUERY],

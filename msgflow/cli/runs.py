@@ -8,11 +8,11 @@ from typing import Annotated
 import typer
 
 from msgflow.cli.completion import complete
-from msgflow.cli.options import DatabaseOption, FormatOption, OutputOption, WideOption, with_default
+from msgflow.cli.options import DatabaseOption, DefaultGroup, FormatOption, OutputOption, WideOption
 from msgflow.errors import ExitCode, UsageError
 from msgflow.files.default_files import DEFAULT_DATABASE
 
-app = typer.Typer(cls=with_default("list"))
+app = typer.Typer(cls=DefaultGroup)
 _RunArgument = Annotated[
     str,
     typer.Argument(metavar="RUN", help="Name or id of the run", autocompletion=complete("run")),
@@ -26,7 +26,7 @@ def list_runs(
     wide: WideOption = False,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
-    """List the runs of a database: the query info."""
+    """List the runs of a database."""
     from dataclasses import replace
 
     from msgflow.cli.output import print_result

@@ -54,7 +54,7 @@ def links(
     if run == "all":
         raise UsageError(
             "suggestions are a file for one run, which does not fit others — all",
-            "msgflow suggest links --run NAME for each of them; msgflow query info names them",
+            "msgflow suggest links --run NAME for each of them; msgflow runs names them",
         )
     if apply and output is None and DEFAULT_LINKS.exists():
         raise UsageError(

@@ -47,7 +47,7 @@ _AFTER = {
     "topic_unnamed": "msgflow suggest links",
     "unmatched_take": "msgflow query topics --measure unmatched",
     "process_without_rclcpp": "msgflow query path-breakdown",
-    "clock_not_synchronised": "msgflow query clocks",
+    "clock_not_synchronised": "msgflow clocks",
 }
 
 

@@ -37,7 +37,7 @@ class Format(StrEnum):
     MARKDOWN = "markdown"
 
 
-_SUFFIXES = {
+SUFFIXES = {
     ".csv": Format.CSV,
     ".json": Format.JSON,
     ".jsonl": Format.JSONL,
@@ -55,7 +55,7 @@ def format_of(path: Path | None) -> Format:
     """
     if path is None or not path.suffix:
         return Format.TABLE
-    return by_suffix(path, _SUFFIXES, "; spreadsheets open CSV, PlotJuggler CSV and Parquet")
+    return by_suffix(path, SUFFIXES, "; spreadsheets open CSV, PlotJuggler CSV and Parquet")
 
 
 def by_suffix(path: Path, known: Mapping[str, Form], more: str = "") -> Form:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
-from msgflow.export.formats import by_suffix
+from msgflow.export.formats import SUFFIXES, Format, by_suffix
 from msgflow.export.graph_vertices import GraphVertices
 from msgflow.query.catalogue import load_query
 from msgflow.query.runner import run_query
@@ -30,7 +30,8 @@ class GraphFormat(StrEnum):
     JSON = "json"
 
 
-_SUFFIXES = {
+_SUFFIXES: dict[str, GraphFormat | Format] = {
+    **SUFFIXES,
     ".dot": GraphFormat.DOT,
     ".gv": GraphFormat.DOT,
     ".mmd": GraphFormat.MERMAID,
@@ -40,8 +41,8 @@ _SUFFIXES = {
 _PICTURE = "; for a picture: msgflow graph | dot -Tsvg, or msgflow ui, page Graph"
 
 
-def graph_format(path: Path | None) -> GraphFormat:
-    """Return the format for the suffix of a file; DOT without a file.
+def graph_format(path: Path | None) -> GraphFormat | Format:
+    """Return the format for the suffix of a file, of graphs or of rows; DOT without a file.
 
     Raises:
         UsageError: no format has this suffix.

@@ -100,7 +100,7 @@ def header_of(name: str, given: Mapping[str, Value] | None = None) -> Header:
         raise UsageError(
             f"a lake does not hold what this query needs — {query.words}",
             f"it answers {', '.join(_words())}; for others: msgflow fleet open RUN, then"
-            f" msgflow query {query.words}",
+            f" {query.command}",
         )
     header = statements().header(query.name.replace("-", "_"))
     params = header.params if variant is None else (variant, *header.params)

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 
     from msgflow.sql.value import Value
 
-
+COMMANDS = ("clocks", "graph", "info", "links")
+"""Queries that have a command of their own: `msgflow clocks`, not `msgflow query clocks`."""
 QUERIES_BY_WORD = {
     "jitter": ("timers", "topics-rate"),
     "rate": ("topics-rate",),
@@ -147,6 +148,7 @@ def _header(name: str) -> Header:
             raise HeaderError(f"{header.path}: {base} has no variants")
         value = "" if variant.type == "BOOLEAN" else f" {name.removeprefix(f'{base}-')}"
         header = replace(header, chosen=f"{base} --{variant.name}{value}", variant=variant)
+    header = replace(header, is_command=(base or name) in COMMANDS)
     return header if variant is None else replace(header, params=(variant, *header.params))
 
 
@@ -157,7 +159,7 @@ def _meant(name: str, views: Callable[[], Collection[str]]) -> str:
         if name in views():
             return f"it is a view: msgflow sql 'FROM {name}'"
         words = tuple(nearest(name, query_names()))
-    commands = (f"msgflow query {load_query(other).words}" for other in words)
+    commands = (load_query(other).command for other in words)
     return " or ".join(commands) or "msgflow query --list"
 
 

@@ -41,10 +41,10 @@ SELECT service_name AS name, is_internal FROM main.service WHERE list_contains($
 # By kind of name: the names of a run, and the command that lists them.
 _KNOWN = {
     "topic": (_TOPICS, "msgflow query topics"),
-    "node": (_NODES, "msgflow query info --section nodes"),
+    "node": (_NODES, "msgflow info --section nodes"),
     "callback": (_CALLBACKS, "msgflow query callbacks"),
-    "host": (_HOSTS, "msgflow query info --section hosts"),
-    "place": (f"{_TOPICS} UNION {_NODES} UNION {_SERVICES}", "msgflow query graph"),
+    "host": (_HOSTS, "msgflow info --section hosts"),
+    "place": (f"{_TOPICS} UNION {_NODES} UNION {_SERVICES}", "msgflow graph --format table"),
 }
 _WORDS = {"place": "topic or node"}
 # Parameters that take an id, in every query: the view and column of it, and the command that lists

@@ -191,13 +191,13 @@ def bind(
     Args:
         header: the query.
         given: values by name; a name may end with an underscore if Python reserves it (`from_`).
-        command: the command with the parameters as options; `msgflow query NAME` when None.
+        command: the command with the parameters as options; that of the query when None.
 
     Raises:
         UsageError: unknown or missing parameter, or a value that does not fit.
     """
     called = header.words if command is None else command
-    command = command or f"msgflow query {header.words}"
+    command = command or header.command
     names = [param.name for param in header.params]
     by_name: dict[str, Value] = {}
     for name, value in given.items():

@@ -183,6 +183,7 @@ class Header:
         unites: objects whose rows a macro takes together.
         variant: parameter that chooses between this query and others; its default is this one.
         chosen: of a variant: the name of the query, and the option that chooses this one.
+        is_command: whether a query has a command of its own name, in place of `msgflow query NAME`.
     """
 
     name: str
@@ -209,11 +210,17 @@ class Header:
     unites: tuple[str, ...] = ()
     variant: Param | None = None
     chosen: str | None = None
+    is_command: bool = False
 
     @property
     def words(self) -> str:
-        """What stands behind `msgflow query`: the name, and the option of a variant."""
+        """The name of a query, and the option of a variant."""
         return self.chosen or self.name
+
+    @property
+    def command(self) -> str:
+        """What a user types to ask a query."""
+        return f"msgflow {self.words}" if self.is_command else f"msgflow query {self.words}"
 
     @property
     def when(self) -> tuple[str, ...]:

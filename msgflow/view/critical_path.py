@@ -53,9 +53,7 @@ def critical_path(
     }
     header = load_query("critical-path")
     result = run_query(connection, header, asked, Slice(run.run_id))
-    options = " ".join(
-        f"--{name.replace('_', '-')} {shlex.quote(str(value))}" for name, value in asked.items()
-    )
+    command = ["msgflow", "flow", "--take", str(asked["take"]), "--why"]
     # The page shows the path itself.
     return encode(
         result.to_arrow().drop_columns(["path"]),
@@ -69,7 +67,7 @@ def critical_path(
                 for column in header.columns
                 if column.name != "path"
             },
-            "command": f"msgflow query critical-path {options} --run {shlex.quote(run.name)}",
+            "command": shlex.join([*command, "--from", asked["from"], "--detail", "full"]),
         },
         origin_ns=origin_ns,
         units=result.units,

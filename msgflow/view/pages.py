@@ -442,7 +442,7 @@ def _is_set(params: Params, name: str) -> bool:
 
 def _command(name: str, extent: Extent, part: Slice, *, internal: bool) -> str:
     """Return the command that prints the rows of a named query, as the page shows them."""
-    words = ["msgflow", "query", *load_query(name).words.split(), "--run", extent.run.name]
+    words = [*load_query(name).command.split(), "--run", extent.run.name]
     return shlex.join(words + _window_options(extent, part) + ["--internal"] * internal)
 
 

@@ -152,7 +152,7 @@ def query_section(
         selection = replace(selection, where=where)
     header = load_query(query)
     result = run_query(connection, header, {}, part.slice, selection=selection)
-    words = ["msgflow", "query", *header.words.split(), "--where", selection.where or ""]
+    words = [*header.command.split(), "--where", selection.where or ""]
     words += ["--sort", *selection.sort, "--limit", str(selection.limit)]
     command = shlex.join([*words, *part.options, "--run", run.name])
     return Section(name, result, (command,))
@@ -187,7 +187,7 @@ def area_section(
     header = load_query(query)
     selection = Selection(where=where, sort=(sort,))
     result = run_query(connection, header, {}, part.slice, selection=selection)
-    words = ["msgflow", "query", *header.words.split(), "--where", where, "--sort", sort]
+    words = [*header.command.split(), "--where", where, "--sort", sort]
     command = shlex.join([*words, *part.options, "--run", run.name])
     return Section(name, result, (command,))
 
@@ -217,11 +217,8 @@ def blame_section(
         table = result.table
         ranks = pa.array([rank] * len(result), pa.int64())
         results.append(table.set_column(table.column_names.index("rank"), "rank", ranks))
-        options = [word for name, value in given.items() for word in (f"--{name}", str(value))]
-        commands.append(
-            shlex.join(["msgflow", "query", "critical-path", *options, *part.options,
-                        "--run", run.name])
-        )  # fmt: skip
+        command = ["msgflow", "flow", "--take", str(take), "--why", "--from", first]
+        commands.append(shlex.join([*command, "--case", "first", "--by", "node"]))
     if not results:
         return Section("blame", QueryResult(pa.table({"rank": pa.array([], pa.int64())})), ())
     return Section("blame", replace(result, table=pa.concat_tables(results)), tuple(commands))

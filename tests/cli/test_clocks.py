@@ -103,7 +103,9 @@ def test_a_database_is_corrected_and_restored(
     assert min(shortest(database)) > 0
     shown = msgflow("clocks", "show", "--db", database, "--format", "json")
     assert [clock["hosts"] for clock in json.loads(shown.stdout)] == ["alpha", "beta"]
-    pairs = json.loads(msgflow("clocks", "pairs", "--db", database, "--format", "json").stdout)
+    pairs = json.loads(
+        msgflow("clocks", "--by", "pair", "--db", database, "--format", "json").stdout
+    )
     assert [(pair["from_hosts"], pair["to_hosts"]) for pair in pairs] == [
         ("alpha", "beta"),
         ("beta", "alpha"),

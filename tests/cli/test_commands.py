@@ -235,7 +235,7 @@ def test_db_upgrade_of_old_views(msgflow: Msgflow, small_database: Path) -> None
     assert msgflow("info", "--db", small_database).exit_code == 0
 
 
-@pytest.mark.parametrize("command", ["info", "query info", "db upgrade"])
+@pytest.mark.parametrize("command", ["info", "info --section runs", "db upgrade"])
 def test_a_database_from_before_the_first_release(
     msgflow: Msgflow, small_database: Path, command: str
 ) -> None:
@@ -254,7 +254,7 @@ def test_a_database_from_before_the_first_release(
     "command",
     [
         "info",
-        "query info",
+        "info --section runs",
         "flow /chatter",
         "sql FROM\u00a0run",
         "check --detail",

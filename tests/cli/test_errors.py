@@ -79,3 +79,36 @@ def test_nothing_is_left_of_a_file_that_failed(
     assert msgflow("sql", "FROM run", "--db", small_database, "-o", "out.csv").exit_code == 1
     assert Path("out.csv").read_text() == "before"
     assert [path.name for path in Path().iterdir()] == ["out.csv"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("query callback-schedule", "msgflow query scheduling"),
+        ("query thread-states", "msgflow query scheduling --measure threads"),
+        ("query cpu-usage", "msgflow query scheduling --measure cpu"),
+        (
+            "query preemption",
+            "msgflow query scheduling --measure preemption or msgflow query waits --by pair",
+        ),
+        ("query wakeup-latency", "msgflow query scheduling --measure wakeup"),
+        ("query critical-path --take 1", "msgflow flow --take ID --why"),
+        ("query clocks", "msgflow clocks"),
+        ("query clocks-pair", "msgflow clocks --by pair"),
+        ("clocks pairs", "msgflow clocks --by pair"),
+        ("query graph --help", "msgflow graph"),
+        ("query info", "msgflow info"),
+        ("query info --section nodes", "msgflow info --section nodes"),
+        ("query info-nodes", "msgflow info --section nodes"),
+        ("query links", "msgflow links"),
+        (
+            "export series -o series.csv",
+            "msgflow query flows --times relative -o FILE.csv; for PlotJuggler msgflow export mcap",
+        ),
+    ],
+)
+def test_an_old_name_says_the_new_one(msgflow: Msgflow, old: str, new: str) -> None:
+    result = msgflow(*old.split())
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert result.stderr.startswith("error: ")
+    assert result.stderr.endswith(f"\n\nhint: {new}\n")

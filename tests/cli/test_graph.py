@@ -44,3 +44,17 @@ def test_mistakes_have_code_2(msgflow: Msgflow, small_database: Path, tmp_path: 
         assert message in result.stderr
         assert "\n\nhint: " in result.stderr
     assert not list(tmp_path.glob("a.*"))
+
+
+def test_it_has_rows_as_a_query(msgflow: Msgflow, small_database: Path, tmp_path: Path) -> None:
+    with Database(small_database) as database:
+        rows = database.query("graph", sort="name").to_arrow().to_pylist()
+    result = msgflow("graph", "--format", "jsonl", "--sort", "name", "--db", small_database)
+    assert [json.loads(line) for line in result.stdout.splitlines()] == rows
+    result = msgflow("graph", "-o", tmp_path / "a.csv", "--columns", "name", "--db", small_database)
+    assert result.exit_code == 0
+    names = (tmp_path / "a.csv").read_text().splitlines()[1:]
+    assert sorted(names) == sorted(f'"{row["name"]}"' for row in rows)
+    result = msgflow("graph", "--format", "json", "--times", "iso", "--db", small_database)
+    assert result.exit_code == 2
+    assert "--times" in result.stderr

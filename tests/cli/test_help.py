@@ -26,8 +26,8 @@ def commands() -> Iterator[str]:
         module = import_module(f"msgflow.cli.{name}")
         if name != "query" and hasattr(module, "app"):
             group = typer.main.get_group(module.app)
-            yield from (f"{name} {command}" for command in group.commands)
-    yield from (f"query {header.words}" for header in load_queries())
+            yield from (f"{name} {command}" for command in group.list_commands(None))
+    yield from (header.command.removeprefix("msgflow ") for header in load_queries())
 
 
 @each(commands())

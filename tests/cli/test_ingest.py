@@ -41,7 +41,9 @@ def test_two_commands_lead_to_the_answer_and_a_trace_is_ingested_once(
     # It says nothing where nothing is to be said.
     replaced = msgflow("ingest", trace, "--replace", "--quiet", "--name", "first")
     assert (replaced.exit_code, replaced.stdout, replaced.stderr) == (0, "", "")
-    runs = json.loads(msgflow("query", "info", "--run", "all", "--format", "json").stdout)
+    runs = json.loads(
+        msgflow("info", "--section", "runs", "--run", "all", "--format", "json").stdout
+    )
     assert [run["name"] for run in runs] == ["first"]
     assert "first" in msgflow("info").stdout
 

@@ -45,7 +45,7 @@ def test_from_a_suggestion_to_links(msgflow: Msgflow, shared_traces: Path, tmp_p
     result = msgflow("ingest", shared_traces / "pingpong", "--links", file)
     assert result.exit_code == 2
     assert "no such node" in result.stderr
-    assert "pingpong" not in msgflow("query", "info").stdout
+    assert "pingpong" not in msgflow("info", "--section", "runs").stdout
 
 
 def test_without_runs_or_files(msgflow: Msgflow, fresh_database: Path, tmp_path: Path) -> None:

@@ -120,7 +120,7 @@ def test_a_reader_that_goes_away_is_no_error(small_database: Path) -> None:
 
 @pytest.mark.parametrize("unbuffered", few(["", "1"], ""))
 @pytest.mark.parametrize(
-    "arguments", [("info",), ("query", "info", "--format", "csv"), ("--help",)]
+    "arguments", [("info",), ("info", "--section", "runs", "--format", "csv"), ("--help",)]
 )
 def test_a_full_disk_is_said(
     small_database: Path, arguments: tuple[str, ...], unbuffered: str
@@ -160,7 +160,7 @@ def test_a_closed_stdout_is_said_by_what_has_data(small_database: Path) -> None:
 
 
 def test_a_closed_stderr_does_not_matter(small_database: Path, tmp_path: Path) -> None:
-    done = without("2", "query", "info", "--db", small_database)
+    done = without("2", "info", "--section", "runs", "--db", small_database)
     assert (done.returncode, b"noon" in done.stdout) == (0, True)
     assert without("2", "ingest", tmp_path, "--db", small_database).returncode == 3
 
@@ -225,7 +225,7 @@ def piped(*arguments: object) -> bytes:
 
 @pytest.mark.parametrize("form", few(["json", "csv", "markdown", "table --wide"], "csv"))
 def test_a_terminal_gets_the_same_bytes_as_a_pipe(small_database: Path, form: str) -> None:
-    arguments = ("query", "info", "--db", small_database, "--format", *form.split())
+    arguments = ("info", "--section", "runs", "--db", small_database, "--format", *form.split())
     pipe = subprocess.run(command(*arguments), stdout=subprocess.PIPE, check=True).stdout
     assert on_terminal(command(*arguments)) == pipe == piped(*arguments) != b""
 
@@ -234,7 +234,7 @@ def test_a_terminal_gets_the_same_bytes_as_a_pipe(small_database: Path, form: st
     "arguments",
     [
         thorough(("query", "topics")),
-        ("query", "info", "--run", "all"),
+        ("info", "--section", "runs", "--run", "all"),
         ("info",),
         thorough(("db", "schema")),
         thorough(("sql", "FROM run, range(3) SELECT * EXCLUDE (created_at)")),
@@ -309,7 +309,7 @@ def two_hosts_far_apart(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_parquet_is_not_written_to_a_terminal(small_database: Path) -> None:
-    arguments = command("query", "info", "--db", small_database, "--format", "parquet")
+    arguments = command("info", "--section", "runs", "--db", small_database, "--format", "parquet")
     leader, follower = pty.openpty()
     done = subprocess.run(arguments, stdout=follower, stderr=subprocess.PIPE, check=False)
     os.close(follower)
@@ -332,7 +332,7 @@ def test_a_terminal_obeys_no_name(small_database: Path, form: str) -> None:
 
 def test_messages_obey_no_name(small_database: Path) -> None:
     leader, follower = pty.openpty()
-    arguments = command("query", "info", "--run", "a\x1b[31m", "--db", small_database)
+    arguments = command("info", "--section", "runs", "--run", "a\x1b[31m", "--db", small_database)
     done = subprocess.run(
         arguments, stderr=follower, check=False, env=os.environ | {"NO_COLOR": "1"}
     )

@@ -9,7 +9,7 @@ import pytest
 from typer.testing import Result
 
 from msgflow.cli.query_command import COMMON_OPTIONS
-from msgflow.query.catalogue import load_queries, query_names
+from msgflow.query.catalogue import load_queries, load_query, query_names
 from msgflow.query.runner import RESERVED
 
 Msgflow = Callable[..., Result]
@@ -20,18 +20,25 @@ def test_the_list_names_every_query(msgflow: Msgflow) -> None:
         result = msgflow(*arguments)
         assert result.exit_code == 0
         for header in load_queries():
-            assert header.words in result.stdout
-            assert header.title in result.stdout
+            assert (header.words in result.stdout) is not header.is_command
+            assert (header.title in result.stdout) is not header.is_command
+
+
+# Of the queries that are commands: how they are asked for their rows.
+ASKED = {"clocks": "clocks show", "info": "info --section runs", "links": "links list"}
 
 
 @pytest.mark.parametrize("name", query_names())
 def test_help_tells_what_a_query_means_and_takes(msgflow: Msgflow, name: str) -> None:
-    result = msgflow("query", name, "--help")
+    command = load_query(name).command.removeprefix("msgflow ")
+    result = msgflow(*ASKED.get(name, command).split(), "--help")
     assert result.exit_code == 0
     header = next(header for header in load_queries() if header.name == name)
     words = "".join(result.stdout.replace("│", "").split())
     assert "".join(header.description.split())[:60] in words
     for param in header.params:
+        if param.name == "take":
+            continue
         assert f"--{param.name.replace('_', '-')}" in words
     for column in header.columns:
         assert column.name in words
@@ -78,31 +85,31 @@ def test_options_select(msgflow: Msgflow, small_database: Path) -> None:
 def test_the_database_comes_from_the_environment_or_lies_here(
     msgflow: Msgflow, small_database: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert msgflow("query", "info").exit_code == 4
+    assert msgflow("info", "--section", "runs").exit_code == 4
     Path("msgflow.duckdb").symlink_to(small_database)
-    assert msgflow("query", "info").exit_code == 0
+    assert msgflow("info", "--section", "runs").exit_code == 0
     Path("msgflow.duckdb").unlink()
     monkeypatch.setenv("MSGFLOW_DB", str(small_database))
-    assert msgflow("query", "info").exit_code == 0
-    assert msgflow("query", "info", "--db", "none.duckdb").exit_code == 4
+    assert msgflow("info", "--section", "runs").exit_code == 0
+    assert msgflow("info", "--section", "runs", "--db", "none.duckdb").exit_code == 4
 
 
 def test_a_file_is_written_in_the_format_of_its_suffix(
     msgflow: Msgflow, small_database: Path
 ) -> None:
-    result = msgflow("query", "info", "--db", small_database, "-o", "runs.parquet")
+    result = msgflow("info", "--section", "runs", "--db", small_database, "-o", "runs.parquet")
     assert result.exit_code == 0
     assert result.stdout == ""
     assert "1 row written to runs.parquet" in result.stderr
     assert pq.read_table("runs.parquet")["name"].to_pylist() == ["noon"]
-    msgflow("query", "info", "--db", small_database, "-o", "runs.x", "--format", "csv")
+    msgflow("info", "--section", "runs", "--db", small_database, "-o", "runs.x", "--format", "csv")
     assert Path("runs.x").read_text().startswith('"run_id","name"')
 
 
 def test_durations_and_times_are_for_people_in_tables_only(
     msgflow: Msgflow, small_database: Path
 ) -> None:
-    arguments = ("query", "info", "--db", small_database, "--format")
+    arguments = ("info", "--section", "runs", "--db", small_database, "--format")
     table = msgflow(*arguments, "table").stdout
     assert "2.500 s" in table
     assert "2023-11-14T22:13:30.000000000Z" in table
@@ -115,19 +122,30 @@ def test_durations_and_times_are_for_people_in_tables_only(
 @pytest.mark.parametrize(
     ("arguments", "code", "error", "hint"),
     [
-        (("info-topic",), 2, "there is no such query — info-topic", "msgflow query topics"),
-        (("info", "--limits", "3"), 2, "no such option: --limits", "info --help"),
-        (("info", "--run", "x"), 2, "there is no such run — x", "morning (1), noon (2)"),
-        (("info", "--start", "1s"), 2, "no time window — info", "leave out --start"),
+        (("query", "info-topic"), 2, "there is no such query — info-topic", "msgflow query topics"),
+        (("query", "topics", "--limits", "3"), 2, "no such option: --limits", "topics --help"),
+        (("links", "--limits", "3"), 2, "no such option: --limits", "links list --help"),
+        (("query", "topics", "--run", "x"), 2, "there is no such run — x", "morning (1), noon (2)"),
         (
-            ("info", "--format", "xml"),
+            ("info", "--section", "runs", "--start", "1s"),
+            2,
+            "no time window — info",
+            "leave out --start",
+        ),
+        (
+            ("query", "topics", "--format", "xml"),
             2,
             "'--format': 'xml' is not one of",
-            "info --help",
+            "topics --help",
         ),
-        (("info", "--list"), 2, "--list takes no name of a query", "info --help"),
-        (("--list", "info"), 2, "--list takes no name of a query", "info --help"),
-        (("info", "-o", "no/dir/x.csv"), 2, "no such file or directory", "can be written"),
+        (("query", "topics", "--list"), 2, "--list takes no name of a query", "topics --help"),
+        (("query", "--list", "topics"), 2, "--list takes no name of a query", "topics --help"),
+        (
+            ("query", "topics", "-o", "no/dir/x.csv"),
+            2,
+            "no such file or directory",
+            "can be written",
+        ),
     ],
 )
 def test_mistakes_have_a_message_and_a_code(
@@ -140,7 +158,7 @@ def test_mistakes_have_a_message_and_a_code(
     hint: str,
 ) -> None:
     monkeypatch.setenv("MSGFLOW_DB", str(small_database))
-    result = msgflow("query", *arguments)
+    result = msgflow(*arguments)
     assert result.exit_code == code
     assert result.stdout == ""
     message, _, rest = result.stderr.removeprefix("run: noon (2)\n").partition("\n\nhint: ")
@@ -150,21 +168,26 @@ def test_mistakes_have_a_message_and_a_code(
 
 
 def test_times_are_chosen_for_programs_only(msgflow: Msgflow, small_database: Path) -> None:
-    result = msgflow("query", "info", "--db", small_database, "--format", "jsonl", "--times", "iso")
+    result = msgflow(
+        "info", "--section", "runs", "--db", small_database, "--format", "jsonl", "--times", "iso"
+    )
     assert result.exit_code == 0
     row = json.loads(result.stdout)
     assert row["start_utc"].endswith("Z")
     assert "duration_s" in row
-    refused = msgflow("query", "info", "--db", small_database, "--times", "iso")
+    refused = msgflow("info", "--section", "runs", "--db", small_database, "--times", "iso")
     assert refused.exit_code == 2
     assert "--times" in refused.stderr
 
 
 def test_a_suffix_of_no_format_is_refused(msgflow: Msgflow, small_database: Path) -> None:
     for name in ("runs.xlsx", "runs.png"):
-        result = msgflow("query", "info", "--db", small_database, "-o", name)
+        result = msgflow("info", "--section", "runs", "--db", small_database, "-o", name)
         assert result.exit_code == 2
         assert name in result.stderr
         assert not Path(name).exists()
-    assert msgflow("query", "info", "--db", small_database, "-o", "runs.txt").exit_code == 0
+    assert (
+        msgflow("info", "--section", "runs", "--db", small_database, "-o", "runs.txt").exit_code
+        == 0
+    )
     assert Path("runs.txt").read_text().startswith("run_id")

@@ -41,8 +41,8 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
         seen.append({"name": name} | arguments)
         return QueryResult(pa.table({"at_ns": [1]}), HEADER)
 
-    for function in ("load_query", "choose_query"):
-        monkeypatch.setattr(f"msgflow.cli.query.{function}", lambda *_: HEADER)
+    for function in ("query.load_query", "query_command.load_query", "query_command.choose_query"):
+        monkeypatch.setattr(f"msgflow.cli.{function}", lambda *_: HEADER)
     monkeypatch.setattr(Database, "query", query)
     return seen
 

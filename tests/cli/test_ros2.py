@@ -83,7 +83,7 @@ def test_words_reach_msgflow_as_they_are(ros2: Path, small_database: Path) -> No
     database = ("--db", str(small_database), "--format", "csv")
     done = run(ros2, "sql", "SELECT name FROM run ORDER BY run_id", *database)
     assert (done.returncode, done.stdout) == (0, '"name"\n"morning"\n"noon"\n')
-    done = run(ros2, "query", "info", "--run=noon", *database, "--limit", "1")
+    done = run(ros2, "info", "--section", "runs", "--run=noon", *database, "--limit", "1")
     assert (done.returncode, done.stdout.splitlines()[1][:8]) == (0, '2,"noon"')
 
 
@@ -102,7 +102,7 @@ def test_options_without_a_command(ros2: Path) -> None:
 
 def test_exit_codes_are_those_of_msgflow(ros2: Path) -> None:
     assert run(ros2, "query", "nothing").returncode == 2
-    done = run(ros2, "query", "info", "--db", "none.duckdb")
+    done = run(ros2, "info", "--section", "runs", "--db", "none.duckdb")
     assert done.returncode == 4
     assert done.stderr.startswith("error: no database")
 

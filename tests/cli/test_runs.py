@@ -219,9 +219,7 @@ def test_a_label_chooses_runs(msgflow: Msgflow, database: Path) -> None:
         )
 
     def runs(label: str) -> str:
-        return msgflow(
-            "query", "info", "--section", "hosts", "--run", label, "--db", database
-        ).stderr
+        return msgflow("info", "--section", "hosts", "--run", label, "--db", database).stderr
 
     assert runs("n=before") == "run: before (1)\n"
     assert runs("robot=r2") == "runs: before (1), after (2)\n"

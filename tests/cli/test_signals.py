@@ -64,7 +64,7 @@ def python(program: str, *arguments: object) -> subprocess.CompletedProcess[str]
 
 @pytest.mark.parametrize("number", few(_ENDINGS, signal.SIGINT))
 def test_a_signal_ends_the_program_cleanly(small_database: Path, number: signal.Signals) -> None:
-    arguments = ("query", "info", "--db", small_database)
+    arguments = ("info", "--section", "runs", "--db", small_database)
     whole = python(_COUNTING, int(number), 0, *arguments)
     assert whole.returncode == 0
     calls = int(whole.stderr.rsplit("\n", 1)[-1])

@@ -214,7 +214,7 @@ def test_topics_of_the_chosen_runs_will_do(
             "first",
             {"to": "/scan,xyz"},
             "in the run — xyz",
-            "the topics and nodes are /a, /b, /camera and 4 more (msgflow query graph)",
+            "the topics and nodes are /a, /b, /camera and 4 more (msgflow graph --format table)",
         ),
         ("second", {"from": "/scan"}, "in the run — /scan", "the topics and nodes are /lidar"),
         ("all", {"from_": "/none!"}, "in these runs — /none!", "the topics and nodes are"),
@@ -287,7 +287,7 @@ def test_a_run_without_topics_has_none(with_topics: duckdb.DuckDBPyConnection) -
     with_topics.execute("DELETE FROM publisher")
     with pytest.raises(UsageError) as raised:
         run_query(with_topics, header(TOPICS), {"to": "/lidar"})
-    assert raised.value.hint == "msgflow query graph"
+    assert raised.value.hint == "msgflow graph --format table"
     with_topics.execute("DELETE FROM run")
     assert len(run_query(with_topics, header(TOPICS), {"to": "/lidar"})) == 1
 

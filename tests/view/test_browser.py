@@ -86,19 +86,12 @@ def require_critical_path_of_the_query(page: Page, database: Path, run: int) -> 
     shown_path = marked(page)
     lit = page.flow()
     words = shlex.split(page.page.locator(".side .command code").text_content() or "")
-    assert words[:3] == ["msgflow", "query", "critical-path"]
-    options = dict(zip(words[3::2], words[4::2], strict=True))
+    assert words[:3] == ["msgflow", "flow", "--take"]
+    assert (words[4:6], words[7:]) == (["--why", "--from"], ["--detail", "full"])
     with open_db(database) as opened:
-        pieces = (
-            opened.query(
-                "critical-path", run=run,
-                **{"from": options["--from"], "to": options["--to"],
-                   "take": int(options["--take"]), "case": options["--case"],
-                   "detail": options["--detail"]},
-            )
-            .to_arrow()
-            .to_pylist()
-        )  # fmt: skip
+        result = opened.flow_why(take_id=int(words[3]), from_=words[6], detail="full")
+        pieces = result.to_arrow().to_pylist()
+    assert [each.run_id for each in result.runs] == [run]
     assert len(pieces) > 2
     named = {
         (kind, row[f"{kind}_id"]) for row in pieces for kind in ("callback_instance", "publication")
@@ -160,7 +153,7 @@ def test_a_report_has_the_critical_path_of_its_slowest_flows(
     number = a_publication(read(demo), 1)
     page.go(f"#/timeline?flow=publication:{number}")
     page.flow()
-    assert "msgflow query critical-path" in page.page.locator(".side").inner_text()
+    assert "msgflow flow --why" in page.page.locator(".side").inner_text()
     assert page.page.locator(".steps tr.is-critical").count() == 0
 
 

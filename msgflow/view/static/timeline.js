@@ -1044,7 +1044,7 @@ export class TimelinePage {
         this.app.source.isServed ? failed(error) : h(
           "p",
           { className: "soft" },
-          "The critical path is in this report for its slowest flows alone; msgflow ui marks it, and msgflow query critical-path prints it.",
+          "The critical path is in this report for its slowest flows alone; msgflow ui marks it, and msgflow flow --why prints it.",
         ),
       );
     }
