@@ -568,8 +568,8 @@ class Database:
             lambda: find_take(connection, _start(connection, place, given, at, run))
         )
         return self.query(
-            "critical-path", run=run_id, take=number, to=topic, internal=internal,
-            **{"from": from_, "case": case, "by": by, "detail": detail},
+            "critical-path", run=run_id, take=number, from_=from_, to=topic, case=case, by=by,
+            detail=detail, internal=internal,
         )  # fmt: skip
 
     def flow_page(self, flow: Flow, path: str | Path) -> int:

@@ -24,6 +24,7 @@ _INSTEAD = {
     ("msgflow export", "series"): (
         "msgflow query flows --times relative -o FILE.csv; for PlotJuggler msgflow export mcap"
     ),
+    ("msgflow query", "--list"): "msgflow query",
     ("msgflow query critical-path", "--take"): "msgflow flow --take ID --why",
     ("msgflow clocks", "pairs"): "msgflow clocks --by pair",
     ("msgflow graph", "svg"): "msgflow graph | dot -Tsvg; or msgflow ui, page Graph",

@@ -51,7 +51,8 @@ def asked(words: list[str]) -> Any:
 def _form(form: AnyFormat | None, path: Path | None) -> GraphFormat | Format:
     if form is None:
         return graph_format(path)
-    return GraphFormat(form) if form in set(GraphFormat) else Format(form)
+    languages = [each.value for each in GraphFormat]
+    return GraphFormat(form.value) if form.value in languages else Format(form.value)
 
 
 def _write(result: QueryResult, form: Any, given: dict[str, Any]) -> None:

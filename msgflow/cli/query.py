@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 from typer.core import TyperCommand, TyperGroup
@@ -11,7 +11,6 @@ from msgflow.cli.query_command import (
     build_command,
     chosen_by,
     print_options_of_every_query,
-    refuse_list,
 )
 from msgflow.errors import UsageError
 from msgflow.query.catalogue import COMMANDS, load_queries, load_query, query_names
@@ -53,16 +52,9 @@ app = typer.Typer(cls=QueryGroup, subcommand_metavar="[NAME] [OPTIONS]")
 
 
 @app.callback(invoke_without_command=True)
-def group(
-    context: typer.Context,
-    list_queries: Annotated[
-        bool, typer.Option("--list", help="List the queries, as without a name")
-    ] = False,
-) -> None:
+def group(context: typer.Context) -> None:
     """List the queries, unless one is named."""
     if context.invoked_subcommand is not None:
-        if list_queries:
-            refuse_list(context.invoked_subcommand)
         return
     from msgflow.cli.output import print_list
 

@@ -55,7 +55,6 @@ COMMON_OPTIONS = frozenset(
         "format",
         "help",
         "internal",
-        "list",
         "memory_limit",
         "output",
         "show",
@@ -79,28 +78,6 @@ _OF_EVERY_QUERY = frozenset(
 _ShowOption = Annotated[
     bool,
     typer.Option("--show", help="Print the SQL and run nothing", rich_help_panel=OUTPUT),
-]
-
-
-def refuse_list(name: str | None) -> None:
-    """Refuse `--list` beside the name of a query.
-
-    Raises:
-        UsageError: always.
-    """
-    raise UsageError(
-        "--list takes no name of a query",
-        f"msgflow query --list, or msgflow query {name} --help",
-    )
-
-
-def _refuse_list(context: typer.Context, wanted: bool) -> None:
-    if wanted:
-        refuse_list(context.info_name)
-
-
-_ListOption = Annotated[
-    bool, typer.Option("--list", hidden=True, is_eager=True, callback=_refuse_list)
 ]
 
 
@@ -219,7 +196,6 @@ def build_command(
         ("wide", WideOption, False),
         ("times", TimesOption, None),
         ("show", _ShowOption, False),
-        ("list_queries", _ListOption, False),
         ("memory_limit", MemoryLimitOption, None),
         ("database", DatabaseOption, DEFAULT_DATABASE),
     ):

@@ -160,7 +160,7 @@ def _meant(name: str, views: Callable[[], Collection[str]]) -> str:
             return f"it is a view: msgflow sql 'FROM {name}'"
         words = tuple(nearest(name, query_names()))
     commands = (load_query(other).command for other in words)
-    return " or ".join(commands) or "msgflow query --list"
+    return " or ".join(commands) or "msgflow query"
 
 
 def load_queries() -> tuple[Header, ...]:

@@ -70,7 +70,7 @@ class QueryResult(Rows):
         if self.header is None and form is not Times.NS:
             raise UsageError(
                 "plain SQL does not say which numbers are times",
-                "use a query: msgflow query --list",
+                "use a query: msgflow query",
             )
         return replace(self, table=converted(self.table, self.units, self.runs, form))
 

@@ -92,6 +92,7 @@ def test_nothing_is_left_of_a_file_that_failed(
             "msgflow query scheduling --measure preemption or msgflow query waits --by pair",
         ),
         ("query wakeup-latency", "msgflow query scheduling --measure wakeup"),
+        ("query --list", "msgflow query"),
         ("query critical-path --take 1", "msgflow flow --take ID --why"),
         ("query clocks", "msgflow clocks"),
         ("query clocks-pair", "msgflow clocks --by pair"),

@@ -90,7 +90,7 @@ def test_an_unknown_query_is_refused_with_similar_ones() -> None:
 def test_without_a_similar_one_the_list_is_named() -> None:
     with pytest.raises(UsageError) as raised:
         load_query("xyzzy")
-    assert raised.value.hint == "msgflow query --list"
+    assert raised.value.hint == "msgflow query"
 
 
 def test_nearest_finds_slips_and_parts() -> None:
@@ -117,7 +117,7 @@ def test_what_may_be_meant_comes_before_what_there_is() -> None:
         ("loss", "msgflow query topics --measure delivery or msgflow info --section quality"),
         ("executor_wait", "it is a view: msgflow sql 'FROM executor_wait'"),
         ("take", "it is a view: msgflow sql 'FROM take'"),
-        ("../x/../node.", "msgflow query --list"),
+        ("../x/../node.", "msgflow query"),
         ("callback-schedule", "msgflow query scheduling"),
         ("thread-states", "msgflow query scheduling --measure threads"),
         ("cpu-usage", "msgflow query scheduling --measure cpu"),
