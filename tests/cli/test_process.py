@@ -74,7 +74,7 @@ HELP = (
     ("--help",),
     ("--version",),
     ("ingest", "--help"),
-    ("query", "--list"),
+    ("query",),
     ("query", "--help"),
     ("query", "topics", "--help"),
     ("query", "topics", "--show"),
