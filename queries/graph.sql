@@ -2,7 +2,9 @@
 -- title: Which node sends what to which, how often and how fast
 -- description: The computation graph: nodes, and the topics, services and actions between them,
 --     with rates and latencies. The services of an action are no rows of their own. As dot,
---     mermaid and json it is for programs that draw it.
+--     mermaid and json it is for programs that draw it: topics show their rate, nodes of one
+--     executor stand together, and dashed (periodic_async) and dotted (partial_sync,
+--     approximate_sync) arrows lead to what an indirect link causes.
 -- grain: one row per node, topic, service or action, and what the node does with it
 -- column: run_id BIGINT            Run
 -- column: kind VARCHAR             What the node does: 'publish', 'receive', 'call', 'serve', or
