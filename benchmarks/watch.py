@@ -4,9 +4,10 @@
 
 For each number of events a pipeline of nodes is simulated, and its recording rotated into chunks of
 that many events. Windows and steps are as long as a chunk, so that a step reads one chunk, and
-analyses three: its own, and one before and behind. Printed are the CPU time of a step (median), the
-part of it that grows with the events, and the memory of the process after a third of the steps and
-after all. CPU times of a machine that has other work are longer than those of an idle one.
+analyses five at most: those of its window, and of the time before and behind it that `--late` says.
+Printed are the CPU time of a step (median), the part of it that grows with the events, and the
+memory of the process after a third of the steps and after all. CPU times of a machine that has
+other work are longer than those of an idle one.
 """
 
 from __future__ import annotations
@@ -59,6 +60,7 @@ def measured(events: int, chunks: int) -> tuple[float, float, int, int]:
         watcher = _Timed(
             window_ns=length,
             step_ns=length,
+            late_ns=length,
             links=None,
             clocks=read_clock_sync("none"),
             note=print,

@@ -68,6 +68,15 @@ def command(
     step: Annotated[
         str, typer.Option("--step", metavar="TIME", help="How far a window is from the one before")
     ] = "2s",
+    late: Annotated[
+        str | None,
+        typer.Option(
+            "--late",
+            metavar="TIME",
+            help="How long a window waits for chunks and messages that are late",
+            show_default="as long as a step",
+        ),
+    ] = None,
     links: LinksOption = None,
     clock_sync: ClockSyncOption = "none",
     once: Annotated[
@@ -165,6 +174,7 @@ def command(
     earlier_ns = 0 if earlier is None else duration_ns(earlier, "--keep-before")
     step_ns = duration_ns(step, "--step")
     window_ns = duration_ns(window, "--window")
+    late_ns = step_ns if late is None else duration_ns(late, "--late")
     if earlier is not None and keep is None:
         raise UsageError(
             "--keep-before is about violations that are kept",
@@ -193,6 +203,7 @@ def command(
         watcher = Watcher(
             window_ns=window_ns,
             step_ns=step_ns,
+            late_ns=late_ns,
             links=None if links is None else read_links(links),
             clocks=read_clock_sync(clock_sync),
             note=print_note,

@@ -40,10 +40,9 @@ def watch_finished(directory: Path, watcher: Watcher) -> Iterator[WindowReport]:
     for chunk in chunks:
         watcher.read(chunk)
         left.remove(chunk.source)
-        if chunk.source not in left:
-            watcher.history.go_on_without(chunk.source)
-        watcher.go_on()
-        if (report := watcher.report(is_live=False)) is not None:
+        # Nothing is late that is on the disk: windows wait for all sources that have more.
+        ends = [end for source, end in watcher.history.ends_ns.items() if source in left]
+        if ends and (report := watcher.report(min(ends))) is not None:
             yield report
             watcher.keep_violation()
     yield from _last(watcher)
@@ -82,27 +81,24 @@ def watch_live(
                 watcher.read(chunk)
                 end_ns = watcher.history.ends_ns.get(chunk.source)
                 arrivals.add(chunk, end_ns, is_live=not is_first)
-                watcher.go_on()
+                watcher.skip_old()
         is_first = False
         for source in arrivals.vanished(looked_s):
-            goes_on = watcher.history.go_on_without(source)
-            end = "going on without it" if goes_on else "waiting for it"
-            note(f"no chunk comes any more from {source}: {end}")
-            watcher.go_on()
+            note(f"no chunk comes any more from {source}")
         ahead_s = arrivals.clocks_ahead_s()
         for source, seconds in ahead_s.items():
             if abs(seconds) * _SECOND_NS > PATIENCE * step_ns:
                 arrivals.leave_out(source)
                 watcher.history.leave_out(source)
                 note(f"{_wrong(source, seconds)}: going on without it, until {_REMEDY}")
-                watcher.go_on()
             elif abs(seconds) * _SECOND_NS > step_ns and not are_apart:
                 are_apart = True
-                note(f"{_wrong(source, seconds)}: windows wait for the slowest, until {_REMEDY}")
+                note(f"{_wrong(source, seconds)}: windows wait as long as --late, until {_REMEDY}")
         if is_last:
             yield from _last(watcher)
             return
-        if (report := watcher.report(is_live=True)) is None:
+        report = watcher.report(watcher.history.newest_ns, is_live=True)
+        if report is None:
             time.sleep(_BETWEEN_LOOKS)
             continue
         lag_s = report.lag_s or 0
@@ -127,9 +123,6 @@ def _wrong(source: Path, ahead_s: float) -> str:
 
 
 def _last(watcher: Watcher) -> Iterator[WindowReport]:
-    if watcher.history.is_empty:
-        return
-    watcher.history.add_border(is_last=True)
-    if (report := watcher.report(is_live=False, is_last=True)) is not None:
+    if (report := watcher.report(watcher.history.newest_ns, is_last=True)) is not None:
         yield report
         watcher.keep_violation()

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from msgflow.run.window import Window
 from msgflow.watch.kept_traces import KeptTraces
 
@@ -13,196 +15,125 @@ if TYPE_CHECKING:
 
     from msgflow.watch.kept_chunk import KeptChunk
 
-# A window may be so much longer, and chunks so much shorter than a step: rotations are never on
-# time. Parts of the whole.
-_SLACK = 0.1
-# No message is waited for longer than so many windows: what is kept has an end.
-_MOST_WINDOWS = 2
-
 
 class History:
     """What is kept of a recording: the last chunks, and what lasts of those before.
 
-    *Borders* are the begin of all, and times up to which all hosts had recorded at a step. Windows
-    reach from border to border, so that each moment belongs to a window once its last message can
-    have arrived: at the next border, or later if messages have taken longer.
-
-    Where messages take longer than a step, the window up to the last border is shown meanwhile, and
-    a final one once in the length of a window.
+    Windows end at multiples of a step. A window is closed once the newest time of all chunks passes
+    its end by as much as something may be late: a chunk of another host, or the last message of a
+    flow. Of the time before a window as much is kept, for what began there.
 
     Attributes:
-        final_ns: the end of the last final window; None before the first.
+        closed_ns: the end of the last window that is closed; before the first one, where that
+            begins.
     """
 
-    def __init__(self, window_ns: int, step_ns: int) -> None:
+    def __init__(self, window_ns: int, step_ns: int, late_ns: int) -> None:
         """Start with nothing.
 
         Args:
             window_ns: length of a window.
-            step_ns: least distance of borders.
+            step_ns: how far a window is from the one before.
+            late_ns: how long a window waits for what is late.
         """
         self._window_ns = window_ns
         self._step_ns = step_ns
+        self._late_ns = late_ns
         self._lasting: dict[Path, KeptChunk] = {}
         self._chunks: list[KeptChunk] = []
-        self._borders: list[int] = []
         self._ends: dict[Path, int] = {}
-        self._last_end_ns = 0
-        # Borders, with what the report at that time has shown.
-        self._longest: list[tuple[int, int, int]] = []
-        self.final_ns: int | None = None
-        self._shown_ns = 0
-
-    @property
-    def is_empty(self) -> bool:
-        """Whether there was no chunk yet."""
-        return not self._chunks
-
-    @property
-    def complete_ns(self) -> int:
-        """Time up to which all hosts have recorded; there must be a chunk."""
-        return min(self._ends.values())
+        self._begin_ns = self.closed_ns = 0
+        self._has_closed = False
 
     @property
     def ends_ns(self) -> Mapping[Path, int]:
-        """Up to when each source has recorded that is waited for."""
+        """Up to when each source has recorded."""
         return self._ends
 
     @property
-    def border_ns(self) -> int:
-        """The last border."""
-        return self._borders[-1]
-
-    @property
-    def last_step(self) -> Window:
-        """The time between the last two borders."""
-        return Window(self._borders[-2], self._borders[-1])
+    def newest_ns(self) -> int:
+        """The newest time of all sources; 0 before the first chunk."""
+        return max(self._ends.values(), default=0)
 
     @property
     def last_event_ns(self) -> int:
         """Time of the last event of all."""
         return max(chunk.last_event_ns for chunk in self._chunks)
 
-    @property
-    def is_due(self) -> bool:
-        """Whether a further border has come."""
-        if not self._ends:
-            return False
-        return self.complete_ns - self._borders[-1] >= self._step_ns * (1 - _SLACK)
-
-    def add(self, chunk: KeptChunk) -> None:
-        """Add the next chunk of a host."""
-        self._chunks.append(chunk)
-        self._chunks.sort(key=lambda each: each.end_ns)
-        if len(self._borders) < 2:
-            self._borders = [min(each.begin_ns for each in self._chunks)]
-        self._ends[chunk.source] = max(chunk.end_ns, self._ends.get(chunk.source, chunk.end_ns))
-        self._last_end_ns = max(self._last_end_ns, chunk.end_ns)
-
-    def go_on_without(self, source: Path) -> bool:
-        """Wait for no more chunks of a source; a later chunk of it counts again.
+    def add(self, chunk: KeptChunk) -> int:
+        """Add the next chunk of a source.
 
         Returns:
-            False if it is the only one.
+            How many of its events came too late: after their window was closed.
         """
-        # One whose chunks cannot be read has no end.
-        if not self._ends.keys() - {source}:
-            return False
-        self._ends.pop(source, None)
-        return True
+        self._chunks.append(chunk)
+        self._chunks.sort(key=lambda each: each.end_ns)
+        self._ends[chunk.source] = max(chunk.end_ns, self._ends.get(chunk.source, chunk.end_ns))
+        if not self._has_closed:
+            self._begin()
+            return 0
+        return int(np.count_nonzero(chunk.times_ns < self.closed_ns))
 
     def leave_out(self, source: Path) -> None:
-        """Forget all of a source whose clock errs, as if it had never recorded."""
-        if not self.go_on_without(source):
+        """Forget all of a source whose clock errs, as if it had never recorded.
+
+        Nothing happens to the only source.
+        """
+        if not self._ends.keys() - {source}:
             return
+        self._ends.pop(source, None)
         self._chunks = [chunk for chunk in self._chunks if chunk.source != source]
-        self._last_end_ns = max(self._ends.values())
-        begin_ns = min((chunk.begin_ns for chunk in self._chunks), default=self._last_end_ns)
-        if len(self._borders) < 2 or self._borders[-1] < begin_ns:
-            # Borders and windows so far had its time.
-            self._borders = [begin_ns]
-            self.final_ns = None
-            self._shown_ns = 0
+        if self.closed_ns > self.newest_ns:
+            # Windows so far had its time.
+            self._has_closed = False
+            self._begin()
 
-    @property
-    def behind_ns(self) -> int:
-        """How long something may come that belongs to a window, after its end."""
-        return max((flow_ns for _, flow_ns, _ in self._longest), default=0)
-
-    @property
-    def before_ns(self) -> int:
-        """How much earlier something may have begun that belongs to a window."""
-        return max((max(flow_ns, wait_ns) for _, flow_ns, wait_ns in self._longest), default=0)
-
-    def note_longest(self, flow_ns: int, wait_ns: int) -> None:
-        """Note what a report has shown. It counts for two windows, and as two windows at most.
+    def skip_old(self, *, earlier_ns: int = 0) -> list[Path]:
+        """Let the first window be no longer than others, however much was recorded before it.
 
         Args:
-            flow_ns: how long a message or a flow was on the way at most.
-            wait_ns: how long a node kept data at most.
+            earlier_ns: how much of what came before it is kept all the same.
+
+        Returns:
+            The directories of the chunks that are forgotten.
         """
-        most_ns = _MOST_WINDOWS * self._window_ns
-        border_ns = self._borders[-1]
-        self._longest = [each for each in self._longest if each[0] > border_ns - most_ns]
-        self._longest.append((border_ns, min(flow_ns, most_ns), min(wait_ns, most_ns)))
+        if self._has_closed or (window := self.next_window(self.newest_ns)) is None:
+            return []
+        self.closed_ns = max(window.start_ns, window.end_ns - self._window_ns)
+        return self.forget(Window(self.closed_ns, window.end_ns), earlier_ns=earlier_ns)
 
-    def add_border(self, *, is_last: bool = False) -> None:
-        """Make a border of the time that all hosts have reached, or of the end of all if it is."""
-        end_ns = self._last_end_ns + 1 if is_last else self.complete_ns
-        if end_ns > self._borders[-1]:
-            self._borders.append(end_ns)
+    def next_window(self, newest_ns: int, *, is_last: bool = False) -> Window | None:
+        """Return the next window that can be closed; None if there is none.
 
-    def newest_window(self) -> Window:
-        """Return the window up to the last border, whose last messages may be on the way."""
-        return Window(self._start_of(self._borders[-1]), self._borders[-1])
-
-    def next_window(self, *, is_live: bool, is_last: bool = False) -> tuple[Window, bool] | None:
-        """Return the next window to show, and whether it may be final; None until there is one.
+        It leaves out nothing since the last one: where steps were late it is longer.
 
         Args:
-            is_live: a window that is not final counts, too: somebody looks at the screen.
+            newest_ns: the newest time that was recorded.
             is_last: nothing more comes.
         """
-        final = self.final_window(is_last=is_last)
-        if not is_live or is_last:
-            return None if final is None else (final, True)
-        if final is not None and self._is_timely(final):
-            return final, True
-        # The window up to the border before the last could be final, but messages take longer.
-        if len(self._borders) < 3 or self._borders[-1] <= self._shown_ns:
+        if not self._chunks:
             return None
-        return self.newest_window(), False
+        # The step that the last moment is in counts as a whole: windows meet there as elsewhere.
+        known_ns = newest_ns + self._step_ns if is_last else newest_ns - self._late_ns
+        end_ns = known_ns // self._step_ns * self._step_ns
+        if end_ns <= self.closed_ns:
+            return None
+        start_ns = min(end_ns - self._window_ns, self.closed_ns)
+        return Window(max(start_ns, self._begin_ns), min(end_ns, newest_ns + 1))
 
-    def final_window(self, *, is_last: bool = False) -> Window | None:
-        """Return the window of which all is known; None if there is no further one.
+    def close(self, window: Window, *, earlier_ns: int = 0) -> list[Path]:
+        """Close a window: what comes of it from now on is late.
 
         Args:
-            is_last: nothing more comes.
+            window: which one.
+            earlier_ns: how much of what came before it is kept, besides what later ones need.
+
+        Returns:
+            The directories of the chunks that are forgotten.
         """
-        if not self._borders:
-            return None
-        ends = self._borders[1:] if is_last else self._borders[1:-1]
-        known = [end for end in ends if is_last or self._is_over(end)]
-        if not known or (self.final_ns is not None and known[-1] <= self.final_ns):
-            return None
-        return self._window_to(known[-1])
-
-    def is_over(self, window: Window) -> bool:
-        """Whether nothing more can come of a window."""
-        return self._is_over(window.end_ns)
-
-    def note_shown(self, window: Window, *, is_final: bool) -> None:
-        """Note that a window has been shown: until the next border, no other one is."""
-        self._shown_ns = self._borders[-1]
-        if is_final:
-            self.final_ns = window.end_ns
-
-    def judged_window(self, window: Window) -> Window:
-        """Return a window to show with all that is not final behind and before it."""
-        start_ns = window.start_ns
-        if self.final_ns is not None:
-            start_ns = min(start_ns, self.final_ns)
-        return Window(start_ns, self._borders[-1])
+        self.closed_ns = window.end_ns
+        self._has_closed = True
+        return self.forget(window, earlier_ns=earlier_ns)
 
     def traces(self, window: Window, *, earlier_ns: int = 0) -> KeptTraces:
         """Return what a window needs: itself, and what comes before and after.
@@ -237,42 +168,15 @@ class History:
             )
         passed = [chunk.path for chunk in self._chunks if chunk not in needed]
         self._chunks = needed
-        reach = self._reach(window)
-        self._borders = [border for border in self._borders if border >= reach]
         return passed
 
-    def _is_over(self, end_ns: int) -> bool:
-        return end_ns <= self._borders[-1] - self.behind_ns
-
-    def _is_timely(self, final: Window) -> bool:
-        if final.end_ns == self._borders[-2] or self.final_ns is None:
-            return True
-        return final.end_ns - self.final_ns >= self._window_ns * (1 - _SLACK)
-
-    def _start_of(self, end_ns: int) -> int:
-        """Return where the window that ends at a border begins: at a border, too."""
-        before = [border for border in self._borders if border < end_ns]
-        reached = [b for b in before if b >= end_ns - self._window_ns * (1 + _SLACK)]
-        return reached[0] if reached else before[-1]
-
-    def _window_to(self, end_ns: int) -> Window:
-        """Return the window that ends at a border, and leaves out nothing since the last one."""
-        start_ns = self._start_of(end_ns)
-        # Windows as short as steps overlap in nothing.
-        if self.final_ns is not None and (
-            start_ns > self.final_ns or self._window_ns <= self._step_ns
-        ):
-            start_ns = self.final_ns
-        return Window(start_ns, end_ns)
-
-    def _reach(self, window: Window) -> int:
-        """Return the last border that is long enough before a window."""
-        before = [b for b in self._borders if b < window.start_ns]
-        known = [b for b in before if b <= window.start_ns - self.before_ns]
-        return max(known, default=0)
+    def _begin(self) -> None:
+        """Let windows begin with the chunks that there are."""
+        begins = [chunk.begin_ns for chunk in self._chunks]
+        self._begin_ns = self.closed_ns = min(begins, default=0)
 
     def _needed(self, window: Window, earlier_ns: int) -> list[KeptChunk]:
-        reach = self._reach(window) - earlier_ns
+        reach = window.start_ns - self._late_ns - earlier_ns
         return [chunk for chunk in self._chunks if chunk.end_ns > reach]
 
     def _lasting_without(self, needed: Sequence[KeptChunk]) -> list[KeptChunk]:

@@ -18,7 +18,7 @@ from msgflow.watch.learned_answers import LearnedAnswers, with_learned
 from msgflow.watch.window_report import report_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
     from pathlib import Path
 
     from msgflow.links import DeclaredLink, LinksFile
@@ -49,6 +49,7 @@ class Watcher:
         *,
         window_ns: int,
         step_ns: int,
+        late_ns: int,
         links: LinksFile | None,
         clocks: ClockSync,
         note: Callable[[str], None],
@@ -62,6 +63,7 @@ class Watcher:
         Args:
             window_ns: length of a window.
             step_ns: how far a window is from the one before.
+            late_ns: how long a window waits for what is late.
             links: indirect links to declare.
             clocks: how clocks of several hosts are brought together.
             note: gets sentences about what is wrong with the recording.
@@ -70,7 +72,7 @@ class Watcher:
             exporter: counts each moment once.
             database: gets each window, for pages.
         """
-        self.history = History(window_ns, step_ns)
+        self.history = History(window_ns, step_ns, late_ns)
         self._links = links
         self._clocks = clocks
         self._note = note
@@ -81,6 +83,8 @@ class Watcher:
         self._database = database
         self.on_passed: Callable[[Path], None] | None = None
         self._said: set[str] = set()
+        # Since the last report.
+        self._late_events = 0
         self._clock_offset_ns = self._last_clock_offset_ns = _clock_offset_ns()
         self._answers = LearnedAnswers()
         self._violated: tuple[int, KeptTraces, list[Path], LinksFile | None, str | None] | None = (
@@ -112,30 +116,30 @@ class Watcher:
         if kept.damages:
             first = kept.damages[0]
             self._note(f"{len(kept.damages)} damages in {chunk.path}, the first: {first.message}")
-        self.history.add(kept)
+        late = self.history.add(kept)
+        self._late_events += late
+        if late:
+            self._note_once(
+                f"events of {chunk.source} come after their window was closed: a longer --late"
+                " waits for them"
+            )
 
-    def go_on(self) -> None:
-        """Make a border if one is due, and forget what no window needs."""
-        if not self.history.is_due:
-            return
-        self.history.add_border()
-        if self.history.final_ns is None:
-            # So much has been recorded before we came.
-            self._forget(self.history.newest_window())
+    def skip_old(self) -> None:
+        """Leave out what was recorded long before the first window."""
+        self._pass(self.history.skip_old(earlier_ns=self._earlier_ns))
 
-    def report(self, *, is_live: bool, is_last: bool = False) -> WindowReport | None:
-        """Return what the next window shows; None until there is one.
+    def report(
+        self, newest_ns: int, *, is_live: bool = False, is_last: bool = False
+    ) -> WindowReport | None:
+        """Close the next window, and return what it shows; None until there is one.
 
         Args:
-            is_live: the recording goes on at this moment: where messages take longer than a step,
-                what is known so far is reported meanwhile.
+            newest_ns: the newest time that was recorded.
+            is_live: the recording goes on at this moment.
             is_last: nothing more comes.
         """
-        found = self.history.next_window(is_live=is_live, is_last=is_last)
-        if found is None:
-            return None
-        window, may_be_final = found
-        return self._report(window, may_be_final=may_be_final, is_live=is_live, is_last=is_last)
+        window = self.history.next_window(newest_ns, is_last=is_last)
+        return None if window is None else self._report(window, newest_ns, is_live=is_live)
 
     def keep_violation(self) -> None:
         """Keep the chunks of the last report if it has a violation, once it has been told."""
@@ -147,9 +151,9 @@ class Watcher:
         """Free the memory of the database."""
         self._con.close()
 
-    def _forget(self, window: Window) -> None:
-        for path in self.history.forget(window, earlier_ns=self._earlier_ns):
-            if self.on_passed is not None:
+    def _pass(self, paths: Sequence[Path]) -> None:
+        if self.on_passed is not None:
+            for path in paths:
                 self.on_passed(path)
 
     def _ingest(self, traces: KeptTraces) -> tuple[LinksFile | None, str | None]:
@@ -211,41 +215,30 @@ class Watcher:
         now_ns = time.monotonic_ns() + self._clock_offset_ns
         return (now_ns - self.history.last_event_ns) / _SECOND_NS
 
-    def _report(
-        self, window: Window, *, may_be_final: bool, is_live: bool, is_last: bool
-    ) -> WindowReport | None:
+    def _report(self, window: Window, newest_ns: int, *, is_live: bool) -> WindowReport:
         history = self.history
-        # What came after the window counts, too: an alarm must be early. So does what is not final
-        # before it: an alarm must miss nothing.
-        judged = history.judged_window(window)
+        # What came after the window counts, too: an alarm must be early.
+        judged = Window(window.start_ns, newest_ns + 1)
         traces = history.traces(judged)
         links, learned = self._ingest(traces)
-        report = report_of(self._con, window, history.last_step)
-        history.note_longest(report.longest_flow_ns, report.longest_wait_ns)
-        is_final = may_be_final and (is_last or history.is_over(window))
-        if not is_final and not is_live:
-            return None
-        report = replace(report, is_final=is_final)
+        report = replace(report_of(self._con, window), late_events=self._late_events)
+        self._late_events = 0
         if self._alarm is not None:
-            final_ns = window.end_ns if is_final else history.final_ns or 0
-            found, verdicts = self._alarm.judge(self._con, judged, final_ns)
+            found, verdicts = self._alarm.judge(self._con, judged, window.end_ns)
             report = replace(report, violations=found, verdicts=verdicts)
-        if self._exporter is not None and is_final:
-            start_ns = window.start_ns if history.final_ns is None else history.final_ns
-            self._exporter.count(self._con, Window(start_ns, window.end_ns))
+        if self._exporter is not None:
+            self._exporter.count(self._con, Window(history.closed_ns, window.end_ns))
         if self._database is not None:
             self._database.offer(window.end_ns, traces, links)
         if report.violations:
             kept = history.traces(judged, earlier_ns=self._earlier_ns)
             paths = history.paths(judged, earlier_ns=self._earlier_ns)
-            self._violated = (history.border_ns, kept, paths, links, learned)
+            self._violated = (newest_ns, kept, paths, links, learned)
         if is_live:
             report = replace(report, lag_s=self._lag_s())
         if self._exporter is not None:
             self._exporter.show(report)
-        history.note_shown(window, is_final=is_final)
-        if is_final:
-            self._forget(window)
+        self._pass(history.close(window, earlier_ns=self._earlier_ns))
         return report
 
 

@@ -25,6 +25,7 @@ def followed(shared_traces: Path, tmp_path: Path) -> Iterator[Followed]:
     watcher = Watcher(
         window_ns=2 * SECOND,
         step_ns=2 * SECOND,
+        late_ns=2 * SECOND,
         links=None,
         clocks=read_clock_sync("none"),
         note=print,

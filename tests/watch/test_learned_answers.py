@@ -80,6 +80,7 @@ def test_what_is_learned_is_declared(
     watcher = Watcher(
         window_ns=8 * SECOND,
         step_ns=8 * SECOND,
+        late_ns=8 * SECOND,
         links=None if of_user is None else read_links(Path("links.yaml"), of_user),
         clocks=read_clock_sync("none"),
         note=print,

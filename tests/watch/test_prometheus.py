@@ -38,6 +38,7 @@ def exporter(recording: Path) -> Exporter:
     watcher = Watcher(
         window_ns=6 * SECOND,
         step_ns=3 * SECOND,
+        late_ns=3 * SECOND,
         links=None,
         clocks=read_clock_sync("none"),
         note=lambda text: None,
@@ -117,6 +118,7 @@ def test_the_sum_of_latencies_does_not_fall_and_losses_have_reasons(
     watcher = Watcher(
         window_ns=SECOND,
         step_ns=SECOND // 2,
+        late_ns=SECOND // 2,
         links=None,
         clocks=read_clock_sync("none"),
         note=lambda text: None,
@@ -145,8 +147,8 @@ def test_the_sum_of_latencies_does_not_fall_and_losses_have_reasons(
 
 def shown(*violations: dict[str, str], lag_s: float | None = None) -> WindowReport:
     return WindowReport(
-        window=Window(0, SECOND), is_final=True, paths=(), executors=(), losses=(),
-        discarded_events=0, longest_flow_ns=0, longest_wait_ns=0,
+        window=Window(0, SECOND), paths=(), executors=(), losses=(),
+        discarded_events=0,
         violations=violations, lag_s=lag_s,
     )  # fmt: skip
 

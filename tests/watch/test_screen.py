@@ -31,13 +31,10 @@ def test_names_are_text_and_all_fits() -> None:
     loss = {"topic": "[/y]", "subscriber": "/s" * 40, "dropped": 4, "lost": 0, "reasons": None}
     report = WindowReport(
         window=Window(0, 2_000_000_000),
-        is_final=True,
         paths=[{"path": "[/z] → \x1b[2J", "reached": 20, **FATES, **times}],
         executors=[{**thread, "blocked_ns": 0, "longest_callback": "Subscription(/[b])"}],
         losses=[loss],
         discarded_events=0,
-        longest_flow_ns=0,
-        longest_wait_ns=0,
     )
     text = shown(report)
     assert all(name in text for name in ("[/x]", "[/y]", "[/z]"))
@@ -51,7 +48,6 @@ def test_latencies_may_be_negative() -> None:
     reports = [
         WindowReport(
             window=Window(0, 2_000_000_000),
-            is_final=True,
             paths=[
                 {"path": "/z", "reached": 1, **FATES, "median_ns": most, "p99_ns": most}
                 | {"max_ns": most}
@@ -59,8 +55,6 @@ def test_latencies_may_be_negative() -> None:
             executors=(),
             losses=(),
             discarded_events=0,
-            longest_flow_ns=0,
-            longest_wait_ns=0,
         )
         for most in (-7_000_000, 3_000_000, -2_000_000)
     ]
@@ -77,13 +71,10 @@ def test_long_names_leave_the_columns_whole() -> None:
     }  # fmt: skip
     report = WindowReport(
         window=Window(0, 2_000_000_000),
-        is_final=True,
         paths=(),
         executors=[thread],
         losses=(),
         discarded_events=0,
-        longest_flow_ns=0,
-        longest_wait_ns=0,
     )
     (line,) = [line for line in shown(report).splitlines() if "100 %" in line]
     assert line.split("  ")[-3:-1] == [" 312 ms", "45.6 ms"]

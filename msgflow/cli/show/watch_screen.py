@@ -194,8 +194,6 @@ def missing(path: Row) -> int:
 def _heading(report: WindowReport) -> Text:
     start, end = (format_epoch(at)[_TIME] for at in report.window.bindings.values())
     text = Text(f"{start} to {end}", style="bold")
-    if not report.is_final:
-        text.append(" (provisional)", style="not bold")
     text.append(f"   {count(len(report.paths), 'path')}", style="not bold")
     if report.lag_s is not None:
         text.append(f"   lag {report.lag_s:.1f} s", style="not bold")
@@ -204,6 +202,8 @@ def _heading(report: WindowReport) -> Text:
     lost = report.discarded_events
     said = f"{count(lost, 'event')} lost by the tracer"
     text.append(f"   {said}", style="red" if lost else "not bold dim")
+    if report.late_events:
+        text.append(f"   {count(report.late_events, 'event')} came late", style="red")
     return text
 
 

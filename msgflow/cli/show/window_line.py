@@ -28,12 +28,13 @@ def window_line(report: WindowReport) -> str:
         words.append(f"{count(missing, 'message')} dropped or lost")
     if report.discarded_events:
         words.append(f"{count(report.discarded_events, 'event')} lost by the tracer")
+    if report.late_events:
+        words.append(f"{count(report.late_events, 'event')} came late")
     if report.verdicts:
         words.append(f"targets: {verdict_words(report)}")
     if report.lag_s is not None:
         words.append(f"lag {report.lag_s:.1f} s")
-    known = "" if report.is_final else " (provisional)"
-    return f"{start} to {end}{known}: {', '.join(words)}"
+    return f"{start} to {end}: {', '.join(words)}"
 
 
 def verdict_words(report: WindowReport) -> str:

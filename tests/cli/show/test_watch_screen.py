@@ -37,11 +37,9 @@ def report(*paths: dict[str, Any], **more: Any) -> WindowReport:
     given = {
         "losses": (),
         "discarded_events": 0,
-        "longest_flow_ns": 0,
-        "longest_wait_ns": 0,
         "lag_s": 1.25,
     } | more
-    return WindowReport(window, True, paths, [executor], **given)
+    return WindowReport(window, paths, [executor], **given)
 
 
 def terminal(width: int = 80, height: int = 40) -> Console:
