@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from msgflow.watch.chunk import Chunk
 
 _SECOND_NS = 1_000_000_000
-# A source without a chunk for so many steps, or so many times the length of its last chunk, is not
-# waited for any more. One whose clock errs by so many steps is not, either.
+# A source without a chunk for so many steps, or so many times the length of its last chunk, has
+# vanished. One whose clock errs by so many steps is left out.
 PATIENCE = 5
 # A chunk may come late; the earliest of so many tells the clock of its host.
 _LEAST_CHUNKS = 3

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from typer.testing import Result
 
-from msgflow.errors import ExitCode, RecordingError
+from msgflow.errors import ExitCode, RecordingError, TraceError
 from msgflow.record.lttng import Session
 from msgflow.watch import watched_sessions
 
@@ -79,6 +80,22 @@ def test_once_reads_one_directory(msgflow: Msgflow, tmp_path: Path) -> None:
     missing = msgflow("watch", "--once", "nothing")
     assert missing.exit_code == ExitCode.TRACE
     assert "no such directory — nothing" in missing.stderr
+
+
+def test_windows_wait_for_a_step_unless_late_says_more(
+    msgflow: Msgflow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    waits = []
+
+    def made(**given: Any) -> None:
+        waits.append(given["late_ns"])
+        raise TraceError("enough", "no more")
+
+    monkeypatch.setattr("msgflow.watch.Watcher", made)
+    for words in ((), ("--step", "3s"), ("--step", "3s", "--late", "500ms")):
+        assert msgflow("watch", "--once", tmp_path, *words).exit_code == ExitCode.TRACE
+    assert waits == [2_000_000_000, 3_000_000_000, 500_000_000]
+    refused(msgflow("watch", "--late", "soon"), "cannot read the duration of --late — soon")
 
 
 def test_a_program_is_watched_alone(msgflow: Msgflow, tmp_path: Path) -> None:

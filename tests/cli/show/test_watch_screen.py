@@ -63,6 +63,8 @@ def lines(screen: WatchScreen, shown: WindowReport) -> list[str]:
 def test_what_is_worst_comes_first() -> None:
     found = lines(new_screen(), report(path("/a → /b", 80), path("/c → /d", 5, lost=3)))
     assert found[0] == "22:13:20 to 22:13:30   2 paths   lag 1.2 s   0 events lost by the tracer"
+    late = lines(new_screen(), report(late_events=1_200))
+    assert " ".join(late).count("1,200 events came late") == 1
     order = [line.split()[0] for line in found if line.startswith(("/a", "/c"))]
     assert order == ["/c", "/a"]
     assert next(line for line in found if line.startswith("/a")).split()[3:10] == [
