@@ -150,6 +150,8 @@ RULES = (
         (f"overlap/{each}.sql", ("schema/test_given_namespace.py",))
         for each in ("given_namespace", "alternating_name")
     ),
+    ("link/gap/early_stream.sql", ("schema/cases/finding.stream_ends_early",)),
+    ("flow/many_chains.sql", ("schema/test_many_chains.py", "schema/cases/finding.path_cut")),
     ("flow/certain_cause.sql", ("schema/cases/derive.certain_cause",)),
     (
         "flow/stuck_root.sql",

@@ -13,8 +13,8 @@ from thorough import thorough
 ROOT = Path(__file__).resolve().parents[2]
 LIMIT = "schema/delivery/delivery_limit.sql"
 QUEUES = "tests/schema/test_delivery_rules.py::test_as_many_missing_in_a_row_as_a_queue_holds"
-ENDS = "schema/health/recording/stream_ends_early.sql"
-DROPPED = ["--replace", "WHERE r.end_ns - s.end_ns > 500_000_000", ""]
+ENDS = "schema/link/gap/early_stream.sql"
+DROPPED = ["--replace", "QUALIFY early_ns > 500_000_000", ""]
 
 
 def numbers_of(file: str, text: str) -> list[str]:
