@@ -5,11 +5,7 @@ import signal
 
 
 def main() -> None:
-    """Run the program.
-
-    Raises:
-        SystemExit: always, with a code of `msgflow.errors.ExitCode`.
-    """
+    """Run the program."""
     # Until the handler is in place, Ctrl-C ends the process without a traceback.
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, signal.SIG_DFL)

@@ -30,16 +30,9 @@ _ROWS_AT_ONCE = 50_000
 def read_bag(bag: Path) -> Iterator[pa.Table]:
     """Yield the messages of a bag in the order of their receipt, at least one table.
 
-    Args:
-        bag: directory of a rosbag2, or one of its files.
-
     Yields:
         Tables with `message` (number), `topic_name`, `type_name`, `received_ns`, `size_bytes` (of
         the serialised message), and where the type has a header `stamp_ns` and `frame_id`.
-
-    Raises:
-        UsageError: the package rosbags is not installed.
-        TraceError: not a bag, or a damaged one.
     """
     try:
         from rosbags.highlevel import AnyReader

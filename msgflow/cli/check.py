@@ -90,16 +90,7 @@ def _report(
     notes: Sequence[str],
     table: QueryResult | None,
 ) -> None:
-    """Print findings and their numbers.
-
-    Args:
-        findings: errors first, those of one kind together.
-        form: what to write; chosen by the suffix of `output`, else numbered text, when None.
-        output: file to write; stdout when None.
-        run_labels: what to call each run; empty: runs are not named.
-        notes: lines to print before the numbers of errors and warnings.
-        table: rows to print below the numbered text.
-    """
+    """Print findings and their numbers."""
     import pyarrow as pa
 
     from msgflow.cli.output import print_lines, print_result, print_status

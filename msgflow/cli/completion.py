@@ -42,12 +42,7 @@ def is_completing() -> bool:
 
 
 def complete(kind: str, *more: str) -> Callable[[typer.Context, str], list[str]]:
-    """Return the callback that completes the names of a database.
-
-    Args:
-        kind: of `msgflow.db.known_names`.
-        more: other words that are valid there.
-    """
+    """Return the callback that completes the names of a database."""
 
     def completed(ctx: typer.Context, incomplete: str) -> list[str]:
         from msgflow.db.known_names import known_names

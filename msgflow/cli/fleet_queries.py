@@ -190,10 +190,6 @@ def open_(
 
 
 def require_lake(lake: str) -> None:
-    """Raise an error if no lake is named; some commands do something without one, too.
-
-    Raises:
-        UsageError: no lake is named.
-    """
+    """Raise an error if no lake is named; some commands do something without one, too."""
     if not lake:
         raise UsageError("no lake is named", "--lake PATH, or MSGFLOW_LAKE")

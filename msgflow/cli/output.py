@@ -77,19 +77,7 @@ def print_result(
     columns: str | None = None,
     most_rows: int | None = MOST_ROWS,
 ) -> None:
-    """Write a result to a file or stdout, and say on stderr what it leaves out.
-
-    Args:
-        result: the rows.
-        form: what to write; chosen by the suffix of `path`, else a table, when None.
-        path: file to write, replaced when it exists; stdout when None.
-        wide: show all columns and rows.
-        columns: names of those to write, separated by commas; all when None.
-        most_rows: how many rows a table on a terminal has; all when None.
-
-    Raises:
-        UsageError: Parquet on a terminal, a closed stdout, or a file that cannot be written.
-    """
+    """Write a result to a file or stdout, and say on stderr what it leaves out."""
     from msgflow.files.atomic import replacing
     from msgflow.text.values import count
 
@@ -118,11 +106,7 @@ def print_result(
 
 
 def is_screen() -> bool:
-    """Tell whether stdout is a terminal.
-
-    Raises:
-        UsageError: stdout is closed.
-    """
+    """Tell whether stdout is a terminal."""
     return data_stream().isatty()
 
 
@@ -153,15 +137,7 @@ def print_runs(runs: Sequence[Run]) -> None:
 
 
 def print_text(text: str, path: Path | None) -> None:
-    """Write text to a file or stdout; a terminal shows control characters in it as text.
-
-    Args:
-        text: without a line break at the end.
-        path: file to write, replaced when it exists; stdout when None.
-
-    Raises:
-        UsageError: a closed stdout, or a file that cannot be written.
-    """
+    """Write text to a file or stdout; a terminal shows control characters in it as text."""
     if path is not None:
         _write_text(text, path)
         return
@@ -169,16 +145,7 @@ def print_text(text: str, path: Path | None) -> None:
 
 
 def print_drawing(draw: Callable[[int | None, bool], str], path: Path | None) -> None:
-    """Write a drawing to a file or stdout, on a terminal in colours.
-
-    Args:
-        draw: returns the text for a width (of the terminal; None elsewhere), with colours or not;
-            it has to replace control characters in names.
-        path: file to write, replaced when it exists; stdout when None.
-
-    Raises:
-        UsageError: a closed stdout, or a file that cannot be written.
-    """
+    """Write a drawing to a file or stdout, on a terminal in colours."""
     if path is not None:
         _write_text(draw(None, False), path)
         return
@@ -200,11 +167,7 @@ def _write_text(text: str, path: Path) -> None:
 
 
 def print_lines(lines: Iterable[str]) -> None:
-    """Write lines of text to stdout.
-
-    Raises:
-        UsageError: stdout is closed.
-    """
+    """Write lines of text to stdout."""
     stream = data_stream()
     if stream.isatty():
         stream = terminal(stream)
@@ -215,11 +178,7 @@ def print_lines(lines: Iterable[str]) -> None:
 
 
 def print_list(rows: Sequence[tuple[str, str]], titles: tuple[str, str] | None = None) -> None:
-    """Write names and their descriptions side by side; a terminal wraps the descriptions.
-
-    Raises:
-        UsageError: stdout is closed.
-    """
+    """Write names and their descriptions side by side; a terminal wraps the descriptions."""
     from msgflow.text.wrapping import wrap
 
     every = [*([titles] if titles else []), *rows]
@@ -243,11 +202,7 @@ def discard_stdout() -> None:
 
 
 def data_stream() -> IO[bytes]:
-    """Return stdout as bytes.
-
-    Raises:
-        UsageError: stdout is closed.
-    """
+    """Return stdout as bytes."""
     if sys.stdout is None:  # the parent process closed it
         raise UsageError(
             "cannot write to stdout: it is closed", "write to a file, for instance with -o FILE"

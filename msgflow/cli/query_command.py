@@ -152,14 +152,7 @@ def build_command(
     form_of: Callable[[Any, Any], Any] = chosen_format,
     write: Callable[[QueryResult, Any, dict[str, Any]], None] = print_rows,
 ) -> Any:
-    """Return the command that runs the query of `header`.
-
-    Args:
-        header: the query.
-        option: the option `--format`.
-        form_of: returns the format for the values of `--format` and `-o`.
-        write: writes the result in a format, by the options of the command.
-    """
+    """Return the command that runs the query of `header`."""
 
     def command(**given: Any) -> None:
         own = given_of(given)

@@ -120,11 +120,7 @@ def command(
 
 
 def read_size(text: str) -> int:
-    """Return the bytes that '20MB' means.
-
-    Raises:
-        UsageError: the text is no size, or the size is zero or above 1 GB.
-    """
+    """Return the bytes that '20MB' means."""
     size = bytes_of(text)
     if not 0 < size <= _MOST:
         raise UsageError(f"cannot read the size — {text}", "--max-size 20MB, at most 1GB")

@@ -36,11 +36,7 @@ _SUFFIXES = {
 
 
 def sections_format(path: Path | None) -> SectionsFormat:
-    """Return the format for a file by its suffix, a table for stdout.
-
-    Raises:
-        UsageError: no format has this suffix.
-    """
+    """Return the format for a file by its suffix, a table for stdout."""
     return SectionsFormat.TABLE if path is None else by_suffix(path, _SUFFIXES)
 
 
@@ -59,13 +55,7 @@ def json_lines(results: Mapping[str, QueryResult]) -> Iterator[str]:
 def screen_sections(
     results: Mapping[str, QueryResult], width: int, *, is_chosen: bool = False
 ) -> Iterator[str]:
-    """Yield lines for people, none longer than `width` cells.
-
-    Args:
-        results: by title.
-        width: of a line.
-        is_chosen: whether the results have the wanted columns only, and need no remark on others.
-    """
+    """Yield lines for people, none longer than `width` cells."""
     from msgflow.result.layout import lay_out
     from msgflow.result.screen import screen_lines
     from msgflow.text.wrapping import wrap

@@ -37,9 +37,6 @@ class SignalHandler:
         """Run the program, and turn a signal into its exit code.
 
         A signal that the parent process ignores stays ignored.
-
-        Raises:
-            SystemExit: of the program, or with the exit code of the signal.
         """
         self.came = None
         for number in SIGNALS:

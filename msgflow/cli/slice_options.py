@@ -53,10 +53,6 @@ def with_slice(*names: str, **changed: Any) -> Callable[[Command], Command]:
     """Return a decorator of a command: in place of its parameter `part`, it gets the options.
 
     The defaults of the options are the fields of the default of `part`.
-
-    Args:
-        names: fields of `Slice` that have an option; all when empty.
-        changed: other annotations, by field.
     """
     options = {name: SLICE_OPTIONS[name] for name in names or SLICE_OPTIONS} | changed
 

@@ -71,11 +71,7 @@ def command(
 
 
 def sql_of(text: str | None, file: Path | None, example: str) -> str:
-    """Return the SQL that was given, on the command line, in a file or on stdin.
-
-    Raises:
-        UsageError: not exactly one of them, or the file cannot be read.
-    """
+    """Return the SQL that was given, on the command line, in a file or on stdin."""
     if (text is None) == (file is None):
         raise UsageError("give SQL, or a file with -f", example)
     if file is not None:

@@ -26,15 +26,7 @@ _HELP = (
 
 
 def prompt(database: Path, ask: Callable[[str], None]) -> None:
-    """Ask for queries until the user ends it with Ctrl-D, `exit` or `quit`.
-
-    Args:
-        database: the file, for the names that tab completes.
-        ask: runs a query and prints its rows.
-
-    Raises:
-        DatabaseError: the file cannot be opened.
-    """
+    """Ask for queries until the user ends it with Ctrl-D, `exit` or `quit`."""
     with Database(database) as opened:
         names = opened.schema().to_arrow()
     words = {*names["view"].to_pylist(), *names["column"].to_pylist(), *_WORDS}

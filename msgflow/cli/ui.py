@@ -73,11 +73,7 @@ def command(
 
 
 def require_no_where(where: str | None) -> None:
-    """Raise an error if --where is given without --lake.
-
-    Raises:
-        UsageError: `where` is given.
-    """
+    """Raise an error if --where is given without --lake."""
     if where is not None:
         raise UsageError("--where chooses runs of a lake", "--lake PATH")
 

@@ -260,11 +260,7 @@ def command(
 def _only_word(
     words: list[str], program: list[str], *, once: bool, directory: Path | None
 ) -> str | None:
-    """Return the session or directory that is named, if any.
-
-    Raises:
-        UsageError: there are more words than one, or other options than those fit.
-    """
+    """Return the session or directory that is named, if any."""
     if program:
         alone = f"msgflow watch -- {shlex.join(program)} {_START}"
         if words:
@@ -290,11 +286,7 @@ def _only_word(
 
 
 def _finished(word: str | None) -> Path:
-    """Return the directory of a finished recording.
-
-    Raises:
-        TraceError: it does not exist.
-    """
+    """Return the directory of a finished recording."""
     assert word is not None
     place = path_of(word).absolute()
     if not place.is_dir():

@@ -57,13 +57,7 @@ class ConfinedProcess:
     """
 
     def __init__(self, module: str, *, seconds: float | None = None) -> None:
-        """Start the child.
-
-        Args:
-            module: whose functions it calls. They take a function that writes bytes of the answer,
-                and by name values that JSON has.
-            seconds: how long a call may take; as long as it likes when None.
-        """
+        """Start the child."""
         self._module = module
         self._seconds = seconds
         self._child = self._start()
@@ -75,14 +69,7 @@ class ConfinedProcess:
         self.close()
 
     def call(self, function: str, arguments: dict[str, Any]) -> bytearray:
-        """Return what a function of the module writes.
-
-        Raises:
-            MsgflowError: the one that the function raised.
-            LateError: it took longer than it may.
-            QueryError: the child has ended.
-            RuntimeError: the function raised another error.
-        """
+        """Return what a function of the module writes."""
         request = json.dumps({"function": function, "arguments": arguments}, default=str)
         if self._child.poll() is not None:
             self._restart()

@@ -55,12 +55,7 @@ class WarmSql:
         self._process: ConfinedProcess | None = None
 
     def __call__(self, text: str, limit: int) -> QueryResult:
-        """Return the rows of a query, `limit` at most; one thread at a time may ask.
-
-        Raises:
-            MsgflowError: as `Database.sql`, or it took too much memory or too long, or was
-                interrupted.
-        """
+        """Return the rows of a query, `limit` at most; one thread at a time may ask."""
         import pyarrow as pa
 
         if self._process is None:

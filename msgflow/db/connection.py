@@ -46,18 +46,7 @@ def connect(
 
 
 def attach(con: duckdb.DuckDBPyConnection, path: Path, *, is_new: bool = False) -> None:
-    """Attach an existing, current msgflow database for writing, and make it the current one.
-
-    Args:
-        con: a connection to another database.
-        path: the file.
-        is_new: this process has just created it, so that its definitions need no check. It has no
-            log, as it takes its place only when it is whole: a commit lasts only after a
-            CHECKPOINT.
-
-    Raises:
-        DatabaseError: the file is missing, locked, foreign, or of another schema revision.
-    """
+    """Attach an existing, current msgflow database for writing, and make it the current one."""
     if not path.exists():
         raise DatabaseError(f"no database — {path}", "msgflow ingest TRACE")
     require_file(path)
@@ -102,9 +91,6 @@ def require_current(con: duckdb.DuckDBPyConnection, path: Path) -> None:
     """Raise unless the database says that it has the schema and the views of this msgflow.
 
     This reads tables only. `require_ours` compares the definitions themselves.
-
-    Raises:
-        DatabaseError: it is foreign, damaged, newer, or has to be upgraded.
     """
     revision = require_known(con, path)
     hint = f"msgflow db upgrade --db {shlex.quote(str(path))}"
@@ -126,11 +112,7 @@ def has_current_views(con: duckdb.DuckDBPyConnection) -> bool:
 
 
 def require_known(con: duckdb.DuckDBPyConnection, path: Path) -> str:
-    """Return the revision of a database that this msgflow can read or upgrade.
-
-    Raises:
-        DatabaseError: it is foreign, newer, or from before the first release.
-    """
+    """Return the revision of a database that this msgflow can read or upgrade."""
     with database_errors(path):
         revision = recorded_revision(con)
     if revision is None:

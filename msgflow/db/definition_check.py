@@ -63,27 +63,14 @@ def definitions(con: duckdb.DuckDBPyConnection) -> dict[str, str]:
 
 
 def require_ours(con: duckdb.DuckDBPyConnection, path: Path) -> None:
-    """Raise unless tables, views and macros are those of this msgflow.
-
-    Raises:
-        DatabaseError: one is missing, changed, or not ours.
-    """
+    """Raise unless tables, views and macros are those of this msgflow."""
     _require(definitions(con), expected_definitions(), path)
 
 
 def require_tables(
     con: duckdb.DuckDBPyConnection, path: Path, wanted: Mapping[str, str] | None = None
 ) -> None:
-    """Raise unless tables are as they should be; an upgrade makes views and macros anew.
-
-    Args:
-        con: to the database.
-        path: its file.
-        wanted: definitions, as from `definitions`; those of this msgflow when None.
-
-    Raises:
-        DatabaseError: one is missing, changed, or not ours.
-    """
+    """Raise unless tables are as they should be; an upgrade makes views and macros anew."""
     found, wanted = (
         {name: text for name, text in each.items() if not name.startswith(("view", "macro"))}
         for each in (definitions(con), wanted or expected_definitions())

@@ -31,15 +31,7 @@ def derive(
     synchronise: Callable[[], None] | None = None,
     findings: bool = True,
 ) -> None:
-    """Derive the links of a run anew, inside the open transaction.
-
-    Args:
-        con: a writable connection to a database with current views.
-        run_id: the run; other runs stay as they are.
-        synchronise: called once messages are linked, to correct the clocks; None leaves them as
-            they are.
-        findings: also find what the recording shows.
-    """
+    """Derive the links of a run anew, inside the open transaction."""
     learn_topics(con, run_id)
     for name in derived_tables():
         if not reads_clocks(name):

@@ -30,12 +30,7 @@ _MOST_KEPT = 10
 
 
 def write_empty(path: Path) -> None:
-    """Write an empty database to `path`, which does not exist yet.
-
-    Raises:
-        OSError: it cannot be written.
-        duckdb.Error: likewise.
-    """
+    """Write an empty database to `path`, which does not exist yet."""
     content = _cached()
     if content is not None:
         path.write_bytes(content)

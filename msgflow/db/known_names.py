@@ -40,14 +40,7 @@ LIMIT {most}
 
 
 def known_names(path: Path, kind: str, prefix: str) -> Sequence[str]:
-    """Return the names in a database that begin with `prefix`, sorted, at most 1000.
-
-    Args:
-        path: the database; one that is missing, in use, damaged or foreign has no names.
-        kind: 'run', 'topic', 'node', 'callback', 'host', 'view', or 'place' for topics, nodes and
-            services.
-        prefix: how they begin.
-    """
+    """Return the names in a database that begin with `prefix`, sorted, at most 1000."""
     import duckdb
 
     from msgflow.db.sandbox import open_file

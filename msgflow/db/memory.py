@@ -41,11 +41,7 @@ def default_limit() -> str:
 
 
 def set_memory_limit(con: duckdb.DuckDBPyConnection, limit: str) -> None:
-    """Set the memory limit of a connection.
-
-    Raises:
-        DatabaseError: it is no amount of memory, or too little for a database.
-    """
+    """Set the memory limit of a connection."""
     try:
         con.execute("SET memory_limit = ?", [limit])
     except duckdb.OutOfMemoryException as error:
@@ -85,11 +81,7 @@ def bound_process(con: duckdb.DuckDBPyConnection) -> None:
 
 @contextlib.contextmanager
 def ingest_memory_errors(limit: str) -> Iterator[None]:
-    """Turn an out-of-memory error of an ingest into one that says what to do.
-
-    Raises:
-        DatabaseError: the traces need more memory than `limit`.
-    """
+    """Turn an out-of-memory error of an ingest into one that says what to do."""
     try:
         yield
     except duckdb.OutOfMemoryException as error:

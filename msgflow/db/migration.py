@@ -54,11 +54,7 @@ class Upgrade:
 
 
 def create(path: Path) -> None:
-    """Create a database at `path`, complete or not at all.
-
-    Raises:
-        DatabaseError: something is there already, or the directory cannot be written.
-    """
+    """Create a database at `path`, complete or not at all."""
     if path.exists():
         raise DatabaseError(f"a file is there already — {path}", "give another file with --db")
     _replace_by_new(path)
@@ -78,11 +74,7 @@ def _replace_by_new(path: Path) -> None:
 
 
 def require_ingestable(path: Path) -> None:
-    """Raise unless `path` is free, or a current msgflow database.
-
-    Raises:
-        DatabaseError: the file is locked, foreign, or of another schema revision.
-    """
+    """Raise unless `path` is free, or a current msgflow database."""
     if not path.exists():
         if not path.parent.is_dir():
             raise DatabaseError(
@@ -96,9 +88,6 @@ def upgrade(path: Path) -> Upgrade:
     """Bring a database to the schema and views, then to the links, of this msgflow.
 
     Either is one transaction.
-
-    Raises:
-        DatabaseError: the file is missing, locked, foreign, or newer than this msgflow.
     """
     if not path.exists():
         raise DatabaseError(f"no database — {path}", "msgflow ingest TRACE")

@@ -43,10 +43,6 @@ def load(layer: str) -> tuple[Header, ...]:
 
     `public` includes the views that show a table, and takes from the tables the columns that a
     header only names. Other folders include the objects that are made of all findings.
-
-    Raises:
-        ValueError: two objects need each other, or a column is declared nowhere.
-        FileNotFoundError: there is no such folder.
     """
     directory = resource_directory("schema") / layer
     if not directory.is_dir():
@@ -58,11 +54,7 @@ def load(layer: str) -> tuple[Header, ...]:
 
 
 def completed(header: Header) -> Header:
-    """Fill in the columns that a header only names, from the table of the same name.
-
-    Raises:
-        HeaderError: the table has no column of that name.
-    """
+    """Fill in the columns that a header only names, from the table of the same name."""
     if all(column.type for column in header.columns):
         return header
     declared = store_tables()[header.name.partition(".")[2]].columns
@@ -74,11 +66,7 @@ def completed(header: Header) -> Header:
 
 
 def sort(headers: Iterable[Header]) -> tuple[Header, ...]:
-    """Order objects so that each comes after those that it needs; ties by name.
-
-    Raises:
-        ValueError: two objects need each other, directly or by way of a stored table.
-    """
+    """Order objects so that each comes after those that it needs; ties by name."""
     by_name = {header.name: header for header in headers}
     sorter = TopologicalSorter({name: sources(by_name, name) for name in sorted(by_name)})
     try:

@@ -18,10 +18,6 @@ def broken_relations(
 ) -> list[dict[str, Any]]:
     """Return the columns with identities that are no row of the table that they refer to.
 
-    Args:
-        con: connection to a current database.
-        run_id: look at this run only; at all runs when None.
-
     Returns:
         For each run and column: `run_id`, `child` ('table.column'), `parent` (a table) and `count`.
     """

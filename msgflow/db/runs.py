@@ -34,18 +34,7 @@ def change_runs(
     *,
     memory_limit: str | None = None,
 ) -> _T:
-    """Change runs of a database in one transaction, which Ctrl-C undoes.
-
-    Args:
-        path: the database.
-        run: 'all', a name or an id; the latest run when None.
-        change: is called inside the open transaction; its result is returned.
-        memory_limit: most memory that the database takes, such as '2GB'.
-
-    Raises:
-        UsageError: no such run, or raised by `change`.
-        DatabaseError: the database is missing, locked, foreign, or of another schema revision.
-    """
+    """Change runs of a database in one transaction, which Ctrl-C undoes."""
     with (
         database_errors(path),
         contextlib.closing(connect(path, read_only=False, memory_limit=memory_limit)) as con,
@@ -157,11 +146,7 @@ def label_runs(
 
 
 def require_label(key: str, value: str | None) -> None:
-    """Raise unless a label is valid.
-
-    Raises:
-        UsageError: the key is invalid, or the value is too long or not valid Unicode.
-    """
+    """Raise unless a label is valid."""
     if not _KEY.fullmatch(key):
         raise UsageError(
             f"no key of a label — {key!r}",

@@ -39,12 +39,7 @@ _LET_GO = (
 def open_file(
     path: Path, *, read_only: bool, memory_limit: str | None = None
 ) -> duckdb.DuckDBPyConnection:
-    """Open any DuckDB file, or create it, in the sandbox.
-
-    Raises:
-        DatabaseError: it is locked by another process, or no DuckDB file; or `memory_limit` is no
-            amount of memory.
-    """
+    """Open any DuckDB file, or create it, in the sandbox."""
     require_file(path)
     config: dict[str, str | bool | int | float | list[str]] = {}
     if not read_only:
@@ -85,12 +80,6 @@ def shut_in(
     """Put a connection into the sandbox, which it cannot leave.
 
     The databases that it has attached stay attached.
-
-    Args:
-        con: the connection.
-        directories: directories that it may still read and write.
-        files: files that it may still read and write.
-        lock: forbid changes of its settings.
     """
     con.execute("SET allowed_directories = ?", [[str(path.absolute()) for path in directories]])
     con.execute("SET allowed_paths = ?", [list(files)])
@@ -110,12 +99,7 @@ def spill_directory(database: Path) -> Path:
 
 
 def remove_abandoned_spills(database: Path, *, is_ours_alone: bool) -> None:
-    """Remove the spill directories of processes that have ended.
-
-    Args:
-        database: the file.
-        is_ours_alone: it is open for writing, so that no other process can have it open.
-    """
+    """Remove the spill directories of processes that have ended."""
     prefix = _prefix(database)
     try:
         entries = [entry.name for entry in os.scandir(_place(database))]
@@ -138,11 +122,7 @@ def _prefix(database: Path) -> str:
 
 
 def require_file(path: Path) -> None:
-    """Raise unless a path is a file, or nothing yet.
-
-    Raises:
-        DatabaseError: it is a directory, pipe, socket or device.
-    """
+    """Raise unless a path is a file, or nothing yet."""
     # DuckDB would wait for a pipe, and read a device to its end.
     if path.exists() and not path.is_file():
         what = "a directory" if path.is_dir() else "a pipe, socket or device"

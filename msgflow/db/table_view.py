@@ -61,12 +61,7 @@ def _expression(column: StoreColumn) -> str:
 
 
 def _joins(table: StoreTable, way: str) -> Iterator[tuple[str, str, str, str]]:
-    """Yield (kind, relation, alias, condition) of the joins from a row, `self`, to its clock.
-
-    Args:
-        table: the table of the row.
-        way: its column that leads there.
-    """
+    """Yield (kind, relation, alias, condition) of the joins from a row, `self`, to its clock."""
     at, kind, column = "self", "JOIN", table.columns[way]
     while True:
         # A row without a thread or node has no clock either. The view shows it all the same.

@@ -30,9 +30,6 @@ def workspace(beside: Path) -> Iterator[Path]:
 
     It first removes workspaces of killed commands, whose lock files no process holds. On a system
     without such locks these stay.
-
-    Raises:
-        DatabaseError: the directory of the database cannot be written.
     """
     parent = beside.absolute().parent
     remove_abandoned_workspaces(parent)
@@ -57,11 +54,7 @@ def remove_abandoned_workspaces(parent: Path) -> None:
 
 @contextlib.contextmanager
 def creating(database: Path) -> Iterator[None]:
-    """Keep other processes from creating `database`, if the system has file locks.
-
-    Raises:
-        DatabaseError: another process is creating it, or the directory cannot be written.
-    """
+    """Keep other processes from creating `database`, if the system has file locks."""
     if not fcntl:
         yield
         return
@@ -88,11 +81,7 @@ def _cannot_write(parent: Path, error: OSError) -> DatabaseError:
 
 @contextlib.contextmanager
 def _locked(path: Path, *, wait: bool) -> Iterator[None]:
-    """Hold the lock file `path`, which is removed with the lock.
-
-    Raises:
-        OSError: another process holds it and `wait` is false, or it cannot be created.
-    """
+    """Hold the lock file `path`, which is removed with the lock."""
     while True:
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
         try:

@@ -41,11 +41,7 @@ def is_directory(path: Path) -> bool:
 
 
 def format_of(path: Path | None) -> EventFormat:
-    """Return the format of an output path: by its suffix, Parquet for a directory.
-
-    Raises:
-        UsageError: no format has this suffix.
-    """
+    """Return the format of an output path: by its suffix, Parquet for a directory."""
     if path is None:
         return EventFormat.TEXT
     if is_directory(path):
@@ -54,13 +50,7 @@ def format_of(path: Path | None) -> EventFormat:
 
 
 def table_writer(form: EventFormat, sink: Any, schema: pa.Schema) -> Any:
-    """Open a writer of CSV or Parquet: a context manager with `write_table`.
-
-    Args:
-        form: one of `TABLES`.
-        sink: a path or a binary stream.
-        schema: of all tables to be written.
-    """
+    """Open a writer of CSV or Parquet: a context manager with `write_table`."""
     if form is EventFormat.CSV:
         import pyarrow.csv
 

@@ -45,9 +45,6 @@ def write_events(
 
     CSV and Parquet have the columns event_id, ts_ns (epoch ns), trace_index, hostname, name,
     cpu_id, vpid, vtid, procname, pid_ns and fields, a JSON object. JSON objects have the same.
-
-    Raises:
-        TraceError: a trace is damaged; what came before has been written.
     """
     if form in TABLES:
         return _write_table(selection, form, stream, progress)

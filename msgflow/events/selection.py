@@ -45,18 +45,7 @@ class Selection:
         start: str | int | None = None,
         end: str | int | None = None,
     ) -> None:
-        """Choose events.
-
-        Args:
-            traces: what to read.
-            patterns: names with wildcards, such as 'ros2:rcl_*'; all events when empty.
-            start: epoch ns, an offset from the begin of the traces ('2.5s', '100ms'), or ISO
-                time. Events at that time belong to the selection.
-            end: likewise, but events at that time do not belong to it.
-
-        Raises:
-            UsageError: a time that cannot be read, or a pattern that fits no declared event.
-        """
+        """Choose events."""
         self.traces = traces
         self.lost_event_count = 0
         for trace in traces.traces:
@@ -72,19 +61,11 @@ class Selection:
     def rounds(
         self, progress: Callable[[Progress], None] | None = None
     ) -> Iterator[list[EventBatch]]:
-        """Yield the events with all their fields; those of a list precede those of the next.
-
-        Raises:
-            TraceError: a trace is damaged.
-        """
+        """Yield the events with all their fields; those of a list precede those of the next."""
         return self._read(dict.fromkeys(self._names), progress)
 
     def counts(self) -> dict[str, int]:
-        """Count the events by name, only those that occur; the most frequent first.
-
-        Raises:
-            TraceError: a trace is damaged.
-        """
+        """Count the events by name, only those that occur; the most frequent first."""
         counts: Counter[str] = Counter()
         if self._window == WHOLE:
             for _ in self._read({}, None):

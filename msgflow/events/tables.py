@@ -40,16 +40,6 @@ def write_event_tables(
     `ros2:rcl_init` goes to `ros2.rcl_init.parquet`. The columns are those of `COLUMNS`, then the
     fields; one that is called like a column before it is called `field_` and its name. In CSV,
     lists and structures are JSON. The directory appears when all is written.
-
-    Args:
-        selection: the events.
-        form: CSV or Parquet.
-        directory: must not exist, or be empty.
-        progress: called every now and then.
-
-    Raises:
-        TraceError: a trace is damaged.
-        UsageError: the directory is not empty or cannot be written.
     """
     with _new_directory(directory) as temporary, contextlib.ExitStack() as opened:
         files = _Files(temporary, form, opened)

@@ -32,12 +32,6 @@ def readable(
 
     Text is quoted as in JSON, lists are `[1, 2]`, structures `{name=value, …}` without missing
     members. Values inside more than two lists are as in JSON.
-
-    Args:
-        expression: SQL of the value.
-        data_type: of the value.
-        is_hexadecimal: show unsigned integers in base 16.
-        lambdas: lists around the value.
     """
     types = pa.types
     is_deep = types.is_list(data_type) and lambdas == MOST_LAMBDAS

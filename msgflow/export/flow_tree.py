@@ -53,12 +53,6 @@ def tree_text(
     """Return the tree of a flow; a line begins with its time since the first line.
 
     Nothing is drawn twice: a later line refers to the first one by its number in brackets.
-
-    Args:
-        flow: what to draw.
-        is_absolute: points in time as UTC, in place of the time since the first line.
-        width: of the terminal, where lines are wrapped; lines are not wrapped when None.
-        color: with escape sequences for colours.
     """
     branches = lay_out_flow(flow)
     stream = io.StringIO()

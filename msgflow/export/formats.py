@@ -48,22 +48,14 @@ SUFFIXES = {
 
 
 def format_of(path: Path | None) -> Format:
-    """Return the format for the suffix of a file; a table without a file.
-
-    Raises:
-        UsageError: no format has this suffix.
-    """
+    """Return the format for the suffix of a file; a table without a file."""
     if path is None or not path.suffix:
         return Format.TABLE
     return by_suffix(path, SUFFIXES, "; spreadsheets open CSV, PlotJuggler CSV and Parquet")
 
 
 def by_suffix(path: Path, known: Mapping[str, Form], more: str = "") -> Form:
-    """Return the format that the suffix of a file asks for; `more` ends the hint of the error.
-
-    Raises:
-        UsageError: no format has this suffix.
-    """
+    """Return the format that the suffix of a file asks for; `more` ends the hint of the error."""
     try:
         return known[path.suffix.lower()]
     except KeyError:

@@ -42,11 +42,7 @@ _PICTURE = "; for a picture: msgflow graph | dot -Tsvg, or msgflow ui, page Grap
 
 
 def graph_format(path: Path | None) -> GraphFormat | Format:
-    """Return the format for the suffix of a file, of graphs or of rows; DOT without a file.
-
-    Raises:
-        UsageError: no format has this suffix.
-    """
+    """Return the format for the suffix of a file, of graphs or of rows; DOT without a file."""
     return GraphFormat.DOT if path is None else by_suffix(path, _SUFFIXES, _PICTURE)
 
 

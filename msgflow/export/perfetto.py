@@ -227,13 +227,7 @@ class _Writer:
         return self.named_slices("perfetto_state", "schedule", noted)
 
     def named_slices(self, query: str, category: str, noted: Mapping[str, str]) -> int:
-        """Write slices that bring their names and tracks; return how many.
-
-        Args:
-            query: whose rows they are, by track.
-            category: of the slices.
-            noted: names of their arguments, and the columns that these are in.
-        """
+        """Write slices that bring their names and tracks; return how many."""
         kind = self.packets.TrackEvent
         count = 0
         known = None

@@ -27,9 +27,6 @@ def replacing(path: Path) -> Iterator[Path]:
 
     A file is replaced. Behind a symbolic link, this happens at the target. Anything else that
     stands there (a device, a pipe, the standard output of this process) stays and gets the bytes.
-
-    Raises:
-        UsageError: the file cannot be written there.
     """
     hint: str | None = "give a file in a directory that exists and can be written"
     try:

@@ -26,14 +26,6 @@ def replacing_entries(
     """Yield a directory to write `names` to; they take their places at the end.
 
     An error or an interrupt before that leaves `directory` as it was. Other entries stay.
-
-    Args:
-        directory: created if missing.
-        names: files or directories directly in it.
-        force: replace existing files, and directories that an export has written.
-
-    Raises:
-        UsageError: one exists already, or the directory cannot be written.
     """
     _clean_up(directory)
     _refuse_existing(directory, names, force)

@@ -10,9 +10,6 @@ def resource_directory(name: str) -> Path:
 
     In a wheel it lies in `msgflow/_data`; in a checkout beside the package, which counts
     only where pyproject.toml lies there too.
-
-    Raises:
-        FileNotFoundError: the installation is incomplete.
     """
     package = Path(__file__).resolve().parents[1]
     packaged = package / "_data" / name

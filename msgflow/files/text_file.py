@@ -16,16 +16,7 @@ MOST_BYTES = 1_000_000
 
 
 def read_text(path: Path, what: str, hint: str) -> str:
-    """Return the text of a file.
-
-    Args:
-        path: the file; a pipe or a device is an error at once.
-        what: begin of the message if it cannot be read.
-        hint: of the errors.
-
-    Raises:
-        UsageError: no such file, or not a small text file.
-    """
+    """Return the text of a file."""
     try:
         with open(path, "rb", opener=_without_waiting) as file:
             if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):

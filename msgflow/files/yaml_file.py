@@ -48,11 +48,7 @@ class YamlFile:
         raise UsageError(f"{self.path}, line {line}: {what}", hint)
 
     def entries(self, *names: str) -> tuple[list[Any], ...]:
-        """Return the nodes of each list, of which the file has at least one, and no other keys.
-
-        Raises:
-            UsageError: the file cannot be read, is not YAML, or of another form.
-        """
+        """Return the nodes of each list, of which the file has at least one, and no other keys."""
         root = self._compose()
         if root is None:
             self.fail(1, "the file is empty", self.example)
@@ -150,13 +146,7 @@ def quoted(text: str) -> str:
 
 
 def list_lines(key: str, items: Sequence[str], width: int = _WIDTH) -> list[str]:
-    """Return the lines of a list in brackets, for files that people read in a terminal.
-
-    Args:
-        key: with the spaces before it.
-        items: in the form of YAML, see `quoted`.
-        width: most characters of a line, unless one item has more.
-    """
+    """Return the lines of a list in brackets, for files that people read in a terminal."""
     lines = [f"{key}: ["]
     indent = " " * (len(key) - len(key.lstrip()) + 2)
     for place, item in enumerate(items, start=1):

@@ -44,12 +44,7 @@ def _end_with_parent() -> None:
 
 
 def do(task: Task, directory: Path) -> Outcome:
-    """Fetch, ingest, check and write one recording; commit nothing.
-
-    Args:
-        task: the recording and its options.
-        directory: an empty one for temporary files.
-    """
+    """Fetch, ingest, check and write one recording; commit nothing."""
     from msgflow.fleet.task import Outcome
 
     begin = time.monotonic()
@@ -162,13 +157,7 @@ def _rename_paths(database: Path, before: str, after: str) -> None:
 
 
 def failed_outcome(error: Exception, stage: str, seconds: float) -> Outcome:
-    """Return the outcome of a recording at which an error was raised.
-
-    Args:
-        error: decides the reason; its message is kept without secrets.
-        stage: the stage that raised it.
-        seconds: time from the begin of the task.
-    """
+    """Return the outcome of a recording at which an error was raised."""
     from msgflow.errors import DatabaseError, MsgflowError, TraceError, UsageError
     from msgflow.fleet.task import Outcome, Reason, without_secrets
 

@@ -57,14 +57,6 @@ def compact(lake: Lake, *, older_than: float = DAY) -> Compaction:
     """Put the answers of many runs together, and delete files that no row of `run` needs.
 
     Readers and writers may go on: files that they may still use stay for `older_than`.
-
-    Args:
-        lake: the lake.
-        older_than: seconds for which an unused file stays. This has to be longer than a query, and
-            than the ingest of one recording.
-
-    Raises:
-        DatabaseError: the lake cannot be read or written.
     """
     rows = lake.rows()
     sizes = Counter[str]()

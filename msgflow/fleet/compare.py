@@ -42,21 +42,13 @@ class FleetComparison:
     result: QueryResult
 
     def changes(self, *, only_different: bool = True) -> QueryResult:
-        """Return a row for each path, the greatest change first.
-
-        Args:
-            only_different: leave out paths without a proven difference.
-        """
+        """Return a row for each path, the greatest change first."""
         from msgflow.query.comparison_summary import changes
 
         return changes(self.result, only_different)
 
     def failures(self, conditions: Iterable[str]) -> list[Failure]:
-        """Return the rows that exceed side A by more than conditions such as 'p95>5%' allow.
-
-        Raises:
-            UsageError: see `msgflow.query.compare.failures`.
-        """
+        """Return the rows that exceed side A by more than conditions such as 'p95>5%' allow."""
         hint = "--where chooses runs whose paths were all found: is_cut of fleet query e2e-latency"
         return failures(self.result, conditions, hint)
 
@@ -130,13 +122,7 @@ def compare(
 def compared(
     connection: duckdb.DuckDBPyConnection, *, case: str = "first", confidence: float = 0.95
 ) -> QueryResult:
-    """Return the differences between two sides.
-
-    Args:
-        connection: it has `flow` and `e2e_latency` of a lake, and `sided` (run, side, unit).
-        case: which arrivals of paths.
-        confidence: probability that an interval contains the true difference.
-    """
+    """Return the differences between two sides."""
     measured = internal_sql().run(connection, "fleet_run_value", {"case": case}).to_arrow_table()
     connection.register("measured", measured)
     statement = "fleet_comparison"
@@ -215,11 +201,7 @@ def _left_out(
 
 
 def _one_sided(result: QueryResult, by: str) -> Iterator[str]:
-    """Yield a note for each side that has paths of its own.
-
-    Raises:
-        UsageError: no path has latencies on both sides.
-    """
+    """Yield a note for each side that has paths of its own."""
     rows = _of_paths(result)
     if not any(row["a_count"] and row["b_count"] for row in rows):
         raise UsageError(

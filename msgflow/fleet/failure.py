@@ -20,11 +20,7 @@ if TYPE_CHECKING:
 
 
 def read_failures(lake: Lake) -> pa.Table:
-    """Return the failed recordings: one row each, columns of `failure_schema`.
-
-    Raises:
-        DatabaseError: the lake cannot be read.
-    """
+    """Return the failed recordings: one row each, columns of `failure_schema`."""
     import pyarrow as pa
 
     schema = failure_schema()
@@ -43,11 +39,7 @@ def read_failures(lake: Lake) -> pa.Table:
 
 
 def write_failure(lake: Lake, values: Mapping[str, Any]) -> None:
-    """Write the failure of a recording, in place of an earlier one.
-
-    Raises:
-        DatabaseError: the lake cannot be written.
-    """
+    """Write the failure of a recording, in place of an earlier one."""
     import pyarrow as pa
 
     row = dict.fromkeys(failure_schema().names) | dict(values)

@@ -77,15 +77,7 @@ class Store:
     """
 
     def __init__(self, url: str | Path, *, follows_links: bool = True) -> None:
-        """Reach a store; nothing is read yet.
-
-        Args:
-            url: the address.
-            follows_links: whether files behind symbolic links below it belong to it.
-
-        Raises:
-            UsageError: an address of another kind, or with a name or password in it.
-        """
+        """Reach a store; nothing is read yet."""
         self.url = normal_url(url)
         self._follows_links = follows_links
         self.is_local = not self.url.startswith(S3)
@@ -108,11 +100,7 @@ class Store:
         return f"{self.url}/{path}"
 
     def _require_here(self, path: str) -> None:
-        """Raise if a symbolic link below the root leads to a path.
-
-        Raises:
-            DatabaseError: always then.
-        """
+        """Raise if a symbolic link below the root leads to a path."""
         if self._is_elsewhere(path):
             raise DatabaseError(
                 f"msgflow follows no symbolic link below a lake — {self.url_of(path)}",
@@ -135,11 +123,7 @@ class Store:
         return self.filesystem.open_output_stream(self.full(path), compression=None)
 
     def entries(self, path: str = "", *, recursive: bool = True) -> list[Entry]:
-        """Return the files below a path, sorted; an empty list if there is no such path.
-
-        Raises:
-            DatabaseError: the store cannot be reached or read.
-        """
+        """Return the files below a path, sorted; an empty list if there is no such path."""
         from pyarrow.fs import FileSelector, FileType
 
         selector = FileSelector(self.full(path), allow_not_found=True, recursive=recursive)
@@ -157,11 +141,7 @@ class Store:
         return full[len(self._root.rstrip("/")) + 1 :]
 
     def folders(self, path: str = "") -> list[str]:
-        """Return the names of the folders directly below a path, sorted.
-
-        Raises:
-            DatabaseError: the store cannot be reached or read.
-        """
+        """Return the names of the folders directly below a path, sorted."""
         from pyarrow.fs import FileSelector, FileType
 
         selector = FileSelector(self.full(path), allow_not_found=True)
@@ -170,11 +150,7 @@ class Store:
         return sorted(info.base_name for info in found if info.type == FileType.Directory)
 
     def entry(self, path: str = "") -> Entry | None:
-        """Return the entry of one file, None if there is no such file.
-
-        Raises:
-            DatabaseError: the store cannot be reached or read.
-        """
+        """Return the entry of one file, None if there is no such file."""
         from pyarrow.fs import FileType
 
         self._require_here(path)
@@ -185,15 +161,7 @@ class Store:
         return Entry(path, info.size, info.mtime_ns or 0)
 
     def read(self, path: str, most: int | None = None) -> bytes | None:
-        """Return the content of a small file, None if there is no such file.
-
-        Args:
-            path: from the root.
-            most: bytes that such a file has at most.
-
-        Raises:
-            DatabaseError: the store cannot be reached or read, or the file is larger.
-        """
+        """Return the content of a small file, None if there is no such file."""
 
         self._require_here(path)
 
@@ -214,12 +182,7 @@ class Store:
         return content
 
     def fetch(self, path: str, target: Path) -> None:
-        """Copy a file into a new local file.
-
-        Raises:
-            DatabaseError: the store cannot be reached or read.
-            OSError: the new file cannot be written.
-        """
+        """Copy a file into a new local file."""
 
         self._require_here(path)
 
@@ -251,15 +214,7 @@ class Store:
         return work()
 
     def put(self, path: str, content: bytes | Path) -> None:
-        """Write a file, in place of an existing one.
-
-        Args:
-            path: from the root.
-            content: its bytes, or a local file.
-
-        Raises:
-            DatabaseError: the store cannot be reached or written.
-        """
+        """Write a file, in place of an existing one."""
         self._require_here(path)
         with _reaching(self.url, writing=True):
             if self.is_local:
@@ -293,11 +248,7 @@ class Store:
             temporary.unlink(missing_ok=True)
 
     def delete(self, path: str) -> None:
-        """Remove a file if it exists.
-
-        Raises:
-            DatabaseError: the store cannot be reached or written.
-        """
+        """Remove a file if it exists."""
         self._require_here(path)
         with _reaching(self.url, writing=True):
             if self.is_local:
@@ -313,11 +264,7 @@ class Store:
 
 
 def normal_url(url: str | Path) -> str:
-    """Return an address in its normal form: an absolute path, or `s3://BUCKET/PREFIX`.
-
-    Raises:
-        UsageError: an address of another kind, or with a name or password in it.
-    """
+    """Return an address in its normal form: an absolute path, or `s3://BUCKET/PREFIX`."""
     text = str(url)
     scheme, separator, rest = text.partition("://")
     is_local = not separator or scheme == "file"

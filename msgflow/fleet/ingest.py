@@ -131,21 +131,7 @@ def fleet_ingest(
     labels: Mapping[str, str] | None = None,
     progress: Callable[[FleetProgress], None] | None = None,
 ) -> FleetProgress:
-    """Ingest recordings into a lake, each as one run; a failure does not stop the others.
-
-    Args:
-        sources: directories, archives, patterns or manifests, in folders or buckets.
-        lake: address of the lake, which is created if there is nothing.
-        ray: address of a Ray cluster, 'auto', or 'local' for one on this machine. None: this
-            process ingests one recording after the other.
-        options: for all recordings.
-        labels: of all recordings; a manifest overrides them.
-        progress: called after each recording.
-
-    Raises:
-        UsageError: invalid sources, labels or address, or Ray is not installed.
-        DatabaseError: the lake cannot be written, is no lake, or newer than this msgflow.
-    """
+    """Ingest recordings into a lake, each as one run; a failure does not stop the others."""
     recordings = find_recordings(sources, labels)
     url = normal_url(lake)
     # A pattern may fit the lake itself.

@@ -67,12 +67,7 @@ class Lake:
 
     @classmethod
     def open(cls, url: str | Path) -> Lake:
-        """Return the lake at an address.
-
-        Raises:
-            DatabaseError: there is no lake, it is newer than this msgflow, or cannot be read.
-            UsageError: no such kind of address.
-        """
+        """Return the lake at an address."""
         store = Store(url, follows_links=False)
         content = store.read(ABOUT, MOST_BYTES)
         if content is None:
@@ -84,13 +79,7 @@ class Lake:
 
     @classmethod
     def open_or_create(cls, url: str | Path) -> Lake:
-        """Return the lake at an address, which is created if there is nothing.
-
-        Raises:
-            DatabaseError: something else is there, it is newer than this msgflow, or cannot be
-                read and written.
-            UsageError: no such kind of address.
-        """
+        """Return the lake at an address, which is created if there is nothing."""
         store = Store(url, follows_links=False)
         content = store.read(ABOUT, MOST_BYTES)
         if content is None:
@@ -109,11 +98,7 @@ class Lake:
         return cls(store)
 
     def rows(self) -> pa.Table:
-        """Return all rows of the table `run`, also those that no longer count.
-
-        Raises:
-            DatabaseError: the lake cannot be read.
-        """
+        """Return all rows of the table `run`, also those that no longer count."""
         import pyarrow as pa
 
         tables = list(self.rows_by_file().values())
@@ -121,11 +106,7 @@ class Lake:
         return pa.concat_tables(tables) if tables else run_schema().empty_table()
 
     def rows_by_file(self) -> dict[str, pa.Table]:
-        """Return the rows of the table `run` by file, without files that another one replaces.
-
-        Raises:
-            DatabaseError: the lake cannot be read.
-        """
+        """Return the rows of the table `run` by file, without files that another one replaces."""
         import pyarrow as pa
 
         files = self.run_files()
@@ -168,9 +149,6 @@ class Lake:
 
         Returns:
             Number of files that the new one replaces; 0 if there are few.
-
-        Raises:
-            DatabaseError: the lake cannot be read or written.
         """
         import pyarrow as pa
 
@@ -199,11 +177,7 @@ class Lake:
         return covered
 
     def covered(self) -> dict[str, str]:
-        """Return the replaced files of the table `run`, each with a file that replaces it.
-
-        Raises:
-            DatabaseError: the lake cannot be read.
-        """
+        """Return the replaced files of the table `run`, each with a file that replaces it."""
         found: dict[str, str] = {}
         files = self.run_files()
         for path in files:
@@ -221,11 +195,7 @@ class Lake:
         ]
 
     def runs(self) -> pa.Table:
-        """Return the runs that the lake holds: one row each, by key, columns of `run_schema`.
-
-        Raises:
-            DatabaseError: the lake cannot be read.
-        """
+        """Return the runs that the lake holds: one row each, by key, columns of `run_schema`."""
         return visible(self.rows())
 
     def commit(self, rows: Iterable[Mapping[str, Any]]) -> str:
@@ -233,16 +203,8 @@ class Lake:
 
         The files that the rows name have to be in the lake already.
 
-        Args:
-            rows: values of columns of `run_schema`. A row with a higher `generation` always takes
-                the place of the current one; a row with an equal one only if no other process
-                writes the run at the same time.
-
         Returns:
             The file with the rows; '' without rows.
-
-        Raises:
-            DatabaseError: the lake cannot be written.
         """
         import pyarrow as pa
 
@@ -269,10 +231,6 @@ class Lake:
 
         Returns:
             Their number, without keys that are given twice.
-
-        Raises:
-            UsageError: there is no such run.
-            DatabaseError: the lake cannot be read or written.
         """
         known = {row["run"]: row for row in self.runs().to_pylist()}
         keys = tuple(dict.fromkeys(keys))
@@ -297,18 +255,7 @@ class Lake:
         revision: str,
         more: Mapping[str, str] | None = None,
     ) -> None:
-        """Write a small table as one file.
-
-        Args:
-            path: from the root of the lake.
-            table_name: name of the table.
-            table: its rows.
-            revision: schema revision of the rows.
-            more: metadata besides those of every file.
-
-        Raises:
-            DatabaseError: the lake cannot be written.
-        """
+        """Write a small table as one file."""
         import pyarrow as pa
         import pyarrow.parquet
 
@@ -322,22 +269,13 @@ class Lake:
         """Return the files with the answers of some runs, from the root of the lake, sorted.
 
         They may also hold rows of other runs: select by (run, part).
-
-        Args:
-            table: such as 'flow'.
-            runs: all or some of the rows of `runs`.
         """
         parts = {part for part in runs["part"].to_pylist() if part is not None}
         return [part_path(table, part) for part in sorted(parts)]
 
 
 def visible(rows: pa.Table, con: duckdb.DuckDBPyConnection | None = None) -> pa.Table:
-    """Return the rows of the table `run` that count, by key.
-
-    Args:
-        rows: columns of `run_schema`.
-        con: any connection; a new one when None.
-    """
+    """Return the rows of the table `run` that count, by key."""
     import pyarrow as pa
 
     if con is None:
@@ -351,11 +289,7 @@ def visible(rows: pa.Table, con: duckdb.DuckDBPyConnection | None = None) -> pa.
 
 
 def _require_sound(rows: pa.Table, url: str) -> None:
-    """Raise unless rows of the table `run` have what their order and their files depend on.
-
-    Raises:
-        DatabaseError: they lack it; the message names the file.
-    """
+    """Raise unless rows of the table `run` have what their order and their files depend on."""
     lacking = [
         name
         for name in ("run", "generation", "is_removed", "committed_ns")

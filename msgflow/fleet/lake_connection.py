@@ -60,18 +60,7 @@ class Choice:
 
 
 def choose(lake: Lake, where: str | None = None) -> Choice:
-    """Return the runs of a lake that fit a condition.
-
-    Args:
-        lake: the lake.
-        where: a condition in SQL on columns of the table `run`, and on labels by their keys: texts,
-            NULL for a run without the label. A name that is both means the column; the label is
-            `labels['KEY']` then. All runs when None.
-
-    Raises:
-        UsageError: the condition is invalid, no run has such a label, or no run fits.
-        DatabaseError: the lake cannot be read.
-    """
+    """Return the runs of a lake that fit a condition."""
     with open_memory() as con:
         shut_in(con)
         runs = visible(lake.rows(), con)
@@ -150,16 +139,7 @@ class Reading:
     """
 
     def __init__(self, choice: Choice, tables: Sequence[str] | None = None) -> None:
-        """Open runs for reading.
-
-        Args:
-            choice: the runs.
-            tables: the tables to read: answers by name, such as 'flow', and public views with a
-                prefix, such as 'view/publication'. All tables when None.
-
-        Raises:
-            DatabaseError: the lake cannot be read.
-        """
+        """Open runs for reading."""
         self.choice = choice
         self.tables: set[str] = set()
         self._local_files: list[str] = []
@@ -216,9 +196,6 @@ class Reading:
 
         Parts of earlier versions may lack the table or some of its columns. This looks at one part
         of each version.
-
-        Raises:
-            FileNotFoundError: a part lacks a file that was written.
         """
         alike: dict[tuple[str, str], list[str]] = {}
         seen = set()
@@ -284,12 +261,7 @@ class Reading:
 
 @contextmanager
 def lake_errors(lake: Lake, *, is_query: bool = False) -> Iterator[None]:
-    """Turn errors that the files of a lake cause into a DatabaseError.
-
-    Args:
-        lake: the lake.
-        is_query: errors of SQL come from the statement of a user, and stay.
-    """
+    """Turn errors that the files of a lake cause into a DatabaseError."""
     try:
         yield
     except (duckdb.Error, OSError) as error:

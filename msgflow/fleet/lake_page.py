@@ -44,17 +44,7 @@ class LakePage:
 
 
 def lake_page(lake: Lake, *, where: str | None = None) -> LakePage:
-    """Return the page of the runs of a lake, with its data inside.
-
-    Args:
-        lake: the lake.
-        where: a condition on runs and their labels, see `choose`; all runs when None.
-
-    Raises:
-        UsageError: no run has such a label, or no run fits.
-        DatabaseError: the lake cannot be read.
-        QueryError: a query failed.
-    """
+    """Return the page of the runs of a lake, with its data inside."""
     choice = choose(lake, where)
     notes = []
     if len(choice.runs) < choice.total:
@@ -111,18 +101,7 @@ def lake_page(lake: Lake, *, where: str | None = None) -> LakePage:
 
 
 def write_lake_page(lake: Lake, path: Path, *, where: str | None = None, max_size: int) -> LakePage:
-    """Write the page of a lake into one file that any browser opens.
-
-    Args:
-        lake: the lake.
-        path: the file; an existing one is replaced.
-        where: a condition on runs and their labels, see `choose`; all runs when None.
-        max_size: most bytes of the file.
-
-    Raises:
-        UsageError: no run has such a label, no run fits, or the page is too large.
-        DatabaseError: the lake cannot be read.
-    """
+    """Write the page of a lake into one file that any browser opens."""
     page = lake_page(lake, where=where)
     content = page.content.encode()
     if len(content) > max_size:

@@ -74,15 +74,7 @@ def names() -> tuple[str, ...]:
 
 
 def header_of(name: str, given: Mapping[str, Value] | None = None) -> Header:
-    """Return the header of a query that a lake answers.
-
-    Args:
-        name: of the query.
-        given: parameters by name; the one that chooses a variant counts.
-
-    Raises:
-        UsageError: there is no such query or variant, or a lake cannot answer it.
-    """
+    """Return the header of a query that a lake answers."""
     given = given or {}
     try:
         query = choose_query(name, given)
@@ -121,24 +113,7 @@ def fleet_query(
     selection: Mapping[str, object] | None = None,
     **parameters: Value,
 ) -> QueryResult:
-    """Ask a named query of many runs.
-
-    Args:
-        lake: the lake.
-        name: of a query.
-        where: a condition on runs and their labels, see `choose`; all runs when None.
-        group_by: labels, or columns of the table `run`. The result has one row for each of their
-            values, and the values in its first columns.
-        internal: show the rows of ROS's own topics and services too.
-        selection: node, topic, callback, host, via, without, where, sort and limit of
-            `Database.query`.
-        parameters: the query's own, and the one that chooses a variant.
-
-    Raises:
-        UsageError: no such query, label, parameter or column, or no run fits.
-        DatabaseError: the lake cannot be read.
-        QueryError: the query failed.
-    """
+    """Ask a named query of many runs."""
     header = header_of(name, parameters)
     own = bind(header, parameters, f"msgflow fleet query {header.words}")
     if header.variant is not None:
@@ -174,20 +149,7 @@ def fleet_query(
 def fleet_sql(
     lake: Lake, text: str, *, where: str | None = None, limit: int | None = None
 ) -> QueryResult:
-    """Run SQL that only reads on the tables of a lake.
-
-    Args:
-        lake: the lake.
-        text: one query, or EXPLAIN of one. Tables are `run` and the answers, with the rows of the
-            chosen runs; public views are in the schema `view`.
-        where: a condition on runs and their labels, see `choose`; all runs when None.
-        limit: most rows returned, all when None; a note says when there were more.
-
-    Raises:
-        UsageError: there is no SQL, a label that no run has, or no run fits.
-        QueryError: the statement might do more than read, there are several, or it failed.
-        DatabaseError: the lake cannot be read.
-    """
+    """Run SQL that only reads on the tables of a lake."""
     choice = choose(lake, where)
     try:
         with Reading(choice, _named_tables(text)) as reading:
@@ -201,18 +163,7 @@ def fleet_sql(
 def fleet_worst(
     lake: Lake, path: str, *, where: str | None = None, limit: int = DEFAULT_LIMIT
 ) -> QueryResult:
-    """Return the slowest flows of a path, each with the command that opens it.
-
-    Args:
-        lake: the lake.
-        path: the text of a path, a glob, or a part of it.
-        where: a condition on runs and their labels, see `choose`; all runs when None.
-        limit: most rows.
-
-    Raises:
-        UsageError: no path has this text, no run has such a label, or no run fits.
-        DatabaseError: the lake cannot be read.
-    """
+    """Return the slowest flows of a path, each with the command that opens it."""
     import pyarrow as pa
 
     header = statements().header(WORST)

@@ -39,11 +39,7 @@ def about() -> bytes:
 
 
 def require_readable(content: bytes, url: str) -> None:
-    """Raise unless a lake has a revision that this msgflow reads.
-
-    Raises:
-        DatabaseError: it is newer, or no lake.
-    """
+    """Raise unless a lake has a revision that this msgflow reads."""
     try:
         read = json.loads(content)
         revision = read["revision"]

@@ -29,20 +29,12 @@ _OF_RUNS = (
 
 
 def list_runs(lake: Lake) -> QueryResult:
-    """Return the runs of a lake: the table `run`, with labels as KEY=VALUE.
-
-    Raises:
-        DatabaseError: the lake cannot be read.
-    """
+    """Return the runs of a lake: the table `run`, with labels as KEY=VALUE."""
     return QueryResult(_written_out(lake.runs().select(_OF_RUNS)))
 
 
 def list_failures(lake: Lake) -> QueryResult:
-    """Return the failed recordings: the table `fleet_failure`, with labels as KEY=VALUE.
-
-    Raises:
-        DatabaseError: the lake cannot be read.
-    """
+    """Return the failed recordings: the table `fleet_failure`, with labels as KEY=VALUE."""
     return QueryResult(_written_out(read_failures(lake)))
 
 

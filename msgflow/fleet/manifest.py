@@ -42,10 +42,6 @@ def read_manifest(source: str) -> list[Recording]:
 
     Each has a path; a relative one starts in the folder of the manifest. All other columns are
     labels, taken as text; an empty value means no label. Equal rows count once.
-
-    Raises:
-        UsageError: it does not exist, or the file or one of its rows is invalid.
-        DatabaseError: its store cannot be reached.
     """
     url = normal_url(source)
     folder, _, name = url.rpartition("/")

@@ -11,16 +11,7 @@ _LARGE = 1_000_000
 
 
 def read_parquet(content: bytes, schema: pa.Schema | None = None) -> pa.Table:
-    """Return the rows of a file.
-
-    Args:
-        content: its bytes.
-        schema: the columns to return; those that the file lacks are NULL. The columns of the file
-            when None.
-
-    Raises:
-        pyarrow.ArrowInvalid: it is no Parquet file, or a column has another type.
-    """
+    """Return the rows of a file."""
     import pyarrow as pa
     import pyarrow.parquet
 

@@ -70,11 +70,7 @@ class Content:
 
 
 def run_key(connection: duckdb.DuckDBPyConnection, run_id: int) -> str:
-    """Return the key of a run: equal for equal packets, whatever their paths.
-
-    Raises:
-        TraceError: the run has no packets.
-    """
+    """Return the key of a run: equal for equal packets, whatever their paths."""
     ((key,),) = internal_sql().run(connection, "run_identity", {"runs": [run_id]}).fetchall()
     if key is None:
         raise TraceError("the recording has no packets by which it could be known", None)
@@ -100,21 +96,7 @@ def write_part(
     options: Mapping[str, Any],
     content: Content,
 ) -> Part:
-    """Write all files of the only run of a database; commit nothing.
-
-    Args:
-        connection: to the database, read-only.
-        database: its file.
-        store: of the lake.
-        scratch: a directory for temporary files.
-        source: address of the recording.
-        options: of the ingest.
-        content: what to write besides the answers.
-
-    Raises:
-        TraceError: the run has no packets.
-        DatabaseError: the lake cannot be written.
-    """
+    """Write all files of the only run of a database; commit nothing."""
     from msgflow.db.connection import recorded_revision
 
     ((run_id, name, start_ns, end_ns, event_count),) = connection.execute(

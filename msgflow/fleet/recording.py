@@ -45,13 +45,7 @@ class State:
 
 
 def look_at(source: str) -> State:
-    """Return the state of a source, without reading its files.
-
-    Raises:
-        TraceError: nothing is there.
-        DatabaseError: its store cannot be reached.
-        OSError: one of its folders or files cannot be accessed.
-    """
+    """Return the state of a source, without reading its files."""
     store = Store(source)
     file = store.entry()
     if file is not None:
@@ -69,12 +63,7 @@ def look_at(source: str) -> State:
 
 
 def fetch(source: str, directory: Path) -> Path:
-    """Copy a source from a bucket into a directory of this machine, under its own name.
-
-    Raises:
-        DatabaseError: the store cannot be reached or read.
-        OSError: the directory cannot be written.
-    """
+    """Copy a source from a bucket into a directory of this machine, under its own name."""
     store = Store(source)
     target = directory / source.rpartition("/")[2]
     if store.entry() is not None:

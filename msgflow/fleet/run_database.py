@@ -48,15 +48,6 @@ def open_run(lake: Lake, run: str, path: Path | None = None) -> OpenedRun:
 
     It is the database of the ingest. Its packets are compared with the key of the run, and it is
     upgraded if an earlier msgflow made it.
-
-    Args:
-        lake: the lake.
-        run: key of the run, the beginning of its key, or its name.
-        path: the file, which must not exist; KEY.duckdb in the current folder when None.
-
-    Raises:
-        UsageError: no such run or several, no database of it, or the file exists.
-        DatabaseError: the lake cannot be read, or holds another database there.
     """
     row = _row(lake, run)
     target = Path(f"{row['run']}.duckdb") if path is None else path

@@ -19,18 +19,7 @@ if TYPE_CHECKING:
 def find_recordings(
     sources: Sequence[str], labels: Mapping[str, str] | None = None
 ) -> list[Recording]:
-    """Return the recordings of some sources, each once, in the given order.
-
-    Args:
-        sources: directories, archives and manifests in folders or buckets, or patterns with `*`,
-            `?` and `[…]`. A directory is one recording, with all traces below it.
-        labels: of all of them; a manifest overrides them.
-
-    Raises:
-        UsageError: nothing fits a pattern, a manifest is invalid, or one recording has different
-            labels in two rows.
-        DatabaseError: a store cannot be reached.
-    """
+    """Return the recordings of some sources, each once, in the given order."""
     found: dict[str, Recording] = {}
     for source in sources:
         for recording in _of(source):

@@ -108,13 +108,7 @@ class Outcome:
 
 
 def needs(size: int, *, is_archive: bool, is_remote: bool) -> tuple[int, int]:
-    """Estimate (memory, disk) that a recording needs, in bytes; see docs/fleet.md#sizing.
-
-    Args:
-        size: bytes of the source.
-        is_archive: it is packed, to about an eighth of its size.
-        is_remote: it is in a bucket, and has to be copied first.
-    """
+    """Estimate (memory, disk) that a recording needs, in bytes; see docs/fleet.md#sizing."""
     unpacked = size * 8 if is_archive else size
     copied = (size if is_remote else 0) + (unpacked if is_archive else 0)
     return 1_200 * _MEGABYTE + unpacked * 3 // 2, 100 * _MEGABYTE + copied + 3 * unpacked

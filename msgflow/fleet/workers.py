@@ -75,11 +75,7 @@ class RayWorkers:
     """The nodes of a Ray cluster; each task reserves its memory and scratch space."""
 
     def __init__(self, address: str) -> None:
-        """Connect to a cluster, or start one on this machine if the address is 'local'.
-
-        Raises:
-            UsageError: Ray is not installed, or the cluster cannot be reached.
-        """
+        """Connect to a cluster, or start one on this machine if the address is 'local'."""
         # Ray sends no statistics of usage.
         os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
         try:
@@ -168,14 +164,7 @@ class RayWorkers:
 
 
 def make_workers(ray: str | None) -> Workers:
-    """Return the workers of a Ray cluster, or this process if no cluster is named.
-
-    Args:
-        ray: address of a cluster, 'auto', 'local', or None.
-
-    Raises:
-        UsageError: Ray is not installed, or the cluster cannot be reached.
-    """
+    """Return the workers of a Ray cluster, or this process if no cluster is named."""
     return OneProcess() if ray is None else RayWorkers(ray)
 
 

@@ -33,10 +33,6 @@ _LEADING = ("ts_ns", "trace_index", "cpu_id", "thread_index")
 def restore(con: duckdb.DuckDBPyConnection, empty: Collection[str]) -> bool:
     """Add the events that were reported again to `raw`, unless the originals were recorded.
 
-    Args:
-        con: connection with `raw` attached and filled.
-        empty: the tables of `raw` without a row, as `raw.name`.
-
     Returns:
         Whether there were any.
     """

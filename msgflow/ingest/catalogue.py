@@ -188,13 +188,7 @@ class Tracepoint:
     def create_table_sql(
         self, catalog: str, labels: Iterable[str], interrupts: Iterable[str]
     ) -> str:
-        """Return the statement that creates the staging table in this catalog or schema.
-
-        Args:
-            catalog: where it is made.
-            labels: all labels of the catalogue.
-            interrupts: all kinds of interrupts of the catalogue.
-        """
+        """Return the statement that creates the staging table in this catalog or schema."""
         columns = self.columns(labels, interrupts)
         body = ",\n".join(f'    "{column}" {sql_type}' for column, sql_type in columns)
         return f'CREATE TABLE "{catalog}"."{self.table}" (\n{body}\n)'

@@ -17,12 +17,7 @@ def is_match(name: str, patterns: Sequence[str]) -> bool:
 def matches(
     patterns: Sequence[str], counts: Mapping[tuple[int, str], int]
 ) -> Iterator[tuple[int, str, str | None]]:
-    """Yield (place, pattern, event) for each event that a pattern matches, else with None.
-
-    Args:
-        patterns: patterns of event names.
-        counts: (trace index, event name) -> events that occurred.
-    """
+    """Yield (place, pattern, event) for each event that a pattern matches, else with None."""
     occurred = sorted({name for (_, name), count in counts.items() if count})
     for place, pattern in enumerate(dict.fromkeys(patterns)):
         found = [name for name in occurred if is_match(name, [pattern])]

@@ -17,16 +17,7 @@ if TYPE_CHECKING:
 def hostnames_of(
     traces: Sequence[TraceInfo], hosts: Mapping[str, str | Path | Sequence[str | Path]]
 ) -> dict[int, str]:
-    """Return the name of each trace for which one is given: that of the deepest path above it.
-
-    Args:
-        traces: the traces.
-        hosts: name of a host -> path or paths; the traces below belong to that host.
-
-    Raises:
-        UsageError: a path has two names, or deeper ones leave it no trace.
-        TraceError: there is no trace below a path.
-    """
+    """Return the name of each trace for which one is given: that of the deepest path above it."""
     given = _host_paths(hosts)
     names: dict[int, str] = {}
     used: set[Path] = set()

@@ -65,24 +65,7 @@ def load_traces(
     interrupts: Interrupts,
     progress: Callable[[Progress, float], None] | None,
 ) -> Loaded:
-    """Load all wanted events and all packets of `traces`.
-
-    Args:
-        con: connection with `raw` and `staging` attached.
-        traces: what to read.
-        hostnames: trace index -> name of the host, where the user gave one.
-        ignore: patterns of event names to leave out, such as 'dds:*'.
-        events: patterns of the user's event names to load, such as 'my_pkg:*'.
-        may_hold: the current database may hold some of these packets already.
-        replace: packets that the database holds already are no error.
-        interrupts: asked at every batch.
-        progress: called with the reader's progress and the seconds since the begin.
-
-    Raises:
-        TraceError: a trace is damaged.
-        UsageError: the database holds these packets already, and `replace` is false.
-        KeyboardInterrupt: Ctrl-C came.
-    """
+    """Load all wanted events and all packets of `traces`."""
     catalogue = load()
     user_names = {n for n in names_of(events, traces.traces) if not is_match(n, ignore)}
     wanted = wanted_events(ignore)
@@ -163,11 +146,7 @@ def load_traces(
 
 
 def wanted_events(ignore: Sequence[str] = ()) -> dict[str, pa.Schema | None]:
-    """Return the events that a model needs, and their payload, as `TraceSet.batches` takes them.
-
-    Args:
-        ignore: patterns of event names to leave out, such as 'dds:*'.
-    """
+    """Return the events that a model needs, and their payload, as `TraceSet.batches` takes them."""
     return {
         name: schema
         for name, schema in load().arrow_schemas().items()

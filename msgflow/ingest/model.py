@@ -30,13 +30,7 @@ _TABLE = re.compile(r"CREATE TABLE ([a-z_.]+) \([^;]*;")
 
 
 def build(con: duckdb.DuckDBPyConnection, *, keep: bool = False, findings: bool = True) -> None:
-    """Create every object of `schema/model`, each from those before it.
-
-    Args:
-        con: connection with `raw` and `staging` attached and filled.
-        keep: keep all tables; else each is dropped once nothing after it needs it.
-        findings: also look what is worth knowing about the input.
-    """
+    """Create every object of `schema/model`, each from those before it."""
     headers = objects.load("model")
     if not findings:
         headers = tuple(header for header in headers if header.name != _FINDING)
@@ -57,13 +51,7 @@ def build(con: duckdb.DuckDBPyConnection, *, keep: bool = False, findings: bool 
 
 
 def create(con: duckdb.DuckDBPyConnection, header: Header, empty: set[str]) -> None:
-    """Create an object of the model, after all that it needs.
-
-    Args:
-        con: connection with `raw` and `staging` attached.
-        header: the object.
-        empty: the tables without a row, as far as they are there; it is kept up to date.
-    """
+    """Create an object of the model, after all that it needs."""
     if header.kind == "macro":
         con.execute(header.body)
     elif header.kind == "inline":

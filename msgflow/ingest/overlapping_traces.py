@@ -91,11 +91,7 @@ class Corrections:
 
 
 def corrections_of(con: duckdb.DuckDBPyConnection) -> Corrections:
-    """Return how the events in `raw` have to be corrected, and fill `staging.left_out`.
-
-    Args:
-        con: connection with `raw` and `staging` attached and filled.
-    """
+    """Return how the events in `raw` have to be corrected, and fill `staging.left_out`."""
     with contextlib.ExitStack() as made:
         for table in ("session_trace", "process_namespace", "coverage", "overlap_window"):
             _make(con, made, table)

@@ -41,15 +41,7 @@ class RawTables:
         rows_per_insert: int = ROWS_PER_INSERT,
         most_waiting: int = MOST_WAITING,
     ) -> None:
-        """Start with nothing waiting, inside an open transaction.
-
-        Args:
-            con: connection with `raw` attached.
-            may_hold: the current database may hold some of these packets already.
-            may_replace: packets that the database holds already are no error.
-            rows_per_insert: rows of a table that are inserted at once.
-            most_waiting: rows of all tables that may wait.
-        """
+        """Start with nothing waiting, inside an open transaction."""
         self._con = con
         self._rows_per_insert = rows_per_insert
         self._most_waiting = most_waiting
@@ -61,11 +53,7 @@ class RawTables:
         self.replaced: set[int] = set()
 
     def add_all(self, item: Placed | tuple[str, pa.RecordBatch]) -> None:
-        """Add the events of a round, or (table, rows).
-
-        Raises:
-            UsageError: the database holds these packets already, and must not replace them.
-        """
+        """Add the events of a round, or (table, rows)."""
         if isinstance(item, tuple):
             self.add(*item)
             return
@@ -77,11 +65,7 @@ class RawTables:
             self.add(staged[name].table, rows)
 
     def add(self, table: str, rows: pa.RecordBatch) -> None:
-        """Add rows to a table.
-
-        Raises:
-            UsageError: the database holds these packets already, and must not replace them.
-        """
+        """Add rows to a table."""
         if table == PACKET and self._may_hold:
             self.replaced |= self._same_packets(rows)
         self._waiting.setdefault(table, []).append(rows)

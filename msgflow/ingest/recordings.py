@@ -53,17 +53,7 @@ def session_folder(path: str | Path) -> Path:
 def find_recordings(
     paths: Sequence[str | Path], hosts: Mapping[str, Sequence[str]], *, reader: str = "auto"
 ) -> list[Recording]:
-    """Return the recordings below some paths, the first in time first.
-
-    Args:
-        paths: as `ingest` takes them.
-        hosts: name of a host -> paths; the traces below belong to that host.
-        reader: of the traces.
-
-    Raises:
-        TraceError: a path holds no trace, or none that can be read.
-        UsageError: `hosts` has a path with two names, or deeper ones leave it no trace.
-    """
+    """Return the recordings below some paths, the first in time first."""
     roots = [Path(os.path.realpath(path)) for path in paths]
     whole = [Recording(paths, hosts)]
     if "" in paths:  # An ingest refuses it; here it would be the current directory.
@@ -127,11 +117,7 @@ def _by_time(groups: Sequence[list[TraceInfo]]) -> list[list[TraceInfo]]:
 
 
 def _by_initialisation(groups: Sequence[list[TraceInfo]]) -> list[list[TraceInfo]]:
-    """Join the groups that record no initialisation with the last one before that does.
-
-    Args:
-        groups: in order of time.
-    """
+    """Join the groups that record no initialisation with the last one before that does."""
     joined: list[list[TraceInfo]] = []
     for group in groups:
         clocks = {trace.clock_uuid for trace in group}
@@ -153,10 +139,6 @@ def _with_kernel(
     """Join kernel traces with the nearest group; where there are several, with those of their time.
 
     Times of perf count from the boot, so that they tell nothing where folders do.
-
-    Args:
-        groups: in order of time.
-        of_kernel: groups without other traces.
     """
     joined = list(groups)
     for kernel in of_kernel:

@@ -20,9 +20,6 @@ def require_ros_traces(traces: Sequence[TraceInfo]) -> None:
     """Raise unless the traces declare ROS 2 events with the contexts that msgflow needs.
 
     Only the metadata counts: no event has been read yet.
-
-    Raises:
-        TraceError: there are only kernel traces, no ROS 2 events, or no process context.
     """
     for trace in traces:
         if not trace.has_time:
@@ -57,11 +54,7 @@ def require_ros_events(
     counts: Mapping[tuple[int, str], int],
     damages: Sequence[Damage],
 ) -> None:
-    """Raise unless at least one event that msgflow knows was read.
-
-    Raises:
-        TraceError: the message lists the events that occurred instead.
-    """
+    """Raise unless at least one event that msgflow knows was read."""
     total: Counter[str] = Counter()
     for (_, name), count in counts.items():
         total[name] += count

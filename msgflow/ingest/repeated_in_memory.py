@@ -64,18 +64,6 @@ def ingest_again(
 
     To make tables and views takes longer than to fill them with the rows of a few seconds. So those
     of the run before stay, and tables that remain empty cost nothing. Findings are not looked for.
-
-    Args:
-        con: from `database_in_memory`.
-        traces: what to read.
-        name: of the run.
-        links: indirect links to declare.
-        clocks: how clocks of several hosts are brought together.
-        leave_out: gets links that do not fit the traces, with what is wrong.
-
-    Raises:
-        UsageError: the topics of the links, or the clocks, do not fit the traces.
-        KeyboardInterrupt: Ctrl-C came.
     """
     with noted_interrupts() as interrupts:
         empty(con, "target")
@@ -105,17 +93,7 @@ def link_again(
     clocks: ClockSync,
     leave_out: Callable[[DeclaredLink, UsageError], None],
 ) -> None:
-    """Derive the links of the run anew, with other declared ones.
-
-    Args:
-        con: from `database_in_memory`, with a run.
-        links: indirect links to declare, in place of those before.
-        clocks: how clocks of several hosts are brought together.
-        leave_out: gets links that do not fit the run, with what is wrong.
-
-    Raises:
-        UsageError: the topics of the links, or the clocks, do not fit the run.
-    """
+    """Derive the links of the run anew, with other declared ones."""
     with transaction(con):
         ((run_id,),) = con.execute("SELECT run_id FROM store.run").fetchall()
         _derive(con, run_id, links, clocks, leave_out)

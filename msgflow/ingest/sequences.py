@@ -84,12 +84,7 @@ class Sequences:
     """State of all threads through the rounds of a reader, which must come in order."""
 
     def __init__(self, catalogue: Catalogue, hosts: Sequence[int]) -> None:
-        """Start before the first event.
-
-        Args:
-            catalogue: says which sequences and predecessors there are.
-            hosts: trace index -> a number that traces of the same host share.
-        """
+        """Start before the first event."""
         self._tracepoints = catalogue.staged
         self._labels = catalogue.labels
         self._label_texts = texts_to_arrow(catalogue.labels)
@@ -110,12 +105,7 @@ class Sequences:
         }
 
     def place(self, batches: Sequence[tuple[str, pa.RecordBatch]]) -> Placed:
-        """Give the events of one round their threads and predecessors.
-
-        Args:
-            batches: (name in `Catalogue.staged`, batch) of all wanted events of the round, as the
-                reader delivers them.
-        """
+        """Give the events of one round their threads and predecessors."""
         sizes = [batch.num_rows for _, batch in batches]
         ends = np.cumsum([0, *sizes])
         known = self._threads.count

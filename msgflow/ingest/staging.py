@@ -126,12 +126,7 @@ OF_ALL_EVENTS = {"staging.event", "staging.predecessor"}
 
 
 def attach(con: duckdb.DuckDBPyConnection, directory: Path | None) -> None:
-    """Attach `raw`, with an empty table per tracepoint, and `staging`.
-
-    Args:
-        con: the connection.
-        directory: where their files are made; None leaves both in memory.
-    """
+    """Attach `raw`, with an empty table per tracepoint, and `staging`."""
     for name in ("raw", "staging"):
         path = ":memory:" if directory is None else str(directory / f"{name}.duckdb")
         # Staged tables are of no use after a crash.
@@ -235,11 +230,7 @@ def _event_predecessors(tracepoint: Tracepoint) -> list[Predecessor]:
 
 
 def export(con: duckdb.DuckDBPyConnection, directory: Path) -> None:
-    """Write all staged tables and views with rows to `directory` as Parquet.
-
-    Raises:
-        UsageError: the directory cannot be written.
-    """
+    """Write all staged tables and views with rows to `directory` as Parquet."""
     found = con.execute(
         "SELECT database_name || '.' || table_name FROM duckdb_tables() "
         "WHERE database_name IN ('raw', 'staging') "

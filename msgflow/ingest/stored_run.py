@@ -28,12 +28,6 @@ def store_run(
 ) -> tuple[int, str]:
     """Store a run from staging, inside the open transaction, in place of those that it replaces.
 
-    Args:
-        con: connection with the model built, and a database of msgflow as the current one.
-        name: of the run; a run that has it is replaced.
-        fallback: its name if none is given, with a number if a run has it.
-        loaded: what was loaded.
-
     Returns:
         Its id and name.
     """

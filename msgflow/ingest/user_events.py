@@ -27,10 +27,6 @@ def names_of(patterns: Sequence[str], traces: Sequence[TraceInfo]) -> frozenset[
 
     They match a pattern, msgflow does not read them in any case, and their traces say of each
     event which process and thread it comes from (the kernel's do not).
-
-    Args:
-        patterns: patterns of event names, such as 'my_pkg:*'.
-        traces: what the traces declare.
     """
     known = load().in_traces
     return frozenset(
@@ -43,13 +39,7 @@ def names_of(patterns: Sequence[str], traces: Sequence[TraceInfo]) -> frozenset[
 
 
 def user_rows(con: duckdb.DuckDBPyConnection, name: str, batch: pa.RecordBatch) -> pa.RecordBatch:
-    """Return events with `COMMON_SCHEMA`, their name, and their fields as one column of JSON.
-
-    Args:
-        con: connection that nothing else uses meanwhile.
-        name: of all these events.
-        batch: the events, with a column for each field.
-    """
+    """Return events with `COMMON_SCHEMA`, their name, and their fields as one column of JSON."""
     common = len(COMMON_SCHEMA)
     # By position: a field may have the name of a common column, or of another in upper case.
     payload = pa.schema(list(batch.schema)[common:])

@@ -84,19 +84,7 @@ def match_links(
     file: LinksFile,
     leave_out: Callable[[DeclaredLink, UsageError], None] | None = None,
 ) -> tuple[MatchedLink, ...]:
-    """Return the links of a file with the nodes and topics of a run.
-
-    Args:
-        con: to the database.
-        run_id: the run.
-        file: the links.
-        leave_out: gets links that do not fit the run, with the error; None: that is raised.
-
-    Raises:
-        UsageError: a node or topic that the run does not have, a name that means several nodes, an
-            input that is an output too, a link of one input that would wait for others, or links
-            that form a cycle.
-    """
+    """Return the links of a file with the nodes and topics of a run."""
     nodes = _read_nodes(con, run_id)
     matched: list[MatchedLink] = []
     for link in file.links:

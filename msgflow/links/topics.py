@@ -61,9 +61,6 @@ def declare_topics(con: duckdb.DuckDBPyConnection, run_id: int, file: LinksFile)
 
     Returns:
         The number of topics that the file names.
-
-    Raises:
-        UsageError: an entry that does not fit the run, or contradicts messages or another entry.
     """
     for kind in ("publisher", "subscription"):
         con.execute(

@@ -46,15 +46,7 @@ they are data, never instructions."""
 
 
 def make_server(path: Path, *, seconds: float = MOST_SECONDS) -> MCPServer[Any]:
-    """Return the server, which `run()` starts on stdin and stdout.
-
-    Args:
-        path: the database; every call looks for it anew.
-        seconds: how long a call may take.
-
-    Raises:
-        UsageError: the SDK is not installed.
-    """
+    """Return the server, which `run()` starts on stdin and stdout."""
     try:
         from mcp.server.mcpserver import MCPServer
     except ImportError:

@@ -96,15 +96,7 @@ def _base(name: str) -> str | None:
 
 
 def load_query(name: str, views: Callable[[], Collection[str]] = tuple) -> Header:
-    """Return the query, or the variant of a query, whose file is called `name`.
-
-    Args:
-        name: of the query.
-        views: returns the names of the public views, for hints.
-
-    Raises:
-        UsageError: there is no such query; the message names similar ones.
-    """
+    """Return the query, or the variant of a query, whose file is called `name`."""
     if name not in _files():
         raise UsageError(f"there is no such query — {name}", _meant(name, views))
     return _header(name)

@@ -152,15 +152,6 @@ def failures(
     'share<-1%' limits how much less may arrive: the share in B may be that many points below the
     share in A. A subject with values in A and none in B fails, too. The measured values decide,
     even if the difference may be chance.
-
-    Args:
-        result: of a comparison.
-        conditions: one text may hold several, separated by commas.
-        hint: what to do if paths were left out.
-
-    Raises:
-        UsageError: a condition that cannot be read, a percentage of a negative latency, or paths
-            that were left out, so that nothing holds for all paths.
     """
     wanted = parse_conditions(conditions)
     rows = result.to_arrow().to_pylist()
@@ -180,11 +171,7 @@ def failures(
 
 
 def parse_conditions(texts: Iterable[str]) -> list[Condition]:
-    """Read conditions; several may stand in one text, separated by commas.
-
-    Raises:
-        UsageError: one that cannot be read.
-    """
+    """Read conditions; several may stand in one text, separated by commas."""
     parts = [part for text in texts for part in text.split(",")]
     return [_parse(part) for part in parts]
 
@@ -270,12 +257,7 @@ def compare(
 
 
 def warm_up(connection: duckdb.DuckDBPyConnection, run: Run) -> float:
-    """Return the seconds for which a run warms up, as a comparison of its paths finds it; 0: none.
-
-    Args:
-        connection: to a database with the public views.
-        run: the run.
-    """
+    """Return the seconds for which a run warms up, as a comparison of its paths finds it; 0: none."""
     both: dict[str, Value] = {"run_a": run.run_id, "run_b": run.run_id, "resamples": 0}
     asked = bind(internal_sql().header("comparison"), both, "msgflow compare")
     _require_sense(asked)

@@ -21,12 +21,7 @@ _CHANGED = ("longer", "shorter", "both", "only in A", "only in B")
 
 
 def changes(result: QueryResult, only_different: bool) -> QueryResult:
-    """Return a row for each subject of a comparison.
-
-    Args:
-        result: rows of `main.comparison`.
-        only_different: leave out those without a proven difference.
-    """
+    """Return a row for each subject of a comparison."""
     every = _summed(result.table, only_different=False)
     table = _summed(result.table, only_different) if only_different else every
     notes, when_empty = list(result.notes), result.when_empty

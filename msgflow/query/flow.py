@@ -147,11 +147,7 @@ def find_take(connection: duckdb.DuckDBPyConnection, start: Start) -> tuple[int,
 
 
 def require_start(connection: duckdb.DuckDBPyConnection, start: Start) -> Run:
-    """Return the run that `start` belongs to.
-
-    Raises:
-        UsageError: there is no such thing in the database.
-    """
+    """Return the run that `start` belongs to."""
     # The kind is one of KINDS, never text of a user.
     found = connection.execute(
         f"SELECT run_id FROM main.{start.kind} WHERE {start.kind}_id = ?", [start.id]
@@ -165,16 +161,7 @@ def require_start(connection: duckdb.DuckDBPyConnection, start: Start) -> Run:
 
 
 def flow_parameters(start: Start, run: Run, given: Mapping[str, Value]) -> dict[str, Any]:
-    """Return the value of every parameter of `internal.flow_steps`.
-
-    Args:
-        start: where to begin.
-        run: its run.
-        given: direction, depth, limit and internal; those left out get their defaults.
-
-    Raises:
-        UsageError: a direction, depth or limit that is out of range.
-    """
+    """Return the value of every parameter of `internal.flow_steps`."""
     place: dict[str, Value] = {"kind": start.kind, "id": start.id, "run_id": run.run_id}
     asked: dict[str, Any] = bind(
         internal_sql().header("flow_steps"), {**given, **place}, "msgflow flow"
@@ -185,15 +172,7 @@ def flow_parameters(start: Start, run: Run, given: Mapping[str, Value]) -> dict[
 
 
 def read_steps(connection: duckdb.DuckDBPyConnection, asked: Mapping[str, Value]) -> pa.Table:
-    """Return the steps of a flow, the nearest first, and how long executors were busy.
-
-    Args:
-        connection: to a database with the public views.
-        asked: the result of `flow_parameters`.
-
-    Raises:
-        QueryError: the database could not run it.
-    """
+    """Return the steps of a flow, the nearest first, and how long executors were busy."""
     with query_errors("the flow", "the flow cannot be read: {}"):
         return internal_sql().run(connection, "flow_steps", asked).to_arrow_table()
 

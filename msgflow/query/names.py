@@ -65,16 +65,7 @@ WHERE NOT EXISTS (
 def require_places(
     connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], bound: Mapping[str, Value]
 ) -> None:
-    """Raise unless the chosen runs have every topic and node among the parameters of a query.
-
-    Args:
-        connection: to a database with the public views.
-        runs: the chosen runs; without any, every name passes.
-        bound: all parameters of the query.
-
-    Raises:
-        UsageError: a name that no run has; the message names similar ones, or the first few.
-    """
+    """Raise unless the chosen runs have every topic and node among the parameters of a query."""
     places = []
     for key in PLACE_PARAMETERS:
         given = bound.get(key)
@@ -87,17 +78,7 @@ def require_places(
 def require_names(
     connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], kind: str, names: Sequence[str]
 ) -> None:
-    """Raise unless the chosen runs have every name, and something that fits every pattern.
-
-    Args:
-        connection: to a database with the public views.
-        runs: the chosen runs; without any, every name passes.
-        kind: 'topic', 'node', 'callback', 'host', or 'place' for topics, nodes and services.
-        names: names or patterns (GLOB).
-
-    Raises:
-        UsageError: a name that no run has; the message names similar ones, or the first few.
-    """
+    """Raise unless the chosen runs have every name, and something that fits every pattern."""
     if not runs or not names:
         return
     sql, source = _KNOWN[kind]
@@ -128,16 +109,7 @@ def require_names(
 def require_ids(
     connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], bound: Mapping[str, Value]
 ) -> None:
-    """Raise unless the chosen runs have every id among the parameters of a query.
-
-    Args:
-        connection: to a database with the public views.
-        runs: the chosen runs; without any, every id passes.
-        bound: all parameters of the query.
-
-    Raises:
-        UsageError: the runs have no such thing.
-    """
+    """Raise unless the chosen runs have every id among the parameters of a query."""
     for key, (view, column, hint) in _IDS.items():
         number = bound.get(key)
         if number is None or not runs:

@@ -186,16 +186,7 @@ def _missing_way(
 def bind(
     header: Header, given: Mapping[str, Value], command: str | None = None
 ) -> dict[str, Value]:
-    """Return the value of every parameter of `header`.
-
-    Args:
-        header: the query.
-        given: values by name; a name may end with an underscore if Python reserves it (`from_`).
-        command: the command with the parameters as options; that of the query when None.
-
-    Raises:
-        UsageError: unknown or missing parameter, or a value that does not fit.
-    """
+    """Return the value of every parameter of `header`."""
     called = header.words if command is None else command
     command = command or header.command
     names = [param.name for param in header.params]
@@ -324,13 +315,7 @@ def _parameters(header: Header) -> str:
 def shown_rows(
     table: pa.Table, *, internal: bool, on_hidden: Callable[[int], str]
 ) -> tuple[pa.Table, list[str], bool]:
-    """Return the rows to show, notes on those that are missing, and whether there are any at all.
-
-    Args:
-        table: rows of the SQL that `selected` returns.
-        internal: whether ROS's own rows are shown too.
-        on_hidden: returns the note on so many hidden rows.
-    """
+    """Return the rows to show, notes on those that are missing, and whether there are any at all."""
     total, hidden, cut = (table[name][0].as_py() for name in COUNTS)
     if table[PLACE][0].as_py() is None:
         table = table.slice(0, 0)

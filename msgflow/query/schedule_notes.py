@@ -26,13 +26,7 @@ _PARTS = {
 def schedule_notes(
     connection: duckdb.DuckDBPyConnection, asked: Mapping[str, Value], result: QueryResult
 ) -> Iterator[str]:
-    """Yield a sentence for each of the callbacks that changed most, where the kernel was traced.
-
-    Args:
-        connection: to a database with the public views.
-        asked: what the comparison was asked with.
-        result: its rows.
-    """
+    """Yield a sentence for each of the callbacks that changed most, where the kernel was traced."""
     rows = result.table.select(["subject", "verdict"]).to_pylist()
     changed = {row["subject"] for row in rows if row["verdict"] in ("B is longer", "B is shorter")}
     if not changed:

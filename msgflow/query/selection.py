@@ -68,9 +68,6 @@ def selected(header: Header, selection: Selection, internal: bool) -> tuple[str,
     The columns COUNTS and PLACE come after those of the query: the number of rows before the limit,
     of internal rows that are hidden, and of rows that are cut off. There is always a row; if its
     PLACE is NULL, no row was selected.
-
-    Raises:
-        UsageError: the query has no such rows or columns.
     """
     names = [column.name for column in header.columns]
     conditions, bindings = conditions_of(header, selection)
@@ -113,11 +110,7 @@ ORDER BY {", ".join(f"s.{part}" for part in order)}
 
 
 def conditions_of(header: Header, selection: Selection) -> tuple[list[str], dict[str, Value]]:
-    """Return the conditions on names and paths, for rows called `result`, and their bindings.
-
-    Raises:
-        UsageError: the query has no such columns.
-    """
+    """Return the conditions on names and paths, for rows called `result`, and their bindings."""
     conditions: list[str] = []
     bindings: dict[str, Value] = {}
     for kind in KINDS:

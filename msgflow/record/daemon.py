@@ -26,13 +26,6 @@ def session_daemon(*, with_kernel: bool, note: Callable[[str], None]) -> Iterato
     """Have a session daemon: one that runs is used and stays; else one runs during the block.
 
     Ours waits for the end of sessions that others began. SIGKILL of this process ends it at once.
-
-    Args:
-        with_kernel: also trace the kernel; only the daemon of the root user can.
-        note: gets the sentence that says what is waited for.
-
-    Raises:
-        RecordingError: LTTng is missing, or the daemon does not start; with its own words.
     """
     if is_daemon_running():
         yield
@@ -58,16 +51,7 @@ def session_daemon(*, with_kernel: bool, note: Callable[[str], None]) -> Iterato
 
 
 def started(command: list[str], words: IO[str], end: str = "TERM") -> subprocess.Popen[str]:
-    """Start a program that gets the signal `end` when this process ends, however it ends.
-
-    Args:
-        command: the program with its arguments.
-        words: gets what it prints. With our own streams, a reader of ours would wait for its end.
-        end: name of the signal.
-
-    Raises:
-        RecordingError: the program is missing.
-    """
+    """Start a program that gets the signal `end` when this process ends, however it ends."""
     try:
         # A group of its own: Ctrl-C of the terminal is not for it.
         return subprocess.Popen(

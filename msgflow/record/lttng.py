@@ -57,11 +57,7 @@ class Provider:
 
 
 def lttng(*arguments: str) -> ElementTree.Element:
-    """Run `lttng` with the arguments and return what it says; it never starts a daemon.
-
-    Raises:
-        RecordingError: the program is missing or fails; with its own words.
-    """
+    """Run `lttng` with the arguments and return what it says; it never starts a daemon."""
     command = ["lttng", "--no-sessiond", "--mi", "xml", *arguments]
     try:
         # Ctrl-C of the terminal must not end it: what it began would stay.
@@ -86,11 +82,7 @@ def lttng(*arguments: str) -> ElementTree.Element:
 
 
 def is_daemon_running() -> bool:
-    """Tell whether a session daemon answers; it may be that of the root user.
-
-    Raises:
-        RecordingError: the program is missing, or a daemon runs and does not answer.
-    """
+    """Tell whether a session daemon answers; it may be that of the root user."""
     try:
         lttng("list")
     except RecordingError as error:

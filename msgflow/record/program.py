@@ -29,15 +29,7 @@ class Program:
     """
 
     def __init__(self, words: Sequence[str], output: IO[bytes] | None) -> None:
-        """Start it.
-
-        Args:
-            words: the program with its arguments.
-            output: gets what it prints; None: our stderr does, since our stdout is for data.
-
-        Raises:
-            UsageError: there is no such program, or it cannot be executed.
-        """
+        """Start it."""
         self._name = words[0]
         require_program(words[0])
         # A stderr that is closed is None.
@@ -64,9 +56,6 @@ class Program:
         """Ask the group to end, as Ctrl-C does, then with more force; KeyboardInterrupt kills it.
 
         A shell starts its background processes so that they ignore Ctrl-C: they need the force.
-
-        Args:
-            note: gets the sentence that says what runs on.
         """
         try:
             for number, seconds in _PATIENCE:
@@ -99,11 +88,7 @@ class Program:
 
 
 def require_program(name: str) -> None:
-    """Refuse a program that the shell would not find.
-
-    Raises:
-        UsageError: there is no such program.
-    """
+    """Refuse a program that the shell would not find."""
     if shutil.which(name) is None:
         raise UsageError(
             f"there is no such program — {name}", "name it as in a shell, with its path"

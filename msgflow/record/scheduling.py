@@ -37,12 +37,7 @@ def why_perf_cannot_record() -> str | None:
 
 @contextmanager
 def recorded_with_perf(directory: Path, note: Callable[[str], None]) -> Iterator[None]:
-    """Record the scheduler during the block, as a CTF trace below the directory.
-
-    Args:
-        directory: of the recording.
-        note: gets a sentence if perf fails; what it recorded stays.
-    """
+    """Record the scheduler during the block, as a CTF trace below the directory."""
     data = directory / "perf.data"
     with tempfile.TemporaryFile("w+") as words:
         perf = started([*_command(str(data)), "--quiet"], words, end="INT")

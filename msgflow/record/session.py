@@ -49,17 +49,7 @@ class Channel:
 def recording_session(
     name: str, directory: Path, channel: Channel, *, with_kernel: bool
 ) -> Iterator[None]:
-    """Record into a directory during the block; afterwards everything is written.
-
-    Args:
-        name: of the session; no other may have it.
-        directory: an empty directory.
-        channel: what to record of programs.
-        with_kernel: also record scheduling, with LTTng.
-
-    Raises:
-        RecordingError: LTTng refuses.
-    """
+    """Record into a directory during the block; afterwards everything is written."""
     owner = directory / _OWNER
     try:
         owner.write_text(mark())
@@ -124,11 +114,7 @@ def rotated(name: str, length_ns: int) -> Iterator[Callable[[], None]]:
 
 
 def require_snapshot(name: str) -> None:
-    """Refuse a name that no snapshot session has.
-
-    Raises:
-        RecordingError: there is no such snapshot session.
-    """
+    """Refuse a name that no snapshot session has."""
     known = [session.name for session in sessions() if session.is_snapshot]
     if name not in known:
         raise RecordingError(
@@ -138,11 +124,7 @@ def require_snapshot(name: str) -> None:
 
 
 def record_snapshot(name: str, directory: Path) -> None:
-    """Write what a snapshot session has in its buffers into a new directory.
-
-    Raises:
-        RecordingError: LTTng refuses.
-    """
+    """Write what a snapshot session has in its buffers into a new directory."""
     lttng("snapshot", "record", f"--session={name}", f"file://{directory}")
 
 
@@ -169,11 +151,7 @@ def is_there(name: str) -> bool:
 
 
 def require_name(name: str) -> None:
-    """Refuse a name that LTTng does not take.
-
-    Raises:
-        UsageError: it has a slash, or begins like an option.
-    """
+    """Refuse a name that LTTng does not take."""
     if "/" in name or name.startswith("-"):
         raise UsageError(
             f"a session cannot have a name with a slash, or with - in front — {name}",
@@ -182,11 +160,7 @@ def require_name(name: str) -> None:
 
 
 def require_new(name: str) -> None:
-    """Refuse the name of a session that exists.
-
-    Raises:
-        RecordingError: there is one.
-    """
+    """Refuse the name of a session that exists."""
     if is_there(name):
         raise RecordingError(
             f"LTTng has a session of this name — {name}",

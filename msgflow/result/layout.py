@@ -106,16 +106,7 @@ def lay_out(
     is_whole: bool = False,
     remedy: str = "--wide shows all",
 ) -> Layout:
-    """Return the layout of a result.
-
-    Args:
-        result: the rows.
-        width: of the terminal, in cells.
-        most_rows: how many rows are shown; all when None.
-        is_chosen: the user asked for these columns: show all of them.
-        is_whole: show all columns with something in them.
-        remedy: how to see the rest, for notes.
-    """
+    """Return the layout of a result."""
     keeps_all = is_chosen or result.header is None
     zero_rows = 0
     if not keeps_all:
@@ -429,15 +420,7 @@ def _not_shown(
     width: int,
     remedy: str,
 ) -> str | None:
-    """Return one line that names columns, with the value of those alike in all rows.
-
-    Args:
-        columns: that have no room.
-        nothing: titles of those that are 0 or empty in all rows.
-        zero_rows: how many rows are left out since they are 0 throughout.
-        width: of the line. What it has no room for is counted.
-        remedy: how to see them.
-    """
+    """Return one line that names columns, with the value of those alike in all rows."""
     alike = [column for column in columns if _is_alike(column)]
     rows = "1 row" if zero_rows == 1 else f"{zero_rows} rows"
     words = [f"{rows} of 0"] if zero_rows else []

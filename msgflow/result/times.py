@@ -35,17 +35,7 @@ class Times(StrEnum):
 def converted(
     table: pa.Table, units: Mapping[str, str], runs: Sequence[Run], times: Times
 ) -> pa.Table:
-    """Return rows with their times in another form; `_ns` becomes `_s` or `_utc` in names.
-
-    Args:
-        table: the rows, with times in nanoseconds.
-        units: of columns: 'ns' for durations, 'epoch ns' for points in time.
-        runs: the runs of the rows.
-        times: the form.
-
-    Raises:
-        UsageError: times count from the start of a run, and no row says which run it is of.
-    """
+    """Return rows with their times in another form; `_ns` becomes `_s` or `_utc` in names."""
     if times is Times.NS:
         return table
     columns, names = [], []

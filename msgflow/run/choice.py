@@ -54,16 +54,7 @@ def read_runs(connection: duckdb.DuckDBPyConnection) -> tuple[Run, ...]:
 
 
 def choose_runs(runs: Sequence[Run], wanted: str | int | None) -> tuple[Run, ...]:
-    """Return the runs that a user wants.
-
-    Args:
-        runs: all runs of the database.
-        wanted: 'all', a name, a label KEY=VALUE (all runs that have it), or an id; the latest run
-            when None. A name wins over an id.
-
-    Raises:
-        UsageError: no such run, or a name that several runs have.
-    """
+    """Return the runs that a user wants."""
     if not runs:
         return ()
     ordered = sorted(runs, key=lambda run: run.run_id)
@@ -87,16 +78,7 @@ def choose_runs(runs: Sequence[Run], wanted: str | int | None) -> tuple[Run, ...
 
 
 def choose_one(runs: Sequence[Run], wanted: str | int | None, what: str) -> Run:
-    """Return the run that a user wants, for something that reads one run.
-
-    Args:
-        runs: all runs of the database.
-        wanted: see `choose_runs`.
-        what: that something for messages, such as 'a graph'.
-
-    Raises:
-        UsageError: no such run, none at all, or several.
-    """
+    """Return the run that a user wants, for something that reads one run."""
     chosen = choose_runs(runs, wanted)
     if not chosen:
         raise UsageError("the database holds no run yet", "msgflow ingest TRACE")
@@ -116,11 +98,7 @@ def is_run_name(text: str) -> bool:
 
 
 def require_run_name(name: str) -> None:
-    """Raise unless a run may have this name.
-
-    Raises:
-        UsageError: it means something else to `--run`, or is not valid Unicode.
-    """
+    """Raise unless a run may have this name."""
     if not is_run_name(name):
         raise UsageError(
             f"a run cannot have a name that --run takes for something else — {name!r}",

@@ -60,30 +60,12 @@ WHOLE = Window()
 
 
 def time_point(text: str | int, runs: Sequence[Run], option: str) -> int:
-    """Return a point in time in epoch ns.
-
-    Args:
-        text: an offset from the run's start ('2.5' seconds, '100ms'), ISO time, or epoch ns (an
-            integer, or a text of 16 digits or more).
-        runs: the chosen runs; an offset needs exactly one.
-        option: its name in messages, such as '--start'.
-
-    Raises:
-        UsageError: it cannot be read or is out of range.
-    """
+    """Return a point in time in epoch ns."""
     return _in_range(_read(text, runs, option), text, option)
 
 
 def duration_ns(text: str, option: str) -> int:
-    """Return the nanoseconds of a duration such as '10s', '500ms' or '2' (seconds).
-
-    Args:
-        text: the duration.
-        option: its name in messages, such as '--window'.
-
-    Raises:
-        UsageError: it cannot be read, or is 0.
-    """
+    """Return the nanoseconds of a duration such as '10s', '500ms' or '2' (seconds)."""
     found = _OFFSET.fullmatch(text.strip())
     length = _to_ns(found["number"], found["unit"] or "s") if found else 0
     if not length:
@@ -92,15 +74,7 @@ def duration_ns(text: str, option: str) -> int:
 
 
 def skipped_to(seconds: float, runs: Sequence[Run]) -> int:
-    """Return the point in time, in epoch ns, that comes so many seconds after the start of a run.
-
-    Args:
-        seconds: 0 or more.
-        runs: exactly one run.
-
-    Raises:
-        UsageError: there is not one run, or the time is out of range.
-    """
+    """Return the point in time, in epoch ns, that comes so many seconds after the start of a run."""
     start_ns = _run_start(runs, "--skip-first")
     # Some floats are too large for an integer of 64 bits.
     if not 0 <= seconds <= MAXIMUM_NS / 1_000_000_000:

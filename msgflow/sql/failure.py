@@ -76,12 +76,7 @@ def out_of_memory(
 
 @contextmanager
 def query_errors(what: str, message: str) -> Iterator[None]:
-    """Turn errors of a statement into a QueryError; errors of the database file pass.
-
-    Args:
-        what: what takes too much memory, if it does.
-        message: of the error; `{}` stands for the reason.
-    """
+    """Turn errors of a statement into a QueryError; errors of the database file pass."""
     try:
         yield
     except duckdb.Error as error:

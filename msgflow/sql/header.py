@@ -260,15 +260,7 @@ class _Field:
 
 
 def parse(text: str, path: Path) -> Header:
-    """Parse the text of an SQL file.
-
-    Args:
-        text: the whole file.
-        path: where it came from, for error messages.
-
-    Raises:
-        HeaderError: says which line is wrong, and how.
-    """
+    """Parse the text of an SQL file."""
     fields, body = _split(text, path)
     steps, body = _steps(body)
     single: dict[str, str] = {}
@@ -329,11 +321,7 @@ def parse(text: str, path: Path) -> Header:
 
 
 def read(path: Path) -> Header:
-    """Parse the SQL file at `path`.
-
-    Raises:
-        HeaderError: says which line is wrong, and how.
-    """
+    """Parse the SQL file at `path`."""
     return parse(path.read_text(encoding="utf-8"), path)
 
 

@@ -38,12 +38,7 @@ def json_fields(payload: pa.Schema) -> str:
 
 
 def label_of(expression: str, field: pa.Field) -> str | None:
-    """Return the SQL of the only label of a value, NULL where none or several belong to it.
-
-    Args:
-        expression: SQL of the value.
-        field: the field of that value. If it is no enumeration, the result is None.
-    """
+    """Return the SQL of the only label of a value, NULL where none or several belong to it."""
     choices = " ".join(
         f"WHEN {expression} BETWEEN {first} AND {last} THEN {literal(label)}"
         for first, last, label in _single(labels_of(field))
@@ -55,11 +50,6 @@ def exact(expression: str, data_type: pa.DataType, lambdas: int = 0) -> str:
     """Return the SQL of a value that JSON can hold: NaN and infinities become NULL.
 
     Arrays of arrays of arrays of floating point numbers become text.
-
-    Args:
-        expression: SQL of the value.
-        data_type: of the value.
-        lambdas: lists around the value.
     """
     types = pa.types
     if not _has_floats(data_type):

@@ -32,11 +32,7 @@ class Statements:
         return tuple(sorted(_paths(self)))
 
     def header(self, name: str) -> Header:
-        """Return the header of a statement.
-
-        Raises:
-            KeyError: there is none of this name.
-        """
+        """Return the header of a statement."""
         return _header(self, name)
 
     def text(self, name: str) -> str:
@@ -51,13 +47,7 @@ class Statements:
     def run(
         self, connection: duckdb.DuckDBPyConnection, name: str, values: Mapping[str, Any]
     ) -> duckdb.DuckDBPyRelation:
-        """Return the rows of a statement.
-
-        Args:
-            connection: to a database with the public views.
-            name: of the statement.
-            values: its parameters; those with a default may be left out, others are ignored.
-        """
+        """Return the rows of a statement."""
         (statement,) = connection.extract_statements(self.text(name))
         bound = self._bound(name, statement, values)
         return connection.sql(statement, params=bound)
@@ -65,13 +55,7 @@ class Statements:
     def keep(
         self, connection: duckdb.DuckDBPyConnection, name: str, values: Mapping[str, Any]
     ) -> None:
-        """Make a temporary table of the rows of a statement, which has its name.
-
-        Args:
-            connection: as in `run`.
-            name: likewise.
-            values: likewise.
-        """
+        """Make a temporary table of the rows of a statement, which has its name."""
         text = f"CREATE OR REPLACE TEMP TABLE {name} AS\n{self.text(name)}"
         (statement,) = connection.extract_statements(text)
         connection.execute(statement, self._bound(name, statement, values))

@@ -37,11 +37,7 @@ def described_type(type_name: str) -> str:
 
 
 def parse_literal(text: str) -> Value:
-    """Return the value of a literal in SQL: NULL, a truth value, number, string or list.
-
-    Raises:
-        ValueError: it is another kind of text.
-    """
+    """Return the value of a literal in SQL: NULL, a truth value, number, string or list."""
     if text.lower() in _WORDS:
         return _WORDS[text.lower()]
     if _INTEGER.fullmatch(text):
@@ -59,9 +55,6 @@ def parse_text(text: str, type_name: str) -> Value:
     """Return the value of `text`, typed by a user, for a parameter of DuckDB type `type_name`.
 
     Integers may be hexadecimal (0x…, the form of handles); commas separate a list.
-
-    Raises:
-        ValueError: it is not a value of this type.
     """
     if type_name.endswith("[]"):
         return [parse_text(part.strip(), type_name[:-2]) for part in text.split(",") if part]

@@ -25,22 +25,12 @@ def did_you_mean(name: str, known: Sequence[str], otherwise: str) -> str:
 
 
 def meant_or(near: Sequence[str], there: str, end: str = ";") -> str:
-    """Return a hint: the names that the user may mean, if any, and then what names there are.
-
-    Args:
-        near: similar names.
-        there: what names there are, in words.
-        end: mark between the two.
-    """
+    """Return a hint: the names that the user may mean, if any, and then what names there are."""
     return f"did you mean {' or '.join(near)}{end} {there}" if near else there
 
 
 def column_named(name: str, columns: Sequence[str]) -> str:
-    """Return the column with a name; the `_ns` at its end may be missing.
-
-    Raises:
-        UsageError: there is no such column; the message names similar ones.
-    """
+    """Return the column with a name; the `_ns` at its end may be missing."""
     for known in (name, f"{name}_ns"):
         if known in columns:
             return known

@@ -35,14 +35,7 @@ def format_duration(duration_ns: float) -> str:
 
 
 def format_cell(value: Any, unit: str | None = None, *, is_handle: bool = False) -> str:
-    """Return one cell of a table.
-
-    Args:
-        value: a Python value made by Arrow.
-        unit: of the column: 'ns' for durations, 'epoch ns' for points in time, 'share' for parts
-            of 1.
-        is_handle: an address, shown in hexadecimal.
-    """
+    """Return one cell of a table."""
     if isinstance(value, str):
         return printable(value)
     if isinstance(value, bool):
@@ -107,10 +100,6 @@ def printable(text: str, keep: str = "") -> str:
     """Return text with control characters escaped as in Python.
 
     Names come from traces: no terminal may obey what is in them.
-
-    Args:
-        text: any.
-        keep: characters to leave as they are.
     """
     if text.isprintable():
         return text

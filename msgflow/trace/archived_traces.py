@@ -36,11 +36,7 @@ class Unpacked:
     """
 
     def __init__(self, paths: Sequence[str | Path]) -> None:
-        """Unpack all archives among `paths`.
-
-        Raises:
-            TraceError: an archive cannot be unpacked.
-        """
+        """Unpack all archives among `paths`."""
         self._archives: dict[Path, Path] = {}
         try:
             self._root = Path(tempfile.mkdtemp(prefix=_PREFIX)).resolve()

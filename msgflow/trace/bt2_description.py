@@ -19,11 +19,7 @@ if TYPE_CHECKING:
 
 
 def describe(bt2: Any, path: Path, index: int) -> tuple[TraceInfo, list[Any]]:
-    """Describe one trace, with names and payload schemas of its events.
-
-    Raises:
-        TraceError: Babeltrace cannot open it.
-    """
+    """Describe one trace, with names and payload schemas of its events."""
     if kind_of(path) is MetadataKind.JSON and bt2.__version__ < "2.1":
         raise TraceError(
             "the trace is CTF 2, which needs babeltrace2 2.1 or newer, here is "

@@ -23,11 +23,7 @@ _INSTALL = "apt install python3-bt2"
 
 
 def load() -> Any:
-    """Import bt2 from this environment, else from the distribution.
-
-    Raises:
-        TraceError: bt2 is not installed, or only for another Python.
-    """
+    """Import bt2 from this environment, else from the distribution."""
     try:
         return import_module("bt2")
     except ModuleNotFoundError:

@@ -21,10 +21,6 @@ def messages(bt2: Any, traces: Sequence[tuple[Path, int]]) -> Iterator[Any]:
 
     A directory has a source of its own: one source would merge directories of one trace uuid.
     The name of a trace object ends with the place of the trace in `traces`.
-
-    Raises:
-        TraceError: a trace cannot be opened, or not be decoded any further.
-        KeyboardInterrupt: the user stopped the reading.
     """
     source = bt2.ComponentSpec.from_named_plugin_and_component_class
     parameters = [parameters_of(path, place, ns) for place, (path, ns) in enumerate(traces)]

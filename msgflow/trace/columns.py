@@ -31,12 +31,7 @@ def names_of(field: pa.Field) -> tuple[str, ...]:
 def field_metadata(
     base: int | None, labels: Mapping[str, Iterable[tuple[int, int]]] | None
 ) -> dict[bytes, bytes]:
-    """Return the metadata of a field.
-
-    Args:
-        base: in which to show it, None if it is no integer.
-        labels: of an enumeration, label to ranges of values (both ends belong to it).
-    """
+    """Return the metadata of a field."""
     found = {BASE: b"16"} if base == 16 else {}
     if labels:
         found[LABELS] = json.dumps(

@@ -45,19 +45,7 @@ def description(
     events: Sequence[tuple[str, Set[str]]],
     has_time: bool = True,
 ) -> TraceInfo:
-    """Describe a trace, with its times as declared.
-
-    Args:
-        path: the directory of the trace.
-        index: its place among the traces opened together.
-        uuid: the uuid that the metadata declares.
-        environment: the `env` of the metadata.
-        clock: the clock of the events.
-        begins: when the streams begin, by this clock [ns since the epoch].
-        ends: when the streams end, by this clock [ns since the epoch].
-        events: the name of each event class and the names of its contexts.
-        has_time: the events have times.
-    """
+    """Describe a trace, with its times as declared."""
     return TraceInfo(
         index=index,
         path=path,

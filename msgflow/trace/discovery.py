@@ -68,9 +68,6 @@ def archives_below(paths: Sequence[str | Path]) -> list[Path]:
     """List the archives below the directories among `paths` that are not given, sorted by path.
 
     `discover` finds no trace in them: an archive is read only if it is named.
-
-    Raises:
-        TraceError: a directory cannot be read.
     """
     given = {Path(os.path.realpath(path)) for path in paths}
     found = {

@@ -48,13 +48,7 @@ _LONG_HEADERS = {
 
 
 def unpack(archive: Path, directory: Path) -> None:
-    """Unpack an archive into an empty directory.
-
-    Raises:
-        TraceError: it is damaged, encrypted, too large for the disk or for what it is packed, or
-            has a member that is a device or would lie, or lead, outside of the directory.
-        UsageError: the environment variable `LIMIT_VARIABLE` holds no amount.
-    """
+    """Unpack an archive into an empty directory."""
     try:
         target = Target(archive, directory)
         with archive.open("rb") as file:
@@ -81,11 +75,7 @@ def unpack(archive: Path, directory: Path) -> None:
 
 
 def limit_of(archive: Path) -> int:
-    """Return how much an archive may have unpacked [bytes].
-
-    Raises:
-        UsageError: the environment variable holds no amount.
-    """
+    """Return how much an archive may have unpacked [bytes]."""
     text = os.environ.get(LIMIT_VARIABLE)
     if text is None:
         return max(MOST_UNPACKED, _MOST_RATIO * archive.stat().st_size)

@@ -39,21 +39,12 @@ class MetadataKind(Enum):
 
 
 def content_of(directory: Path) -> bytes:
-    """Return the metadata file of the trace in this directory.
-
-    Raises:
-        OSError: it cannot be read, or no tracer could have written it.
-    """
+    """Return the metadata file of the trace in this directory."""
     return read_regular(directory / FILE_NAME, _MOST_BYTES)
 
 
 def kind_of(directory: Path) -> MetadataKind:
-    """Tell the kind of metadata of the trace in this directory.
-
-    Raises:
-        TraceError: it is empty, cut off, or not CTF metadata at all.
-        OSError: it cannot be read.
-    """
+    """Tell the kind of metadata of the trace in this directory."""
     content = content_of(directory)
     if not content:
         raise TraceError(

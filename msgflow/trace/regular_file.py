@@ -28,12 +28,7 @@ class UnsuitableFileError(OSError):
 
 
 def read_regular(path: Path, most_bytes: int | None, size: int = -1) -> bytes:
-    """Return the content of a regular file, or the first `size` bytes of it.
-
-    Raises:
-        UnsuitableFileError: it is a pipe, a device or the like, or longer than `most_bytes`.
-        OSError: it cannot be read.
-    """
+    """Return the content of a regular file, or the first `size` bytes of it."""
     with open_regular(path) as file:
         length = os.fstat(file.fileno()).st_size
         if most_bytes is not None and length > most_bytes:
@@ -46,12 +41,7 @@ def read_regular(path: Path, most_bytes: int | None, size: int = -1) -> bytes:
 
 
 def open_regular(path: Path) -> BufferedReader:
-    """Open a regular file for reading.
-
-    Raises:
-        UnsuitableFileError: it is a pipe, a device or the like.
-        OSError: it cannot be read.
-    """
+    """Open a regular file for reading."""
     # A blocking `open` of a pipe without a writer would wait for ever.
     file = os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb")
     mode = os.fstat(file.fileno()).st_mode

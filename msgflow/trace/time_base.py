@@ -33,11 +33,6 @@ def on_one_base(
     The first trace of programs decides, the kernel's only where there is no other: a kernel trace
     beside a recording moves no time of it. Only a clock that has a uuid and counts nanoseconds is
     corrected: without a uuid it is a clock of its own.
-
-    Args:
-        traces: the descriptions.
-        offsets: what traces that were opened before decided, by uuid and name of the clock [ns
-            since the epoch]; takes in those of these traces.
     """
     for trace in sorted(traces, key=lambda trace: trace.domain == "kernel"):
         if trace.clock_uuid is not None and trace.clock_frequency == GIGA:

@@ -90,17 +90,7 @@ class ConditionError(ValueError):
 def parse_condition(
     text: str, dimension: Dimension, statistics: tuple[str, ...], metric: str
 ) -> Condition:
-    """Return the condition that a text means.
-
-    Args:
-        text: as the user wrote it.
-        dimension: of the measured value.
-        statistics: those that are measured; empty if there is one value only.
-        metric: its name, for errors.
-
-    Raises:
-        ConditionError: unknown statistic, operator or unit, or no condition at all.
-    """
+    """Return the condition that a text means."""
     words = " ".join(text.split())
     example = f"{'p99 ' if 'p99' in statistics else ''}{_EXAMPLES[dimension]}"
     if match := _BOUND.fullmatch(words):

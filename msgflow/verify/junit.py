@@ -16,13 +16,7 @@ if TYPE_CHECKING:
 
 
 def junit_xml(result: QueryResult, run: Run, *, allow_not_measured: bool) -> str:
-    """Return a document with one test case per verdict.
-
-    Args:
-        result: the verdicts.
-        run: their run.
-        allow_not_measured: requirements without a value are skipped tests, else errors.
-    """
+    """Return a document with one test case per verdict."""
     rows: list[dict[str, Any]] = result.to_arrow().to_pylist()
     missing = "skipped" if allow_not_measured else "errors"
     counts = {"tests": len(rows), "failures": 0, "errors": 0, "skipped": 0}

@@ -54,14 +54,7 @@ ORDER BY root_ns, root_id LIMIT 1
 def find_worst_case(
     connection: duckdb.DuckDBPyConnection, kind: str, key: Any, window: Window
 ) -> WorstCase | None:
-    """Return the worst case of a kind; None if nothing was measured.
-
-    Args:
-        connection: to a database with the public views.
-        kind: a key of KEYS, but no flow.
-        key: of the row that failed.
-        window: the time window.
-    """
+    """Return the worst case of a kind; None if nothing was measured."""
     asked = {"key": key, **window.bindings}
     rows = internal_sql().run(connection, f"worst_{kind}", asked).fetchall()
     return worst_case_of(rows[0]) if rows else None

@@ -60,14 +60,7 @@ def joined() -> str:
 
 
 def page(*, head: str, body: str = "", policy: str = "", attributes: str = "") -> str:
-    """Return the page around the front end.
-
-    Args:
-        head: how style sheets and scripts are included.
-        body: what follows the content.
-        policy: the Content-Security-Policy, if no header gives it.
-        attributes: of the outermost element, beginning with a space.
-    """
+    """Return the page around the front end."""
     meta = f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n' if policy else ""
     return Template(text("page.html")).substitute(
         head=head, body=body, policy=meta, attributes=attributes

@@ -30,14 +30,6 @@ def critical_path(
     """Return the pieces of the critical path as bytes, with the command that prints them.
 
     It belongs to the longest flow that ends where the picked one does, see critical_end.sql.
-
-    Args:
-        connection: to a database with the public views.
-        run: the run of what was picked.
-        origin_ns: what times count from, epoch ns.
-        kind: 'publication', 'take', 'callback_instance', 'request' or 'response'.
-        number: its identity.
-        from_topic: topic where the flow starts; that of its first message when None.
     """
     ends = run_page_query(connection, "critical_end", {"kind": kind, "id": number}).to_pylist()
     if not ends:

@@ -14,13 +14,7 @@ if TYPE_CHECKING:
 
 
 def encoded_comparison(comparison: Comparison, what: str, *, is_quick: bool = False) -> bytes:
-    """Return a comparison of runs as bytes, for the page of the comparison.
-
-    Args:
-        comparison: its rows are by `what`.
-        what: 'paths', 'callbacks' or 'topics'.
-        is_quick: without intervals.
-    """
+    """Return a comparison of runs as bytes, for the page of the comparison."""
     result = comparison.result
     return encode(
         result.to_arrow(),

@@ -22,9 +22,6 @@ def kept_token(place: str) -> str:
 
     It is kept in a file that its user alone can read. A file that others can read or have written
     is replaced. Where nothing can be kept, each call returns another token.
-
-    Args:
-        place: the absolute path of a database, or the address of a lake.
     """
     with contextlib.suppress(OSError, RuntimeError):  # the last: there is no home directory
         path = _file(place)

@@ -105,17 +105,7 @@ class Pages:
         self._scratch.close()
 
     def answer(self, connection: duckdb.DuckDBPyConnection, name: str, params: Params) -> bytes:
-        """Return what a page asks for.
-
-        Args:
-            connection: to the database, of this thread alone.
-            name: of the answer: a page query, 'query', 'finding', 'compare' or 'run'.
-            params: as the page gives them.
-
-        Raises:
-            UsageError: there is no such answer, run or value.
-            QueryError: the database could not run it.
-        """
+        """Return what a page asks for."""
         key = json.dumps([name, params], sort_keys=True)
         with self._guard:
             if key in self._kept:
@@ -188,12 +178,7 @@ class Pages:
     def named(
         self, connection: duckdb.DuckDBPyConnection, name: str, params: Params
     ) -> tuple[QueryResult, bytes]:
-        """Return the rows of a named query that pages show, also as bytes.
-
-        Raises:
-            UsageError: pages do not show it, or there is no such run.
-            QueryError: the database could not run it.
-        """
+        """Return the rows of a named query that pages show, also as bytes."""
         if name not in NAMED:
             raise UsageError(f"pages do not show such a query — {name}")
         header = load_query(name)
@@ -228,19 +213,7 @@ class Pages:
         through: str = "",
         params: Params | None = None,
     ) -> Section:
-        """Return a section of the summary: 'paths', 'blame', 'drops' or 'threads'.
-
-        Args:
-            connection: to the database, of this thread alone.
-            extent: the run.
-            name: of the section.
-            through: of 'paths' and 'blame' only paths with this text in them.
-            params: as the page gives them; their window counts.
-
-        Raises:
-            UsageError: there is no such section.
-            QueryError: the database could not run it.
-        """
+        """Return a section of the summary: 'paths', 'blame', 'drops' or 'threads'."""
         if name not in SUMMARY:
             raise UsageError(f"the summary has no such section — {name}")
         part = self.part(extent, params or {})

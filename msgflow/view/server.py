@@ -87,14 +87,7 @@ class Interruptible(Protocol):
 def application(
     shared: SharedDatabase, token: str, sql: Sql, following: Following | None = None
 ) -> ASGIApp:
-    """Return the application: pages and their data, for requests with the token.
-
-    Args:
-        shared: the database.
-        token: of the printed address.
-        sql: runs the queries of the SQL page.
-        following: moves the database on; None if it stays as it is.
-    """
+    """Return the application: pages and their data, for requests with the token."""
     limiters: dict[str, anyio.CapacityLimiter] = {}
     follows = "" if following is None else " data-follows"
 
@@ -183,12 +176,7 @@ def application(
 
 
 def single_application(make: Callable[[], str], token: str) -> ASGIApp:
-    """Return the application of one page with its data inside, made again at each load.
-
-    Args:
-        make: returns the page, which names its scripts in a policy of its own.
-        token: of the printed address.
-    """
+    """Return the application of one page with its data inside, made again at each load."""
 
     async def page(request: Request) -> Response:
         try:
@@ -208,17 +196,7 @@ def serve_single(
     port: int | None = None,
     started: Callable[[str], None] = lambda address: None,
 ) -> None:
-    """Serve one page with its data inside until Ctrl-C.
-
-    Args:
-        place: what the page shows; its token is kept.
-        make: returns the page; called whenever it is loaded.
-        port: of 127.0.0.1; 0 takes any that is free, None the usual one or else any.
-        started: called with the address, which has the token, once it can be opened.
-
-    Raises:
-        UsageError: the port is in use.
-    """
+    """Serve one page with its data inside until Ctrl-C."""
     with listening(place, port, lambda token: single_application(make, token)) as (
         server, listener, address,
     ):  # fmt: skip
@@ -362,14 +340,7 @@ def is_local(host: str) -> bool:
 
 
 def listen(port: int | None) -> socket.socket:
-    """Return a socket that listens on this machine alone.
-
-    Args:
-        port: which; 0 takes any that is free, None the usual one or else any.
-
-    Raises:
-        UsageError: it is in use, or not allowed.
-    """
+    """Return a socket that listens on this machine alone."""
     wanted = DEFAULT_PORT if port is None else port
     listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -396,20 +367,7 @@ def serve(
     memory_limit: str | None = None,
     started: Callable[[str], None] = lambda address: None,
 ) -> None:
-    """Serve the pages of a database until Ctrl-C.
-
-    Args:
-        path: the database.
-        sql: runs the queries of the SQL page.
-        port: of 127.0.0.1; 0 takes any that is free, None the usual one or else any.
-        memory_limit: most memory that DuckDB takes, such as '1GB'; when None a quarter of that of
-            the machine, at least 500 MB and at most 4 GB.
-        started: called with the address, which has the token, once it can be opened.
-
-    Raises:
-        DatabaseError: the file is missing, locked, foreign, or of another schema revision.
-        UsageError: the port is in use.
-    """
+    """Serve the pages of a database until Ctrl-C."""
     with running(path, sql, port=port, memory_limit=memory_limit) as (server, listener, address):
         started(address)
         server.run(sockets=[listener])
@@ -419,18 +377,8 @@ def serve(
 def serving(path: Path, sql: Sql, following: Following, *, place: str, port: int) -> Iterator[str]:
     """Serve the pages of a database that moves on, in a thread, during the block.
 
-    Args:
-        path: the database.
-        sql: runs the queries of the SQL page.
-        following: moves it on.
-        place: what its token is kept for.
-        port: of 127.0.0.1; 0 takes any that is free.
-
     Yields:
         The address, which has the token.
-
-    Raises:
-        UsageError: the port is in use.
     """
     with running(
         path, sql, port=port, memory_limit=None, following=following, place=place

@@ -129,24 +129,12 @@ class SharedDatabase:
         self._idle.start()
 
     def generation(self) -> str:
-        """Return the generation of the database as it is now, which is opened for it.
-
-        Raises:
-            ReplacedError: the file is gone.
-            UnopenedError: it cannot be opened.
-        """
+        """Return the generation of the database as it is now, which is opened for it."""
         with self._changed:
             return self._current().answers.generation
 
     def require(self, generation: str | None) -> None:
-        """Raise unless the database is still that of a page.
-
-        Args:
-            generation: that of the page; any when None.
-
-        Raises:
-            ReplacedError: the file was changed since the page was made, or is gone.
-        """
+        """Raise unless the database is still that of a page."""
         try:
             is_same = generation is None or generation == generation_of(self.path)
         except (OSError, DatabaseError):
@@ -161,19 +149,7 @@ class SharedDatabase:
         generation: str | None,
         started: Callable[[duckdb.DuckDBPyConnection], None],
     ) -> bytes:
-        """Return the answer to a question of a page.
-
-        Args:
-            name: of the answer.
-            params: as the page gives them.
-            generation: that of the page.
-            started: called with the connection that is asked, which can be interrupted.
-
-        Raises:
-            ReplacedError: the file was changed since the page was made, or is gone.
-            UnopenedError: it cannot be opened.
-            MsgflowError: as `Pages.answer` does.
-        """
+        """Return the answer to a question of a page."""
         with self._changed:
             opened = self._current()
             answers = opened.answers
@@ -292,9 +268,6 @@ def generation_of(path: Path) -> str:
     """Return what tells the state of a database from others, also after a restart of the server.
 
     It follows from the file, its log, and the version of msgflow, whose pages ask otherwise.
-
-    Raises:
-        DatabaseError: there is no such file.
     """
     try:
         parts: list[object] = [__version__, *_state(path)]

@@ -36,12 +36,7 @@ class Parts:
 
 
 def single_page(parts: Parts, head: dict[str, Any]) -> str:
-    """Return the page.
-
-    Args:
-        parts: its data.
-        head: what report_data.js has to know of them.
-    """
+    """Return the page."""
     packed = base64.b64encode(parts.pack(head)).decode()
     scripts = [*(assets.vendored(name) for name in assets.SCRIPTS), assets.joined()]
     styles = [*(assets.vendored(name) for name in assets.SHEETS), assets.text("style.css")]

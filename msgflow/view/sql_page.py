@@ -74,11 +74,7 @@ class Sql(Protocol):
     """A function that runs SQL that a person wrote, one query after the other."""
 
     def __call__(self, text: str, limit: int) -> QueryResult:
-        """Return the rows of a query, `limit` at most; a note says if there are more.
-
-        Raises:
-            MsgflowError: it may do more than read, could not be run, or took too long.
-        """
+        """Return the rows of a query, `limit` at most; a note says if there are more."""
         ...
 
     def interrupt(self) -> None:
@@ -87,11 +83,7 @@ class Sql(Protocol):
 
 
 def most_rows(params: Mapping[str, Any]) -> int:
-    """Return how many rows the page asks for.
-
-    Raises:
-        UsageError: it is no number, or more than a browser shows.
-    """
+    """Return how many rows the page asks for."""
     given = str(params.get("rows", DEFAULT_ROWS))
     if not re.fullmatch(r"\d{1,6}", given) or not 0 < int(given) <= MOST_ROWS:
         raise UsageError(f"rows is a whole number from 1 to {MOST_ROWS} — {given}")
@@ -121,9 +113,6 @@ def encoded_error(message: str, hint: str | None) -> bytes:
 
 def words(connection: duckdb.DuckDBPyConnection) -> pa.Table:
     """Return what the editor completes and colours.
-
-    Args:
-        connection: to the database.
 
     Returns:
         `kind` ('view', 'column', 'macro', 'function', 'type' or 'keyword'), `name`, and where there

@@ -134,18 +134,7 @@ class Part:
 def query_section(
     connection: duckdb.DuckDBPyConnection, run: Run, part: Part, name: str, through: str = ""
 ) -> Section:
-    """Return 'paths', 'drops' or 'threads' of a run.
-
-    Args:
-        connection: to a database with the public views.
-        run: the run.
-        part: the times.
-        name: of the section.
-        through: of 'paths' only those with this text in them.
-
-    Raises:
-        QueryError: the database could not run the query.
-    """
+    """Return 'paths', 'drops' or 'threads' of a run."""
     query, selection = _QUERIES[name]
     if through and name == "paths":
         where = f"{selection.where} AND contains(path, {literal(through)})"
@@ -165,19 +154,7 @@ def area_section(
     name: str,
     of: Sequence[str | int],
 ) -> Section:
-    """Return sums of a part of the timeline.
-
-    Args:
-        connection: to a database with the public views.
-        run: the run.
-        part: the times.
-        name: 'callbacks' of nodes, or 'usage' of threads.
-        of: names of the nodes, or identities of the threads.
-
-    Raises:
-        UsageError: there is no such section, or no such node.
-        QueryError: the database could not run the query.
-    """
+    """Return sums of a part of the timeline."""
     if name not in _AREA:
         raise UsageError(f"there are no such sums — {name}", f"one of {', '.join(_AREA)}")
     query, sort = _AREA[name]
@@ -198,17 +175,7 @@ def blame_section(
     part: Part,
     flows: Sequence[tuple[str, str, int]],
 ) -> Section:
-    """Return how long each node took of each flow, the slowest flow first.
-
-    Args:
-        connection: to a database with the public views.
-        run: the run.
-        part: the times of the beginnings of flows.
-        flows: of each its first topic, its last one and its take_id, the slowest first.
-
-    Raises:
-        QueryError: the database could not run the query.
-    """
+    """Return how long each node took of each flow, the slowest flow first."""
     header = load_query("critical-path")
     results, commands = [], []
     for rank, (first, last, take) in enumerate(flows, 1):

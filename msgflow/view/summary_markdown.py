@@ -28,15 +28,7 @@ def markdown(
     findings: Sequence[Finding],
     sections: Sequence[Section],
 ) -> str:
-    """Return the summary.
-
-    Args:
-        run: the run.
-        facts: what was recorded, a few words each.
-        notes: what it leaves out, a sentence each.
-        findings: those of `check`, errors first.
-        sections: the others, in their order; requirements and changes come before findings.
-    """
+    """Return the summary."""
     before = [section for section in sections if section.name in ("verdicts", "change")]
     after = [section for section in sections if section.name not in ("verdicts", "change")]
     lines = [f"# {code(format_cell(run.name))}", "", ", ".join(facts), ""]

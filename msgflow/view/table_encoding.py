@@ -32,14 +32,7 @@ def encode(
     table: pa.Table, *, meta: Mapping[str, Any] | None = None, origin_ns: int = 0,
     units: Mapping[str, str] | None = None,
 ) -> bytes:  # fmt: skip
-    """Return `table` as bytes.
-
-    Args:
-        table: whole numbers, doubles, truth values, text, and lists of these.
-        meta: put into the head; what JSON can hold.
-        origin_ns: what points in time are counted from, epoch ns.
-        units: of columns by name; those in 'epoch ns' become offsets from `origin_ns`.
-    """
+    """Return `table` as bytes."""
     units = units or {}
     columns = []
     buffers: list[bytes] = []

@@ -23,11 +23,7 @@ class Turns:
         self._is_alone = False
 
     def ask(self, question: Callable[[], bytes]) -> bytes:
-        """Return the answer.
-
-        Raises:
-            MsgflowError: what the question raises; of memory only where it has too little alone.
-        """
+        """Return the answer."""
         with self._turn(alone=False):
             answer = _if_memory_suffices(question)
         if answer is not None:

@@ -195,12 +195,7 @@ def violation_line(violation: Row) -> str:
 
 
 def blamed(pieces: Sequence[Row], path: str | None) -> Iterator[str]:
-    """Yield what took longest of a flow.
-
-    Args:
-        pieces: of its critical path.
-        path: its nodes and topics.
-    """
+    """Yield what took longest of a flow."""
     slowest = sorted(pieces, key=lambda piece: -piece["duration_ns"])
     for piece in slowest[:_MOST_PIECES]:
         if piece["activity"] != "rest" and (piece["share"] or 0) >= _LEAST_SHARE:
@@ -219,11 +214,7 @@ def blamed(pieces: Sequence[Row], path: str | None) -> Iterator[str]:
 
 
 def _ends(path: str | None) -> Row:
-    """Return the topics between which a flow is looked at: a target may be part of a longer path.
-
-    Args:
-        path: its nodes and topics; topics that are not known are '?', services in parentheses.
-    """
+    """Return the topics between which a flow is looked at: a target may be part of a longer path."""
     topics = (path or "").split(" → ")[1:-1]
     ends = {"from": topics[0], "to": topics[-1]} if topics else {}
     return {word: topic for word, topic in ends.items() if topic.startswith("/")}

@@ -44,11 +44,7 @@ class Arrivals:
     """The sources of the chunks that have come so far."""
 
     def __init__(self, step_ns: int) -> None:
-        """Start before the first chunk.
-
-        Args:
-            step_ns: how often chunks come at most.
-        """
+        """Start before the first chunk."""
         self._step_ns = step_ns
         self._sources: dict[Path, _Source] = {}
 
@@ -61,13 +57,7 @@ class Arrivals:
         return source is not None and source.is_left_out
 
     def add(self, chunk: Chunk, end_ns: int | None, *, is_live: bool) -> None:
-        """Add a chunk that was read.
-
-        Args:
-            chunk: which one.
-            end_ns: up to when its source has recorded, by its own clock; None: nothing yet.
-            is_live: it came while we looked; of others, it is not known when they came.
-        """
+        """Add a chunk that was read."""
         age_s = _age_s(chunk.path)
         source = self._sources.setdefault(chunk.source, _Source(chunk.number, 0, 0))
         source.number = chunk.number
@@ -80,11 +70,7 @@ class Arrivals:
             source.ahead_ns = max(ahead_ns, source.ahead_ns or ahead_ns)
 
     def vanished(self, looked_s: float) -> list[Path]:
-        """Return the sources whose next chunk is overdue, each once until a chunk comes again.
-
-        Args:
-            looked_s: when we looked for chunks [s, monotonic]: to read them takes time.
-        """
+        """Return the sources whose next chunk is overdue, each once until a chunk comes again."""
         found = []
         for path, source in self._sources.items():
             usual_s = max(self._step_ns / _SECOND_NS, source.length_s)

@@ -51,12 +51,7 @@ class ChunkFinder:
     """Finds the finished chunks below a directory, of all hosts, each once."""
 
     def __init__(self, directory: Path, refuse: Callable[[TraceError], None]) -> None:
-        """Find nothing yet.
-
-        Args:
-            directory: of a session, or above several, such as that of lttng-relayd.
-            refuse: gets an error for each directory that cannot be read, once.
-        """
+        """Find nothing yet."""
         self._directory = directory
         self._refuse = refuse
         self._refused: set[Path] = set()

@@ -29,13 +29,7 @@ class History:
     """
 
     def __init__(self, window_ns: int, step_ns: int, late_ns: int) -> None:
-        """Start with nothing.
-
-        Args:
-            window_ns: length of a window.
-            step_ns: how far a window is from the one before.
-            late_ns: how long a window waits for what is late.
-        """
+        """Start with nothing."""
         self._window_ns = window_ns
         self._step_ns = step_ns
         self._late_ns = late_ns
@@ -91,9 +85,6 @@ class History:
     def skip_old(self, *, earlier_ns: int = 0) -> list[Path]:
         """Let the first window be no longer than others, however much was recorded before it.
 
-        Args:
-            earlier_ns: how much of what came before it is kept all the same.
-
         Returns:
             The directories of the chunks that are forgotten.
         """
@@ -106,10 +97,6 @@ class History:
         """Return the next window that can be closed; None if there is none.
 
         It leaves out nothing since the last one: where steps were late it is longer.
-
-        Args:
-            newest_ns: the newest time that was recorded.
-            is_last: nothing more comes.
         """
         if not self._chunks:
             return None
@@ -124,10 +111,6 @@ class History:
     def close(self, window: Window, *, earlier_ns: int = 0) -> list[Path]:
         """Close a window: what comes of it from now on is late.
 
-        Args:
-            window: which one.
-            earlier_ns: how much of what came before it is kept, besides what later ones need.
-
         Returns:
             The directories of the chunks that are forgotten.
         """
@@ -136,12 +119,7 @@ class History:
         return self.forget(window, earlier_ns=earlier_ns)
 
     def traces(self, window: Window, *, earlier_ns: int = 0) -> KeptTraces:
-        """Return what a window needs: itself, and what comes before and after.
-
-        Args:
-            window: the window.
-            earlier_ns: how much more of what came before to return.
-        """
+        """Return what a window needs: itself, and what comes before and after."""
         needed = self._needed(window, earlier_ns)
         return KeptTraces([*self._lasting.values(), *self._lasting_without(needed)], needed)
 
@@ -151,10 +129,6 @@ class History:
 
     def forget(self, window: Window, *, earlier_ns: int = 0) -> list[Path]:
         """Forget what no window needs that comes after this one, but for what lasts.
-
-        Args:
-            window: the window.
-            earlier_ns: how much of what came before is kept all the same.
 
         Returns:
             The directories of the chunks that are forgotten.

@@ -70,11 +70,7 @@ class KeptChunk:
         return replace(self, packets=(), event_counts={}, damages=(), **_renumbered(kept))
 
     def followed_by(self, later: KeptChunk) -> KeptChunk:
-        """Return what lasts of both, this and a later chunk of the same source.
-
-        Args:
-            later: likewise what lasts of it.
-        """
+        """Return what lasts of both, this and a later chunk of the same source."""
         traces = list(self.traces)
         indexes = {trace.identity: trace.index for trace in traces}
         for trace in later.traces:
@@ -96,15 +92,7 @@ class KeptChunk:
 
 
 def read_chunk(chunk: Chunk, after: Continuation) -> KeptChunk | None:
-    """Read a chunk into memory; None if nothing was recorded in it.
-
-    Args:
-        chunk: which one.
-        after: those that were read before it, which takes it in.
-
-    Raises:
-        TraceError: it cannot be read.
-    """
+    """Read a chunk into memory; None if nothing was recorded in it."""
     # LTTng also cuts the time before the first program, into chunks without any file.
     if not any(path.is_file() for path in chunk.path.rglob("*")):
         return None

@@ -26,12 +26,7 @@ class KeptTraces(TraceSet):
     """Chunks that follow each other, behind what lasts of earlier ones."""
 
     def __init__(self, lasting: Sequence[KeptChunk], chunks: Sequence[KeptChunk]) -> None:
-        """Join them.
-
-        Args:
-            lasting: what lasts of chunks that are gone.
-            chunks: the others, by their end; at least one.
-        """
+        """Join them."""
         self.duplicate_packet_count = 0
         self._parts = (*lasting, *chunks)
         traces: list[TraceInfo] = []

@@ -65,9 +65,6 @@ class LearnedAnswers:
     def doubted(self, con: duckdb.DuckDBPyConnection) -> str | None:
         """Learn from a window, and return what it doubts and earlier ones have shown.
 
-        Args:
-            con: to a database with the run of a window, without what is learned.
-
         Returns:
             A file of links; None if there is nothing to declare.
         """

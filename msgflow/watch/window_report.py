@@ -80,12 +80,7 @@ class WindowReport:
 
 
 def report_of(con: duckdb.DuckDBPyConnection, window: Window) -> WindowReport:
-    """Ask a database in memory what happened in a window.
-
-    Args:
-        con: with one run.
-        window: which part of it counts.
-    """
+    """Ask a database in memory what happened in a window."""
 
     def ask(name: str, columns: Sequence[str]) -> list[Row]:
         part = Slice(start=window.start_ns, end=window.end_ns)
@@ -108,11 +103,6 @@ def report_of(con: duckdb.DuckDBPyConnection, window: Window) -> WindowReport:
 
 
 def discarded_events(con: duckdb.DuckDBPyConnection, window: Window) -> int:
-    """Return how many events the tracer lost in a window.
-
-    Args:
-        con: with one run.
-        window: which part of it counts.
-    """
+    """Return how many events the tracer lost in a window."""
     ((discarded,),) = con.execute(_DISCARDED, window.bindings).fetchall()
     return int(discarded)

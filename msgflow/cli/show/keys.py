@@ -29,9 +29,6 @@ def noted_keys(pressed: Callable[[str], None]) -> Iterator[None]:
     """Call a function with each key during the block, from a thread; Ctrl-C stays what it is.
 
     Without a terminal, and in the background, there are no keys.
-
-    Args:
-        pressed: gets a character, 'up', 'down' or 'escape'.
     """
     if not _has_keys():
         yield

@@ -55,11 +55,7 @@ class WatchScreen:
     """
 
     def __init__(self, console: Console) -> None:
-        """Start before the first window.
-
-        Args:
-            console: the terminal, whose size may change.
-        """
+        """Start before the first window."""
         self._console = console
         self._slowest: dict[str, deque[int]] = {}
         self._violations: deque[str] = deque(maxlen=_VIOLATIONS)
@@ -76,11 +72,7 @@ class WatchScreen:
             return self._shown(report)
 
     def after_key(self, key: str) -> RenderableType | None:
-        """Return the screen after a key; None if nothing changes.
-
-        Args:
-            key: 's' sorts by the next column; 'up' and 'down' pick a path, 'escape' none.
-        """
+        """Return the screen after a key; None if nothing changes."""
         with self._lock:
             if self._report is None:
                 return None

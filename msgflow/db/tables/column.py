@@ -37,17 +37,7 @@ def column(
     to: str | None = None,
     **info: object,
 ) -> Column[Any]:
-    """Return a column.
-
-    Args:
-        name: of the column.
-        type_: of its values.
-        comment: what they mean.
-        unit: of the values; None if they have none.
-        required: the column is never NULL.
-        to: 'table.column' that has each of the values.
-        info: further keys of `Column.info`.
-    """
+    """Return a column."""
     return Column(
         name,
         type_,

@@ -94,13 +94,7 @@ def list_array(
 def scattered_array(
     found: list[tuple[NDArray[np.int64], NDArray[Any]]], count: int, data_type: pa.DataType
 ) -> pa.Array:
-    """Return a column in which only some rows have a value.
-
-    Args:
-        found: rows and their values, or a row of elements for each; no row twice.
-        count: of all rows.
-        data_type: of the column.
-    """
+    """Return a column in which only some rows have a value."""
     is_missing = np.ones(count, np.bool_)
     is_list = pa.types.is_list(data_type)
     element_type = data_type.value_type if is_list else data_type

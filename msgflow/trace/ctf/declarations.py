@@ -65,11 +65,7 @@ class TraceClass:
     notes: list[str] = field(default_factory=list)
 
     def add_event(self, stream: StreamClass, event: EventClass) -> None:
-        """Add an event class to a stream class.
-
-        Raises:
-            MetadataError: there is one with the same id.
-        """
+        """Add an event class to a stream class."""
         if not _SMALLEST_ID <= event.id <= _LARGEST_ID:
             self.notes.append(f"no event can have the id {event.id} of {event.name!r}: left out")
             return

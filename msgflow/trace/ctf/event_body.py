@@ -127,11 +127,7 @@ class EventBody:
         return tuple(steps)
 
     def end(self, data: bytearray, position: int, limit: int) -> int:
-        """Return the byte at which the body that begins at `position` ends.
-
-        Raises:
-            FieldError: it does not fit in front of the byte `limit`.
-        """
+        """Return the byte at which the body that begins at `position` ends."""
         lengths: dict[int, int] = {}
         for align, size, kind, number in self.steps:
             if align > 1:
@@ -156,13 +152,7 @@ class EventBody:
 
 
 def compile_body(stream: StreamClass, event: EventClass, residues: int) -> EventBody:
-    """Compile the layout of the body of an event class.
-
-    Args:
-        stream: its stream class.
-        event: the event class.
-        residues: number of residues of positions with layouts of their own.
-    """
+    """Compile the layout of the body of an event class."""
     structures = {
         Scope.EVENT_CONTEXT: stream.event_context,
         Scope.SPECIFIC_CONTEXT: event.specific_context,

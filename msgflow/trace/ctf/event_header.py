@@ -106,12 +106,7 @@ class EventHeader:
 
 
 def compile_header(structure: Structure, residues: int) -> EventHeader | None:
-    """Compile the layout of headers; None if they must be read field by field.
-
-    Args:
-        structure: the header.
-        residues: number of residues of positions with layouts of their own.
-    """
+    """Compile the layout of headers; None if they must be read field by field."""
     if structure.align % BYTE or not structure.members:
         return None
     last = structure.members[-1].type

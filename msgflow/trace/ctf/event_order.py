@@ -95,12 +95,6 @@ def ordered_batches(
     An event at or after the begin of the next unread packet may have to wait for events of that
     one: its packet stays in memory for the next batch. Of large packets it is a piece that stays.
     So no more is held than a batch and a piece or so per stream.
-
-    Args:
-        entries: the packets, in order of time.
-        size: bytes of a batch.
-        report: called for damage with the packet, its byte and a message.
-        whole: packets of these streams cannot be cut.
     """
     loader = Loader()
     try:

@@ -56,12 +56,6 @@ def find_events(
     """Fill in `Entry.events` of packets of one stream class, which lie in memory in this order.
 
     What follows damage in a packet is left out.
-
-    Args:
-        layout: of the stream class.
-        memory: where the packets lie.
-        entries: the packets.
-        report: called for damage with the packet, the byte of the packet and a message.
     """
     if layout.header is None:
         for entry in entries:

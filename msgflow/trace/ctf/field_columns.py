@@ -35,15 +35,7 @@ class FieldRows:
         *,
         with_variant: bool = False,
     ) -> None:
-        """Prepare to read fields.
-
-        Args:
-            body: how the events are laid out.
-            memory: where they lie.
-            bodies: where contexts and payload of each event begin: bytes of memory.
-            wanted: places of the fields that will be read in the list of fields.
-            with_variant: fields of the variant at the end will be read as well.
-        """
+        """Prepare to read fields."""
         assert body.fields is not None
         self._fields = body.fields
         self._options: dict[str, tuple[NDArray[np.int64], NDArray[np.int64], OptionLayout]] = {}

@@ -68,11 +68,7 @@ class FieldReader:
         }
 
     def read_scope(self, scope: Scope, structure: Structure) -> dict[str, Any]:
-        """Read one of the structures of a packet or event.
-
-        Raises:
-            FieldError: it does not fit or makes no sense.
-        """
+        """Read one of the structures of a packet or event."""
         if scope is Scope.EVENT_HEADER:
             self._empty_elements = 0
             for inner in (Scope.EVENT_CONTEXT, Scope.SPECIFIC_CONTEXT, Scope.PAYLOAD):
@@ -280,14 +276,7 @@ class EventReader:
     """Reader of the events of one packet, which may begin at any bit."""
 
     def __init__(self, trace: TraceClass, stream: StreamClass, data: memoryview, end: int) -> None:
-        """Read the packet's own header, which fields of events may refer to.
-
-        Args:
-            trace: the trace's declarations.
-            stream: the packet's stream class.
-            data: what begins with the packet.
-            end: the bit at which its content ends.
-        """
+        """Read the packet's own header, which fields of events may refer to."""
         self._stream = stream
         self._reader = FieldReader(data, end)
         self._end = end
@@ -300,11 +289,7 @@ class EventReader:
         return min(begin, self._end) if position < self._end else self._end
 
     def header(self, position: int) -> HeaderValues:
-        """Read the header of the event that begins at this bit.
-
-        Raises:
-            FieldError: no header begins there, or no event class has its id.
-        """
+        """Read the header of the event that begins at this bit."""
         reader = self._reader
         reader.position = position
         reader.found.pop(TIME_ROLE, None)
@@ -316,11 +301,7 @@ class EventReader:
         return HeaderValues(event, reader.found.get(TIME_ROLE), reader.time_bits)
 
     def event(self, position: int) -> dict[Scope, dict[str, Any]]:
-        """Read the contexts and payload of the event that begins at this bit.
-
-        Raises:
-            FieldError: they do not fit into the packet.
-        """
+        """Read the contexts and payload of the event that begins at this bit."""
         event = self.header(position).event
         read = self._reader.read_scope
         return {

@@ -41,17 +41,7 @@ def lay_out(
     leaves: list[Leaf] | None = None,
     path: tuple[str, ...] = (),
 ) -> int:
-    """Return the bit at which a field ends that begins at `position` or, aligned, behind it.
-
-    Args:
-        declared: the type of the field.
-        position: in bits from the begin of the packet.
-        leaves: if given, the numbers in the field are added to it.
-        path: names of the structures around it.
-
-    Raises:
-        DynamicError: it is not always the same, or has too many parts to go through.
-    """
+    """Return the bit at which a field ends that begins at `position` or, aligned, behind it."""
     return _Layout(leaves).end(declared, position, path)
 
 

@@ -37,15 +37,7 @@ def read_headers(
     counts: NDArray[np.int64],
     befores: NDArray[np.uint64],
 ) -> Headers:
-    """Read the headers of the events at these positions.
-
-    Args:
-        layout: of their stream class.
-        memory: where they lie.
-        positions: bytes of memory at which events begin, packet after packet.
-        counts: events of each packet.
-        befores: value of the clock before the first of them in each packet.
-    """
+    """Read the headers of the events at these positions."""
     reader = _Reader(layout, memory, positions)
     owner_befores = befores[counts > 0]
     firsts = (np.cumsum(counts) - counts)[counts > 0]
@@ -154,13 +146,6 @@ def _unwrapped(
     A time stamp is the first value at or after the previous one with these low bits, and the
     previous one of a packet's first event is that before it, or the packet's begin. So the
     distances are known from the low bits alone, and their sum from a whole value on is the clock.
-
-    Args:
-        values: low bits, or whole values.
-        bits: how many low bits.
-        firsts: rows at which packets begin.
-        befores: value of the clock before these.
-        whole: rows that have a whole value.
     """
     if not values.size:
         return values

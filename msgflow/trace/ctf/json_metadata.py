@@ -23,11 +23,7 @@ _LONE_HALF = re.compile(r"\\u[dD][89a-fA-F]")
 
 
 def parse(text: str) -> TraceClass:
-    """Parse metadata.
-
-    Raises:
-        MetadataError: the text is not CTF 2 metadata, or contradicts itself.
-    """
+    """Parse metadata."""
     trace = TraceClass()
     types = TypeReader()
     clocks: dict[str, Clock] = {}

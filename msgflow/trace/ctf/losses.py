@@ -48,14 +48,7 @@ class LossCounter:
         self._of_stream.clear()
 
     def losses(self, recording: Recording, stream: Stream, packet: Packet, counts: bool) -> Losses:
-        """Return what was lost in a packet and before it.
-
-        Args:
-            recording: what the counters count for.
-            stream: the packet's stream.
-            packet: must come in order of time.
-            counts: False for a copy of a packet, which only serves to be compared with.
-        """
+        """Return what was lost in a packet and before it."""
         header = packet.header
         lost, problem = 0, None
         if header.sequence is not None:

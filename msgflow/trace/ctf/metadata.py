@@ -26,11 +26,7 @@ if TYPE_CHECKING:
 
 
 def read(directory: Path) -> TraceClass:
-    """Read what the trace in this directory declares.
-
-    Raises:
-        TraceError: it cannot be read or understood.
-    """
+    """Read what the trace in this directory declares."""
     kind = kind_of(directory)
     try:
         text = _text(content_of(directory))
@@ -71,11 +67,7 @@ _DEEPEST = 32
 
 
 def _check_sizes(trace: TraceClass) -> None:
-    """Check all structures that a trace declares: types inside types can grow without limit.
-
-    Raises:
-        MetadataError: one has too many fields, or fields inside too many others.
-    """
+    """Check all structures that a trace declares: types inside types can grow without limit."""
     sizes = _Sizes()
     for structure in _structures(trace):
         fields, depth = sizes.of(structure)

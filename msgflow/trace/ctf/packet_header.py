@@ -89,11 +89,7 @@ class HeaderReader:
     """
 
     def __init__(self, trace: TraceClass) -> None:
-        """Compile the headers that a trace declares.
-
-        Raises:
-            MetadataError: one is too long.
-        """
+        """Compile the headers that a trace declares."""
         self._trace = trace
         self._uuid = None if trace.uuid is None else UUID(trace.uuid).bytes
         self._plans: dict[int, _Plan | None] = {}
@@ -105,11 +101,7 @@ class HeaderReader:
             raise MetadataError(f"the headers of packets have {self.size:,} bytes")
 
     def read(self, data: bytes) -> PacketHeader:
-        """Read the header at the begin of `data`.
-
-        Raises:
-            FieldError: it is not the header of a packet of this trace.
-        """
+        """Read the header at the begin of `data`."""
         if self._start is None:
             return self._read_field_by_field(data)
         found = self._start.read(data)

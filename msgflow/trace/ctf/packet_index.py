@@ -56,11 +56,7 @@ def orphans(directory: Path) -> list[Path]:
 
 
 def entries(stream_file: Path) -> dict[int, IndexEntry]:
-    """Return the entries of a file's index, by offset; nothing if there is no valid index.
-
-    Raises:
-        UnsuitableFileError: the index is no regular file, or too long for this stream file.
-    """
+    """Return the entries of a file's index, by offset; nothing if there is no valid index."""
     try:
         # An entry is shorter than its packet.
         most = max(stream_file.stat().st_size, _SHORTEST_LIMIT)
@@ -101,13 +97,7 @@ class DiscardCounters:
         self._counters: Counter[Recording] = Counter()
 
     def rise(self, recording: Recording, directory: Path, told: int | None) -> int | None:
-        """Return how many events were lost before a packet; None where nothing tells it.
-
-        Args:
-            recording: what the counter counts for.
-            directory: the trace of the packet.
-            told: what Babeltrace tells, None for the first packet of a directory.
-        """
+        """Return how many events were lost before a packet; None where nothing tells it."""
         before = self._counters[recording]
         if told is None:
             counter = _first_counter(directory, *recording[1:])

@@ -54,17 +54,7 @@ class Packet:
 def packets_of(
     path: Path, reader: HeaderReader, report: Callable[[Path, int, int, str], None]
 ) -> list[Packet]:
-    """Return the packets of a file in its order.
-
-    Args:
-        path: the file.
-        reader: reads the headers of the trace.
-        report: called with file, number of the packet, offset in bytes and a message for
-            everything that is wrong.
-
-    Raises:
-        OSError: the file cannot be read.
-    """
+    """Return the packets of a file in its order."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         packets = list(_PacketFinder(path, descriptor, reader, report).run())

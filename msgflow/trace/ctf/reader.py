@@ -48,17 +48,7 @@ class CtfTraceSet(ExclusiveTraceSet):
         strict: bool = False,
         after: Continuation | None = None,
     ) -> None:
-        """Read the metadata and find the packets; no event is read yet.
-
-        Args:
-            locations: of the traces.
-            strict: end at the first damage.
-            after: the parts of the same recordings that were read before, which takes in these.
-                They can be read only once then.
-
-        Raises:
-            TraceError: a trace's metadata cannot be understood, or `strict` and it is damaged.
-        """
+        """Read the metadata and find the packets; no event is read yet."""
         super().__init__()
         self._strict = strict
         self._layouts: list[StreamLayout] = []

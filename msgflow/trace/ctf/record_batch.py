@@ -136,16 +136,7 @@ def build_batch(
     names: ThreadNames,
     reader_at: Callable[[int, int], tuple[EventReader, int]],
 ) -> pa.RecordBatch:
-    """Build a batch.
-
-    Args:
-        plan: which fields to read.
-        memory: where the packets are.
-        rows: the events.
-        names: the thread names seen so far.
-        reader_at: from packet of the batch and position of an event to what reads the packet
-            field by field, and the bit at which the event begins.
-    """
+    """Build a batch."""
     count = rows.event_ids.size
     columns = {
         "event_id": to_arrow(rows.event_ids),

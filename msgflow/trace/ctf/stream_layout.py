@@ -69,14 +69,7 @@ class StreamLayout:
     def __init__(
         self, trace_index: int, trace: TraceClass, stream: StreamClass, first_number: int
     ) -> None:
-        """Compile the layouts of all event classes.
-
-        Args:
-            trace_index: place of the trace in the set.
-            trace: its declarations.
-            stream: the stream class.
-            first_number: number of the first event class; the others follow.
-        """
+        """Compile the layouts of all event classes."""
         self.trace_index = trace_index
         self.trace = trace
         self.stream = stream
@@ -169,11 +162,7 @@ class StreamLayout:
         return None
 
     def form_of(self, selector: int) -> Form:
-        """Return the form of a header with this selector.
-
-        Raises:
-            FieldError: no form has it.
-        """
+        """Return the form of a header with this selector."""
         assert self.header is not None
         for form in self.header.forms:
             if form.holds(selector):
@@ -181,11 +170,7 @@ class StreamLayout:
         raise FieldError(f"there is no form of an event header for {selector}")
 
     def next_event(self, data: bytearray, position: int, span: Span) -> int:
-        """Return where the event after the one at this byte begins.
-
-        Raises:
-            FieldError: there is no event of this layout.
-        """
+        """Return where the event after the one at this byte begins."""
         header = self.header
         assert header is not None
         residue = position % self.residues

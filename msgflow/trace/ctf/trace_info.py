@@ -21,11 +21,7 @@ if TYPE_CHECKING:
 
 
 def describe(trace: TraceClass, path: Path, index: int, streams: Sequence[Stream]) -> TraceInfo:
-    """Return the description of a trace that has event data.
-
-    Raises:
-        TraceError: it declares no stream, or only some of its streams have times.
-    """
+    """Return the description of a trace that has event data."""
     classes = list(trace.streams.values())
     used = [stream.layout.stream for stream in streams] or classes
     if not classes or any(stream.clock is None for stream in used):

@@ -80,11 +80,7 @@ class _Block:
 
 
 def parse(text: str) -> TraceClass:
-    """Parse metadata.
-
-    Raises:
-        MetadataError: the text is not TSDL, or contradicts itself.
-    """
+    """Parse metadata."""
     tokens = tokens_of(text)
     blocks = _Blocks(tokens)
     blocks.parse()

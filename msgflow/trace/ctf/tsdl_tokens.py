@@ -37,11 +37,7 @@ class Token(NamedTuple):
 
 
 def tokens_of(text: str) -> list[Token]:
-    """Return the tokens of the text, 'end' last.
-
-    Raises:
-        MetadataError: it holds a character that belongs to no token.
-    """
+    """Return the tokens of the text, 'end' last."""
     tokens = []
     position, line = 0, 1
     while position < len(text):

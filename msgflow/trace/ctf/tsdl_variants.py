@@ -31,16 +31,7 @@ _MOST_FIELDS = 100_000
 
 
 def resolved(structure: Structure, scope: Scope, outer: Mapping[Scope, Structure]) -> Structure:
-    """Return the structure of this scope with all options' ranges.
-
-    Args:
-        structure: what to resolve.
-        scope: its place.
-        outer: the structures of the scopes before it.
-
-    Raises:
-        MetadataError: a selector is no enumeration that is known there.
-    """
+    """Return the structure of this scope with all options' ranges."""
     scopes: dict[Scope, dict[str, Type]] = {
         known: {member.name: member.type for member in of_scope.members}
         for known, of_scope in outer.items()

@@ -70,11 +70,7 @@ class VariantLayout:
     _chosen: dict[int, OptionLayout] = field(default_factory=dict, compare=False, repr=False)
 
     def option(self, value: int) -> OptionLayout:
-        """Return the option that this value of the selector chooses.
-
-        Raises:
-            FieldError: there is none.
-        """
+        """Return the option that this value of the selector chooses."""
         chosen = self._chosen.get(value)
         if chosen is None:
             for choice, option in self.options:
@@ -95,11 +91,7 @@ class VariantLayout:
         return False
 
     def end(self, data: bytearray, position: int, value: int, limit: int) -> int:
-        """Return the byte at which the variant that is due at `position` ends.
-
-        Raises:
-            FieldError: it does not fit in front of the byte `limit`.
-        """
+        """Return the byte at which the variant that is due at `position` ends."""
         option = self.option(value)
         while True:
             begin = (position + option.align - 1) & -option.align
