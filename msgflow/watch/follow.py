@@ -36,15 +36,18 @@ def watch_finished(directory: Path, watcher: Watcher) -> Iterator[WindowReport]:
             f"there are no chunks of a rotated recording — {directory}",
             f"msgflow ingest {directory} reads what was recorded as a whole",
         )
-    left = [chunk.source for chunk in chunks]
-    for chunk in chunks:
+    firsts = {chunk.source: chunk for chunk in reversed(chunks)}
+    for chunk in firsts.values():
         watcher.read(chunk)
-        left.remove(chunk.source)
+    left = [chunk for chunk in chunks if chunk not in firsts.values()]
+    while left:
         # Nothing is late that is on the disk: windows wait for all sources that have more.
-        ends = [end for source, end in watcher.history.ends_ns.items() if source in left]
+        waits_for = {chunk.source for chunk in left}
+        ends = [end for source, end in watcher.history.ends_ns.items() if source in waits_for]
         if ends and (report := watcher.report(min(ends))) is not None:
             yield report
             watcher.keep_violation()
+        watcher.read(left.pop(0))
     yield from _last(watcher)
 
 

@@ -491,6 +491,15 @@ def test_a_chunk_that_comes_after_those_of_another_host(
         assert (numbers, missed, notes) == (0, 0, [])
 
 
+def test_of_a_finished_recording_no_chunk_is_late(simulated: Path) -> None:
+    """Even where chunks are longer than a window and what it waits for."""
+    notes: list[str] = []
+    found = list(watch_finished(simulated, watching(notes, 0.2, 0.2, late=0.05)))
+    assert len(found) > 2
+    assert not any(report.late_events for report in found)
+    assert notes == []
+
+
 def test_a_source_that_stops_holds_up_no_window(simulated: Path) -> None:
     """It is neither waited for nor late."""
     chunks = finished_chunks(simulated)
