@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from msgflow.database import Database
 
 _START = "Which message"
-_WHY = "With --why"
 
 
 class FlowFormat(StrEnum):
@@ -70,8 +69,8 @@ def command(
         typer.Option(
             "--at",
             metavar="TIME",
-            help="The first one at or after: seconds from the start of the run, ISO time, or ns",
-            show_default="the first one",
+            help="The first one then or after: seconds from the start of the run, ISO time, or ns",
+            show_default=False,
             rich_help_panel=_START,
         ),
     ] = None,
@@ -107,7 +106,7 @@ def command(
             metavar="N",
             min=1,
             max=100,
-            help="The N slowest flows, each back from its last message; --from and --to choose",
+            help="The N slowest flows, each back from its last message",
             rich_help_panel=_START,
         ),
     ] = None,
@@ -115,13 +114,12 @@ def command(
         bool,
         typer.Option(
             "--why",
-            help="What the message waited for up to its take, in place of the tree: the query"
-            " critical-path for this flow",
+            help="What the message waited for, as the query critical-path has it",
             rich_help_panel=OUTPUT,
         ),
     ] = False,
-    by: Annotated[str | None, header_option(_OF_WHY["by"], _WHY)] = None,
-    detail: Annotated[str | None, header_option(_OF_WHY["detail"], _WHY)] = None,
+    by: Annotated[str | None, header_option(_OF_WHY["by"], OUTPUT)] = None,
+    detail: Annotated[str | None, header_option(_OF_WHY["detail"], OUTPUT)] = None,
     case: Annotated[
         str | None,
         case_option("With --slowest or --why: flows that count", rich_help_panel=_START),
@@ -131,7 +129,7 @@ def command(
         typer.Option(
             "--from",
             metavar="NAME",
-            help="With --slowest or --why: topics or nodes where flows start; globs",
+            help="With --slowest or --why: where flows start; globs",
             autocompletion=complete("place"),
             rich_help_panel=_START,
         ),
@@ -141,7 +139,7 @@ def command(
         typer.Option(
             "--to",
             metavar="NAME",
-            help="With --slowest: topics or nodes where flows end; globs",
+            help="With --slowest: where flows end; globs",
             autocompletion=complete("place"),
             rich_help_panel=_START,
         ),

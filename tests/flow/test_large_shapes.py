@@ -51,6 +51,7 @@ def test_a_long_path(fresh_database: Path) -> None:
     )
 
 
+@pytest.mark.thorough
 def test_a_burst(empty_database: Path, tmp_path: Path) -> None:
     """One callback publishes thousands of messages: each waits for all before it."""
     system = RosSystem()

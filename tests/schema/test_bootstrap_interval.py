@@ -8,6 +8,7 @@ from math import sqrt
 import duckdb
 import pytest
 from rules import derived
+from thorough import few
 
 # A hundred values of side a, of side b all the same.
 STAGE = """
@@ -93,7 +94,7 @@ def test_so_many_values_are_drawn(
         assert total == pytest.approx(round(total), abs=1e-6)
 
 
-@pytest.mark.parametrize("number", [500, 2_000])
+@pytest.mark.parametrize("number", few([500, 2_000], 500))
 def test_means_of_four_times_as_many_values_vary_half_as_much(
     con: duckdb.DuckDBPyConnection, number: int
 ) -> None:

@@ -64,6 +64,7 @@ def test_a_fast_clock_makes_none_wrong(
     assert score["transport"].found > least
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("layout", few(["humble", "jazzy"], "humble"))
 def test_writes_that_go_on_at_the_same_time(tmp_path: Path, layout: str) -> None:
     """Of two publishers, and of the threads of one."""
@@ -76,6 +77,7 @@ def test_writes_that_go_on_at_the_same_time(tmp_path: Path, layout: str) -> None
     assert transport.found >= 0.9 * transport.happened
 
 
+@pytest.mark.thorough
 def test_a_clock_that_is_set_by_hours(tmp_path: Path) -> None:
     """As on a host without a clock of its own; all messages are taken on the other host."""
     known = scenarios()["two_hosts"]
@@ -91,6 +93,7 @@ def test_a_clock_that_is_set_by_hours(tmp_path: Path) -> None:
     assert transport.recall >= 0.99
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("by_ns", few([-41_370_000, 41_370_000, -1_041_370_000], -41_370_000))
 def test_a_clock_that_is_set_where_messages_are_many(tmp_path: Path, by_ns: int) -> None:
     """A hundred messages of a burst come in the time of the step; another host takes them."""
@@ -106,6 +109,7 @@ def test_a_clock_that_is_set_where_messages_are_many(tmp_path: Path, by_ns: int)
     assert transport.recall >= 0.99
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("layout", few(["rolling", "kilted"], "rolling"))
 def test_messages_that_are_written_for_each_subscription_on_its_own(
     tmp_path: Path, layout: str

@@ -42,6 +42,7 @@ def recorded(ros: Path, tmp_path: Path) -> Recorded:
     return scores
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("system", few(["pipeline", "services"], "services"))
 def test_links_of_a_robot_are_right(recorded: Recorded, system: str) -> None:
     scores = recorded(system)

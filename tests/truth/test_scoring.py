@@ -67,6 +67,7 @@ def test_quick_comparison_is_faultless(chosen, tmp_path):
     assert ", 0 of them not what they must be" in done.stdout
 
 
+@pytest.mark.thorough
 def test_lost_events_are_not_asked_for(simulation, database):
     scores = _scores(simulation, database)
     kinds = ("publication", "take", "callback_instance", "transport", "direct")
@@ -78,6 +79,7 @@ def test_lost_events_are_not_asked_for(simulation, database):
     assert scores["transport"].labels.startswith("exact")
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("share", few([0, 0.3], 0.3))
 @pytest.mark.parametrize("layout", few(["foxy", "galactic"], "galactic"))
 def test_takes_without_an_event_are_no_loss(tmp_path, layout, share):
@@ -98,6 +100,7 @@ def test_takes_without_an_event_are_no_loss(tmp_path, layout, share):
     assert reasons["no_stamp"] > 100
 
 
+@pytest.mark.thorough
 def test_of_writes_that_go_on_at_the_same_time_none_is_decided(tmp_path):
     """Threads of rclpy share a publisher, and have no event until they take the next message."""
     simulation = simulate("python_timers", tmp_path / "trace", layout="humble", factor=0.1)
@@ -148,6 +151,7 @@ def test_a_link_to_another_message_is_wrong(simulation, database):
     assert score.missing == 4
 
 
+@pytest.mark.thorough
 def test_a_wrong_link_by_time_may_say_that_events_are_missing(simulation, database):
     """Only a link by time may. One that is right is not counted."""
     _change(
@@ -175,6 +179,7 @@ def test_a_wrong_link_by_time_may_say_that_events_are_missing(simulation, databa
     assert (score.wrong, score.loss_affected, score.misguessed) == (4, 2, 0)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("end_shift_ns", "is_marked", "wrong"), [(1, True, 0), (1, False, 1), (0, True, 1)]
 )
@@ -230,6 +235,7 @@ def losses(tmp_path_factory):
     return simulation, path
 
 
+@pytest.mark.thorough
 def test_reasons_are_judged_where_the_trace_decides_them(losses):
     simulation, path = losses
     _, drops = compare_simulated(path, simulation.truth)
@@ -244,6 +250,7 @@ def test_reasons_are_judged_where_the_trace_decides_them(losses):
     }  # fmt: skip
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("truth", ["before_subscription", "before_discovery", "lost_in_transport"])
 def test_a_wrong_reason_is_found(losses, tmp_path, truth):
     simulation, path = losses
@@ -254,6 +261,7 @@ def test_a_wrong_reason_is_found(losses, tmp_path, truth):
     assert any(drop.truth == truth and not drop.undecided and not drop.is_right for drop in drops)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("reason", ["unknown", "receiver_gap"])
 def test_no_loss_excuses_anything_where_none_was(losses, tmp_path, reason):
     """Not a reason of what was not taken, nor one of what was."""
@@ -282,6 +290,7 @@ def test_no_loss_excuses_anything_where_none_was(losses, tmp_path, reason):
     assert not any(drop.is_right for drop in drops if drop.reason == reason)
 
 
+@pytest.mark.thorough
 def test_a_loss_excuses_what_is_near_it(simulation, database):
     """Where every message is said to be hidden by a gap, those within are excused, and few more."""
     scores, drops = compare_simulated(database, simulation.truth)
@@ -299,6 +308,7 @@ def test_a_loss_excuses_what_is_near_it(simulation, database):
     assert said["sent, loss", "unknown"].undecided is None
 
 
+@pytest.mark.thorough
 def test_excuses_where_nothing_is_missing_are_wrong(losses, monkeypatch):
     simulation, path = losses
     monkeypatch.setattr(compare, "EXCUSE", None)
@@ -312,6 +322,7 @@ LOSS = Recording(lost_event_share=0.3)
 STEPS = Recording(realtime_steps=((200_000_000, 7_000), (500_000_000, -40_000_000)))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("system", "layout", "factor", "recording"),
     few(
@@ -346,6 +357,7 @@ def test_what_a_trace_leaves_open_is_excused(tmp_path, system, layout, factor, r
     assert [drop for drop in drops if not drop.undecided and not drop.is_right] == []
 
 
+@pytest.mark.thorough
 def test_what_follows_from_a_missing_link_is_not_judged_twice(tmp_path):
     """The take that comes after a message that was lost may be of it."""
     simulation = simulate("losses", tmp_path / "trace", layout="humble", factor=0.2)
@@ -385,6 +397,7 @@ def test_what_follows_from_a_missing_link_is_not_judged_twice(tmp_path):
 TRUNCATED = Recording(cut_streams=1, unfinished_streams=1)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("system", "layout"),
     few(
@@ -441,6 +454,7 @@ def caches(tmp_path_factory):
     return simulation, path
 
 
+@pytest.mark.thorough
 def test_a_decided_link_is_the_only_candidate(caches, tmp_path):
     simulation, path = caches
     assert _scores(simulation, path)["partial_sync"].doubted == 0
@@ -451,6 +465,7 @@ def test_a_decided_link_is_the_only_candidate(caches, tmp_path):
     assert 0 < score.doubted <= score.decided
 
 
+@pytest.mark.thorough
 def test_a_message_that_another_firing_may_have_used_is_not_decided(tmp_path):
     """On several threads, caches are emptied while messages come."""
     simulation = simulate("reentrant", tmp_path / "trace", factor=0.1, clock_offset_ns=350_000_000)
@@ -461,6 +476,7 @@ def test_a_message_that_another_firing_may_have_used_is_not_decided(tmp_path):
     assert 10 < score.decided < score.happened / 2
 
 
+@pytest.mark.thorough
 def test_an_indirect_link_stored_twice_is_repeated(caches, tmp_path):
     """Also where two annotations give some links twice."""
     simulation, path = caches

@@ -236,7 +236,7 @@ def test_a_suggestion_says_what_was_not_delivered(overwritten: Path) -> None:
     ]
 
 
-@pytest.mark.parametrize("name", few(["demo", "services", "actions"], "services", "actions"))
+@pytest.mark.parametrize("name", few(["demo", "services", "actions"], "services"))
 def test_a_run_meets_what_is_suggested_from_it(
     name: str, simulated: Callable[..., Path], tmp_path: Path
 ) -> None:

@@ -244,6 +244,7 @@ def test_a_page_of_a_replaced_database_says_so(
     page.errors.clear()
 
 
+@pytest.mark.thorough
 def test_a_browser_without_what_the_page_needs(
     demo: Path, report: Callable[..., str], page: Page
 ) -> None:
@@ -291,6 +292,7 @@ def _asked_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(report_module, "Pages", RememberingPages)
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("_asked_once")
 def test_a_report_says_what_it_left_out(demo: Path, tmp_path: Path, page: Page) -> None:
     target = tmp_path / "report.html"

@@ -370,6 +370,7 @@ def test_durations_between_clocks_that_are_apart_are_marked(
     assert (page.page.locator(".slow .doubt").count() == 0) == is_together
 
 
+@pytest.mark.thorough
 def test_hosts_and_nodes_of_the_slowest_flow_stand_out_in_the_graph(
     systems: Path, report: Report, page: Page
 ) -> None:

@@ -82,6 +82,7 @@ def test_pages_move_on_until_somebody_looks_closer(page: Page, followed: Followe
     wait_for_another(page, second)
 
 
+@pytest.mark.thorough
 def test_a_page_that_is_left_while_the_next_one_comes_hears_no_keys(
     page: Page, followed: Followed
 ) -> None:
