@@ -257,7 +257,7 @@ def compare(
 
 
 def warm_up(connection: duckdb.DuckDBPyConnection, run: Run) -> float:
-    """Return the seconds for which a run warms up, as a comparison of its paths finds it; 0: none."""
+    """Return how long a run warms up, in seconds, as a comparison of its paths finds it."""
     both: dict[str, Value] = {"run_a": run.run_id, "run_b": run.run_id, "resamples": 0}
     asked = bind(internal_sql().header("comparison"), both, "msgflow compare")
     _require_sense(asked)

@@ -315,7 +315,7 @@ def _parameters(header: Header) -> str:
 def shown_rows(
     table: pa.Table, *, internal: bool, on_hidden: Callable[[int], str]
 ) -> tuple[pa.Table, list[str], bool]:
-    """Return the rows to show, notes on those that are missing, and whether there are any at all."""
+    """Return the rows to show, notes on those that are missing, and whether there are any."""
     total, hidden, cut = (table[name][0].as_py() for name in COUNTS)
     if table[PLACE][0].as_py() is None:
         table = table.slice(0, 0)

@@ -74,7 +74,7 @@ def duration_ns(text: str, option: str) -> int:
 
 
 def skipped_to(seconds: float, runs: Sequence[Run]) -> int:
-    """Return the point in time, in epoch ns, that comes so many seconds after the start of a run."""
+    """Return the point in time, in epoch ns, so many seconds after the start of a run."""
     start_ns = _run_start(runs, "--skip-first")
     # Some floats are too large for an integer of 64 bits.
     if not 0 <= seconds <= MAXIMUM_NS / 1_000_000_000:

@@ -214,7 +214,7 @@ def blamed(pieces: Sequence[Row], path: str | None) -> Iterator[str]:
 
 
 def _ends(path: str | None) -> Row:
-    """Return the topics between which a flow is looked at: a target may be part of a longer path."""
+    """Return the topics between which a flow counts: a target may be part of a longer path."""
     topics = (path or "").split(" → ")[1:-1]
     ends = {"from": topics[0], "to": topics[-1]} if topics else {}
     return {word: topic for word, topic in ends.items() if topic.startswith("/")}
