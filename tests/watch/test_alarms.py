@@ -127,6 +127,7 @@ def test_what_was_kept_before_stays(watched, tmp_path: Path) -> None:
         assert all((directory / "msgflow.duckdb").exists() for directory in kept)
 
 
+@pytest.mark.thorough
 def test_more_of_what_came_before_is_kept(watched, tmp_path: Path) -> None:
     """Chunks, and their events in the database, with the names of nodes that began earlier."""
     targets = TARGETS.replace("80 ms", "36 ms")

@@ -411,6 +411,7 @@ def test_a_node_may_hang_for_as_long_as_windows_wait(hang: Path, tmp_path: Path)
     assert max(row["max_ns"] or 0 for report in found for row in report.paths) > 650 * MS
 
 
+@pytest.mark.thorough
 def test_windows_and_alarms_wait_for_nothing_that_takes_longer(hang: Path) -> None:
     """It has not arrived there; each moment is counted once, when its window is closed."""
     alarm, exporter = Mock(), Mock()
