@@ -94,7 +94,7 @@ class History:
         return self.forget(Window(self.closed_ns, window.end_ns), earlier_ns=earlier_ns)
 
     def next_window(self, newest_ns: int, *, is_last: bool = False) -> Window | None:
-        """Return the next window that can be closed; None if there is none.
+        """Return the next window that can be closed; else None.
 
         It leaves out nothing since the last one: where steps were late it is longer.
         """

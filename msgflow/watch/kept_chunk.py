@@ -59,7 +59,7 @@ class KeptChunk:
         return int(self.times_ns[-1]) if self.times_ns.size else self.end_ns
 
     def lasting(self) -> KeptChunk | None:
-        """Return what stays true when the chunk has passed: objects, names; None if there is none.
+        """Return what stays true when the chunk has passed: objects, names; else None.
 
         It has no packets: nothing of it tells what was lost.
         """
