@@ -48,7 +48,7 @@ class YamlFile:
         raise UsageError(f"{self.path}, line {line}: {what}", hint)
 
     def entries(self, *names: str) -> tuple[list[Any], ...]:
-        """Return the nodes of each list, of which the file has at least one, and no other keys."""
+        """Return the nodes of each list; the file has at least one list and no other keys."""
         root = self._compose()
         if root is None:
             self.fail(1, "the file is empty", self.example)
