@@ -63,6 +63,7 @@ ARGUMENTS = {
     ],
     "arrivals": ["[]::BIGINT[][]"],
     # Names of tables.
+    "outcomes": ["'same_outcomes'"],
     "flows": ["'same_flows'"],
     "trail": ["'same_trail'"],
     "callbacks": ["'same_callbacks'"],
@@ -74,6 +75,7 @@ ARGUMENTS = {
     "window_end_ns": ["NULL", "(SELECT quantile_disc(start_ns, 0.6) FROM main.publication)"],
 }
 TABLES = {
+    "same_outcomes": "main.end_to_end([1])",
     "same_flows": "main.end_to_end_flow([1])",
     "same_trail": "main.end_to_end_trail('same_flows', [1])",
     "same_callbacks": "(SELECT i.*, w.busy_min_ns, w.busy_max_ns FROM main.callback_instance AS i"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -15,10 +14,11 @@ from msgflow.db.objects import public_names
 from msgflow.db.sql_guard import guarded_query, in_own_lines, require_condition
 from msgflow.errors import QueryError, UsageError
 from msgflow.files.default_files import DEFAULT_PATHS
-from msgflow.query.catalogue import choose_query, load_queries, query_names
+from msgflow.query.catalogue import choose_query, load_queries, load_query, query_names
 from msgflow.query.path_numbers import with_path_numbers
 from msgflow.query.runner import run_query
 from msgflow.query.selection import make_selection
+from msgflow.query.steps import Steps
 from msgflow.result.query_result import QueryResult
 from msgflow.run.choice import read_runs
 from msgflow.run.slice import Slice
@@ -466,13 +466,23 @@ class Database:
 
         connection = self.connection
         one = self._ask(lambda: Slice(run).one_run(connection, "an explanation"))
-        ask = partial(self.query, run=one.run_id, start=start, end=end, skip_first=skip_first)
+        part = Slice(one.run_id, start, end, skip_first)
         dead_ends = [
             (finding.subject, finding.detail)
             for finding in self.findings(run=one.run_id)
             if finding.name == "dead_end"
         ]
-        return explain(ask, one, place, dead_ends)
+
+        def explained() -> Explanation:
+            with Steps(connection) as steps:
+
+                def ask(name: str, **given: Value) -> QueryResult:
+                    result = run_query(connection, load_query(name), given, part, steps=steps)
+                    return with_path_numbers(connection, result)
+
+                return explain(ask, one, place, dead_ends)
+
+        return self._ask(explained)
 
     def flow(
         self,

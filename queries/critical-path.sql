@@ -66,13 +66,22 @@
 -- brief: rank, at_ns, duration_ns, share, activity, state, who, node, what, is_certain, pieces,
 --     hop, part, thread, wakers, priority, who_priority
 -- note: clocks
+CREATE OR REPLACE TEMP TABLE path_outcome AS
+SELECT
+    run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns, status,
+    reason, is_first, is_last, is_newest, is_loss_affected
+FROM main.end_to_end(
+    $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns,
+    max_depth := $max_depth, max_paths := $max_paths
+);
+
 CREATE OR REPLACE TEMP TABLE named_path AS
-SELECT path_id, path, subscriptions
+SELECT run_id, path_id, subscription_id, is_path, is_cut, path, topics, publishers, subscriptions
 FROM main.flow_path(
     $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths, only_paths := true
 );
 
-CREATE OR REPLACE TEMP TABLE critical_part AS
+CREATE OR REPLACE TEMP TABLE critical_flow AS
 WITH path AS (
     SELECT path_id
     FROM named_path
@@ -93,17 +102,29 @@ WITH path AS (
         )), false)
 )
 SELECT
-    flow_id, run_id, path_id, root_kind, root_id, take_id, latency_ns, hop, position, part,
-    from_ns, to_ns, duration_ns, callback_instance_id, publication_id
-FROM main.end_to_end_part(
-    $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns, $case,
-    sink_take_id := $take, max_depth := $max_depth, max_paths := $max_paths,
-    most_flows := $slowest,
+    flow_id, run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns
+FROM main.chosen_flow(
+    'path_outcome', $case, sink_take_id := $take, most_flows := $slowest,
     at_quantile := CASE $quantile WHEN 'median' THEN 0.5 WHEN 'p90' THEN 0.9 WHEN 'p95' THEN 0.95
         WHEN 'p99' THEN 0.99 WHEN 'max' THEN 1.0 END,
     path_ids := CASE WHEN $via IS NOT NULL OR $without IS NOT NULL
         THEN (SELECT coalesce(list(path_id), []) FROM path) END
 );
+
+CREATE OR REPLACE TEMP TABLE critical_trail AS
+SELECT flow_id, hop, take_id, publication_id, previous_take_id, next_take_id
+FROM main.end_to_end_trail(
+    'critical_flow', $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths
+);
+
+CREATE OR REPLACE TEMP TABLE critical_part AS
+SELECT
+    flow_id, run_id, path_id, root_kind, root_id, take_id, latency_ns, hop, position, part,
+    from_ns, to_ns, duration_ns, callback_instance_id, publication_id
+FROM main.end_to_end_piece('critical_flow', 'critical_trail', $runs);
+
+CREATE OR REPLACE TEMP TABLE critical_piece AS
+SELECT * FROM main.critical_piece('critical_part', $runs);
 
 WITH untraced AS (
     -- What a thread did without a traced callback led to the message that comes next, unless it
@@ -119,7 +140,7 @@ WITH untraced AS (
                 ROWS BETWEEN CURRENT ROW AND UNBOUNDED FOLLOWING
             )
         END AS message_id
-    FROM main.critical_piece('critical_part', $runs)
+    FROM critical_piece
 ),
 -- A row per message: the list of a long path in each of its pieces would take much memory.
 reader AS (

@@ -57,6 +57,21 @@
 --     pairs, stored
 -- answer: roots
 -- note: clocks
+CREATE OR REPLACE TEMP TABLE path_outcome AS
+SELECT
+    run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns, status,
+    reason, is_first, is_last, is_newest, is_loss_affected
+FROM main.end_to_end(
+    $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns,
+    max_depth := $max_depth, max_paths := $max_paths
+);
+
+CREATE OR REPLACE TEMP TABLE named_path AS
+SELECT run_id, path_id, subscription_id, is_path, is_cut, path, topics, publishers, subscriptions
+FROM main.flow_path(
+    $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths, only_paths := true
+);
+
 WITH flow AS (
     SELECT
         run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, latency_ns, status,
@@ -67,10 +82,7 @@ WITH flow AS (
             WHEN 'newest' THEN is_newest
             ELSE true
         END AS is_counted
-    FROM main.end_to_end(
-        $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns,
-        max_depth := $max_depth, max_paths := $max_paths
-    )
+    FROM path_outcome
 ),
 -- What became of a root is the same in each of its rows, but for gaps in its time.
 root AS (
@@ -129,12 +141,6 @@ latency AS (
     WHERE status = 'reached' AND is_counted
     GROUP BY run_id, path_id
 ),
-path AS MATERIALIZED (
-    SELECT run_id, path_id, subscription_id, is_cut, path
-    FROM main.flow_path(
-        $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths, only_paths := true
-    )
-),
 -- Only where the end of a path goes on can anything come back to it.
 looped AS (
     SELECT path_id, count(*) AS number
@@ -147,7 +153,7 @@ looped AS (
                 FROM flow
                 WHERE take_id IS NOT NULL AND path_id IN (
                     SELECT path_id
-                    FROM path
+                    FROM named_path
                     WHERE subscription_id IN (
                         SELECT subscription_id FROM main.continued_subscription($runs)
                     )
@@ -184,7 +190,7 @@ SELECT
     p.is_cut,
     r.reasons,
     p.path
-FROM path AS p
+FROM named_path AS p
 LEFT JOIN completeness AS c ON p.path_id = c.path_id
 LEFT JOIN affected AS a ON p.path_id = a.path_id
 LEFT JOIN latency AS l ON p.path_id = l.path_id

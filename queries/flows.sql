@@ -31,6 +31,21 @@
 -- slowest: latency_ns
 -- brief: path, root_ns, latency_ns, age_from_stamp_ns, status, reason, take_id, sink_ns, root_id
 -- note: clocks
+CREATE OR REPLACE TEMP TABLE path_outcome AS
+SELECT
+    run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns, status,
+    reason, is_first, is_last, is_newest, is_loss_affected
+FROM main.end_to_end(
+    $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns,
+    max_depth := $max_depth, max_paths := $max_paths
+);
+
+CREATE OR REPLACE TEMP TABLE named_path AS
+SELECT run_id, path_id, subscription_id, is_path, is_cut, path, topics, publishers, subscriptions
+FROM main.flow_path(
+    $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths, only_paths := true
+);
+
 SELECT
     f.run_id,
     f.root_kind,
@@ -44,13 +59,8 @@ SELECT
     p.path,
     m.size_bytes,
     f.sink_ns - m.stamp_ns AS age_from_stamp_ns
-FROM main.end_to_end(
-    $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns,
-    max_depth := $max_depth, max_paths := $max_paths
-) AS f
-JOIN main.flow_path(
-    $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths, only_paths := true
-) AS p ON f.path_id = p.path_id
+FROM path_outcome AS f
+JOIN named_path AS p ON f.path_id = p.path_id
 LEFT JOIN (
     SELECT l.take_id, b.size_bytes, b.stamp_ns
     FROM main.link_transport AS l

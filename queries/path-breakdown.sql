@@ -52,13 +52,25 @@
 --     overlaps
 -- zero: total_ns
 -- note: clocks
+CREATE OR REPLACE TEMP TABLE path_outcome AS
+SELECT
+    run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns, status,
+    reason, is_first, is_last, is_newest, is_loss_affected
+FROM main.end_to_end(
+    $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns,
+    max_depth := $max_depth, max_paths := $max_paths
+);
+
+CREATE OR REPLACE TEMP TABLE named_path AS
+SELECT run_id, path_id, subscription_id, is_path, is_cut, path, topics, publishers, subscriptions
+FROM main.flow_path(
+    $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths, only_paths := true
+);
+
 CREATE OR REPLACE TEMP TABLE breakdown_flow AS
 SELECT
     flow_id, run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns
-FROM main.end_to_end_flow(
-    $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns, $case,
-    max_depth := $max_depth, max_paths := $max_paths
-);
+FROM main.chosen_flow('path_outcome', $case);
 
 CREATE OR REPLACE TEMP TABLE breakdown_trail AS
 SELECT flow_id, hop, take_id, publication_id, previous_take_id, next_take_id
@@ -152,9 +164,7 @@ message AS (
         unnest(p.topics) AS topic_name,
         unnest(p.publishers) AS publisher_id,
         unnest(p.subscriptions) AS subscription_id
-    FROM main.flow_path(
-        $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths, only_paths := true
-    ) AS p
+    FROM named_path AS p
     WHERE p.is_path
 )
 SELECT

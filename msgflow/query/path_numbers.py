@@ -27,7 +27,7 @@ def with_path_numbers(connection: duckdb.DuckDBPyConnection, result: QueryResult
     """
     if PATH not in result.columns:
         return result
-    own = {path for path in result.table[PATH].unique().to_pylist() if path is not None}
+    own = {path for path in result.table[PATH].to_pylist() if path is not None}
     if len(own) < 2:
         return result
     runs = {"runs": [run.run_id for run in result.runs]}

@@ -22,6 +22,7 @@ from msgflow.query.selection import (
     selected,
     sorted_by,
 )
+from msgflow.query.steps import Steps
 from msgflow.result.query_result import QueryResult
 from msgflow.run.slice import LATEST, Slice
 from msgflow.run.window import format_epoch
@@ -32,7 +33,7 @@ from msgflow.text.name_suggestions import did_you_mean
 from msgflow.text.values import format_duration
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     import pyarrow as pa
 
@@ -63,6 +64,7 @@ def run_query(
     *,
     internal: bool = False,
     selection: Selection | None = None,
+    steps: Steps | None = None,
 ) -> QueryResult:
     """Run the query of `header`.
 
@@ -73,16 +75,13 @@ def run_query(
         part: runs and times to read.
         internal: show the rows of ROS's own topics and services too.
         selection: which rows are wanted; all when None.
+        steps: tables that it shares with other queries, which stay; its own when None.
 
     Raises:
         UsageError: a parameter, run, name, id, column or time that does not exist or cannot be
             read, or rows that the query does not have.
         QueryError: the database could not run it.
     """
-    used = [
-        connection.extract_statements(statement)[0].named_parameters
-        for statement in header.statements
-    ]
     if part.has_window and not header.has_window:
         raise UsageError(
             f"the query has no time window — {header.words}",
@@ -99,11 +98,13 @@ def run_query(
     for kind, names in selection.names().items():
         require_names(connection, runs, kind, names)
     values = reserved | own
-    bindings = {name: values[name] for name in used[-1]} | chosen
+    used = connection.extract_statements(header.body)[0].named_parameters
+    bindings = {name: values[name] for name in used} | chosen
     with (
         query_errors(header.words, f"the query failed: {{}} — {header.words}"),
-        _steps(connection, header, used, values),
+        contextlib.nullcontext(steps) if steps is not None else Steps(connection) as tables,
     ):
+        tables.make(header, values)
         try:
             table = connection.sql(sql, params=bindings).to_arrow_table()
         except _OF_CONDITIONS as error:
@@ -129,25 +130,6 @@ def run_query(
     if header.note == "callbacks":
         notes += _without_callbacks(connection, runs)
     return QueryResult(table, header, runs, notes, order=sorted_by(header, selection))
-
-
-@contextlib.contextmanager
-def _steps(
-    connection: duckdb.DuckDBPyConnection,
-    header: Header,
-    used: Sequence[set[str]],
-    values: Mapping[str, Value],
-) -> Iterator[None]:
-    """Make the temporary tables that a query needs, and drop them afterwards."""
-    try:
-        for step, names in zip(header.steps, used, strict=False):
-            connection.execute(step.sql, {name: values[name] for name in names})
-        yield
-    finally:
-        for step in header.steps:
-            # An interrupt of the query may interrupt this, too; the next query replaces the table.
-            with contextlib.suppress(duckdb.Error):
-                connection.execute(f"DROP TABLE IF EXISTS temp.{step.table}")
 
 
 def _narrowing(parameters: Mapping[str, Value], selection: Selection) -> list[str]:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import shlex
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
-from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
+import duckdb
+
 from msgflow.errors import UsageError
+from msgflow.sql.statement import internal_sql
 from msgflow.text.values import format_duration
 
 if TYPE_CHECKING:
@@ -114,7 +116,7 @@ def explain(
         run=run,
         place=place,
         paths=_slowest_first(paths, path),
-        nodes=_by_node(parts),
+        nodes=_by_node(parts, path),
         slowest_flow=_longest(flow),
         waits=waits.first(_WAITS),
         losses=losses,
@@ -202,7 +204,10 @@ def _chosen(result: QueryResult, is_wanted: Callable[[dict[str, Any]], bool]) ->
 def _taken(result: QueryResult, places: Sequence[int]) -> QueryResult:
     import pyarrow
 
-    return replace(result, table=result.table.take(pyarrow.array(places, pyarrow.int64())))
+    # Table.take() would load pandas, which takes longer than all these rows.
+    table = result.table
+    rows = [table.slice(place, 1) for place in places] or [table.slice(0, 0)]
+    return replace(result, table=pyarrow.concat_tables(rows))
 
 
 def _slowest_first(paths: QueryResult, first: str) -> QueryResult:
@@ -214,29 +219,12 @@ def _slowest_first(paths: QueryResult, first: str) -> QueryResult:
     return _taken(paths, places)
 
 
-def _by_node(parts: QueryResult) -> QueryResult:
-    """Return the share of each node, and the largest of its parts."""
-    import pyarrow
-
-    rows = sorted(parts.table.to_pylist(), key=lambda row: str(row["node"]))
-    nodes = []
-    for node, group in groupby(rows, key=lambda row: row["node"]):
-        own = list(group)
-        largest = max(own, key=lambda row: row["total_ns"])
-        nodes.append(
-            {
-                "node": node,
-                "share": sum(row["share"] or 0 for row in own),
-                "total_ns": sum(row["total_ns"] for row in own),
-                "part": largest["part"],
-                "what": largest["what"],
-                "median_ns": largest["median_ns"],
-                "max_ns": largest["max_ns"],
-            }
-        )
-    nodes.sort(key=lambda row: -row["total_ns"])
-    fields = [parts.table.schema.field(name) for name in nodes[0]]
-    return replace(parts, table=pyarrow.Table.from_pylist(nodes, pyarrow.schema(fields)))
+def _by_node(parts: QueryResult, path: str) -> QueryResult:
+    """Return the share of each node in the time of a path, and the largest of its parts."""
+    with duckdb.connect() as con:
+        con.register("breakdown", parts.table)
+        table = internal_sql().run(con, "node_share", {"path": path}).to_arrow_table()
+    return replace(parts, table=table)
 
 
 def _longest(flow: QueryResult) -> QueryResult:

@@ -42,35 +42,18 @@ CREATE OR REPLACE MACRO main.end_to_end_flow(
     flow_case := 'first', sink_take_id := NULL, max_depth := 32, max_paths := 1000,
     most_flows := NULL, at_quantile := NULL, path_ids := NULL
 ) AS TABLE
+WITH outcome AS NOT MATERIALIZED (
+    SELECT
+        run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns,
+        status, is_first, is_last, is_newest
+    FROM main.end_to_end(
+        runs, from_topic, to_topic, from_event, to_event, window_start_ns, window_end_ns,
+        max_depth := max_depth, max_paths := max_paths
+    )
+)
 SELECT
-    row_number() OVER (
-        ORDER BY e.path_id, e.root_ns, e.root_kind, e.root_id, e.sink_ns, e.take_id
-    ) AS flow_id,
-    e.run_id, e.path_id, e.root_kind, e.root_id, e.root_ns, e.take_id, e.sink_event, e.sink_ns,
-    e.sink_ns - e.root_ns AS latency_ns
-FROM main.end_to_end(
-    runs, from_topic, to_topic, from_event, to_event, window_start_ns, window_end_ns,
-    max_depth := max_depth, max_paths := max_paths
-) AS e
-WHERE derive.known_word('flow_case', flow_case, ['first', 'last', 'newest', 'every_pair'])
-    AND e.status = 'reached'
-    AND coalesce(e.take_id = sink_take_id, true)
-    AND CASE flow_case
-        WHEN 'first' THEN e.is_first
-        WHEN 'last' THEN e.is_last
-        WHEN 'newest' THEN e.is_newest
-        ELSE true
-    END
-    AND (path_ids IS NULL OR list_contains(path_ids, e.path_id))
--- The quantile is one that occurred: so many flows took no longer. Flows of stored messages come
--- last: they have no latency in main.end_to_end.
-QUALIFY CASE
-    WHEN at_quantile IS NOT NULL THEN row_number() OVER (
-        ORDER BY e.latency_ns NULLS LAST, e.path_id, e.root_ns, e.root_kind, e.root_id, e.take_id
-    ) = greatest(1, ceil(at_quantile * count(e.latency_ns) OVER ()))
-    WHEN most_flows IS NOT NULL THEN row_number() OVER (
-        ORDER BY e.latency_ns DESC NULLS LAST, e.path_id, e.root_ns, e.root_kind, e.root_id,
-            e.take_id
-    ) <= most_flows
-    ELSE true
-END
+    flow_id, run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns
+FROM main.chosen_flow(
+    'outcome', flow_case, sink_take_id := sink_take_id, most_flows := most_flows,
+    at_quantile := at_quantile, path_ids := path_ids
+)

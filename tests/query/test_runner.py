@@ -9,6 +9,7 @@ from msgflow.db import objects
 from msgflow.errors import QueryError, UsageError
 from msgflow.query.runner import bind, run_query
 from msgflow.query.selection import make_selection
+from msgflow.query.steps import Steps
 from msgflow.run.slice import Slice
 from msgflow.sql.header import Header, parse
 from msgflow.sql.value import Value
@@ -501,6 +502,23 @@ def test_a_query_goes_in_steps(connection: duckdb.DuckDBPyConnection) -> None:
     for _ in range(2):  # What was made on the way is gone.
         result = run_query(connection, asked, {"least": "/b"}, Slice("first"))
         assert result.to_arrow()["topic"].to_pylist() == ["/b", "/c"]
+    assert not connection.execute("SELECT * FROM duckdb_tables() WHERE temporary").fetchall()
+
+
+def test_queries_share_their_steps(connection: duckdb.DuckDBPyConnection) -> None:
+    asked = header(STEPS)
+
+    def topics(part: Slice) -> list[str]:
+        table = run_query(connection, asked, {}, part, steps=steps).to_arrow()
+        return table["topic"].to_pylist()
+
+    with Steps(connection) as steps:
+        assert topics(Slice("first")) == ["/a", "/b", "/c"]
+        connection.execute("DELETE FROM message WHERE topic = '/b'")
+        # With the same values the tables stay; with others all are made again.
+        assert topics(Slice("first")) == ["/a", "/b", "/c"]
+        assert topics(Slice("first", start=150)) == ["/c"]
+        assert topics(Slice("first")) == ["/a", "/c"]
     assert not connection.execute("SELECT * FROM duckdb_tables() WHERE temporary").fetchall()
 
 

@@ -1,0 +1,32 @@
+-- name: internal.node_share
+-- title: Time by node, on a path
+-- description: The share of each node in the time of one path, and the largest of its parts.
+-- grain: one row per node
+-- param: path VARCHAR  The path
+-- column: node VARCHAR [node]  Node, or 'between nodes'
+-- column: share DOUBLE [share]  Part of the time of the path
+-- column: total_ns BIGINT [ns]  Time of all flows
+-- column: part VARCHAR  The part that took longest
+-- column: what VARCHAR  Its callback or topic
+-- column: median_ns BIGINT [ns]  Its median
+-- column: max_ns BIGINT [ns]  Its maximum
+WITH part AS (
+    SELECT
+        *,
+        row_number() OVER () AS place
+    FROM breakdown
+),
+longest AS (
+    SELECT
+        *,
+        row_number() OVER (PARTITION BY node ORDER BY total_ns DESC, place) = 1 AS is_longest,
+        sum(share) OVER (PARTITION BY node) AS node_share,
+        sum(total_ns) OVER (PARTITION BY node) AS node_ns
+    FROM part
+    WHERE path = $path
+)
+SELECT
+    node, coalesce(node_share, 0) AS share, node_ns::BIGINT AS total_ns, part, what, median_ns, max_ns
+FROM longest
+WHERE is_longest
+ORDER BY total_ns DESC, node
