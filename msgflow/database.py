@@ -127,7 +127,7 @@ class Database:
         """Return what `work` returns; Ctrl-C interrupts it."""
         try:
             with database_errors(self.path):
-                return interruptible(self.connection, work)
+                return interruptible(self.connection, work, only_reads=True)
         except duckdb.OutOfMemoryException as error:
             raise out_of_memory(str(self.path)) from error
 
@@ -1150,7 +1150,7 @@ def guarded_rows(
     most = None if limit is None else limit + 1
     query = guarded_query(connection, text, example, most)
     try:
-        table = interruptible(connection, lambda: _rows(connection, query))
+        table = interruptible(connection, lambda: _rows(connection, query), only_reads=True)
     except duckdb.Error as error:
         raise type(error)(in_own_lines(str(error))) from error
     if limit is None or table.num_rows <= limit:

@@ -48,7 +48,7 @@ class SignalHandler:
         except KeyboardInterrupt as error:
             from msgflow.cli.output import print_error
 
-            code = _exit_code(error)
+            code = _exit_code(type(error))
             print_error(code.name.lower())
             raise SystemExit(int(code)) from None
         finally:
@@ -60,14 +60,18 @@ class SignalHandler:
     def __call__(self, number: int, frame: FrameType | None) -> None:
         """Raise KeyboardInterrupt, or Terminated for the others."""
         restore_default_actions()
+        kind = KeyboardInterrupt if number == signal.SIGINT else Terminated
         if _is_importing(frame):
             # Code in C may lose an exception, and that of DuckDB would abort the process.
-            code = ExitCode.INTERRUPTED if number == signal.SIGINT else ExitCode.TERMINATED
-            os.write(2, f"error: {code.name.lower()}\n".encode())
-            os._exit(int(code))
-        error = (KeyboardInterrupt if number == signal.SIGINT else Terminated)()
-        self.came = _exit_code(error)
-        raise error
+            self.end_process(kind)
+        self.came = _exit_code(kind)
+        raise kind
+
+    def end_process(self, kind: type[KeyboardInterrupt]) -> None:
+        """End the process at once, with the exit code of a signal."""
+        code = _exit_code(kind)
+        os.write(2, f"error: {code.name.lower()}\n".encode())
+        os._exit(int(code))
 
 
 def restore_default_actions() -> None:
@@ -77,9 +81,9 @@ def restore_default_actions() -> None:
             signal.signal(number, signal.SIG_DFL)
 
 
-def _exit_code(error: KeyboardInterrupt) -> ExitCode:
+def _exit_code(kind: type[KeyboardInterrupt]) -> ExitCode:
     """Return the exit code of a command that a signal ended."""
-    return ExitCode.TERMINATED if isinstance(error, Terminated) else ExitCode.INTERRUPTED
+    return ExitCode.TERMINATED if issubclass(kind, Terminated) else ExitCode.INTERRUPTED
 
 
 def _is_importing(frame: FrameType | None) -> bool:

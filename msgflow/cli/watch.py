@@ -74,7 +74,7 @@ def command(
             "--late",
             metavar="TIME",
             help="How long a window waits for chunks and messages that are late",
-            show_default="as long as a step",
+            show_default="two steps",
         ),
     ] = None,
     links: LinksOption = None,
@@ -174,7 +174,7 @@ def command(
     earlier_ns = 0 if earlier is None else duration_ns(earlier, "--keep-before")
     step_ns = duration_ns(step, "--step")
     window_ns = duration_ns(window, "--window")
-    late_ns = step_ns if late is None else duration_ns(late, "--late")
+    late_ns = 2 * step_ns if late is None else duration_ns(late, "--late", least_ns=0)
     if earlier is not None and keep is None:
         raise UsageError(
             "--keep-before is about violations that are kept",

@@ -286,7 +286,7 @@ def _text(header: Header) -> str:
 def _asked(lake: Lake, name: str, con: duckdb.DuckDBPyConnection, ask: Any) -> Any:
     try:
         with lake_errors(lake, is_query=True):
-            return interruptible(con, ask)
+            return interruptible(con, ask, only_reads=True)
     except duckdb.Error as error:
         lacking = _LACKING.search(str(error))
         if lacking is not None and name in names():

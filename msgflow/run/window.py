@@ -64,11 +64,11 @@ def time_point(text: str | int, runs: Sequence[Run], option: str) -> int:
     return _in_range(_read(text, runs, option), text, option)
 
 
-def duration_ns(text: str, option: str) -> int:
+def duration_ns(text: str, option: str, *, least_ns: int = 1) -> int:
     """Return the nanoseconds of a duration such as '10s', '500ms' or '2' (seconds)."""
     found = _OFFSET.fullmatch(text.strip())
-    length = _to_ns(found["number"], found["unit"] or "s") if found else 0
-    if not length:
+    length = _to_ns(found["number"], found["unit"] or "s") if found else -1
+    if length < least_ns:
         raise UsageError(f"cannot read the duration of {option} — {text}", f"{option} 2.5s")
     return length
 

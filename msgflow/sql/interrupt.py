@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 _T = TypeVar("_T")
 _SECONDS_BETWEEN_ATTEMPTS = 0.05
+_SECONDS_TO_ANSWER = 1
 
 
 class Terminated(KeyboardInterrupt):
@@ -27,9 +28,17 @@ class Terminated(KeyboardInterrupt):
 
 
 class Interrupts:
-    """The state of Ctrl-C: whether it came, and whether it still counts."""
+    """The state of Ctrl-C: whether it came, and whether it still counts.
 
-    def __init__(self) -> None:
+    Args:
+        end_process: ends the process with the exit code of a signal; None where that is not ours
+            to do.
+    """
+
+    def __init__(
+        self, end_process: Callable[[type[KeyboardInterrupt]], None] | None = None
+    ) -> None:
+        self._end_process = end_process
         self._is_noted = False
         self._is_final = False
         self._is_answered = False
@@ -57,6 +66,11 @@ class Interrupts:
         """Count the Ctrl-C that came as what the work waited for; another one is raised at once."""
         self._is_answered = True
 
+    def end_process(self) -> None:
+        """End the process, if Ctrl-C came and the process is the command line."""
+        if self._is_noted and self._end_process is not None:
+            self._end_process(self._kind)
+
     def make_final(self) -> None:
         """Raise KeyboardInterrupt if Ctrl-C came before; from now on it comes too late.
 
@@ -66,11 +80,13 @@ class Interrupts:
             self.check()
             self._is_final = True
 
-    def forward(self, connection: duckdb.DuckDBPyConnection) -> None:
-        """Interrupt what `connection` runs if Ctrl-C came in time."""
+    def forward(self, connection: duckdb.DuckDBPyConnection) -> bool:
+        """Interrupt what `connection` runs if Ctrl-C came in time, and say whether it did."""
         with self._lock:
-            if self._is_noted and not self._is_final:
+            is_in_time = self._is_noted and not self._is_final
+            if is_in_time:
                 connection.interrupt()
+            return is_in_time
 
 
 # Windows has no terminal that goes away.
@@ -100,7 +116,8 @@ def noted_interrupts() -> Iterator[Interrupts]:
         if isinstance(outer, Interrupts):
             yield outer
             return
-    interrupts = Interrupts()
+    ends = (getattr(handler, "end_process", None) for handler in before.values())
+    interrupts = Interrupts(next(filter(None, ends), None))
     ours = [number for number, handler in before.items() if _may_be_replaced(handler)]
     try:
         for number in ours:
@@ -127,11 +144,15 @@ def until_interrupted() -> Iterator[Interrupts]:
             interrupts.answer()
 
 
-def interruptible(connection: duckdb.DuckDBPyConnection, work: Callable[[], _T]) -> _T:
+def interruptible(
+    connection: duckdb.DuckDBPyConnection, work: Callable[[], _T], *, only_reads: bool = False
+) -> _T:
     """Return what `work` returns; Ctrl-C interrupts the statement that it runs on `connection`.
 
     DuckDB looks for signals only while the main thread computes a part of the statement, and might
-    never notice Ctrl-C. Hence another thread does the work.
+    never notice Ctrl-C. Hence another thread does the work. Some functions of DuckDB do not notice
+    an interrupt either. Where nothing is written (`only_reads`), the command line ends without them
+    after a second.
 
     Raises:
         KeyboardInterrupt: after the statement has ended.
@@ -155,11 +176,14 @@ def interruptible(connection: duckdb.DuckDBPyConnection, work: Callable[[], _T])
             is_watched.set()
             raise
         # Repeatedly: between two statements of the work there is nothing to interrupt.
+        attempts = 0
         while not future.done():
             try:
                 is_watched.set()
                 wait((future,), timeout=_SECONDS_BETWEEN_ATTEMPTS)
-                interrupts.forward(connection)
+                attempts += interrupts.forward(connection)
+                if only_reads and attempts * _SECONDS_BETWEEN_ATTEMPTS > _SECONDS_TO_ANSWER:
+                    interrupts.end_process()
             except KeyboardInterrupt:
                 interrupts.note()
         interrupts.check()

@@ -41,10 +41,10 @@ def watch_finished(directory: Path, watcher: Watcher) -> Iterator[WindowReport]:
         watcher.read(chunk)
     left = [chunk for chunk in chunks if chunk not in firsts.values()]
     while left:
-        # Nothing is late that is on the disk: windows wait for all sources that have more.
-        waits_for = {chunk.source for chunk in left}
-        ends = [end for source, end in watcher.history.ends_ns.items() if source in waits_for]
-        if ends and (report := watcher.report(min(ends))) is not None:
+        # Nothing is late that is on the disk: windows wait for all sources that have more, also
+        # for those whose first chunks are empty.
+        ends = [watcher.history.ends_ns.get(chunk.source, 0) for chunk in left]
+        if all(ends) and (report := watcher.report(min(ends))) is not None:
             yield report
             watcher.keep_violation()
         watcher.read(left.pop(0))
@@ -100,7 +100,9 @@ def watch_live(
         if is_last:
             yield from _last(watcher)
             return
-        report = watcher.report(watcher.history.newest_ns, is_live=True)
+        # A clock that is ahead must not make all that others record late.
+        ahead = {source for source, seconds in ahead_s.items() if seconds * _SECOND_NS > step_ns}
+        report = watcher.report(watcher.history.newest_without(ahead), is_live=True)
         if report is None:
             time.sleep(_BETWEEN_LOOKS)
             continue

@@ -10,7 +10,7 @@ from msgflow.run.window import Window
 from msgflow.watch.kept_traces import KeptTraces
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Collection, Mapping, Sequence
     from pathlib import Path
 
     from msgflow.watch.kept_chunk import KeptChunk
@@ -48,6 +48,11 @@ class History:
     def newest_ns(self) -> int:
         """The newest time of all sources; 0 before the first chunk."""
         return max(self._ends.values(), default=0)
+
+    def newest_without(self, sources: Collection[Path]) -> int:
+        """Return the newest time of the other sources, or of all if there are no others."""
+        ends = (end for source, end in self._ends.items() if source not in sources)
+        return max(ends, default=self.newest_ns)
 
     @property
     def last_event_ns(self) -> int:

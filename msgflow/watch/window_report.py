@@ -66,7 +66,6 @@ class WindowReport:
         """Return it as one line of JSON."""
         shown = {
             **self.window.bindings,
-            "is_final": True,
             "lag_s": self.lag_s if self.lag_s is None else round(self.lag_s, 3),
             "paths": self.paths,
             "executors": self.executors,

@@ -251,3 +251,26 @@ def test_commands_that_write_ended_at_random_moments() -> None:
         (name, number) for name in names for number in (2, 9)
     }
     assert [end for end in ends if end[3]] == []
+
+
+_DEAF = """import time
+    from unittest.mock import Mock
+    from msgflow.sql.interrupt import interruptible
+    def work():
+        signal.raise_signal({0})
+        time.sleep(50)
+    interruptible(Mock(), work, only_reads={1})"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_statement_that_notices_no_interrupt_ends_with_the_process(
+    number: signal.Signals,
+) -> None:
+    """Where it only reads: there is nothing to undo."""
+    assert failing(number, _DEAF.replace("{1}", "True")) == _ENDINGS[number]
+
+
+def test_what_a_statement_writes_is_waited_for() -> None:
+    said = "time.sleep(2)\n        print('done', file=sys.stderr)"
+    body = _DEAF.replace("{1}", "False").replace("time.sleep(50)", said)
+    assert failing(signal.SIGINT, body) == (ExitCode.INTERRUPTED, "done\nerror: interrupted\n")

@@ -82,7 +82,7 @@ def test_once_reads_one_directory(msgflow: Msgflow, tmp_path: Path) -> None:
     assert "no such directory — nothing" in missing.stderr
 
 
-def test_windows_wait_for_a_step_unless_late_says_more(
+def test_windows_wait_for_two_steps_unless_late_says_more(
     msgflow: Msgflow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     waits = []
@@ -92,9 +92,10 @@ def test_windows_wait_for_a_step_unless_late_says_more(
         raise TraceError("enough", "no more")
 
     monkeypatch.setattr("msgflow.watch.Watcher", made)
-    for words in ((), ("--step", "3s"), ("--step", "3s", "--late", "500ms")):
+    lates = ((), ("--step", "3s"), ("--step", "3s", "--late", "500ms"), ("--late", "0"))
+    for words in lates:
         assert msgflow("watch", "--once", tmp_path, *words).exit_code == ExitCode.TRACE
-    assert waits == [2_000_000_000, 3_000_000_000, 500_000_000]
+    assert waits == [4_000_000_000, 6_000_000_000, 500_000_000, 0]
     refused(msgflow("watch", "--late", "soon"), "cannot read the duration of --late — soon")
 
 

@@ -129,6 +129,14 @@ def test_what_came_before_is_forgotten_later() -> None:
     assert [path.name for path in history.forget(window)] == ["100"]
 
 
+def test_a_clock_that_is_ahead_need_not_count_as_the_newest() -> None:
+    history = History(WINDOW, STEP, LATE)
+    history.add(chunk(0, 100))
+    assert history.newest_without({ROBOT}) == 100
+    history.add(chunk(300, 400, LAPTOP))
+    assert (history.newest_ns, history.newest_without({LAPTOP})) == (400, 100)
+
+
 @pytest.mark.parametrize("ahead", [-100_000, 100_000])
 def test_a_host_whose_clock_errs_leaves_nothing_behind(ahead: int) -> None:
     """Windows go on in the time of the others, none of them is longer than it should be."""

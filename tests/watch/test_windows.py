@@ -55,7 +55,7 @@ def watching(
     clocks: str | Path = "none",
     late: float | None = None,
 ) -> Watcher:
-    """Return a watcher; what is late is waited for as long as a step, or for so many seconds."""
+    """Return a watcher; it waits for a step, or for so many seconds, for what is late."""
     return Watcher(
         window_ns=round(window * SECOND),
         step_ns=round(step * SECOND),
@@ -517,4 +517,39 @@ def test_a_source_that_stops_holds_up_no_window(simulated: Path) -> None:
     watcher.close()
     assert len(found) > 1
     assert newest_ns - found[-1].window.end_ns < SECOND
+    assert not any(report.late_events for report in found)
+
+
+def test_of_a_finished_recording_windows_wait_for_a_host_that_begins_empty(
+    simulated: Path, tmp_path: Path
+) -> None:
+    copy = shutil.copytree(simulated, tmp_path / "trace")
+    # The one that is read later.
+    first = finished_chunks(copy)[1]
+    assert first.number == finished_chunks(copy)[0].number
+    for file in first.path.rglob("*"):
+        if file.is_file():
+            file.unlink()
+    notes: list[str] = []
+    found = list(watch_finished(copy, watching(notes, 0.2, 0.2, late=0.05)))
+    assert len(found) > 2
+    assert not any(report.late_events for report in found)
+
+
+def test_a_clock_that_is_ahead_makes_nothing_late(
+    simulated: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Here one source comes two chunks earlier than the other one, as far as its times say."""
+    ahead, behind = (sorted(path.iterdir()) for path in sorted(simulated.glob("*/archives")))
+    notes: list[str] = []
+    watcher = watching(notes, 0.5, 0.5)
+    place = tmp_path / ahead[0].parts[-3]
+    monkeypatch.setattr(Arrivals, "clocks_ahead_s", lambda self: {place: 1.0})
+    order = [[*ahead[:3], behind[0]], [ahead[3], behind[1]], [behind[2]], [behind[3]]]
+    looks = fed(order, tmp_path, monkeypatch)
+    found = list(
+        watch_live(tmp_path, watcher, step_ns=SECOND // 2, is_over=looks, note=notes.append)
+    )
+    watcher.close()
+    assert len(found) > 1
     assert not any(report.late_events for report in found)
