@@ -57,7 +57,11 @@ class ConfinedProcess:
     """
 
     def __init__(self, module: str, *, seconds: float | None = None) -> None:
-        """Start the child."""
+        """Start the child.
+
+        Each function of the module takes a function that writes bytes of the answer, and by name
+        values that JSON has. A call may take so many seconds; None sets no bound.
+        """
         self._module = module
         self._seconds = seconds
         self._child = self._start()

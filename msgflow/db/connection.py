@@ -46,7 +46,11 @@ def connect(
 
 
 def attach(con: duckdb.DuckDBPyConnection, path: Path, *, is_new: bool = False) -> None:
-    """Attach an existing, current msgflow database for writing, and make it the current one."""
+    """Attach an existing, current msgflow database for writing, and make it the current one.
+
+    `is_new` says that this process has just created the file: its definitions need no check, and it
+    has no log. A commit then lasts only after a CHECKPOINT.
+    """
     if not path.exists():
         raise DatabaseError(f"no database — {path}", "msgflow ingest TRACE")
     require_file(path)

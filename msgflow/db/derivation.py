@@ -31,7 +31,11 @@ def derive(
     synchronise: Callable[[], None] | None = None,
     findings: bool = True,
 ) -> None:
-    """Derive the links of a run anew, inside the open transaction."""
+    """Derive the links of a run anew, inside the open transaction.
+
+    `synchronise` corrects the clocks. It is called once messages are linked; None leaves the clocks
+    as they are. `findings` also finds what the recording shows.
+    """
     learn_topics(con, run_id)
     for name in derived_tables():
         if not reads_clocks(name):

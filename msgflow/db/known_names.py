@@ -40,7 +40,11 @@ LIMIT {most}
 
 
 def known_names(path: Path, kind: str, prefix: str) -> Sequence[str]:
-    """Return the names in a database that begin with `prefix`, sorted, at most 1000."""
+    """Return the names in a database that begin with `prefix`, sorted, at most 1000.
+
+    `kind` is 'run', 'topic', 'node', 'callback', 'host', 'view', or 'place' for topics, nodes and
+    services. A file that is missing, in use, damaged or foreign has no names.
+    """
     import duckdb
 
     from msgflow.db.sandbox import open_file

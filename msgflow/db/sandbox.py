@@ -79,7 +79,8 @@ def shut_in(
 ) -> None:
     """Put a connection into the sandbox, which it cannot leave.
 
-    The databases that it has attached stay attached.
+    The databases that it has attached stay attached. It may still read and write the files `files`
+    and those in `directories`. `lock` also forbids changes of its settings.
     """
     con.execute("SET allowed_directories = ?", [[str(path.absolute()) for path in directories]])
     con.execute("SET allowed_paths = ?", [list(files)])
@@ -99,7 +100,11 @@ def spill_directory(database: Path) -> Path:
 
 
 def remove_abandoned_spills(database: Path, *, is_ours_alone: bool) -> None:
-    """Remove the spill directories of processes that have ended."""
+    """Remove the spill directories of processes that have ended.
+
+    `is_ours_alone` says that the database is open for writing. No other process can have it open
+    then, so that every other spill directory is abandoned.
+    """
     prefix = _prefix(database)
     try:
         entries = [entry.name for entry in os.scandir(_place(database))]

@@ -45,7 +45,12 @@ class Selection:
         start: str | int | None = None,
         end: str | int | None = None,
     ) -> None:
-        """Choose events."""
+        """Choose events.
+
+        Without `patterns`, such as 'ros2:rcl_*', all names are chosen. `start` and `end` are epoch
+        ns, ISO times, or offsets from the begin of the traces ('2.5s', '100ms'). Events at `start`
+        are chosen, events at `end` are not.
+        """
         self.traces = traces
         self.lost_event_count = 0
         for trace in traces.traces:

@@ -65,7 +65,12 @@ def load_traces(
     interrupts: Interrupts,
     progress: Callable[[Progress, float], None] | None,
 ) -> Loaded:
-    """Load all wanted events and all packets of `traces`."""
+    """Load all wanted events and all packets of `traces`.
+
+    `may_hold` says that the current database may hold some of these packets already; `replace`,
+    that this is no error. `interrupts` is asked at every batch. `progress` gets the progress of the
+    reader and the seconds since the begin.
+    """
     catalogue = load()
     user_names = {n for n in names_of(events, traces.traces) if not is_match(n, ignore)}
     wanted = wanted_events(ignore)

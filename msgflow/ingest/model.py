@@ -51,7 +51,10 @@ def build(con: duckdb.DuckDBPyConnection, *, keep: bool = False, findings: bool 
 
 
 def create(con: duckdb.DuckDBPyConnection, header: Header, empty: set[str]) -> None:
-    """Create an object of the model, after all that it needs."""
+    """Create an object of the model, after all that it needs.
+
+    `empty` names the tables that exist and have no row. This function keeps it up to date.
+    """
     if header.kind == "macro":
         con.execute(header.body)
     elif header.kind == "inline":

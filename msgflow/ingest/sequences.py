@@ -84,7 +84,10 @@ class Sequences:
     """State of all threads through the rounds of a reader, which must come in order."""
 
     def __init__(self, catalogue: Catalogue, hosts: Sequence[int]) -> None:
-        """Start before the first event."""
+        """Start before the first event.
+
+        `hosts` has a number for each trace index, which traces of the same host share.
+        """
         self._tracepoints = catalogue.staged
         self._labels = catalogue.labels
         self._label_texts = texts_to_arrow(catalogue.labels)
@@ -105,7 +108,11 @@ class Sequences:
         }
 
     def place(self, batches: Sequence[tuple[str, pa.RecordBatch]]) -> Placed:
-        """Give the events of one round their threads and predecessors."""
+        """Give the events of one round their threads and predecessors.
+
+        `batches` has all wanted events of the round, in the order of the reader, each batch with
+        its name in `Catalogue.staged`.
+        """
         sizes = [batch.num_rows for _, batch in batches]
         ends = np.cumsum([0, *sizes])
         known = self._threads.count

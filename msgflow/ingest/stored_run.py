@@ -28,6 +28,9 @@ def store_run(
 ) -> tuple[int, str]:
     """Store a run from staging, inside the open transaction, in place of those that it replaces.
 
+    It replaces the run that has `name`, too. Without a name it gets `fallback`, with a number
+    behind it if another run has that name.
+
     Returns:
         Its id and name.
     """

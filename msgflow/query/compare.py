@@ -257,7 +257,10 @@ def compare(
 
 
 def warm_up(connection: duckdb.DuckDBPyConnection, run: Run) -> float:
-    """Return how long a run warms up, in seconds, as a comparison of its paths finds it."""
+    """Return how long a run warms up, in seconds, as a comparison of its paths finds it.
+
+    0 means that it does not warm up.
+    """
     both: dict[str, Value] = {"run_a": run.run_id, "run_b": run.run_id, "resamples": 0}
     asked = bind(internal_sql().header("comparison"), both, "msgflow compare")
     _require_sense(asked)

@@ -65,7 +65,10 @@ WHERE NOT EXISTS (
 def require_places(
     connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], bound: Mapping[str, Value]
 ) -> None:
-    """Raise unless the chosen runs have every topic and node among the parameters of a query."""
+    """Raise unless the chosen runs have every topic and node among the parameters of a query.
+
+    Without runs, every name passes.
+    """
     places = []
     for key in PLACE_PARAMETERS:
         given = bound.get(key)
@@ -78,7 +81,11 @@ def require_places(
 def require_names(
     connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], kind: str, names: Sequence[str]
 ) -> None:
-    """Raise unless the chosen runs have every name, and something that fits every pattern."""
+    """Raise unless the chosen runs have every name, and something that fits every pattern.
+
+    `kind` is 'topic', 'node', 'callback', 'host', or 'place' for topics, nodes and services.
+    Patterns are globs. Without runs, every name passes.
+    """
     if not runs or not names:
         return
     sql, source = _KNOWN[kind]
@@ -109,7 +116,10 @@ def require_names(
 def require_ids(
     connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], bound: Mapping[str, Value]
 ) -> None:
-    """Raise unless the chosen runs have every id among the parameters of a query."""
+    """Raise unless the chosen runs have every id among the parameters of a query.
+
+    Without runs, every id passes.
+    """
     for key, (view, column, hint) in _IDS.items():
         number = bound.get(key)
         if number is None or not runs:

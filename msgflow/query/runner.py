@@ -168,7 +168,11 @@ def _missing_way(
 def bind(
     header: Header, given: Mapping[str, Value], command: str | None = None
 ) -> dict[str, Value]:
-    """Return the value of every parameter of `header`."""
+    """Return the value of every parameter of `header`.
+
+    A given name may end with an underscore, as Python reserves some names (`from_`). `command` is
+    the one that has the parameters as options, `msgflow query NAME` when None.
+    """
     called = header.words if command is None else command
     command = command or header.command
     names = [param.name for param in header.params]

@@ -29,7 +29,11 @@ class Program:
     """
 
     def __init__(self, words: Sequence[str], output: IO[bytes] | None) -> None:
-        """Start it."""
+        """Start it.
+
+        `output` gets what it prints. If that is None, our stderr does, since our stdout is for
+        data.
+        """
         self._name = words[0]
         require_program(words[0])
         # A stderr that is closed is None.

@@ -35,7 +35,10 @@ class Times(StrEnum):
 def converted(
     table: pa.Table, units: Mapping[str, str], runs: Sequence[Run], times: Times
 ) -> pa.Table:
-    """Return rows with their times in another form; `_ns` becomes `_s` or `_utc` in names."""
+    """Return rows with their times in another form; `_ns` becomes `_s` or `_utc` in names.
+
+    `units` names the columns that are times: 'ns' are durations, 'epoch ns' points in time.
+    """
     if times is Times.NS:
         return table
     columns, names = [], []

@@ -54,7 +54,11 @@ def read_runs(connection: duckdb.DuckDBPyConnection) -> tuple[Run, ...]:
 
 
 def choose_runs(runs: Sequence[Run], wanted: str | int | None) -> tuple[Run, ...]:
-    """Return the runs that a user wants."""
+    """Return the runs that a user wants.
+
+    `wanted` is 'all', a name, a label KEY=VALUE (all runs that have it), or an id. A name wins over
+    a label, and a label over an id. None means the latest run.
+    """
     if not runs:
         return ()
     ordered = sorted(runs, key=lambda run: run.run_id)

@@ -60,7 +60,11 @@ WHOLE = Window()
 
 
 def time_point(text: str | int, runs: Sequence[Run], option: str) -> int:
-    """Return a point in time in epoch ns."""
+    """Return a point in time in epoch ns.
+
+    `text` is an offset from the start of the only run ('2.5' seconds, '100ms'), an ISO time, or
+    epoch ns: an integer, or a text of 16 digits or more.
+    """
     return _in_range(_read(text, runs, option), text, option)
 
 

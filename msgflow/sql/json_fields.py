@@ -38,7 +38,10 @@ def json_fields(payload: pa.Schema) -> str:
 
 
 def label_of(expression: str, field: pa.Field) -> str | None:
-    """Return the SQL of the only label of a value, NULL where none or several belong to it."""
+    """Return the SQL of the only label of a value, NULL where none or several belong to it.
+
+    The result is None if no value of the field has such a label, as when it is no enumeration.
+    """
     choices = " ".join(
         f"WHEN {expression} BETWEEN {first} AND {last} THEN {literal(label)}"
         for first, last, label in _single(labels_of(field))

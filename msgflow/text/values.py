@@ -35,7 +35,11 @@ def format_duration(duration_ns: float) -> str:
 
 
 def format_cell(value: Any, unit: str | None = None, *, is_handle: bool = False) -> str:
-    """Return one cell of a table."""
+    """Return one cell of a table.
+
+    Its unit is 'ns' for durations, 'epoch ns' for points in time, or 'share' for parts of 1. A
+    handle is an address, shown in hexadecimal.
+    """
     if isinstance(value, str):
         return printable(value)
     if isinstance(value, bool):

@@ -31,7 +31,11 @@ def names_of(field: pa.Field) -> tuple[str, ...]:
 def field_metadata(
     base: int | None, labels: Mapping[str, Iterable[tuple[int, int]]] | None
 ) -> dict[bytes, bytes]:
-    """Return the metadata of a field."""
+    """Return the metadata of a field.
+
+    `base` is None if the field is no integer. An enumeration has `labels`, each with ranges of
+    values. Both ends belong to a range.
+    """
     found = {BASE: b"16"} if base == 16 else {}
     if labels:
         found[LABELS] = json.dumps(

@@ -45,7 +45,11 @@ def description(
     events: Sequence[tuple[str, Set[str]]],
     has_time: bool = True,
 ) -> TraceInfo:
-    """Describe a trace, with its times as declared."""
+    """Describe a trace, with its times as declared.
+
+    `begins` and `ends` are those of its streams, in ns since the epoch by the declared clock. An
+    event has a name and the names of its contexts.
+    """
     return TraceInfo(
         index=index,
         path=path,

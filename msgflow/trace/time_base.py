@@ -33,6 +33,9 @@ def on_one_base(
     The first trace of programs decides, the kernel's only where there is no other: a kernel trace
     beside a recording moves no time of it. Only a clock that has a uuid and counts nanoseconds is
     corrected: without a uuid it is a clock of its own.
+
+    `offsets` are what traces opened before decided, in ns since the epoch. The function adds those
+    of these traces.
     """
     for trace in sorted(traces, key=lambda trace: trace.domain == "kernel"):
         if trace.clock_uuid is not None and trace.clock_frequency == GIGA:

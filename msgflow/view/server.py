@@ -196,7 +196,11 @@ def serve_single(
     port: int | None = None,
     started: Callable[[str], None] = lambda address: None,
 ) -> None:
-    """Serve one page with its data inside until Ctrl-C."""
+    """Serve one page with its data inside until Ctrl-C.
+
+    `place` says what the page shows: its token is kept. `make` is called at each load. `port` and
+    `started` are as for `serve`.
+    """
     with listening(place, port, lambda token: single_application(make, token)) as (
         server, listener, address,
     ):  # fmt: skip
@@ -340,7 +344,10 @@ def is_local(host: str) -> bool:
 
 
 def listen(port: int | None) -> socket.socket:
-    """Return a socket that listens on this machine alone."""
+    """Return a socket that listens on this machine alone.
+
+    Port 0 means any free one, None the usual one, or any free one where that is taken.
+    """
     wanted = DEFAULT_PORT if port is None else port
     listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -367,7 +374,12 @@ def serve(
     memory_limit: str | None = None,
     started: Callable[[str], None] = lambda address: None,
 ) -> None:
-    """Serve the pages of a database until Ctrl-C."""
+    """Serve the pages of a database until Ctrl-C.
+
+    `port` is as for `listen`. `started` gets the address, with the token, once it can be opened.
+    Without `memory_limit`, DuckDB takes a quarter of the machine's memory, at least 500 MB and at
+    most 4 GB.
+    """
     with running(path, sql, port=port, memory_limit=memory_limit) as (server, listener, address):
         started(address)
         server.run(sockets=[listener])

@@ -32,7 +32,11 @@ def encode(
     table: pa.Table, *, meta: Mapping[str, Any] | None = None, origin_ns: int = 0,
     units: Mapping[str, str] | None = None,
 ) -> bytes:  # fmt: skip
-    """Return `table` as bytes."""
+    """Return `table` as bytes.
+
+    Columns with the unit 'epoch ns' become offsets from `origin_ns`, which is in epoch ns, too.
+    `meta` goes into the head, and holds what JSON can hold.
+    """
     units = units or {}
     columns = []
     buffers: list[bytes] = []

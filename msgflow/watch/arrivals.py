@@ -44,7 +44,10 @@ class Arrivals:
     """The sources of the chunks that have come so far."""
 
     def __init__(self, step_ns: int) -> None:
-        """Start before the first chunk."""
+        """Start before the first chunk.
+
+        Chunks come every `step_ns` at most.
+        """
         self._step_ns = step_ns
         self._sources: dict[Path, _Source] = {}
 
@@ -57,7 +60,11 @@ class Arrivals:
         return source is not None and source.is_left_out
 
     def add(self, chunk: Chunk, end_ns: int | None, *, is_live: bool) -> None:
-        """Add a chunk that was read."""
+        """Add a chunk that was read.
+
+        Its source has recorded up to `end_ns` by its own clock; None means nothing yet. `is_live`
+        says that it came while we looked: only then is it known when it came.
+        """
         age_s = _age_s(chunk.path)
         source = self._sources.setdefault(chunk.source, _Source(chunk.number, 0, 0))
         source.number = chunk.number
@@ -70,7 +77,11 @@ class Arrivals:
             source.ahead_ns = max(ahead_ns, source.ahead_ns or ahead_ns)
 
     def vanished(self, looked_s: float) -> list[Path]:
-        """Return the sources whose next chunk is overdue, each once until a chunk comes again."""
+        """Return the sources whose next chunk is overdue, each once until a chunk comes again.
+
+        We looked for chunks at `looked_s`, in seconds of the monotonic clock: reading them takes
+        time.
+        """
         found = []
         for path, source in self._sources.items():
             usual_s = max(self._step_ns / _SECOND_NS, source.length_s)

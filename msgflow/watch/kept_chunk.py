@@ -92,7 +92,10 @@ class KeptChunk:
 
 
 def read_chunk(chunk: Chunk, after: Continuation) -> KeptChunk | None:
-    """Read a chunk into memory; None if nothing was recorded in it."""
+    """Read a chunk into memory; None if nothing was recorded in it.
+
+    `after` holds the chunks read before, and takes this one in: a chunk can be read only once.
+    """
     # LTTng also cuts the time before the first program, into chunks without any file.
     if not any(path.is_file() for path in chunk.path.rglob("*")):
         return None

@@ -94,7 +94,10 @@ def list_array(
 def scattered_array(
     found: list[tuple[NDArray[np.int64], NDArray[Any]]], count: int, data_type: pa.DataType
 ) -> pa.Array:
-    """Return a column in which only some rows have a value."""
+    """Return a column in which only some rows have a value.
+
+    `found` has rows with their values, or with a row of elements for each. No row occurs twice.
+    """
     is_missing = np.ones(count, np.bool_)
     is_list = pa.types.is_list(data_type)
     element_type = data_type.value_type if is_list else data_type

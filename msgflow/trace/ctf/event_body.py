@@ -152,7 +152,11 @@ class EventBody:
 
 
 def compile_body(stream: StreamClass, event: EventClass, residues: int) -> EventBody:
-    """Compile the layout of the body of an event class."""
+    """Compile the layout of the body of an event class.
+
+    There is a layout for each residue of its position: of the byte at which it begins, modulo
+    `residues`.
+    """
     structures = {
         Scope.EVENT_CONTEXT: stream.event_context,
         Scope.SPECIFIC_CONTEXT: event.specific_context,

@@ -106,7 +106,10 @@ class EventHeader:
 
 
 def compile_header(structure: Structure, residues: int) -> EventHeader | None:
-    """Compile the layout of headers; None if they must be read field by field."""
+    """Compile the layout of headers; None if they must be read field by field.
+
+    `residues` is as for `compile_body`.
+    """
     if structure.align % BYTE or not structure.members:
         return None
     last = structure.members[-1].type

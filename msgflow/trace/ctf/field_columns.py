@@ -35,7 +35,12 @@ class FieldRows:
         *,
         with_variant: bool = False,
     ) -> None:
-        """Prepare to read fields."""
+        """Prepare to read fields.
+
+        `bodies` are the bytes of memory at which contexts and payload of each event begin. `wanted`
+        are places in the list of fields. `with_variant` also prepares fields of the variant at the
+        end.
+        """
         assert body.fields is not None
         self._fields = body.fields
         self._options: dict[str, tuple[NDArray[np.int64], NDArray[np.int64], OptionLayout]] = {}

@@ -276,7 +276,10 @@ class EventReader:
     """Reader of the events of one packet, which may begin at any bit."""
 
     def __init__(self, trace: TraceClass, stream: StreamClass, data: memoryview, end: int) -> None:
-        """Read the packet's own header, which fields of events may refer to."""
+        """Read the packet's own header, which fields of events may refer to.
+
+        `data` begins with the packet. `end` is the bit at which its content ends.
+        """
         self._stream = stream
         self._reader = FieldReader(data, end)
         self._end = end

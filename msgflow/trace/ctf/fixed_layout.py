@@ -41,7 +41,13 @@ def lay_out(
     leaves: list[Leaf] | None = None,
     path: tuple[str, ...] = (),
 ) -> int:
-    """Return the bit at which a field ends that begins at `position` or, aligned, behind it."""
+    """Return the bit at which a field ends that begins at `position` or, aligned, behind it.
+
+    Positions are bits from the begin of the packet. The numbers in the field are added to `leaves`,
+    if given. `path` names the structures around it.
+
+    A DynamicError says that the layout depends on values, or has too many parts to go through.
+    """
     return _Layout(leaves).end(declared, position, path)
 
 

@@ -37,7 +37,11 @@ def read_headers(
     counts: NDArray[np.int64],
     befores: NDArray[np.uint64],
 ) -> Headers:
-    """Read the headers of the events at these positions."""
+    """Read the headers of the events at these positions.
+
+    `positions` are the bytes of memory at which events begin, packet after packet. `counts` are the
+    events of each packet, `befores` the values of the clock before the first event of each.
+    """
     reader = _Reader(layout, memory, positions)
     owner_befores = befores[counts > 0]
     firsts = (np.cumsum(counts) - counts)[counts > 0]
@@ -146,6 +150,9 @@ def _unwrapped(
     A time stamp is the first value at or after the previous one with these low bits, and the
     previous one of a packet's first event is that before it, or the packet's begin. So the
     distances are known from the low bits alone, and their sum from a whole value on is the clock.
+
+    `values` are low bits of `bits` bits, but whole values at the rows `whole`. Packets begin at the
+    rows `firsts`; `befores` are the values of the clock before these.
     """
     if not values.size:
         return values

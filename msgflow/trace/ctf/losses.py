@@ -48,7 +48,11 @@ class LossCounter:
         self._of_stream.clear()
 
     def losses(self, recording: Recording, stream: Stream, packet: Packet, counts: bool) -> Losses:
-        """Return what was lost in a packet and before it."""
+        """Return what was lost in a packet and before it.
+
+        Packets must come in order of time. `counts` is false for a copy of a packet: its counter of
+        lost events then only counts for the next packets of the same stream.
+        """
         header = packet.header
         lost, problem = 0, None
         if header.sequence is not None:

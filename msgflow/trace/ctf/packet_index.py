@@ -97,7 +97,10 @@ class DiscardCounters:
         self._counters: Counter[Recording] = Counter()
 
     def rise(self, recording: Recording, directory: Path, told: int | None) -> int | None:
-        """Return how many events were lost before a packet; None where nothing tells it."""
+        """Return how many events were lost before a packet; None where nothing tells it.
+
+        `told` is the number that Babeltrace tells: None for the first packet of a directory.
+        """
         before = self._counters[recording]
         if told is None:
             counter = _first_counter(directory, *recording[1:])

@@ -117,6 +117,10 @@ def entries_of(
     The same packet may be given twice (a copied directory, overlapping snapshots): same trace
     uuid, stream class, stream instance and begin. The one of the first trace is read. In one
     trace, where packets may well begin at the same time, see `Repetitions`.
+
+    `begins` has packets that do not say when they begin: the clock's value and the time. `counter`
+    has counted up to the first of these packets. `report` gets packet, byte and message for
+    counters that make no sense.
     """
     candidates = []
     for stream in streams:

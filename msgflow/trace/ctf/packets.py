@@ -54,7 +54,11 @@ class Packet:
 def packets_of(
     path: Path, reader: HeaderReader, report: Callable[[Path, int, int, str], None]
 ) -> list[Packet]:
-    """Return the packets of a file in its order."""
+    """Return the packets of a file in its order.
+
+    `report` gets all that is wrong: the file, the number of the packet, the offset in bytes and a
+    message.
+    """
     descriptor = os.open(path, os.O_RDONLY)
     try:
         packets = list(_PacketFinder(path, descriptor, reader, report).run())

@@ -48,7 +48,11 @@ class CtfTraceSet(ExclusiveTraceSet):
         strict: bool = False,
         after: Continuation | None = None,
     ) -> None:
-        """Read the metadata and find the packets; no event is read yet."""
+        """Read the metadata and find the packets; no event is read yet.
+
+        `strict` ends at the first damage. `after` holds what was read before of the same
+        recordings, and takes these parts in. They can be read only once then.
+        """
         super().__init__()
         self._strict = strict
         self._layouts: list[StreamLayout] = []

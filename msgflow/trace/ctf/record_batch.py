@@ -136,7 +136,12 @@ def build_batch(
     names: ThreadNames,
     reader_at: Callable[[int, int], tuple[EventReader, int]],
 ) -> pa.RecordBatch:
-    """Build a batch."""
+    """Build a batch.
+
+    `names` are the thread names seen so far. `reader_at` takes a packet of the batch and the
+    position of an event. It returns what reads the packet field by field, and the bit at which the
+    event begins.
+    """
     count = rows.event_ids.size
     columns = {
         "event_id": to_arrow(rows.event_ids),
