@@ -272,7 +272,7 @@ CREATE TABLE store.executor_state (
     start_event_id BIGINT  -- Executor event that began it [event order] {hidden}
 );
 
--- One row per publication that a call led to, callback instance that called, and way it did so
+-- One row per publication caused by a call, callback instance that called, and services in between
 CREATE TABLE store.flow_call (
     run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
     publication_id BIGINT NOT NULL,  -- What was published {to publication}
@@ -294,7 +294,7 @@ CREATE TABLE store.flow_root (
     run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
     publication_id BIGINT NOT NULL,  -- The message {to publication}
     publisher_id BIGINT NOT NULL,  -- Its publisher {to publisher}
-    is_source BOOLEAN DEFAULT false NOT NULL,  -- No message that was taken led to it
+    is_source BOOLEAN DEFAULT false NOT NULL,  -- Not caused by a taken message
     root_kind VARCHAR NOT NULL,  -- 'callback_instance' or 'publication'
     root_id BIGINT NOT NULL,  -- Row of that kind where its flow begins
     route BIGINT[] NOT NULL  -- Node (or, negative, process) that called, then services; empty: by
@@ -309,8 +309,8 @@ CREATE TABLE store.flow_hop (
         -- no service
     publisher_id BIGINT NOT NULL,  -- Publisher {to publisher}
     subscription_id BIGINT NOT NULL,  -- Subscription that took from it {to subscription}
-    is_source BOOLEAN DEFAULT false NOT NULL,  -- At least one publication of it was caused by no
-        -- message
+    is_source BOOLEAN DEFAULT false NOT NULL,  -- At least one of its publications was not caused by
+        -- a taken message
     is_cached BOOLEAN DEFAULT false NOT NULL  -- The message may wait in the node for others
 );
 

@@ -57,7 +57,7 @@ def apply(
         for one in runs:
             clocks = opened.query("clocks", run=one.run_id).to_arrow().to_pylist()
             corrected = [clock for clock in clocks if clock["method"] not in ("none", "reference")]
-            print_status(f"{len(corrected)} of {len(clocks)} clocks corrected: msgflow clocks show")
+            print_status(f"{len(corrected)} of {len(clocks)} clocks corrected: msgflow clocks")
             pairs = opened.query("clocks-pair", run=one.run_id).to_arrow().to_pylist()
             if how == "messages" and pairs:
                 messages = sum(pair["message_count"] for pair in pairs)

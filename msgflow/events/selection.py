@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from msgflow.trace import Progress, TraceSet
 
 BATCH_ROWS = 20_000
-"""Most rows of a batch: few, so that the first lines come soon."""
+"""Rows of a batch at most: few, so that the first lines appear soon."""
 
 _NOTHING = pa.schema([])
 # By position: a payload may have a field of the same name.

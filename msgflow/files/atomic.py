@@ -61,7 +61,7 @@ def _into_stream(path: Path) -> Iterator[Path]:
     with tempfile.TemporaryDirectory(prefix="msgflow-") as directory:
         temporary = Path(directory) / path.name
         yield temporary
-        # Opened by its name, stdout would be written from its beginning.
+        # If stdout were opened by its name, writing would begin at the start of the file.
         is_stdout = _is_stdout(path)
         with (
             temporary.open("rb") as source,

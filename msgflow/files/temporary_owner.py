@@ -9,7 +9,7 @@ import re
 from functools import cache
 from pathlib import Path
 
-# Where processes are known by number: until the next start of the machine, in this container.
+# A process number is valid in this container, until the machine starts again.
 _NAMESPACE = ("/proc/sys/kernel/random/boot_id", "/proc/self/ns/pid")
 _UNKNOWN = "0" * 12
 _MARK = re.compile(r"([0-9a-f]{12})-(\d+)-(\d+)")

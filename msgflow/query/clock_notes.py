@@ -46,7 +46,7 @@ def clock_notes(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run]) -> l
         if run.run_id in clocks
     ] + [
         f"{'' if len(runs) == 1 else f'run {run.title}: '}times between {reference}"
-        f" and {hosts} {_wrong_by(least, greatest)}; msgflow clocks show"
+        f" and {hosts} {_wrong_by(least, greatest)}; msgflow clocks"
         for run in runs
         for run_id, reference, hosts, least, greatest in corrections
         if run_id == run.run_id

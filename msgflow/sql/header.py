@@ -37,8 +37,8 @@ The header ends at the first line that is not a `--` comment. Two spaces end a p
   `store.gap WHERE kind = 'loss'`: then only such rows count.
 - `also`: objects whose rows are stored in the table of this one, too. Each has a `when` of its own,
   so that what few recordings have is planned only there.
-- `unites`: objects whose rows a macro takes together, under the name that is its first argument; of
-  those with a `when`, the ones that have rows. The run is its second one.
+- `unites`: objects whose rows a macro reads as one table. Its first argument is the name of that
+  table, its second the run. An object whose `when` finds no row is left out.
 
 - `variant`: a parameter whose values are queries of their own. The default is this file, and `age`
   stands in the file of the same name with `-age` behind it; a BOOLEAN `each`, in that with `-each`.

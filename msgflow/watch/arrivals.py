@@ -46,7 +46,7 @@ class Arrivals:
     def __init__(self, step_ns: int) -> None:
         """Start before the first chunk.
 
-        Chunks come every `step_ns` at most.
+        Chunks come at most once every `step_ns`.
         """
         self._step_ns = step_ns
         self._sources: dict[Path, _Source] = {}

@@ -21,7 +21,7 @@ class History:
 
     Windows end at multiples of a step. A window is closed once the newest time of all chunks passes
     its end by as much as something may be late: a chunk of another host, or the last message of a
-    flow. Of the time before a window as much is kept, for what began there.
+    flow. As much of the time before a window is kept, for flows that began there.
 
     Attributes:
         closed_ns: the end of the last window that is closed; before the first one, where that

@@ -1,5 +1,5 @@
 -- name: derive.clocks_to_synchronise
--- description: Runs with several clocks that messages were to bring together.
+-- description: Runs with several clocks, for which synchronisation by messages was asked.
 -- grain: one row per run
 SELECT s.run_id
 FROM derive.several_clocks AS s

@@ -1,7 +1,7 @@
 -- name: derive.place
 -- kind: macro
--- description: What names or globs, separated by commas, stand for. One that fits a topic stands
---     for topics. One that fits none stands for nodes: a node is often called like the topic that
+-- description: The topics and nodes that names or globs, separated by commas, mean. One that fits a
+--     topic means topics. Any other one means nodes, as a node is often called like the topic that
 --     it publishes.
 -- grain: one row per topic, and per node
 -- param: runs BIGINT[]  Runs to look at

@@ -1,8 +1,8 @@
 -- name: main.end_to_end_piece_explained
 -- kind: macro
 -- description: The parts of flows (main.end_to_end_piece), with the callback of each, and how long
---     its executor was busy while it waited. A parameter gives the callback instances, so that
---     they need not be looked up for each part.
+--     the executor was busy with other callbacks while the message waited. A parameter gives the
+--     callback instances, so that they need not be looked up for each part.
 -- grain: one row per flow and part
 -- param: flows VARCHAR  Name of the rows of main.end_to_end_flow: a table, or a part of the query
 -- param: trail VARCHAR  Likewise of main.end_to_end_trail
@@ -39,9 +39,9 @@
 -- column: callback_instance_id BIGINT  Callback instance that it is, or that it waits for
 -- column: publication_id BIGINT  Message that is published or under way
 -- column: callback_id BIGINT  Its callback
--- column: busy_min_ns BIGINT [ns]  While a message or request waited for it: executor busy with
---     other callbacks, at least
--- column: busy_max_ns BIGINT [ns]  At most
+-- column: busy_min_ns BIGINT [ns]  Least time for which its executor was busy with other callbacks
+--     while a message or request waited
+-- column: busy_max_ns BIGINT [ns]  Most time
 -- column: is_turning BOOLEAN  The hop leads through a cache or a service: a part may occur twice
 CREATE OR REPLACE MACRO main.end_to_end_piece_explained(flows, trail, callbacks, runs) AS TABLE
 WITH RECURSIVE flow AS NOT MATERIALIZED (
@@ -58,8 +58,8 @@ callback AS NOT MATERIALIZED (
     SELECT callback_instance_id, callback_id, take_id, start_ns, end_ns, busy_min_ns, busy_max_ns
     FROM query_table(callbacks)
 ),
--- Publications to which their own callback did not lead directly: what led to each instead, of the
--- callback instance that the flow came in with.
+-- Publications that were not caused directly by the callback instance by which a flow came in: what
+-- caused them at the end of the calls; where nothing was called, that callback instance itself.
 roundabout AS MATERIALIZED (
     SELECT c.publication_id, c.entered_id, c.publishing_id, c.publishing_key, c.kind
     FROM (
@@ -115,7 +115,7 @@ origin AS MATERIALIZED (
     ) AS a
     JOIN derive.request_sender AS s ON a.request_id = s.request_id
 ),
--- Calls of services between the two, from the last one back to the first.
+-- Calls of services between the caller and what published, from the last one back to the first.
 leg (publishing_key, caller_id, level, request_id, called_key, sender_key) AS (
     SELECT c.publishing_key, c.entered_id, 1, o.request_id, o.called_key, o.sender_key
     FROM (
@@ -234,8 +234,8 @@ message AS (
         i.callback_id, i.busy_min_ns, i.busy_max_ns,
         b.start_ns, b.intra_ns, b.rclcpp_ns, b.rcl_ns, b.rmw_ns, b.dds_ns, b.end_ns,
         least(b.intra_ns, b.rclcpp_ns, b.rcl_ns, b.rmw_ns, b.dds_ns) AS layer_ns,
-        -- Nothing shows when the last one ends, unless it has a later event itself: the message is
-        -- written behind it.
+        -- No event shows when the last layer ends, unless the publication has a later one: the
+        -- message is written after it.
         (b.intra_ns IS NOT NULL)::INTEGER + (b.rclcpp_ns IS NOT NULL)::INTEGER
         + (b.rcl_ns IS NOT NULL)::INTEGER + (b.rmw_ns IS NOT NULL)::INTEGER
         + (b.dds_ns IS NOT NULL)::INTEGER - coalesce(

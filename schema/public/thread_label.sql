@@ -1,6 +1,6 @@
 -- name: main.thread_label
--- description: What people call a thread: the nodes of its process, and its own name where that is
---     not the one of the process, as of threads of the middleware.
+-- description: What people call a thread: the nodes of its process, and its own name where it
+--     differs from that of the process, as for threads of the middleware.
 -- grain: one row per thread
 -- column: run_id BIGINT     Run that the row belongs to
 -- column: thread_id BIGINT  The thread

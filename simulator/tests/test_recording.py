@@ -233,7 +233,7 @@ def test_a_rotated_trace_is_one_trace_in_chunks(made):
 
 
 def test_a_chunk_is_missing(made):
-    """What was in it, and nothing else."""
+    """What the lost chunk held is missing, and nothing else."""
     simulation = made("chunk")
     kept = [path for path in made("rotated").trace_directories if not path.parts[-5].endswith("-2")]
     ends = [path.parts[-5:] for path in simulation.trace_directories]

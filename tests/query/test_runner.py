@@ -431,9 +431,7 @@ def test_how_far_corrected_clocks_can_be_wrong_is_said(
         connection.execute("INSERT INTO clock_uncertainty VALUES (2, ?)", [bound])
     query = QUERY.replace("-- param", "-- note: clocks\n-- param")
     result = run_query(connection, header(query), {}, Slice("first"), internal=True)
-    assert result.notes == [
-        f"times between alpha, inside and beta are {wrong_by}; msgflow clocks show"
-    ]
+    assert result.notes == [f"times between alpha, inside and beta are {wrong_by}; msgflow clocks"]
 
 
 @pytest.mark.parametrize("given", [1, "1", None])

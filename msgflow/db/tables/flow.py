@@ -32,8 +32,8 @@ Table(
     reference("taken_request_id", "Request that the service took", to="request.request_id"),
     reference("taken_response_id", "Response that the caller took", to="response.response_id"),
     comment=(
-        "One row per publication that a call led to, callback instance that called, and way it "
-        "did so"
+        "One row per publication caused by a call, callback instance that called, and services in "
+        "between"
     ),
 )
 
@@ -43,7 +43,7 @@ Table(
     run_id(),
     reference("publication_id", "The message", to="publication.publication_id", required=True),
     reference("publisher_id", "Its publisher", to="publisher.publisher_id", required=True),
-    flag("is_source", "No message that was taken led to it"),
+    flag("is_source", "Not caused by a taken message"),
     text("root_kind", "'callback_instance' or 'publication'", required=True),
     number("root_id", "Row of that kind where its flow begins", required=True),
     route(),
@@ -67,7 +67,7 @@ Table(
         to="subscription.subscription_id",
         required=True,
     ),
-    flag("is_source", "At least one publication of it was caused by no message"),
+    flag("is_source", "At least one of its publications was not caused by a taken message"),
     flag("is_cached", "The message may wait in the node for others"),
     comment="One row per step of the graph: subscription before, route, publisher and subscription",
 )

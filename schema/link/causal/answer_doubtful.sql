@@ -1,15 +1,15 @@
 -- name: derive.answer_doubtful
 -- kind: macro
--- description: Publications after takes without a callback that may have another cause than the
---     message. In rclpy a timer shows no event, and what it publishes follows some message, too. An
---     answer comes once per message, and soon. So whether a publisher answers the messages of a
---     subscription is doubtful if a timer explains the publisher (derive.timed_publisher), if its
---     own intervals are steadier than its delay after the takes, or if the number of publications
---     per message differs. Intervals with a gap do not count if five others are left. Only messages
---     count that the publisher published something after. If these are fewer than five, they do not
---     tell: then the publisher is doubtful if it or the subscription is older than the recording,
---     since timers may be, too. If the publisher answers, what it publishes beyond the usual number
---     per message is doubtful.
+-- description: Publications that followed a take without a callback, and may have another cause
+--     than its message. In rclpy a timer shows no event, and what it publishes follows some
+--     message, too. An answer comes once per message, and soon. So it is doubtful that a publisher
+--     answers the messages of a subscription if a timer explains the publisher
+--     (derive.timed_publisher), if its own intervals are steadier than its delay after the takes,
+--     or if the number of publications per message differs. Intervals with a gap do not count if
+--     five others are left. Only messages after which the publisher published count. Fewer than
+--     five prove nothing: then the publisher is doubtful if it or the subscription is older than
+--     the recording, since a timer may then be older than the recording as well. If the publisher
+--     answers, what it publishes beyond the usual number per message is doubtful.
 -- grain: one row per publication that is not surely an answer
 -- param: only_run BIGINT  Run to look at
 -- param: links VARCHAR  Name of the rows of derive.link_causal_take_adjacent

@@ -1,7 +1,7 @@
 -- name: staging.later_initialisation
--- description: Initialisations of ROS that are not the first event of their process, which most
---     are. `is_other_main`: by another thread, or under another name, than the one before.
---     `gap_ns`: begin of the first gap behind it.
+-- description: Initialisations of ROS before which their process already had an event. Most have
+--     none, and are left out. `is_other_main`: by another thread, or under another name, than the
+--     one before. `gap_ns`: begin of the first gap after it.
 -- grain: one row per such rcl_init
 -- when: raw.ros2_rcl_init
 WITH initialisation AS (

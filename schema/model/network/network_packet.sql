@@ -5,8 +5,9 @@
 --     acknowledgement numbers, for UDP the length. The checksum identifies a UDP datagram without
 --     identification. TCP segments count without their length, since a network card cuts or joins
 --     them on the way, and without their checksum, which it fills in: the first of them still is
---     not received before all were sent. NULL: a later fragment, or nothing tells the packet from
---     others; what stays on its host (127.0.0.0/8, ::1) does not tell of others.
+--     not received before all were sent. NULL for a later fragment, for a packet that looks like
+--     others, and for one that stays on its host (127.0.0.0/8, ::1), which tells nothing of other
+--     clocks.
 -- grain: one row per packet sent or received on a host
 -- when: raw.net_dev_queue, raw.net_if_receive_skb
 WITH recorded AS (

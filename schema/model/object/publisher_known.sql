@@ -1,7 +1,8 @@
 -- name: staging.publisher_known
 -- description: Publishers whose rcl initialisation was traced, with their rmw handle, their GID
 --     (first 16 bytes; all zeros: none) and, where DDS is instrumented, their writer: by GID, or
---     where one of the two has none, by topic. A writer is that of one publisher.
+--     where one of the two has none, by topic. Each writer belongs to one
+--     publisher.
 -- grain: one row per rcl_publisher_init
 -- when: raw.ros2_rcl_publisher_init
 WITH rmw_init AS (

@@ -1,7 +1,7 @@
 -- name: staging.declared_tid
 -- description: Ids of threads in PID namespaces, as kernel traces declare them: in contexts of
---     switches, when a recording begins, and when a thread is created. What was still so later has
---     `until_ns`.
+--     switches (`source` is 'context'), when a recording begins ('state dump'), and when a thread
+--     is created ('fork'). What was still so later has `until_ns`.
 -- grain: one row per declaration
 -- when: staging.schedule
 WITH dump AS (

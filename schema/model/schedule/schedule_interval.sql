@@ -2,6 +2,7 @@
 -- description: What each thread of a ROS process did, from switch to switch and waking. A waking
 --     may come before the switch that it undoes. What the next switch contradicts is not known. A
 --     thread that is seen on a CPU without a switch to it got it at some time since its waking.
+--     `cpu` is the one that the thread ran on, or left; `next_cpu` the one on which it goes on.
 -- grain: one row per interval in which a thread had one state
 -- when: staging.thread_switch
 WITH extent AS (

@@ -2,8 +2,9 @@
 -- description: The number that the kernel has for each thread. A declaration counts: contexts of
 --     switches while its process lived, else the latest of the state dump and its creation; unless
 --     it is of several threads or the schedule contradicts it. Else it is what ran on the CPU at
---     most events of the thread. It means this thread from `from_ns` until `until_ns`, where it
---     means the next one.
+--     most events of the thread. `source` says which: 'context', 'state dump', 'fork' or
+--     'schedule'. The number means this thread from `from_ns` on, and the next one from `until_ns`
+--     on.
 -- grain: one row per thread of a process life and number
 -- when: staging.schedule
 WITH ran AS (

@@ -1,7 +1,9 @@
 -- name: staging.thread_waking
 -- description: When threads of ROS processes were woken, and by what: the interrupt that the CPU
 --     was handling, else the thread that ran there. A switch ends every interrupt. Where the kernel
---     trace contradicts itself about what ran, only a thread that is seen there is known.
+--     trace contradicts itself about what ran, only a thread that is seen there is known. `kind` is
+--     'thread', 'timer', 'interrupt' or 'softirq'; NULL: not known. `waker_tid` is the thread that
+--     woke it, or that was interrupted.
 -- grain: one row per waking of such a thread
 -- when: staging.thread_tid
 WITH waking AS (

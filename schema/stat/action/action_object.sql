@@ -1,13 +1,13 @@
 -- name: derive.action_object
 -- kind: macro
--- description: Action servers or clients, put together from their objects: rcl creates these one
---     right after the other, the one of send_goal first. So the others are the first ones of their
---     names that the process created from then on.
+-- description: Action servers or clients, put together from their objects. rcl creates these one
+--     right after the other, the one of send_goal first: the others are the first of their names
+--     that the process created at that time or later.
 -- grain: one row per action server, or per action client
 -- param: endpoints VARCHAR  Name of the rows of derive.action_endpoint
 -- param: of_calls VARCHAR  Kind of the objects of calls: 'service' of servers, 'client' of clients
--- param: of_topics VARCHAR  Kind of those of topics: 'publisher' of servers, 'subscription' of
---     clients
+-- param: of_topics VARCHAR  Kind of the objects of topics: 'publisher' of servers,
+--     'subscription' of clients
 CREATE OR REPLACE MACRO derive.action_object(endpoints, of_calls, of_topics) AS TABLE
 SELECT
     g.run_id, g.process_id, g.node_id, g.action_name, g.created_ns,
