@@ -28,7 +28,7 @@ _ROWS_AT_ONCE = 50_000
 
 
 def read_bag(bag: Path) -> Iterator[pa.Table]:
-    """Yield the messages of a bag in the order of their receipt, at least one table.
+    """Yield the messages of a bag in the order of their receipt, in one table or more.
 
     Yields:
         Tables with `message` (number), `topic_name`, `type_name`, `received_ns`, `size_bytes` (of
@@ -45,10 +45,10 @@ def read_bag(bag: Path) -> Iterator[pa.Table]:
     if not bag.exists():
         raise TraceError(f"no such bag — {bag}", "give the directory of a rosbag2")
     try:
-        # Bags before Iron do not have their types: those of ROS itself are known.
+        # Bags from before Iron do not hold their types. The reader knows those of ROS itself.
         with AnyReader([bag], default_typestore=get_typestore(Stores.LATEST)) as reader:
             yield from _tables(reader)
-    except Exception as error:  # what its parsers meet in a damaged file has no common class
+    except Exception as error:  # what its parsers raise in a damaged file has no common class
         said = str(error).strip().splitlines()
         raise TraceError(
             f"cannot read as a bag of ROS 2: {said[0] if said else type(error).__name__} — {bag}",

@@ -1,4 +1,4 @@
-"""Derivation of links: rows of objects in `derive` are stored in the tables of their names."""
+"""Derivation of links: rows of an object in `derive` are stored in the table of its name."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def _derive_on_clocks(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
 def derive_findings(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
     """Find anew what a recording shows, inside the open transaction."""
     kinds = kinds_of("recording")
-    # Each is asked once for all kinds.
+    # Each source is asked once, for all kinds that name it.
     sources = dict.fromkeys(source for kind in kinds for source in kind.sources)
     filled = {source for source in sources if _has_row(con, source, run_id)}
     found = [kind for kind in kinds if not kind.sources or filled.intersection(kind.sources)]
@@ -122,7 +122,7 @@ def derive_table(con: duckdb.DuckDBPyConnection, name: str, run_id: int) -> None
 
 
 def _may_have_rows(con: duckdb.DuckDBPyConnection, header: Header, run_id: int) -> bool:
-    """Tell whether an object may have rows of a run, by what `when` of its header says."""
+    """Tell whether an object may have rows of a run, as the `when` of its header says."""
     return not header.sources or any(_has_row(con, source, run_id) for source in header.sources)
 
 
@@ -136,7 +136,7 @@ def _has_row(con: duckdb.DuckDBPyConnection, source: tuple[str, str], run_id: in
 
 
 def _united(con: duckdb.DuckDBPyConnection, header: Header, run_id: int) -> str:
-    """Return the WITH clause for what an object unites, as far as it may have rows."""
+    """Return the WITH clause for the objects that one unites, of those that may have rows."""
     if not header.unites:
         return ""
     parts = [name for name in header.unites if _may_have_rows(con, _header(name), run_id)]

@@ -53,7 +53,7 @@ class Target:
         name: its name in the file, else the words that choose its subject.
         topics: topics of a path, in order; empty for a path that only has a name.
         path_name: name of a path in the file with named paths.
-        chosen: fields that choose rows, by name: names or patterns.
+        chosen: names or patterns that choose rows, by the name of the field.
         requirements: at least one.
     """
 
@@ -134,7 +134,7 @@ def _kind(file: YamlFile, node: Any) -> str:
     if node.id != "mapping":
         file.fail(line_of(node), "a target is not a mapping", _EXAMPLE)
     names = [key.value for key, _ in node.value if key.id == "scalar"]
-    # A timer may be chosen by its callback, and so on: the first key of SUBJECTS is the kind.
+    # A timer may be chosen by its callback, for example: the first key in SUBJECTS is the kind.
     found = [kind for kind in SUBJECTS if kind in names]
     if not found:
         near = [kind for name in names for kind in nearest(str(name), (*SUBJECTS,))]

@@ -1,6 +1,6 @@
 -- name: overlap.coverage
 -- kind: inline
--- description: The time in which a session recorded each CPU.
+-- description: The time in which a session recorded programs on each CPU.
 -- grain: one row per session and CPU
 SELECT
     s.host,

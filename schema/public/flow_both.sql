@@ -1,8 +1,8 @@
 -- name: main.flow_both
 -- kind: macro
--- description: The flow of one message: everything that a publication, take, callback instance,
---     request or response caused and was caused by, and the thing itself. Other effects of its
---     causes are omitted.
+-- description: The flow of one message: a publication, take, callback instance, request or
+--     response, all that it caused, and all that caused it. Other effects of its causes are
+--     omitted.
 -- grain: one row per vertex
 -- param: start_kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or
 --     'response'

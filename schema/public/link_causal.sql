@@ -1,6 +1,6 @@
 -- name: main.link_causal
--- description: What led to each publication.
--- grain: one row per callback instance, or take without one, and publication that it led to
+-- description: What caused each publication.
+-- grain: one row per publication, and callback instance, or take without one, that caused it
 -- column: run_id
 -- column: callback_instance_id
 -- column: take_id

@@ -19,16 +19,16 @@ if TYPE_CHECKING:
 
 
 def numbers_of(streams: Iterable[Stream]) -> dict[Packet, tuple[int, int]]:
-    """Return a number for each packet, in place of the clock's value and of the time."""
+    """Return a number for each packet, twice: for the clock's value, and for the time."""
     packets = (packet for stream in streams for packet in stream.packets)
     return {packet: (number, number) for number, packet in enumerate(packets)}
 
 
 def begins_of(stream: Stream) -> dict[Packet, tuple[int, int]]:
-    """Return the clock's value in front of each packet, and the time of its first event.
+    """Return the clock's value before each packet, and the time of its first event.
 
-    Nothing if the packets say themselves when they begin. The clock goes on from packet to
-    packet, so all of the stream must be looked at.
+    The result is empty if all packets say when they begin. The clock goes on from packet to
+    packet, so all of the stream must be read.
     """
     if all(packet.header.begin is not None for packet in stream.packets):
         return {}
@@ -52,7 +52,7 @@ def begins_of(stream: Stream) -> dict[Packet, tuple[int, int]]:
 def end_of(stream: Stream, packet: Packet) -> int | None:
     """Return the clock's value at the end of a packet, None if it has none.
 
-    A crash leaves packets that do not know their end: it is then that of the last event.
+    A packet that a crash cut off does not know its end: its last event tells it.
     """
     header = packet.header
     if header.end or header.end is None or not header.begin:
@@ -62,7 +62,7 @@ def end_of(stream: Stream, packet: Packet) -> int | None:
 
 
 def _clock_values(stream: Stream, packet: Packet, begin: int) -> NDArray[np.uint64]:
-    """Return the times of a packet's events; later reading reports its damage."""
+    """Return the clock's values of a packet's events; a later reading reports its damage."""
     loader = Loader()
     entry = Entry(stream, packet, 0, begin, 0, 0, 0)
     try:

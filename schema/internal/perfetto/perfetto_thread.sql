@@ -6,7 +6,7 @@
 -- column: track BIGINT  Its track
 -- column: parent BIGINT  Track of its process
 -- column: pid BIGINT  Pid that Perfetto knows the process by
--- column: tid BIGINT  Its tid, or a number of its own where several have that tid
+-- column: tid BIGINT  Its tid, or a number of its own where several threads have that tid
 -- column: name VARCHAR  What Perfetto calls it
 -- column: has_states BOOLEAN  States of an executor were recorded on it
 -- column: state_track BIGINT  Their track

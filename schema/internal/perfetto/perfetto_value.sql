@@ -1,7 +1,7 @@
 -- name: internal.perfetto_value
 -- title: Values of counters in Perfetto
--- description: Rates from each publication to the one before; messages that were published and
---     later taken.
+-- description: The rate of each publisher, from the time since its publication before; and how many
+--     messages of each subscription were published and not yet taken, of those that it took later.
 -- grain: one row per value
 -- param: run_id BIGINT  Run
 -- param: start_ns BIGINT  Begin of the window, epoch ns
@@ -9,7 +9,7 @@
 -- column: track BIGINT  Track of the counter
 -- column: at_ns BIGINT [epoch ns]  When
 -- column: value DOUBLE  In the unit of the track
--- column: place BIGINT  Order of what is at one moment
+-- column: place BIGINT  Order of the values of one moment
 WITH rate AS (
     SELECT
         publisher_id * 8 + 4 AS track, start_ns AS at_ns,

@@ -1,7 +1,7 @@
 -- name: derive.link_causal
 -- kind: macro
--- description: Which callback instance made each publication. A link may be spoilt by lost events
---     where a gap touches the instance or the publication.
+-- description: Which callback instance made each publication. Lost events may spoil a link where a
+--     gap touches the instance or the publication.
 -- grain: one row per publication made inside a callback instance
 -- also: derive.link_causal_by_hand, derive.link_causal_annotated
 -- param: only_run BIGINT  Run to look at

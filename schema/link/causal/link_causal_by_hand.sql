@@ -1,19 +1,19 @@
 -- name: derive.link_causal_by_hand
 -- kind: macro
--- description: Publications that messages led to which no callback was called with: what a thread
+-- description: Publications caused by messages that no callback was called with: what a thread
 --     publishes after such a take (`take_adjacent`), and what a callback instance publishes after
---     it (`polled`). What may be no answer to the message before it has one candidate more:
---     nothing. So has what a thread published after it slept since the take, where a kernel trace
---     shows it: it probably waited for something else in between. Files of links may declare that
---     a publisher answers a subscription (`direct`): then there is no doubt.
--- grain: one row per take, and publication that it led to
+--     it (`polled`). A publication that may be no answer to the message before it has one candidate
+--     more: nothing. The same holds if the thread slept between the take and the publication, where
+--     a kernel trace shows that: it probably waited for something else. Files of links may declare
+--     that a publisher answers a subscription (`direct`). Then there is no doubt.
+-- grain: one row per take, and publication that it caused
 -- when: derive.take_by_hand
 -- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.link_causal_by_hand(only_run) AS TABLE
 WITH adjacent AS MATERIALIZED (
     FROM derive.link_causal_take_adjacent(only_run)
 ),
--- A thread that waits begins a new turn: the last sleep before the publication tells.
+-- Publications whose thread slept after the take: it then began something new.
 slept AS (
     SELECT a.publication_id
     FROM adjacent AS a

@@ -1,11 +1,12 @@
 -- name: derive.link_causal_take_adjacent
 -- kind: macro
--- description: Publications that a thread makes after it took a message by hand (rclpy, rclc,
---     wait sets), until its next take, also of a request or a response. The link ends where a
---     callback is seen to begin or end or an executor to go on, and at a gap. What is published
---     inside a callback instance is caused by that instance instead, and what the middleware
---     publishes by itself (without a publisher, and nothing was lost) by nothing. Timers of rclpy
---     do not show: what they publish is among the rows, and derive.answer_doubtful tells it apart.
+-- description: Publications that a thread makes after it took a message by hand (rclpy, rclc, wait
+--     sets), until its next take. A take of a request or a response counts, too. The link ends at
+--     the begin or end of a callback, at the next event of an executor, and at a gap. What is
+--     published inside a callback instance is caused by that instance instead. What the middleware
+--     publishes by itself (it has no publisher, though nothing was lost) has no cause. Timers of
+--     rclpy do not show: what they publish is among the rows, and derive.answer_doubtful tells it
+--     apart.
 -- grain: one row per publication made after a take without a callback
 -- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.link_causal_take_adjacent(only_run) AS TABLE
@@ -16,7 +17,7 @@ WITH by_hand AS (
 busy AS (
     SELECT DISTINCT run_id, thread_id FROM by_hand
 ),
--- What a thread turns to: a message of its own, or something else.
+-- What a thread turned to: a message that it took by hand, or something else.
 turn AS (
     SELECT run_id, thread_id, event_id, take_id, subscription_id, taken_ns FROM by_hand
     UNION ALL

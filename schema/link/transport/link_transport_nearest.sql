@@ -1,11 +1,12 @@
 -- name: derive.link_transport_nearest
 -- kind: macro
 -- description: Takes of the messages whose publication was found by time. A subscription takes a
---     message once, and those of a publisher in the order in which they were published: what
---     seems to be older than one taken before was stamped after the clock had been set back. Once
---     it was set back, what fits a greater difference than can be fits by chance, unless the clock
---     is known to have been behind meanwhile, and was set forward again. The link is doubtful
---     where events may be lost around the moment of publishing.
+--     message once, and those of a publisher in the order in which they were published. A message
+--     that seems older than one taken before was stamped after the clock had been set back: it has
+--     no row. After that, a message whose stamp is further from its publication than the clock then
+--     allows fits by chance. It has no row either, unless the clock is known to have been behind
+--     meanwhile: then it was set forward again. The link is doubtful where events may be lost
+--     around the moment of publishing.
 -- grain: one row per take whose publication is known by time
 -- when: store.nearest_message
 -- param: only_run BIGINT  Run to look at
@@ -31,8 +32,9 @@ sent AS MATERIALIZED (
     FROM received AS r
     JOIN store.publication AS b ON r.publication_id = b.publication_id
     WHERE b.run_id = only_run
-    -- Threads that take messages of one subscription may be held up. The latest publication counts,
-    -- not that of the take before: after a jump, many takes seem to be old, and in their order.
+    -- Threads that take messages of one subscription may be held up. Each take is compared with the
+    -- latest publication, not with that of the take before: after a jump, many takes seem to be
+    -- old, but follow each other in order.
     QUALIFY max(b.end_ns) OVER (
         PARTITION BY r.subscription_id, b.publisher_id ORDER BY r.taken_ns, r.take_id
         ROWS UNBOUNDED PRECEDING

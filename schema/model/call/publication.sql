@@ -3,7 +3,7 @@
 -- description: Publications, numbered in the order of their calls, with their publisher.
 -- grain: one row per publish() call
 
--- An end without a begin says nothing of where its thread is; what came before it does.
+-- The end of a callback without its begin does not say where the thread is. What came before does.
 WITH stray AS (
     SELECT c.start_event_id, c.thread_id
     FROM staging.publication_call AS c
@@ -26,7 +26,7 @@ placed AS (
 elsewhere AS (
     SELECT thread_id, event_id FROM staging.callback_gap WHERE NOT is_between
 ),
--- With a gap of other CPUs between its events: they may be of two.
+-- Calls with a gap of other CPUs between their events, which may belong to two calls.
 interrupted AS (
     SELECT c.start_event_id
     FROM (

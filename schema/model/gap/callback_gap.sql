@@ -1,7 +1,8 @@
 -- name: staging.callback_gap
--- description: Gaps that threads have seen while they made calls, or that the CPUs had which they
---     may have visited meanwhile. The former are numbered on each thread.
--- grain: one row per event of a call behind a gap
+-- description: Gaps before events of calls. Either the gap interrupts the record of the thread
+--     (`is_between`), or it is on other CPUs, which the thread may have visited meanwhile.
+--     `segment` numbers the former on each thread.
+-- grain: one row per event of a call after a gap
 -- when: staging.near_gap
 SELECT
     g.event_id,

@@ -1,5 +1,6 @@
 -- name: staging.gap
--- description: Gaps of the traces: what was lost of them, and when nothing was recorded.
+-- description: Gaps of the traces: stretches in which events were lost, and pauses, in which
+--     nothing was recorded.
 -- grain: one row per gap in a recording
 -- when: staging.loss, staging.pause
 SELECT trace_id, cpu, kind, start_ns, end_ns, event_count FROM staging.loss

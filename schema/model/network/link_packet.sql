@@ -1,8 +1,9 @@
 -- name: staging.link_packet
--- description: Packets seen being sent on one clock and received on another. Roughly how far two
---     clocks are apart is what most ends of equal keys agree on to within a second, those of the
---     rarest keys, unless another difference does nearly as well; two ends of a key belong together
---     where they are within one second of that.
+-- description: Packets that were seen being sent on one clock and received on another. To find
+--     roughly how far two clocks are apart, the times of ends with equal keys are compared, of the
+--     rarest keys first. The difference that most of them agree on to within a second counts,
+--     unless another one does nearly as well. Two ends of a key belong together if their difference
+--     is within a second of that.
 -- grain: one row per packet and clock that received it
 -- when: staging.single_packet
 WITH counted AS (
@@ -57,7 +58,8 @@ apart AS (
     GROUP BY e.from_clock_id, e.to_clock_id, e.shift_ns, e.votes
     HAVING coalesce(max(o.votes), 0) * 1.2 <= e.votes
 ),
--- When it should be received; a second before or after that is the same or a neighbouring second.
+-- When each packet should be received. What is within a second of that lies in the same second or
+-- in a neighbouring one.
 due AS (
     SELECT s.event_id, s.trace_id, s.ts_ns, s.key, a.to_clock_id, s.ts_ns + a.shift_ns AS due_ns
     FROM staging.single_packet AS s

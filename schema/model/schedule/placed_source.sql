@@ -1,7 +1,8 @@
 -- name: staging.placed_source
 -- kind: inline
--- description: Traces with the clock and host that they are of, and what has to be added to their
---     times: as recorded, but for what kernel traces tell of themselves.
+-- description: Traces with their clock and host, and what has to be added to their times
+--     (`shift_ns`). All are as recorded, except for kernel traces that have a row in
+--     staging.placement.
 -- grain: one row per CTF trace
 SELECT
     s.* REPLACE (

@@ -1,7 +1,7 @@
 -- name: staging.schedule_candidate
--- description: Clocks that a kernel trace may be of, and what has to be added to its times then.
---     LTTng names the clock. perf names none: its times count from the origin of the clock, or
---     from the epoch.
+-- description: Clocks that a kernel trace may have used, and what has to be added to its times in
+--     each case. LTTng names the clock. perf names none: its times count from the origin of the
+--     clock, or from the epoch.
 -- grain: one row per kernel trace, clock of a ROS process, and shift
 -- when: raw.sched_switch
 WITH kernel AS (

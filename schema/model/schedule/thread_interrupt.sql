@@ -1,5 +1,6 @@
 -- name: staging.thread_interrupt
--- description: Interrupts that were handled while a thread of a ROS process had the CPU.
+-- description: Interrupts that were handled while a thread of a ROS process had the CPU. Those of
+--     timers are left out.
 -- grain: one row per interrupt
 -- when: raw.interrupt
 SELECT

@@ -1,6 +1,6 @@
 -- name: derive.callback_running
--- description: Stretches of time in which at least one thread of an executor of several ran a
---     callback. With the sum of all such time of the callback before.
+-- description: Stretches of time in which at least one thread of an executor with several threads
+--     ran a callback. `before_ns` is the sum of the earlier stretches of the callback.
 -- grain: one row per such stretch
 WITH run AS (
     SELECT

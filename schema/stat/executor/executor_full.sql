@@ -1,6 +1,6 @@
 -- name: derive.executor_full
--- description: Stretches of time in which all threads of an executor of several ran callbacks. With
---     the sum of all such time before.
+-- description: Stretches of time in which all threads of an executor with several threads ran
+--     callbacks. `before_ns` is the sum of the earlier stretches.
 -- grain: one row per such stretch
 WITH edge AS (
     SELECT r.run_id, r.executor_id, r.start_ns AS at_ns, 1 AS step

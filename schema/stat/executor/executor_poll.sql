@@ -1,13 +1,15 @@
 -- name: derive.executor_poll
 -- kind: macro
 -- description: The moments at which executors learned what is ready: the ends of their waits
---     (polling points). What is not found there waits for the next one. With the sum of all time
---     spent waiting before. A wait for less than a millisecond may have found something ready at
---     once; in a longer one nothing was ready when it began. What a callback that spins waits for
---     is no business of its executor.
+--     (polling points). What is not found there waits for the next one. `before_ns` is the sum of
+--     all time spent waiting before. A wait of less than a millisecond may have found something
+--     ready at once. When a longer one began, nothing was ready: `asleep_ns` is the begin of the
+--     latest such wait. Waits inside a callback that spins are left out: its executor does not
+--     learn from them.
 -- grain: one row per wait of an executor that was seen to end
--- param: executors VARCHAR  Name of rows of executor_id, until_ns: those to look at. Waits that
---     began after the last of these moments are left out (where all are NULL: none)
+-- param: executors VARCHAR  Name of rows with the executors to look at (executor_id) and moments
+--     (until_ns). Waits that began after the latest of these moments are left out, unless all
+--     are NULL
 CREATE OR REPLACE MACRO derive.executor_poll(executors) AS TABLE
 WITH wait AS (
     SELECT run_id, executor_id, thread_id, start_ns, end_ns
@@ -19,8 +21,8 @@ WITH wait AS (
             SELECT coalesce(max(until_ns), 9223372036854775807) FROM query_table(executors)
         )
 ),
--- Threads with a callback that may spin: it does not end before the next event of the executor, nor
--- did the last wait of the thread begin before it.
+-- Threads with a callback that may spin: the next event of the executor came before its end, and
+-- the thread began a wait after it had begun.
 spinning AS (
     SELECT DISTINCT i.thread_id
     FROM store.callback_instance AS i

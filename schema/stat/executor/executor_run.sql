@@ -1,8 +1,8 @@
 -- name: derive.executor_run
 -- description: The callback instances that occupied threads of executors, numbered on each thread
---     in order of time. Callback instances nested in others are part of those. So they never
---     overlap on one thread, and the sum over any stretch of time takes only two look-ups. Times
---     are those of the executor's clock.
+--     in order of time. Callback instances nested in others are part of those. So the rows of one
+--     thread never overlap, and the sum over any stretch of time takes only two look-ups. Times are
+--     those of the executor's clock.
 -- grain: one row per callback instance that is not nested in another
 SELECT
     i.run_id,
