@@ -98,13 +98,20 @@ def reads_clocks(name: str) -> bool:
 
 @cache
 def derivation_hash() -> str:
-    """Return the SHA-256 of the SQL that derives stored tables, learned topics and findings."""
+    """Return the SHA-256 of the SQL that derives stored tables, learned topics and findings.
+
+    What an object needs rows of, and what it takes together, decides as well as its statement.
+    """
     found = objects.load("health/recording")
     tables = (f"derive.{name}" for name in derived_tables())
     needs = (need for header in found for need in header.needs)
     names = objects.sources_of([_TOPICS, *tables, *needs])
     headers = [*(header for header in objects.views() if header.name in names), *found]
-    return objects.hash_of(text for header in headers for text in (header.name, header.body))
+    return objects.hash_of(
+        text
+        for header in headers
+        for text in (header.name, header.body, str((header.sources, header.also, header.unites)))
+    )
 
 
 def derive_table(con: duckdb.DuckDBPyConnection, name: str, run_id: int) -> None:

@@ -62,13 +62,13 @@ def test_only_what_reads_clocks_waits_for_them() -> None:
 def test_the_hash_follows_the_rules_that_are_stored(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = {"views": objects.views(), "load": objects.load("health/recording")}
 
-    def hashes(changed: str) -> str:
+    def hashes(changed: str, **fields: object) -> str:
         for cached in (derivation.derivation_hash, derivation.derived_tables):
             cached.cache_clear()
         with monkeypatch.context() as patched:
             for name, headers in whole.items():
                 given = [
-                    objects.replace(one, body=f"{one.body} -- changed")
+                    objects.replace(one, **(fields or {"body": f"{one.body} -- changed"}))
                     if one.name == changed
                     else one
                     for one in headers
@@ -87,6 +87,12 @@ def test_the_hash_follows_the_rules_that_are_stored(monkeypatch: pytest.MonkeyPa
         assert hashes(read) != now, read
     for not_read in ("derive.executor_busy", "main.flow_edge", "derive.finding_kind"):
         assert hashes(not_read) == now, not_read
+    # Nor is anything stored that an object leaves out, or takes together with others.
+    for field, other in (
+        ("sources", (("store.take", "method = 'x'"),)),
+        ("unites", ("main.take",)),
+    ):
+        assert hashes(links[0], **{field: other}) != now, field
     derivation.derivation_hash.cache_clear()
 
 

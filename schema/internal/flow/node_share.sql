@@ -26,7 +26,8 @@ longest AS (
     WHERE path = $path
 )
 SELECT
-    node, coalesce(node_share, 0) AS share, node_ns::BIGINT AS total_ns, part, what, median_ns, max_ns
+    node, coalesce(node_share, 0) AS share, node_ns::BIGINT AS total_ns, part, what, median_ns,
+    max_ns
 FROM longest
 WHERE is_longest
 ORDER BY total_ns DESC, node
