@@ -57,6 +57,7 @@ ONLY_RUN = re.compile(r"(\w+\.)?run_id (= (only_run|\w+\.run_id)|IN \(SELECT run
 FINDINGS = (
     "busy_waiting",
     "clock_jumps",
+    "clock_set",
     "discarded_events",
     "doubtful_answer",
     "latency_uncertain",
@@ -69,9 +70,9 @@ FINDINGS = (
 )
 # Rules about messages that are matched by time, with cases of their own.
 NEAREST = (
-    "agreed_difference", "clock_drift", "clock_set_back", "close_pair", "publication_beside_gap",
-    "sharp_difference", "standing_difference", "unstamped_call", "unstamped_message",
-    "unstamped_publication",
+    "agreed_difference", "clock_drift", "clock_set_back", "clock_step", "close_pair",
+    "publication_beside_gap", "sharp_difference", "standing_difference", "unstamped_call",
+    "unstamped_message", "unstamped_publication",
 )  # fmt: skip
 # No finding of the input says that it found nothing.
 NOTHING_FOUND = "model/test_findings.py"

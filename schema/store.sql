@@ -424,7 +424,8 @@ CREATE TABLE store.nearest_message (
     topic_name VARCHAR NOT NULL,  -- Topic of the message
     source_timestamp_ns BIGINT NOT NULL,  -- Stamp of the message, clock of ROS [epoch ns]
     publication_id BIGINT,  -- Where it came from; NULL: several could be it {to publication}
-    candidate_count BIGINT  -- Publications that it could have been
+    candidate_count BIGINT  -- Publications that it could have been; NULL: the clock was set about
+        -- then
 );
 
 -- One row per take whose publication is known

@@ -61,9 +61,11 @@ SELECT
             THEN 'events are missing'
         WHEN m.is_undecided AND m.reason = 'publisher_gap' AND m.is_beside_hole
             THEN 'events are missing'
-        WHEN m.is_twin AND m.reason IN ('ambiguous', 'publisher_not_traced', 'unknown')
+        WHEN m.is_twin
+            AND m.reason IN ('ambiguous', 'clock_set', 'publisher_not_traced', 'unknown')
             THEN 'another message has its stamp'
-        WHEN m.is_unseen AND m.reason IN ('ambiguous', 'publisher_not_traced', 'unknown')
+        WHEN m.is_unseen
+            AND m.reason IN ('ambiguous', 'clock_set', 'publisher_not_traced', 'unknown')
             THEN 'a stream is missing'
         WHEN m.truth = 'sent, no event' AND m.reason = 'receiver_gap' AND m.is_torn
             THEN 'events are missing'
@@ -71,12 +73,14 @@ SELECT
             AND m.reason IN ('before_tracing', 'publisher_gap', 'publisher_trace_ends')
             AND m.is_beside_hole
             THEN 'events are missing'
-        WHEN m.truth = 'sent, no event' AND m.reason = 'ambiguous' THEN 'the link is not decided'
+        WHEN m.truth = 'sent, no event' AND m.reason IN ('ambiguous', 'clock_set')
+            THEN 'the link is not decided'
         -- Any publisher may have sent a message of a topic that is not known.
         WHEN (m.is_undecided OR m.truth = 'sent, no event') AND m.reason = 'publisher_gap'
             AND (m.is_unnamed OR m.has_silent)
             THEN 'initialisation is missing'
-        WHEN m.is_undecided AND m.reason IN ('ambiguous', 'unknown') THEN 'the link is not decided'
+        WHEN m.is_undecided AND m.reason IN ('ambiguous', 'clock_set', 'unknown')
+            THEN 'the link is not decided'
         -- Its handle may be another's by then, and what says so is missing.
         WHEN m.truth = 'recorded' AND m.reason = 'receiver_gap' AND m.is_unnamed
             THEN 'initialisation is missing'

@@ -232,17 +232,14 @@ SELECT
         WHEN k.is_before_tracing THEN 'before_tracing'
         WHEN o.take_id IN (SELECT take_id FROM stampable) THEN 'receiver_gap'
         WHEN o.stamp_ns IS NULL THEN 'no_stamp'
+        WHEN n.is_clock_set THEN 'clock_set'
         WHEN coalesce(j.is_before_tracing, o.stamp_ns < (SELECT begin_ns FROM run_begin))
             THEN 'before_tracing'
         WHEN j.has_gap THEN 'publisher_gap'
         WHEN j.has_none_left AND NOT j.has_nameless THEN 'publisher_trace_ends'
         WHEN o.take_id IN (
             SELECT take_id FROM derive.take_candidate(only_run)
-        ) OR (o.topic_name, o.stamp_ns) IN (
-            SELECT (topic_name, source_timestamp_ns)
-            FROM store.nearest_message
-            WHERE run_id = only_run AND publication_id IS NULL
-        ) THEN 'ambiguous'
+        ) OR n.is_clock_set IS NOT NULL THEN 'ambiguous'
         WHEN o.take_id IN (SELECT take_id FROM replaced) THEN 'receiver_gap'
         WHEN j.take_id IS NULL OR NOT (j.has_absent OR j.has_stampless)
             THEN 'publisher_not_traced'
@@ -251,3 +248,8 @@ SELECT
 FROM orphan AS o
 LEFT JOIN judged AS j ON o.take_id = j.take_id
 LEFT JOIN kept AS k ON o.take_id = k.take_id
+LEFT JOIN (
+    SELECT topic_name, source_timestamp_ns, candidate_count IS NULL AS is_clock_set
+    FROM store.nearest_message
+    WHERE run_id = only_run AND publication_id IS NULL
+) AS n ON o.topic_name = n.topic_name AND o.stamp_ns = n.source_timestamp_ns

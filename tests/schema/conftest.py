@@ -18,6 +18,8 @@ RULES = (
     "sharp_difference",
     "stamp_pair",
     "stamp_clock",
+    "certain_clock",
+    "clock_step",
     "publication_beside_gap",
     "nearest_message",
 )
@@ -32,8 +34,6 @@ CREATE TABLE published (run_id BIGINT DEFAULT 1, clock_id BIGINT DEFAULT 1,
 CREATE TABLE message (run_id BIGINT DEFAULT 1, topic_name VARCHAR DEFAULT '/a',
     source_timestamp_ns BIGINT, only_subscription_id BIGINT DEFAULT 0, clock_id BIGINT DEFAULT 1,
     taken_ns BIGINT);
-CREATE TABLE set_back (clock_id BIGINT DEFAULT 1, taken_ns BIGINT, step_ns BIGINT);
-CREATE MACRO derive.clock_set_back(only_run) AS TABLE FROM set_back;
 CREATE TABLE store.stamp_clock (run_id BIGINT DEFAULT 1, clock_id BIGINT DEFAULT 1, at_ns BIGINT,
     start_ns BIGINT, end_ns BIGINT, difference_ns BIGINT DEFAULT 0, drift_ppb BIGINT DEFAULT 0,
     message_count BIGINT DEFAULT 100, segment BIGINT DEFAULT 0, is_sharp BOOLEAN DEFAULT true);

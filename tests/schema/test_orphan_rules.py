@@ -36,7 +36,8 @@ CREATE TABLE store.process (process_id BIGINT, host_id BIGINT DEFAULT 1,
     first_seen_ns BIGINT DEFAULT {100 * MS}, last_seen_ns BIGINT DEFAULT {900 * MS});
 CREATE TABLE store.trace (run_id BIGINT DEFAULT 1, domain VARCHAR, start_ns BIGINT);
 CREATE TABLE store.nearest_message (run_id BIGINT DEFAULT 1, topic_name VARCHAR DEFAULT '/a',
-    source_timestamp_ns BIGINT DEFAULT {STAMP}, publication_id BIGINT);
+    source_timestamp_ns BIGINT DEFAULT {STAMP}, publication_id BIGINT,
+    candidate_count BIGINT DEFAULT 2);
 CREATE TABLE derive.stamp_shift (run_id BIGINT DEFAULT 1, host_id BIGINT DEFAULT 1, from_ns BIGINT,
     shift_ns BIGINT, greatest_shift_ns BIGINT);
 CREATE TABLE derive.process_presence (run_id BIGINT DEFAULT 1, process_id BIGINT DEFAULT 1,
@@ -448,6 +449,27 @@ def test_several_messages_may_be_it(con: duckdb.DuckDBPyConnection, statement: s
     assert reason(con, TAKE, SENDER, RECORDED, statement) == "ambiguous"
     assert reason(con, seen_until(STAMP - 1)) == "publisher_trace_ends"
     assert reason(con, missed(STAMP, STAMP)) == "publisher_gap"
+
+
+@pytest.mark.parametrize(
+    ("topic", "stamp", "expected"),
+    [
+        ("/a", STAMP, "clock_set"),
+        ("/a", STAMP + 1, "publisher_not_traced"),
+        ("/b", STAMP, "publisher_not_traced"),
+    ],
+)
+def test_the_clock_was_set(
+    con: duckdb.DuckDBPyConnection, topic: str, stamp: int, expected: str
+) -> None:
+    """When the message was stamped is not known then, so neither a gap nor an end says more."""
+    statement = (
+        "INSERT INTO store.nearest_message (topic_name, source_timestamp_ns, candidate_count) "
+        f"VALUES ('{topic}', {stamp}, NULL)"
+    )
+    assert reason(con, TAKE, SENDER, RECORDED, statement) == expected
+    if expected == "clock_set":
+        assert reason(con, missed(STAMP, STAMP), seen_until(STAMP - 1)) == "clock_set"
 
 
 @pytest.mark.parametrize(

@@ -63,7 +63,10 @@ Table(
         "Where it came from; NULL: several could be it",
         to="publication.publication_id",
     ),
-    number("candidate_count", "Publications that it could have been"),
+    number(
+        "candidate_count",
+        "Publications that it could have been; NULL: the clock was set about then",
+    ),
     comment="One row per message that one publication or several fit by time",
 )
 

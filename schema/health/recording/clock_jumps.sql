@@ -1,14 +1,13 @@
 -- name: finding.clock_jumps
 -- title: The clock of a host was set while recording
--- description: The clock that stamps messages stepped against the clock of the trace. Matching by
---     equal stamps is not affected. Latencies measured by stamps are, and matching by time near the
---     step may be. Where messages are matched by time, steps of a few microseconds show; elsewhere
---     those of more than 100 ms.
+-- description: The clock that stamps messages stepped against the clock of the trace by more than
+--     100 ms. Matching by equal stamps is not affected. Latencies measured by stamps are. Where
+--     messages are matched by time, the finding clock_set says so.
 -- cause: NTP or a user set the clock of the host (the trace follows a clock that cannot be set).
 -- cure: Let the clock settle before recording (chronyc waitsync), and slew instead of step.
 -- grain: one row per host
 -- severity: warning
-WITH stamped AS (
+WITH step AS (
     SELECT
         run_id, host_id,
         shift_ns - lag(shift_ns) OVER (PARTITION BY host_id ORDER BY from_ns) AS step_ns
@@ -19,26 +18,6 @@ WITH stamped AS (
         JOIN store.stamp_clock AS c ON h.clock_id = c.clock_id
         WHERE c.message_count > 0
     )
-),
-step AS (
-    SELECT run_id, host_id, step_ns
-    FROM stamped
-    -- A clock that is slewed moves by 5 ms in ten seconds (adjtime: 500 ppm); the rest is for
-    -- stamps of threads that had to wait for the CPU.
-    WHERE abs(step_ns) > 100_000_000
-    UNION ALL
-    SELECT c.run_id, h.host_id, c.step_ns
-    FROM (
-        SELECT
-            run_id, clock_id, segment,
-            difference_ns - lag(difference_ns) OVER on_clock AS step_ns,
-            lag(segment) OVER on_clock AS previous_segment
-        FROM store.stamp_clock
-        WHERE message_count > 0
-        WINDOW on_clock AS (PARTITION BY clock_id ORDER BY at_ns)
-    ) AS c
-    JOIN store.host AS h ON c.clock_id = h.clock_id
-    WHERE c.segment > c.previous_segment
 )
 SELECT
     s.run_id,
@@ -55,4 +34,7 @@ SELECT
     ) AS detail
 FROM step AS s
 JOIN main.host AS h ON s.host_id = h.host_id
+-- A clock that is slewed moves by 5 ms in ten seconds (adjtime: 500 ppm); the rest is for stamps of
+-- threads that had to wait for the CPU.
+WHERE abs(s.step_ns) > 100_000_000
 GROUP BY s.run_id, h.host_id, h.hostname

@@ -9,11 +9,9 @@
 --     it was published; of those within a burst, to the one with most messages, of equal ones to
 --     the greatest. If messages were taken on other clocks, nothing says which of several
 --     differences is right. If messages taken on this clock could as well be those of later
---     publications, the clock may have jumped by a period, and nothing is known, unless a message
---     was older than the one taken before it by as much as such a jump.
+--     publications, the clock may have jumped by a period, and nothing is known.
 -- grain: one row per clock and stretch of time; message_count is 0 where nothing is known
--- param: regions VARCHAR  Rows as of derive.agreed_difference, is_taken_here, stretch_ns,
---     steps_ns (by how much it may have been set back; NULL: not at all)
+-- param: regions VARCHAR  Rows as of derive.agreed_difference, is_taken_here, stretch_ns
 CREATE OR REPLACE MACRO derive.followed_difference(regions) AS TABLE
 WITH RECURSIVE preferred AS (
     SELECT
@@ -51,7 +49,6 @@ ballot AS MATERIALIZED (
         CASE WHEN any_value(r.is_taken_here)
             THEN min(r.difference_ns) + derive.clock_limit().burst_ns END AS latest_ns,
         any_value(r.most_count) AS most_count,
-        any_value(r.steps_ns) AS steps_ns,
         list(
             struct_pack(
                 vote_count := r.vote_count,
@@ -78,12 +75,10 @@ ballot AS MATERIALIZED (
     GROUP BY r.clock_id, r.stretch
 ),
 followed (
-    clock_id, number, stretch, difference_ns, message_count, segment, since_stretch, is_begun,
-    steps_ns, is_doubtful
+    clock_id, number, stretch, difference_ns, message_count, segment, since_stretch, is_begun
 ) AS (
     SELECT
-        clock_id, 0::BIGINT, stretch, 0::BIGINT, 0::BIGINT, 0::BIGINT, stretch, false,
-        []::BIGINT[], false
+        clock_id, 0::BIGINT, stretch, 0::BIGINT, 0::BIGINT, 0::BIGINT, stretch, false
     FROM ballot
     WHERE number = 1
     UNION ALL
@@ -91,77 +86,47 @@ followed (
         clock_id,
         number,
         stretch,
+        coalesce(near.difference_ns, jump_ns, previous_ns),
         CASE
-            WHEN is_shown THEN jump_ns
-            ELSE coalesce(near.difference_ns, jump_ns, previous_ns)
-        END,
-        CASE
-            WHEN is_shown THEN most_count
-            WHEN is_doubtful THEN 0
+            WHEN near.difference_ns > latest_ns THEN 0
             WHEN near IS NOT NULL THEN near.vote_count
             WHEN jump_ns IS NOT NULL THEN most_count
             ELSE 0
         END,
-        CASE
-            WHEN is_shown OR near IS NULL AND jump_ns IS NOT NULL THEN segment + 1
-            ELSE segment
-        END,
+        CASE WHEN near IS NULL AND jump_ns IS NOT NULL THEN segment + 1 ELSE segment END,
         CASE WHEN near IS NULL AND jump_ns IS NULL THEN since_stretch ELSE stretch END,
-        is_begun OR near IS NOT NULL OR jump_ns IS NOT NULL,
-        steps_ns,
-        is_doubtful
+        is_begun OR near IS NOT NULL OR jump_ns IS NOT NULL
     FROM (
         SELECT
-            *,
-            coalesce(near.difference_ns > latest_ns, false) AS is_doubtful,
-            is_doubtful AND len(
-                list_filter(
-                    list_concat(previous_steps_ns, steps_ns),
-                    lambda s: abs(jump_ns - previous_ns - s) <= derive.clock_limit().burst_ns
-                )
-            ) > 0 AS is_shown
-        FROM (
-            SELECT
-                b.clock_id, b.number, b.stretch, b.latest_ns, b.most_count, b.steps_ns,
-                CASE WHEN b.has_later OR b.is_short AND NOT f.is_begun THEN b.jump_ns END
-                    AS jump_ns,
-                f.difference_ns AS previous_ns, f.segment, f.since_stretch, f.is_begun,
-                f.steps_ns AS previous_steps_ns,
-                list_max(
-                    list_transform(
-                        list_filter(
-                            b.regions,
-                            lambda r: greatest(
-                                r.least_ns - f.difference_ns, f.difference_ns - r.greatest_ns
-                            ) <= (b.stretch - f.since_stretch + 1) * b.wander_ns
-                                AND (
-                                    r.vote_count >= derive.clock_limit().quorum
-                                    OR NOT f.is_begun
-                                    AND f.difference_ns BETWEEN r.least_ns AND r.greatest_ns
-                                )
-                        ),
-                        lambda r: struct_pack(
-                            vote_count := r.vote_count,
-                            closeness := -abs(r.difference_ns - f.difference_ns),
-                            difference_ns := r.difference_ns
-                        )
+            b.clock_id, b.number, b.stretch, b.latest_ns, b.most_count,
+            CASE WHEN b.has_later OR b.is_short AND NOT f.is_begun THEN b.jump_ns END
+                AS jump_ns,
+            f.difference_ns AS previous_ns, f.segment, f.since_stretch, f.is_begun,
+            list_max(
+                list_transform(
+                    list_filter(
+                        b.regions,
+                        lambda r: greatest(
+                            r.least_ns - f.difference_ns, f.difference_ns - r.greatest_ns
+                        ) <= (b.stretch - f.since_stretch + 1) * b.wander_ns
+                            AND (
+                                r.vote_count >= derive.clock_limit().quorum
+                                OR NOT f.is_begun
+                                AND f.difference_ns BETWEEN r.least_ns AND r.greatest_ns
+                            )
+                    ),
+                    lambda r: struct_pack(
+                        vote_count := r.vote_count,
+                        closeness := -abs(r.difference_ns - f.difference_ns),
+                        difference_ns := r.difference_ns
                     )
-                ) AS near
-            FROM followed AS f
-            JOIN ballot AS b ON f.clock_id = b.clock_id AND f.number + 1 = b.number
-        )
+                )
+            ) AS near
+        FROM followed AS f
+        JOIN ballot AS b ON f.clock_id = b.clock_id AND f.number + 1 = b.number
     )
 )
-SELECT
-    f.clock_id, f.stretch, f.difference_ns,
-    -- If the clock was set back by whole periods in this stretch, all messages fit the old
-    -- difference, those behind the step by chance.
-    CASE
-        WHEN len(f.steps_ns) > 0
-            AND lead(f.is_doubtful) OVER (PARTITION BY f.clock_id ORDER BY f.stretch) THEN 0
-        ELSE f.message_count
-    END AS message_count,
-    f.segment
+SELECT f.clock_id, f.stretch, f.difference_ns, f.message_count, f.segment
 FROM followed AS f
 JOIN ballot AS b ON f.clock_id = b.clock_id AND f.number = b.number
 WHERE f.message_count > 0 OR b.most_count >= derive.clock_limit().quorum

@@ -17,55 +17,32 @@
 -- param: only_run BIGINT  Run to look at
 -- when: store.stamp_clock
 CREATE OR REPLACE MACRO derive.nearest_message(only_run) AS TABLE
--- A clock does not jump there and back within a stretch. If a single stretch tells nothing, the
--- clock went on between those beside it.
-WITH observed AS (
-    SELECT
-        clock_id, at_ns, start_ns, difference_ns, drift_ppb, message_count, segment, is_sharp,
-        (lag(difference_ns) OVER on_clock + lead(difference_ns) OVER on_clock) // 2 AS between_ns,
-        (lag(drift_ppb) OVER on_clock + lead(drift_ppb) OVER on_clock) // 2 AS between_ppb,
-        message_count = 0 AND coalesce(
-            lag(message_count) OVER on_clock > 0
-            AND lead(message_count) OVER on_clock > 0
-            AND lag(segment) OVER on_clock = lead(segment) OVER on_clock,
-            false
-        ) AS is_between
-    FROM store.stamp_clock
-    WHERE run_id = only_run
-    WINDOW on_clock AS (PARTITION BY clock_id ORDER BY at_ns)
+WITH course AS MATERIALIZED (
+    FROM derive.certain_clock(only_run)
 ),
--- Before a stretch that is not known, the clock may have been set already.
-course AS (
+step AS MATERIALIZED (
+    FROM derive.clock_step(only_run)
+),
+started AS (
     SELECT
-        clock_id, at_ns, start_ns, drift_ppb, state, row_number() OVER on_clock = 1 AS is_first,
-        lag(state) OVER on_clock AS before,
-        lead(state) OVER on_clock AS after
-    FROM (
-        SELECT
-            clock_id, at_ns, start_ns,
-            CASE WHEN is_between THEN between_ppb ELSE drift_ppb END AS drift_ppb,
-            struct_pack(
-                difference_ns := CASE WHEN is_between THEN between_ns ELSE difference_ns END,
-                segment := segment,
-                is_sharp := coalesce(is_sharp, true),
-                is_known := (message_count > 0 OR is_between)
-                    AND coalesce(lead(message_count > 0 OR is_between) OVER on_clock, true)
-            ) AS state
-        FROM observed
-        WINDOW on_clock AS (PARTITION BY clock_id ORDER BY at_ns)
-    )
-    WINDOW on_clock AS (PARTITION BY clock_id ORDER BY at_ns)
+        * EXCLUDE (start_ns), start_ns AS first_ns,
+        CASE
+            WHEN lag(start_ns) OVER (PARTITION BY clock_id ORDER BY start_ns) IS NULL
+                THEN -9223372036854775807
+            ELSE start_ns
+        END AS start_ns
+    FROM course
 ),
 located AS (
     SELECT
         b.run_id, b.clock_id, b.topic_name, b.publisher_id, b.thread_id, b.publication_id,
-        b.written_ns, b.next_event_ns, b.has_break, c.state, c.before, c.after,
-        c.state.difference_ns
-        + round((b.written_ns - c.at_ns)::DOUBLE * c.drift_ppb / 1e9)::BIGINT AS difference_ns,
+        b.written_ns, b.next_event_ns, b.has_break, c.segment, c.is_certain,
+        c.difference_ns
+        + round((b.written_ns - c.at_ns)::DOUBLE * c.drift_ppb / 1e9)::BIGINT AS then_ns,
         -- Where the drift is not known, it may be any that clocks have, also among the messages
         -- that vote.
         CASE
-            WHEN NOT c.state.is_sharp
+            WHEN NOT c.is_sharp
                 THEN round(
                     (abs(b.written_ns - c.at_ns) + c.at_ns - c.first_ns)::DOUBLE
                     * derive.clock_limit().drift_ppb / 1e9
@@ -73,34 +50,16 @@ located AS (
             ELSE 0
         END AS wander_ns
     FROM derive.unstamped_publication(only_run) AS b
-    ASOF JOIN (
-        SELECT
-            clock_id, at_ns, drift_ppb, state, before, after, start_ns AS first_ns,
-            CASE WHEN is_first THEN -9223372036854775807 ELSE start_ns END AS start_ns
-        FROM course
-    ) AS c ON b.clock_id = c.clock_id AND b.written_ns >= c.start_ns
-),
--- Around a jump of the clock, a publication may be before or after it. A message that fits
--- publications on both sides is ambiguous. Where the clock was set back, stamps from before and
--- after the jump mix: one side is not to hide the other.
-sided AS (
-    SELECT state.segment % 3 AS side, *, difference_ns AS then_ns FROM located
-    WHERE state.is_known
-    UNION ALL
-    SELECT before.segment % 3, *, before.difference_ns FROM located
-    WHERE before.segment < state.segment AND before.is_known
-    UNION ALL
-    SELECT after.segment % 3, *, after.difference_ns FROM located
-    WHERE after.segment > state.segment AND after.is_known
+    ASOF JOIN started AS c ON b.clock_id = c.clock_id AND b.written_ns >= c.start_ns
 ),
 published AS MATERIALIZED (
     SELECT
-        side, clock_id, topic_name, publisher_id, thread_id, publication_id, written_ns,
+        segment, clock_id, topic_name, publisher_id, thread_id, publication_id, written_ns,
         written_ns + then_ns AS opens_ns,
         next_event_ns + then_ns AS closes_ns,
         next_event_ns IS NOT NULL AND NOT has_break AS goes_on,
         lag(next_event_ns + then_ns) OVER (
-            PARTITION BY side, publisher_id, thread_id ORDER BY written_ns, publication_id
+            PARTITION BY segment, publisher_id, thread_id ORDER BY written_ns, publication_id
         ) AS closed_ns,
         wander_ns,
         wander_ns > 0 AND coalesce(
@@ -110,44 +69,64 @@ published AS MATERIALIZED (
             ) <= 2 * wander_ns,
             false
         ) AS is_crowded
-    FROM sided
-    WINDOW on_topic AS (PARTITION BY side, topic_name ORDER BY written_ns, publication_id)
+    FROM located
+    WHERE is_certain
+    WINDOW on_topic AS (PARTITION BY segment, topic_name ORDER BY written_ns, publication_id)
 ),
--- The times in which the clocks stood in one relation: from one jump to the next.
-segment AS (
+-- The stamps from one step to the next, and those around a step. Before the first stretch and behind
+-- the last one a clock is as in it.
+segment AS MATERIALIZED (
     SELECT
-        clock_id,
-        CASE WHEN is_first THEN -9223372036854775807 ELSE start_ns + state.difference_ns END
-            AS start_stamp_ns,
-        sum(
-            CASE
-                WHEN before.segment = state.segment AND before.is_known = state.is_known THEN 0
-                ELSE 1
-            END
-        ) OVER (PARTITION BY clock_id ORDER BY start_ns ROWS UNBOUNDED PRECEDING) AS segment,
-        state.is_known
+        clock_id, segment,
+        CASE WHEN clock_id IN (SELECT clock_id FROM step)
+            THEN min(2 * start_ns - end_ns + difference_ns)
+            ELSE -9223372036854775807 END AS first_stamp_ns,
+        CASE WHEN clock_id IN (SELECT clock_id FROM step)
+            THEN max(2 * end_ns - start_ns + difference_ns)
+            ELSE 9223372036854775807 END AS last_stamp_ns
     FROM course
+    WHERE is_certain
+    GROUP BY clock_id, segment
+    UNION ALL
+    SELECT clock_id, NULL, start_ns + unnest(differences_ns), end_ns + unnest(differences_ns)
+    FROM step
 ),
 publisher AS (
     SELECT DISTINCT run_id, clock_id, topic_name, publisher_id FROM located
 ),
-message AS MATERIALIZED (
+heard AS (
     SELECT
         m.run_id, m.topic_name, m.source_timestamp_ns, m.only_subscription_id, p.publisher_id,
+        p.clock_id,
         min(CASE WHEN m.clock_id = p.clock_id THEN m.taken_ns END) AS taken_ns
     FROM derive.unstamped_message(only_run) AS m
     JOIN publisher AS p ON m.run_id = p.run_id AND m.topic_name = p.topic_name
     GROUP BY
-        m.run_id, m.topic_name, m.source_timestamp_ns, m.only_subscription_id, p.publisher_id
+        m.run_id, m.topic_name, m.source_timestamp_ns, m.only_subscription_id, p.publisher_id,
+        p.clock_id
+),
+-- A message that may be of two times, since the clock was set back, is of none. Nor is one that was
+-- taken on this clock when that may have been set.
+message AS MATERIALIZED (
+    SELECT
+        h.*,
+        CASE WHEN count(*) = 1 AND bool_and(coalesce(c.is_certain AND c.segment = g.segment, true))
+            THEN any_value(g.segment) END AS segment
+    FROM heard AS h
+    ASOF LEFT JOIN started AS c ON h.clock_id = c.clock_id AND h.taken_ns >= c.start_ns
+    LEFT JOIN segment AS g
+        ON h.clock_id = g.clock_id
+        AND h.source_timestamp_ns BETWEEN g.first_stamp_ns AND g.last_stamp_ns
+    GROUP BY ALL
 ),
 -- Threads that share a publisher write at the same time; one alone never does.
 looked_for AS (
     SELECT
         m.topic_name, m.publisher_id, p.thread_id, m.source_timestamp_ns, m.only_subscription_id,
-        m.taken_ns, p.side
+        m.taken_ns, m.segment
     FROM message AS m
-    JOIN (SELECT DISTINCT publisher_id, thread_id, side FROM published) AS p
-        ON m.publisher_id = p.publisher_id
+    JOIN (SELECT DISTINCT publisher_id, thread_id, segment FROM published) AS p
+        ON m.publisher_id = p.publisher_id AND m.segment = p.segment
 ),
 -- Where the clock is not known sharply, also what a message just missed: the publication before it,
 -- or the next one.
@@ -157,7 +136,7 @@ beside AS (
     ASOF JOIN published AS p
         ON m.publisher_id = p.publisher_id
         AND m.thread_id = p.thread_id
-        AND m.side = p.side
+        AND m.segment = p.segment
         AND m.source_timestamp_ns >= p.opens_ns
     UNION ALL
     SELECT m.topic_name, m.source_timestamp_ns, m.only_subscription_id, m.taken_ns, p.*
@@ -165,14 +144,14 @@ beside AS (
     ASOF JOIN published AS p
         ON m.publisher_id = p.publisher_id
         AND m.thread_id = p.thread_id
-        AND m.side = p.side
+        AND m.segment = p.segment
         AND m.source_timestamp_ns < p.opens_ns
     WHERE m.source_timestamp_ns >= p.opens_ns - p.wander_ns
 ),
 looked_up AS MATERIALIZED (
     SELECT
         topic_name, publisher_id, source_timestamp_ns, only_subscription_id, publication_id,
-        clock_id, goes_on, side,
+        clock_id, goes_on,
         is_crowded
         OR first_value(source_timestamp_ns) OVER of_publication < opens_ns
         OR coalesce(
@@ -187,7 +166,7 @@ looked_up AS MATERIALIZED (
     FROM beside
     WHERE coalesce(written_ns < taken_ns, true)
     WINDOW of_publication AS (
-        PARTITION BY publication_id, side, only_subscription_id ORDER BY source_timestamp_ns
+        PARTITION BY publication_id, only_subscription_id ORDER BY source_timestamp_ns
     )
 ),
 within AS MATERIALIZED (
@@ -195,7 +174,7 @@ within AS MATERIALIZED (
         topic_name, publisher_id, source_timestamp_ns, only_subscription_id, publication_id,
         clock_id, goes_on, is_crowded, delay_ns, closed_for_ns,
         row_number() OVER (
-            PARTITION BY publication_id, side, only_subscription_id ORDER BY source_timestamp_ns
+            PARTITION BY publication_id, only_subscription_id ORDER BY source_timestamp_ns
         ) AS place
     FROM looked_up
     WHERE is_within
@@ -286,12 +265,7 @@ usual_of_clock AS (
 -- All that a message may be of. Several writes may go on at the moment of its stamp.
 candidate AS MATERIALIZED (
     SELECT
-        topic_name, source_timestamp_ns, only_subscription_id, publisher_id, publication_id,
-        bool_or(is_crowded) AS is_crowded,
-        bool_or(is_usual) AS is_usual,
-        bool_or(is_prompt) AS is_prompt,
-        min(delay_ns) AS delay_ns,
-        any_value(least_ns) AS least_ns,
+        *,
         count(*) OVER (
             PARTITION BY topic_name, source_timestamp_ns, only_subscription_id
         ) AS candidate_count
@@ -320,7 +294,6 @@ candidate AS MATERIALIZED (
     )
     -- Whether a thread that is not seen to go on still writes is known by what is usual alone.
     WHERE is_usual OR goes_on
-    GROUP BY topic_name, source_timestamp_ns, only_subscription_id, publisher_id, publication_id
 ),
 -- A publication that is all a message may be of has that message: the first of several, unless
 -- others came as soon. So no other message is of it.
@@ -391,35 +364,45 @@ matched AS (
 ),
 placed AS (
     SELECT
-        m.run_id, m.topic_name, m.source_timestamp_ns, m.publisher_id, p.clock_id,
-        g.segment, g.is_known
+        m.run_id, m.topic_name, m.source_timestamp_ns, m.publisher_id, m.clock_id, m.segment,
+        g.is_certain, m.segment IS NULL AND m.clock_id IN (SELECT clock_id FROM step) AS is_set
     FROM message AS m
-    JOIN publisher AS p ON m.publisher_id = p.publisher_id
-    ASOF JOIN segment AS g
-        ON p.clock_id = g.clock_id AND m.source_timestamp_ns >= g.start_stamp_ns
+    ASOF LEFT JOIN (
+        SELECT
+            clock_id, segment, is_certain,
+            CASE
+                WHEN lag(start_ns) OVER (PARTITION BY clock_id, segment ORDER BY start_ns) IS NULL
+                    THEN -9223372036854775807
+                ELSE start_ns + difference_ns
+            END AS start_stamp_ns
+        FROM course
+    ) AS g
+        ON m.clock_id = g.clock_id
+        AND m.segment = g.segment
+        AND m.source_timestamp_ns >= g.start_stamp_ns
 ),
 -- The right difference of the clocks explains the messages; one that fits few of them is wrong.
 -- Some topics may have publishers that were not traced, but hardly all.
 explained AS (
     SELECT
-        clock_id, segment, topic_name, is_known,
+        clock_id, segment, topic_name, is_certain,
         count(*) AS message_count,
         sum(CASE WHEN is_matched THEN 1 ELSE 0 END) AS matched_count
     FROM (
         SELECT
-            p.clock_id, p.segment, p.topic_name, p.source_timestamp_ns, p.is_known,
+            p.clock_id, p.segment, p.topic_name, p.source_timestamp_ns, p.is_certain,
             bool_or(x.publication_id IS NOT NULL) AS is_matched
         FROM placed AS p
         LEFT JOIN matched AS x
             ON p.publisher_id = x.publisher_id AND p.source_timestamp_ns = x.source_timestamp_ns
-        GROUP BY p.clock_id, p.segment, p.topic_name, p.source_timestamp_ns, p.is_known
+        GROUP BY p.clock_id, p.segment, p.topic_name, p.source_timestamp_ns, p.is_certain
     )
-    GROUP BY clock_id, segment, topic_name, is_known
+    GROUP BY clock_id, segment, topic_name, is_certain
 ),
 trusted AS (
     SELECT
-        clock_id, segment,
-        bool_and(is_known) AND (
+        clock_id, segment, is_certain,
+        is_certain AND (
             coalesce(
                 max(
                     CASE WHEN message_count >= derive.clock_limit().quorum
@@ -429,7 +412,7 @@ trusted AS (
             ) >= derive.clock_limit().explained_share
         ) AS is_trusted
     FROM explained
-    GROUP BY clock_id, segment
+    GROUP BY clock_id, segment, is_certain
 )
 SELECT
     p.run_id,
@@ -439,12 +422,14 @@ SELECT
         WHEN count(DISTINCT x.publication_id) = 1
             AND NOT bool_or(coalesce(x.is_rivalled, false))
             AND bool_and(x.publication_id IS NULL OR t.is_trusted)
+            AND NOT bool_or(p.is_set)
             THEN any_value(x.publication_id)
     END AS publication_id,
-    count(DISTINCT x.publication_id) AS candidate_count
+    CASE WHEN NOT bool_or(p.is_set) THEN count(DISTINCT x.publication_id) END AS candidate_count
 FROM placed AS p
-JOIN trusted AS t ON p.clock_id = t.clock_id AND p.segment = t.segment
+LEFT JOIN trusted AS t
+    ON p.clock_id = t.clock_id AND p.segment = t.segment AND p.is_certain = t.is_certain
 LEFT JOIN matched AS x
     ON p.publisher_id = x.publisher_id AND p.source_timestamp_ns = x.source_timestamp_ns
 GROUP BY p.run_id, p.topic_name, p.source_timestamp_ns
-HAVING count(x.publication_id) > 0 OR bool_or(NOT t.is_trusted)
+HAVING count(x.publication_id) > 0 OR bool_or(NOT t.is_trusted) OR bool_or(p.segment IS NULL)

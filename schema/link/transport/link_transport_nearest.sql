@@ -1,12 +1,9 @@
 -- name: derive.link_transport_nearest
 -- kind: macro
 -- description: Takes of the messages whose publication was found by time. A subscription takes a
---     message once, and those of a publisher in the order in which they were published. A message
---     that seems older than one taken before was stamped after the clock had been set back: it has
---     no row. After that, a message whose stamp is further from its publication than the clock then
---     allows fits by chance. It has no row either, unless the clock is known to have been behind
---     meanwhile: then it was set forward again. The link is doubtful where events may be lost
---     around the moment of publishing.
+--     message once, and those of a publisher in the order in which they were published: what
+--     seems to be older than one taken before is not linked. The link is doubtful where events may
+--     be lost around the moment of publishing.
 -- grain: one row per take whose publication is known by time
 -- when: store.nearest_message
 -- param: only_run BIGINT  Run to look at
@@ -28,7 +25,7 @@ WITH received AS (
 sent AS MATERIALIZED (
     SELECT
         r.run_id, r.take_id, r.taken_ns, r.subscription_id, r.publication_id, r.candidate_count,
-        b.publisher_id, b.process_id, b.end_ns, r.source_timestamp_ns - b.end_ns AS difference_ns
+        b.publisher_id
     FROM received AS r
     JOIN store.publication AS b ON r.publication_id = b.publication_id
     WHERE b.run_id = only_run
@@ -39,32 +36,6 @@ sent AS MATERIALIZED (
         PARTITION BY r.subscription_id, b.publisher_id ORDER BY r.taken_ns, r.take_id
         ROWS UNBOUNDED PRECEDING
     ) - b.end_ns <= derive.clock_limit().write_ns
-),
-set_back AS (
-    SELECT
-        z.subscription_id, z.taken_ns, s.end_ns,
-        s.difference_ns - z.set_back_ns + derive.clock_limit().write_ns AS most_ns
-    FROM derive.clock_set_back(only_run) AS z
-    ASOF JOIN sent AS s ON z.subscription_id = s.subscription_id AND z.taken_ns > s.taken_ns
-    WHERE z.is_lasting
-),
-behind AS (
-    SELECT s.take_id, h.clock_id, z.end_ns AS since_ns, s.end_ns AS until_ns, z.most_ns
-    FROM sent AS s
-    JOIN store.process AS o ON s.process_id = o.process_id
-    JOIN store.host AS h ON o.host_id = h.host_id
-    ASOF JOIN set_back AS z
-        ON s.subscription_id = z.subscription_id AND s.taken_ns >= z.taken_ns
-    WHERE s.difference_ns > z.most_ns
-),
-chance AS (
-    SELECT b.take_id
-    FROM behind AS b
-    ANTI JOIN store.stamp_clock AS c
-        ON b.clock_id = c.clock_id
-        AND c.difference_ns <= b.most_ns
-        AND c.end_ns > b.since_ns
-        AND c.start_ns <= b.until_ns
 )
 SELECT
     s.run_id,
@@ -77,4 +48,3 @@ SELECT
     a.publication_id IS NOT NULL AS is_loss_affected
 FROM sent AS s
 LEFT JOIN derive.publication_beside_gap('sent') AS a ON s.publication_id = a.publication_id
-ANTI JOIN chance AS c ON s.take_id = c.take_id
