@@ -70,7 +70,7 @@ FINDINGS = (
 )
 # Rules about messages that are matched by time, with cases of their own.
 NEAREST = (
-    "agreed_difference", "clock_drift", "clock_set_back", "clock_step", "close_pair",
+    "agreed_difference", "certain_clock", "clock_drift", "clock_step", "close_pair",
     "publication_beside_gap", "sharp_difference", "standing_difference", "unstamped_call",
     "unstamped_message", "unstamped_publication",
 )  # fmt: skip

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import duckdb
 import pytest
@@ -33,22 +33,18 @@ def followed(
     stretches: Sequence[Sequence[Region]],
     *,
     is_here: bool = True,
-    steps: Mapping[int, Sequence[int]] | None = None,
 ) -> list[tuple[int, int, int]]:
-    """(difference, votes, segment) per stretch, of regions (difference, half width, votes).
-
-    Steps are those that takes of a stretch show.
-    """
+    """(difference, votes, segment) per stretch, of regions (difference, half width, votes)."""
     con.execute("CREATE OR REPLACE TABLE region (clock_id BIGINT, stretch BIGINT, least_ns BIGINT, "
                 "greatest_ns BIGINT, difference_ns BIGINT, vote_count BIGINT, most_count BIGINT, "
-                "is_taken_here BOOLEAN, stretch_ns BIGINT, steps_ns BIGINT[])")  # fmt: skip
+                "is_taken_here BOOLEAN, stretch_ns BIGINT)")  # fmt: skip
     for stretch, regions in enumerate(stretches):
         most = max(votes for _, _, votes in regions)
         for difference, half, votes in regions:
             con.execute(
-                "INSERT INTO region VALUES (1, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+                "INSERT INTO region VALUES (1, ?, ?, ?, ?, ?, ?, ?, ?)",
                 [stretch, difference - half, difference + half, difference, votes, most, is_here,
-                 STRETCH_NS, (steps or {}).get(stretch)],
+                 STRETCH_NS],
             )  # fmt: skip
     return con.execute(
         "SELECT difference_ns, message_count, segment FROM derive.followed_difference('region') "
@@ -154,7 +150,7 @@ def test_each_clock_is_followed_by_itself(rules: duckdb.DuckDBPyConnection) -> N
     followed(rules, [[(3_000_000, 500, 20)]] * 3)
     rules.execute(
         "INSERT INTO region SELECT 2, stretch, least_ns + change, greatest_ns + change, "
-        "difference_ns + change, vote_count, most_count, is_taken_here, stretch_ns, steps_ns "
+        "difference_ns + change, vote_count, most_count, is_taken_here, stretch_ns "
         "FROM (SELECT *, 4000000 * stretch AS change FROM region)"
     )
     rows = rules.execute(
@@ -326,35 +322,12 @@ def test_a_later_publication_that_fits_as_well_tells_nothing(
     assert found == [(0, 20 if is_known else 0, 0)]
 
 
-@pytest.mark.parametrize(("away", "is_shown"), [(450_000, True), (-550_000, False)])
-@pytest.mark.parametrize("noticed", [1, 2])
-def test_unless_takes_show_that_the_clock_was_set_back_so_far(
-    rules: duckdb.DuckDBPyConnection, noticed: int, away: int, *, is_shown: bool
-) -> None:
-    """In this stretch or in the one before; of two takes, one is enough."""
-    old, both = [(0, 500, 20)], [(0, 500, 20), (-3_000_000, 500, 19)]
-    steps = {noticed: [-9_000_000, -3_000_000 + away]}
-    found = followed(rules, [old, old, both, both, both, both], steps=steps)
-    # Where it was set back in the stretch before, that one has messages of both sides.
-    before = (0, 0 if noticed == 1 else 20, 0)
-    behind = (-3_000_000, 20, 1) if is_shown else (0, 0, 0)
-    assert found[1:4] == [before, behind, (behind[0], 19 if is_shown else 0, behind[2])]
-
-
 def test_what_came_before_is_known_where_no_take_shows_a_step(
     rules: duckdb.DuckDBPyConnection,
 ) -> None:
     """Messages begin to wait in a queue."""
     old, both = [(0, 500, 20)], [(0, 500, 20), (-3_000_000, 500, 19)]
     assert followed(rules, [old, old, both, both])[:3] == [(0, 20, 0), (0, 20, 0), (0, 0, 0)]
-
-
-def test_takes_alone_show_no_jump(rules: duckdb.DuckDBPyConnection) -> None:
-    """A message that was held up: no other difference fits, or none that lasts."""
-    old, both = [(0, 500, 20)], [(0, 500, 20), (-3_000_000, 500, 19)]
-    steps = {1: [-3_000_000]}
-    assert followed(rules, [old] * 5, steps=steps) == [(0, 20, 0)] * 5
-    assert followed(rules, [old, both, old, old, old], steps=steps)[1] == (0, 0, 0)
 
 
 @pytest.mark.parametrize(("until_next", "until_later", "is_jump"), [

@@ -1,25 +1,30 @@
 -- name: finding.clock_set
 -- title: A clock was set, and messages around that moment have no link
 -- description: Messages are matched by time (Humble, Iron), and the clock that stamps them was set.
---     What was stamped between the last message that is certain before and the first one behind has
---     no link, nor has what could be of either time, since the clock was set back. All other links
---     are as certain as without it.
+--     What was stamped between the moment until which its difference from the clock of the trace is
+--     certain, and the one from which on it is so again, has no link. Nor has what could be of two
+--     times, since the clock was set back. All other links are as certain as without it.
 -- cause: NTP or a user set the clock of the host (the trace follows a clock that cannot be set).
 -- cure: Let the clock settle before recording (chronyc waitsync), and slew instead of step.
 -- grain: one row per host and step; it counts messages that were received
 -- severity: warning
--- when: store.nearest_message
+-- when: store.stamp_clock
 -- param: run_id BIGINT  Run
 WITH step AS (
     SELECT
-        *, end_ns + greatest(before_ns, behind_ns) AS last_stamp_ns,
+        *,
+        CASE
+            WHEN lead(start_ns) OVER (PARTITION BY clock_id ORDER BY start_ns) IS NULL
+                THEN 9223372036854775807
+            ELSE end_ns + greatest(before_ns, behind_ns)
+        END AS last_stamp_ns,
         (SELECT min(start_ns) FROM store.trace WHERE run_id = $run_id) AS begin_ns
     FROM derive.clock_step($run_id)
 ),
 missed AS (
-    SELECT z.clock_id, z.segment, count(*) AS number
+    SELECT z.clock_id, z.segment, count(DISTINCT o.take_id) AS number
     FROM (
-        SELECT DISTINCT o.take_id, t.source_timestamp_ns, h.clock_id
+        SELECT o.take_id, t.source_timestamp_ns, h.clock_id
         FROM store.orphan_take AS o
         JOIN store.take AS t ON o.take_id = t.take_id
         JOIN store.subscription AS s ON o.subscription_id = s.subscription_id
