@@ -711,7 +711,8 @@ def test_where_the_clocks_are_not_known_nothing_is_told(rules: duckdb.DuckDBPyCo
     publish(rules, 2, SECOND, SECOND + MILLISECOND)
     publish(rules, 3, -SECOND, MILLISECOND - SECOND)
     publish(rules, 4, 2 * SECOND, 2 * SECOND + MILLISECOND)
-    take(rules, *(n * SECOND + MICROSECOND for n in (-1, 0, 1, 2)))
+    for stamp in (n * SECOND + MICROSECOND for n in (-1, 0, 1, 2)):
+        take(rules, stamp, taken=stamp + MILLISECOND)
     assert nearest(rules) == {
         MICROSECOND - SECOND: (3, 1),
         MICROSECOND: (1, 1),
@@ -867,6 +868,7 @@ def test_all_messages_until_a_step_show_whether_a_difference_is_right(
     publish(rules, 99, 6 * SECOND - PERIOD, 6 * SECOND - PERIOD + MILLISECOND)
     stranger = 6 * SECOND - PERIOD // 2
     take(rules, stranger)
+    rules.execute("UPDATE message SET taken_ns = source_timestamp_ns + 1000000")
     found = nearest(rules)
     assert found[10_000] == (0, 1)
     assert found.get(stranger) == ((None, 0) if segment else None)

@@ -141,7 +141,7 @@ ONCE_WRONG = {
     # A rotation in a silence.
     "rotated_autoware": {"direct": 1.0, "partial_sync": 1.0, "periodic_async": 1.0},
     # A step of the clock between bursts; messages around it may be on either side.
-    "clock_step": {"transport": 0.995},
+    "clock_step": {"transport": 0.86},
     # Messages that nobody took have others in their place.
     "untraced_rival": {"transport": 1.0},
     # Writes that go on at the same time: some messages may be of either.

@@ -10,7 +10,7 @@ CREATE OR REPLACE MACRO derive.clock_step(only_run) AS TABLE
 SELECT
     only_run::BIGINT AS run_id, t.clock_id, t.before_segment, t.segment, t.last_ns AS start_ns,
     t.start_ns AS end_ns, t.before_ns, t.difference_ns AS behind_ns,
-    list_distinct(list(c.difference_ns)) AS differences_ns
+    list_sort(list_distinct(list(c.difference_ns))) AS differences_ns
 FROM (
     SELECT
         clock_id, segment, start_ns, difference_ns,

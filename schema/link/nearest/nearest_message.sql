@@ -108,16 +108,22 @@ heard AS (
 -- A message that may be of two times, since the clock was set back, is of none. Nor is one that was
 -- taken on this clock when that may have been set.
 message AS MATERIALIZED (
-    SELECT
-        h.*,
-        CASE WHEN count(*) = 1 AND bool_and(coalesce(c.is_certain AND c.segment = g.segment, true))
-            THEN any_value(g.segment) END AS segment
-    FROM heard AS h
-    ASOF LEFT JOIN started AS c ON h.clock_id = c.clock_id AND h.taken_ns >= c.start_ns
-    LEFT JOIN segment AS g
-        ON h.clock_id = g.clock_id
-        AND h.source_timestamp_ns BETWEEN g.first_stamp_ns AND g.last_stamp_ns
-    GROUP BY ALL
+    SELECT *, segment IS NULL AND clock_id IN (SELECT clock_id FROM step) AS is_set
+    FROM (
+        SELECT
+            h.*,
+            CASE
+                WHEN count(*) = 1
+                    AND bool_and(coalesce(c.is_certain AND c.segment = g.segment, true))
+                    THEN any_value(g.segment)
+            END AS segment
+        FROM heard AS h
+        ASOF LEFT JOIN started AS c ON h.clock_id = c.clock_id AND h.taken_ns >= c.start_ns
+        LEFT JOIN segment AS g
+            ON h.clock_id = g.clock_id
+            AND h.source_timestamp_ns BETWEEN g.first_stamp_ns AND g.last_stamp_ns
+        GROUP BY ALL
+    )
 ),
 -- Threads that share a publisher write at the same time; one alone never does.
 looked_for AS (
@@ -362,74 +368,52 @@ matched AS (
         ) AS is_rivalled
     FROM left_over
 ),
-placed AS (
-    SELECT
-        m.run_id, m.topic_name, m.source_timestamp_ns, m.publisher_id, m.clock_id, m.segment,
-        g.is_certain, m.segment IS NULL AND m.clock_id IN (SELECT clock_id FROM step) AS is_set
-    FROM message AS m
-    ASOF LEFT JOIN (
-        SELECT
-            clock_id, segment, is_certain,
-            CASE
-                WHEN lag(start_ns) OVER (PARTITION BY clock_id, segment ORDER BY start_ns) IS NULL
-                    THEN -9223372036854775807
-                ELSE start_ns + difference_ns
-            END AS start_stamp_ns
-        FROM course
-    ) AS g
-        ON m.clock_id = g.clock_id
-        AND m.segment = g.segment
-        AND m.source_timestamp_ns >= g.start_stamp_ns
-),
 -- The right difference of the clocks explains the messages; one that fits few of them is wrong.
 -- Some topics may have publishers that were not traced, but hardly all.
 explained AS (
     SELECT
-        clock_id, segment, topic_name, is_certain,
+        clock_id, segment, topic_name,
         count(*) AS message_count,
         sum(CASE WHEN is_matched THEN 1 ELSE 0 END) AS matched_count
     FROM (
         SELECT
-            p.clock_id, p.segment, p.topic_name, p.source_timestamp_ns, p.is_certain,
+            m.clock_id, m.segment, m.topic_name, m.source_timestamp_ns,
             bool_or(x.publication_id IS NOT NULL) AS is_matched
-        FROM placed AS p
+        FROM message AS m
         LEFT JOIN matched AS x
-            ON p.publisher_id = x.publisher_id AND p.source_timestamp_ns = x.source_timestamp_ns
-        GROUP BY p.clock_id, p.segment, p.topic_name, p.source_timestamp_ns, p.is_certain
+            ON m.publisher_id = x.publisher_id AND m.source_timestamp_ns = x.source_timestamp_ns
+        GROUP BY m.clock_id, m.segment, m.topic_name, m.source_timestamp_ns
     )
-    GROUP BY clock_id, segment, topic_name, is_certain
+    GROUP BY clock_id, segment, topic_name
 ),
 trusted AS (
     SELECT
-        clock_id, segment, is_certain,
-        is_certain AND (
-            coalesce(
-                max(
-                    CASE WHEN message_count >= derive.clock_limit().quorum
-                        THEN matched_count / message_count END
-                ),
-                sum(matched_count) / sum(message_count)
-            ) >= derive.clock_limit().explained_share
-        ) AS is_trusted
+        clock_id, segment,
+        coalesce(
+            max(
+                CASE WHEN message_count >= derive.clock_limit().quorum
+                    THEN matched_count / message_count END
+            ),
+            sum(matched_count) / sum(message_count)
+        ) >= derive.clock_limit().explained_share AS is_trusted
     FROM explained
-    GROUP BY clock_id, segment, is_certain
+    GROUP BY clock_id, segment
 )
 SELECT
-    p.run_id,
-    p.topic_name,
-    p.source_timestamp_ns,
+    m.run_id,
+    m.topic_name,
+    m.source_timestamp_ns,
     CASE
         WHEN count(DISTINCT x.publication_id) = 1
             AND NOT bool_or(coalesce(x.is_rivalled, false))
             AND bool_and(x.publication_id IS NULL OR t.is_trusted)
-            AND NOT bool_or(p.is_set)
+            AND NOT bool_or(m.is_set)
             THEN any_value(x.publication_id)
     END AS publication_id,
-    CASE WHEN NOT bool_or(p.is_set) THEN count(DISTINCT x.publication_id) END AS candidate_count
-FROM placed AS p
-LEFT JOIN trusted AS t
-    ON p.clock_id = t.clock_id AND p.segment = t.segment AND p.is_certain = t.is_certain
+    CASE WHEN NOT bool_or(m.is_set) THEN count(DISTINCT x.publication_id) END AS candidate_count
+FROM message AS m
+LEFT JOIN trusted AS t ON m.clock_id = t.clock_id AND m.segment = t.segment
 LEFT JOIN matched AS x
-    ON p.publisher_id = x.publisher_id AND p.source_timestamp_ns = x.source_timestamp_ns
-GROUP BY p.run_id, p.topic_name, p.source_timestamp_ns
-HAVING count(x.publication_id) > 0 OR bool_or(NOT t.is_trusted) OR bool_or(p.segment IS NULL)
+    ON m.publisher_id = x.publisher_id AND m.source_timestamp_ns = x.source_timestamp_ns
+GROUP BY m.run_id, m.topic_name, m.source_timestamp_ns
+HAVING count(x.publication_id) > 0 OR bool_or(m.segment IS NULL OR NOT t.is_trusted)
