@@ -4,7 +4,7 @@
 --     is certain. It is so between stretches of time that agree with it: in a stretch beside a
 --     step, or before one that is not known, the clock may have been set already. If a single
 --     stretch tells nothing, the clock went on between those beside it: it does not jump there and
---     back within a stretch. A stretch that is not certain is of the segment before it.
+--     back within a stretch.
 -- grain: one row per clock and stretch of time
 -- param: only_run BIGINT  Run to look at
 -- when: store.stamp_clock
@@ -31,30 +31,17 @@ WITH told AS (
         WHERE run_id = only_run
         WINDOW on_clock AS (PARTITION BY clock_id ORDER BY at_ns)
     )
-),
-judged AS (
-    SELECT
-        *,
-        is_known
-        AND coalesce(
-            last_value(CASE WHEN is_known THEN segment END IGNORE NULLS) OVER (
-                on_clock ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING
-            ) = segment,
-            true
-        )
-        AND coalesce(
-            lead(is_known) OVER on_clock AND lead(segment) OVER on_clock = segment, true
-        ) AS is_certain
-    FROM told
-    WINDOW on_clock AS (PARTITION BY clock_id ORDER BY at_ns)
 )
 SELECT
-    * REPLACE (
-        coalesce(
-            last_value(CASE WHEN is_certain THEN segment END IGNORE NULLS) OVER on_clock,
-            min(CASE WHEN is_certain THEN segment END) OVER (PARTITION BY clock_id),
-            0
-        ) AS segment
+    *,
+    is_known
+    AND coalesce(
+        last_value(CASE WHEN is_known THEN segment END IGNORE NULLS) OVER (
+            on_clock ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING
+        ) = segment,
+        true
     )
-FROM judged
+    AND coalesce(lead(is_known) OVER on_clock AND lead(segment) OVER on_clock = segment, true)
+        AS is_certain
+FROM told
 WINDOW on_clock AS (PARTITION BY clock_id ORDER BY at_ns)

@@ -73,8 +73,8 @@ published AS MATERIALIZED (
     WHERE is_certain
     WINDOW on_topic AS (PARTITION BY segment, topic_name ORDER BY written_ns, publication_id)
 ),
--- The stamps from one step to the next, and those around a step. Before the first stretch and behind
--- the last one a clock is as in it.
+-- The stamps from one step to the next, and those around a step. Before the first stretch and
+-- behind the last one a clock is as in it.
 segment AS MATERIALIZED (
     SELECT
         clock_id, segment,
