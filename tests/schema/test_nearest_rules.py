@@ -819,11 +819,20 @@ def test_around_a_step_nothing_is_told(
 def test_a_stamp_of_two_times_is_of_none(
     rules: duckdb.DuckDBPyConnection, written: int, *, is_told: bool
 ) -> None:
-    """The clock was set back by more than the second before the step."""
+    """The clock was set back by more than the second before the step; another clock takes it."""
     back = -3 * SECOND // 2
     step_by(rules, back)
-    found = stamped(rules, written, back if written > 3 * SECOND else 0)
+    found = stamped(rules, written, back if written > 3 * SECOND else 0, taken=0)
     assert found == ((1, 1) if is_told else (None, None))
+
+
+@pytest.mark.parametrize("written", [SECOND // 2, 5 * SECOND + SECOND // 4])
+def test_but_its_take_on_this_clock_tells_of_which(
+    rules: duckdb.DuckDBPyConnection, written: int
+) -> None:
+    back = -3 * SECOND // 2
+    step_by(rules, back)
+    assert stamped(rules, written, back if written > 3 * SECOND else 0) == (1, 1)
 
 
 @pytest.mark.parametrize(

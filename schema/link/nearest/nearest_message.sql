@@ -105,17 +105,17 @@ heard AS (
         m.run_id, m.topic_name, m.source_timestamp_ns, m.only_subscription_id, p.publisher_id,
         p.clock_id
 ),
--- A message that may be of two times, since the clock was set back, is of none. Nor is one that was
--- taken on this clock when that may have been set.
+-- A message that was taken on this clock is of the time in which it was taken; it did not wait while
+-- the clock was set. Another one that may be of two times, since the clock was set back, is of none.
 message AS MATERIALIZED (
     SELECT *, segment IS NULL AND clock_id IN (SELECT clock_id FROM step) AS is_set
     FROM (
         SELECT
             h.*,
             CASE
-                WHEN count(*) = 1
-                    AND bool_and(coalesce(c.is_certain AND c.segment = g.segment, true))
-                    THEN any_value(g.segment)
+                WHEN h.taken_ns IS NOT NULL
+                    THEN any_value(g.segment) FILTER (c.is_certain AND c.segment = g.segment)
+                WHEN count(*) = 1 THEN any_value(g.segment)
             END AS segment
         FROM heard AS h
         ASOF LEFT JOIN started AS c ON h.clock_id = c.clock_id AND h.taken_ns >= c.start_ns
