@@ -18,7 +18,7 @@ MILLISECOND = 1_000_000
     ("system", "factor", "at_ms", "linked", "told"),
     [
         # Topics have several publishers.
-        thorough("rivals", 0.15, 100, 0.9, "clock_jumps"),
+        thorough("rivals", 0.15, 100, 0.75, "clock_set"),
         # Hardly any message is on either side.
         ("pipeline", 0.01, 10, 0.0, "unmatched_take"),
     ],

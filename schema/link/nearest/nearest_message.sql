@@ -113,7 +113,7 @@ message AS MATERIALIZED (
         SELECT
             h.*,
             CASE
-                WHEN h.taken_ns IS NOT NULL
+                WHEN count(h.taken_ns) > 0
                     THEN any_value(g.segment) FILTER (c.is_certain AND c.segment = g.segment)
                 WHEN count(*) = 1 THEN any_value(g.segment)
             END AS segment
