@@ -184,7 +184,7 @@ def test_two_publishers_at_once_are_ambiguous(unstamped: Unstamped, analyse: Ana
 
 
 def test_a_clock_that_drifts_and_jumps_is_followed(system: RosSystem, analyse: Analyse) -> None:
-    """Links are right all the way; around the jump some may be missing."""
+    """Links are right all the way; in the second around the jump there are none."""
     slewed = Slewed(system)
     system.wait(_EPOCH - 10_000_000)
     system.publisher(TALKER, 0x10, "/a")
@@ -194,7 +194,7 @@ def test_a_clock_that_drifts_and_jumps_is_followed(system: RosSystem, analyse: A
     model = analyse(system)
     links = {(published, stamp) for published, stamp, _ in model.rows(LINKS)}
     assert links <= set(slewed.truth)
-    assert len(links) >= 0.98 * len(slewed.truth)
+    assert len(links) >= 0.85 * len(slewed.truth)
 
 
 def test_a_gap_after_the_publication_makes_the_link_doubtful(
@@ -229,11 +229,13 @@ class Coarse(Unstamped):
         return -(time % 4_000_000)
 
 
-@pytest.mark.parametrize(("kind", "share"), [(Jumping, 0.4), (Coarse, 0.0)])
+@pytest.mark.parametrize(
+    ("kind", "share", "reason"), [(Jumping, 0.4, "clock_set"), (Coarse, 0.0, "ambiguous")]
+)
 def test_a_clock_that_fits_by_chance_tells_nothing(
-    system: RosSystem, analyse: Analyse, kind: type[Unstamped], share: float
+    system: RosSystem, analyse: Analyse, kind: type[Unstamped], share: float, reason: str
 ) -> None:
-    """No link is wrong; what cannot be told is ambiguous."""
+    """No link is wrong; what cannot be told says why."""
     unstamped = kind(system)
     system.wait(_EPOCH - 10_000_000)
     system.publisher(TALKER, 0x10, "/a")
@@ -244,7 +246,7 @@ def test_a_clock_that_fits_by_chance_tells_nothing(
     links = {(published, stamp) for published, stamp, _ in model.rows(LINKS)}
     assert links <= set(unstamped.truth)
     assert len(links) >= share * len(unstamped.truth)
-    assert "ambiguous" in model.column("SELECT DISTINCT reason FROM store.orphan_take")
+    assert reason in model.column("SELECT DISTINCT reason FROM store.orphan_take")
 
 
 @dataclass
@@ -302,4 +304,4 @@ def test_a_jump_by_a_period_is_followed(system: RosSystem, analyse: Analyse, jum
         remote.message(_EPOCH + n * 10_000_000)
     links = {(published, stamp) for published, stamp, _ in analyse(system).rows(LINKS)}
     assert links <= set(remote.truth)
-    assert len(links) >= 0.9 * len(remote.truth)
+    assert len(links) >= 0.75 * len(remote.truth)
