@@ -161,7 +161,7 @@ def test_a_clock_that_is_set_back_by_milliseconds_makes_none_wrong(
         ),
         # Only the other host takes what this one publishes: which difference is right then is not
         # known.
-        thorough((1,), ((3 * SECOND, -2 * SECOND),), 1_400),
+        thorough((1,), ((3 * SECOND, -2 * SECOND),), 1_300),
     ],
 )
 def test_a_clock_that_is_set_back_by_seconds_makes_none_wrong(
@@ -192,10 +192,10 @@ def test_a_clock_that_is_set_back_by_seconds_makes_none_wrong(
         # By four periods: all messages fit publications of four periods before as well.
         (Recording(realtime_steps=((13 * SECOND // 10, -40_000_000),)), 0.3, 300),
         thorough(
-            Recording(realtime_steps=((SECOND // 5, 7_000), (SECOND // 2, -40_000_000))), 1, 2_900
+            Recording(realtime_steps=((SECOND // 5, 7_000), (SECOND // 2, -40_000_000))), 1, 0
         ),
         # Forward: no stamp goes back, but no later publication fits either.
-        thorough(Recording(realtime_steps=((143 * SECOND // 100, 40_000_000),)), 1, 2_700),
+        thorough(Recording(realtime_steps=((143 * SECOND // 100, 40_000_000),)), 1, 2_200),
     ],
 )
 def test_where_all_topics_have_one_period(
