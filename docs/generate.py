@@ -93,7 +93,7 @@ _QUERIES = """\
 | --- | --- |
 {index}
 `msgflow query NAME` runs one, `msgflow query NAME --show` prints its SQL. Every query takes
-`--run NAME|ID|all`; those with a time window `--start`, `--end` and `--skip-first SECONDS`.
+`--run NAME|ID|all`; those with a time window `--start` and `--end`.
 Quantiles are values that occurred (`quantile_disc`).
 
 Rows are chosen by what their columns name, which stands in brackets behind their meaning:

@@ -2,34 +2,24 @@
 
 from __future__ import annotations
 
+import os
 import re
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar, Unpack
 
-import duckdb
-
-from msgflow.db.connection import connect
-from msgflow.db.objects import public_names
-from msgflow.db.sql_guard import guarded_query, in_own_lines, require_condition
 from msgflow.errors import QueryError, UsageError
 from msgflow.files.default_files import DEFAULT_PATHS
-from msgflow.query.catalogue import choose_query, load_queries, load_query, query_names
-from msgflow.query.path_numbers import with_path_numbers
-from msgflow.query.runner import run_query
-from msgflow.query.selection import make_selection
-from msgflow.query.steps import Steps
-from msgflow.result.query_result import QueryResult
-from msgflow.run.choice import read_runs
-from msgflow.run.slice import Slice
-from msgflow.sql.failure import database_errors, first_line, in_words, out_of_memory
-from msgflow.sql.interrupt import interruptible
+from msgflow.query.catalogue import choose_query, load_queries, query_names
+from msgflow.run.slice import Slice, SliceWords, TimeWords
 from msgflow.text.name_suggestions import did_you_mean
 
+# What is imported here, `msgflow COMMAND --help` waits for: DuckDB and what asks it are not.
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
     from types import TracebackType
 
+    import duckdb
     import pyarrow as pa
 
     from msgflow.db.finding import Finding
@@ -44,6 +34,7 @@ if TYPE_CHECKING:
     from msgflow.query.compare import Comparison
     from msgflow.query.flow import Start
     from msgflow.query.why import Explanation
+    from msgflow.result.query_result import QueryResult
     from msgflow.run.choice import Run
     from msgflow.sql.header import Header
     from msgflow.sql.value import Value
@@ -51,6 +42,7 @@ if TYPE_CHECKING:
     from msgflow.view.report import Report
 
 _T = TypeVar("_T")
+_P = ParamSpec("_P")
 
 DEFAULT_LIMIT = 10_000
 _WRITING_WITH = re.compile(r"WITH clause containing a .* statement must be at the top level")
@@ -84,7 +76,9 @@ class Database:
 
     All reading uses one read-only connection without access to other files or the network; the
     first question opens it. Use the object as a context manager, or call `close`. Many methods take
-    `run`, `start`, `end` and `skip_first`: `msgflow.Slice` explains them.
+    `run`, `start` and `end`: `msgflow.Slice` explains them. Methods raise a DatabaseError if the
+    file is missing, locked, foreign or of another schema revision, and a QueryError if DuckDB
+    cannot answer.
 
     Attributes:
         path: the file; `ingest` creates it.
@@ -92,7 +86,7 @@ class Database:
 
     def __init__(self, path: str | Path, *, memory_limit: str | None = None) -> None:
         self.path = Path(path)
-        self._memory_limit = memory_limit
+        self._memory_limit = memory_limit or os.environ.get("MSGFLOW_MEMORY_LIMIT")
         self._connection: duckdb.DuckDBPyConnection | None = None
 
     def __enter__(self) -> Database:
@@ -119,15 +113,30 @@ class Database:
         Raises:
             DatabaseError: the file is missing, locked, foreign, or of another schema revision.
         """
+        from msgflow.db.connection import connect
+
         if self._connection is None:
             self._connection = connect(self.path, read_only=True, memory_limit=self._memory_limit)
         return self._connection
 
-    def _ask(self, work: Callable[[], _T]) -> _T:
-        """Return what `work` returns; Ctrl-C interrupts it."""
+    def _ask(
+        self,
+        work: Callable[Concatenate[duckdb.DuckDBPyConnection, _P], _T],
+        *given: _P.args,
+        **named: _P.kwargs,
+    ) -> _T:
+        """Return what `work` returns for the connection; Ctrl-C interrupts it."""
+        import duckdb
+
+        from msgflow.sql.failure import database_errors, out_of_memory
+        from msgflow.sql.interrupt import interruptible
+
+        connection = self.connection
         try:
             with database_errors(self.path):
-                return interruptible(self.connection, work, only_reads=True)
+                return interruptible(
+                    connection, lambda: work(connection, *given, **named), only_reads=True
+                )
         except duckdb.OutOfMemoryException as error:
             raise out_of_memory(str(self.path)) from error
 
@@ -167,7 +176,6 @@ class Database:
 
         Raises:
             TraceError: no trace, or none that can be read.
-            DatabaseError: the file is locked, foreign, or of another schema revision.
             UsageError: `links` is not such a file, or does not fit the traces; a path in `hosts`
                 with two names, or without a trace of its own.
         """
@@ -205,7 +213,6 @@ class Database:
 
         Raises:
             UsageError: not such a file, no such run, or a link that does not fit the run.
-            DatabaseError: the file cannot be opened.
         """
         from msgflow.links import apply_links, read_links
 
@@ -221,8 +228,6 @@ class Database:
 
         Raises:
             UsageError: no such run.
-            QueryError: the database could not run a query.
-            DatabaseError: the file cannot be opened.
         """
         from msgflow.links import LinkSuggestions
         from msgflow.sql.statement import internal_sql
@@ -260,7 +265,6 @@ class Database:
 
         Raises:
             UsageError: no such file or run, or a file that does not fit the run.
-            DatabaseError: the file cannot be opened.
         """
         from msgflow.clocks import apply_clocks, read_clock_sync
 
@@ -269,13 +273,13 @@ class Database:
         return apply_clocks(self.path, sync, run=run, memory_limit=self._memory_limit)
 
     def join_bag(self, bag: str | Path, *, run: str | int | None = None) -> QueryResult:
-        """Store which publications the messages of a bag of the same run are of.
+        """Join the messages of a bag to their publications: size, header.stamp, frame_id.
 
-        The view `bag_message` has them, with size, header.stamp and frame_id. What an earlier bag
-        gave to the run is removed.
+        The bag was recorded in the same run. It replaces an earlier one. What cannot be joined is
+        counted, by topic. The view `bag_message` has the messages.
 
         Args:
-            bag: directory of a rosbag2, or one of its files (.mcap, .db3).
+            bag (BAG): directory of a rosbag2, or one of its files (.mcap, .db3).
             run: a name or an id; the latest run when None.
 
         Returns:
@@ -285,7 +289,6 @@ class Database:
             UsageError: no such run or several, clocks that are not synchronised, or the package
                 rosbags is not installed.
             TraceError: not a bag, or a damaged one.
-            DatabaseError: the file cannot be opened.
         """
         from msgflow.bag.join import join_bag
 
@@ -301,7 +304,6 @@ class Database:
 
         Raises:
             UsageError: no such run, or a name that another run has or that `run` reads otherwise.
-            DatabaseError: the file cannot be opened.
         """
         from msgflow.db.runs import rename_run
 
@@ -317,7 +319,6 @@ class Database:
 
         Raises:
             UsageError: no such run, an invalid key or value, or no such label to remove.
-            DatabaseError: the file cannot be opened.
         """
         from msgflow.db.runs import label_runs
 
@@ -332,7 +333,6 @@ class Database:
 
         Raises:
             UsageError: no such run.
-            DatabaseError: the file cannot be opened.
         """
         from msgflow.db.runs import remove_runs
 
@@ -347,7 +347,6 @@ class Database:
         run: str | int | None = None,
         start: str | int | None = None,
         end: str | int | None = None,
-        skip_first: float | None = None,
         internal: bool = False,
         node: str | Sequence[str] | None = None,
         topic: str | Sequence[str] | None = None,
@@ -370,7 +369,7 @@ class Database:
 
         Args:
             name: of the query, see `list_queries`.
-            run, start, end, skip_first: what to read, see `msgflow.Slice`.
+            run, start, end: what to read, see `msgflow.Slice`.
             internal: show the rows of ROS's own topics and services too.
             node: rows that name one of these nodes.
             topic: rows that name one of these topics.
@@ -382,23 +381,26 @@ class Database:
             sort: column to sort by, 'p99_ns' or 'p99_ns:desc', or several.
             limit: most rows.
             slowest: number of the slowest rows, for queries whose rows have a duration.
-            path: name of a path in a file; in place of `from_`, `to`, `via` and `without`.
-            paths: that file.
+            path: name of a path in a file; in place of from, to, via and without.
+            paths: the file with the paths that have names.
             parameters: the query's own; `from_` means `from`.
 
         Raises:
             UsageError: a query, parameter, name, column, run or time that does not exist or cannot
                 be read, a condition that does more than read, or rows that the query does not have.
-            QueryError: the database could not run it.
-            DatabaseError: the file cannot be opened.
         """
+        from msgflow.db.objects import public_names
+        from msgflow.db.sql_guard import require_condition
+        from msgflow.query.path_numbers import with_path_numbers
+        from msgflow.query.runner import run_query
+        from msgflow.query.selection import make_selection
+
         header = choose_query(name, parameters, public_names)
-        connection = self.connection
-        part = Slice(run, start, end, skip_first)
+        part = Slice(run, start, end)
         if path is not None:
             if via or without or {"from", "from_", "to", "to_"} & set(parameters):
                 raise _path_and_others(path)
-            words = self._ask(lambda: self._named_path(header, path, Path(paths), part))
+            words = self._ask(self._named_path, header, path, Path(paths), part)
             via, without = words.pop("via", None), words.pop("without", None)
             parameters |= words
         selection = {
@@ -412,72 +414,64 @@ class Database:
         for word in own:
             parameters[word] = selection.pop(word)  # type: ignore[assignment]
 
-        def ask() -> QueryResult:
+        def ask(connection: duckdb.DuckDBPyConnection) -> QueryResult:
             if where is not None:
                 require_condition(connection, where)
+            chosen = make_selection(selection)
             result = run_query(
-                connection,
-                header,
-                parameters,
-                part,
-                internal=internal,
-                selection=make_selection(selection),
+                connection, header, parameters, part, internal=internal, selection=chosen
             )
             return with_path_numbers(connection, result)
 
         return self._ask(ask)
 
-    def _named_path(self, header: Header, name: str, file: Path, part: Slice) -> dict[str, str]:
+    def _named_path(
+        self,
+        connection: duckdb.DuckDBPyConnection,
+        header: Header,
+        name: str,
+        file: Path,
+        part: Slice,
+    ) -> dict[str, str]:
         """Return the arguments of `query` that a named path stands for."""
-
         if not any(param.name == "from" for param in header.params):
             raise UsageError(f"{header.words} has no paths — --path {name}", "leave it out")
-        return self._words_of_path(name, file, part)
+        return _words_of_path(connection, name, file, part)
 
-    def _words_of_path(self, name: str, file: Path, part: Slice) -> dict[str, str]:
-        from msgflow.paths import read_paths
+    def why(self, place: str | None = None, **part: Unpack[SliceWords]) -> Explanation:
+        """Explain why a topic is late: its slowest path, where the time goes, what to ask next.
 
-        named = read_paths(file)
-        path = named.named(name)
-        named.require(self.connection, part.runs(self.connection), path)
-        return path.words()
-
-    def why(
-        self,
-        place: str | None = None,
-        *,
-        run: str | int | None = None,
-        start: str | int | None = None,
-        end: str | int | None = None,
-        skip_first: float | None = None,
-    ) -> Explanation:
-        """Return why flows are late that end at a topic or node, from the named queries.
+        The first path is that of the slowest flow: all other sections are about it. Each section is
+        part of a named query, with the same numbers: e2e-latency, path-breakdown, critical-path,
+        waits --by pair, and topics --measure delivery.
 
         Args:
-            place: the topic or node, or a glob; the path with the slowest flow of all when None.
-            run, start, end, skip_first: what to read, see `msgflow.Slice`; one run.
+            place: topic or node where the flows end; a glob is possible. By default the end of the
+                path with the slowest flow.
+            **part: what to read, see `msgflow.Slice`; one run.
 
         Raises:
             UsageError: not exactly one run, no such place or time, or no flow arrives there.
-            QueryError: the database could not run a query.
-            DatabaseError: the file cannot be opened.
         """
+        from msgflow.query.catalogue import load_query
+        from msgflow.query.path_numbers import with_path_numbers
+        from msgflow.query.runner import run_query
+        from msgflow.query.steps import Steps
         from msgflow.query.why import explain
 
-        connection = self.connection
-        one = self._ask(lambda: Slice(run).one_run(connection, "an explanation"))
-        part = Slice(one.run_id, start, end, skip_first)
+        one = self._ask(Slice(part.pop("run", None)).one_run, "an explanation")
+        times = Slice(one.run_id, **part)
         dead_ends = [
             (finding.subject, finding.detail)
             for finding in self.findings(run=one.run_id)
             if finding.name == "dead_end"
         ]
 
-        def explained() -> Explanation:
+        def explained(connection: duckdb.DuckDBPyConnection) -> Explanation:
             with Steps(connection) as steps:
 
                 def ask(name: str, **given: Value) -> QueryResult:
-                    result = run_query(connection, load_query(name), given, part, steps=steps)
+                    result = run_query(connection, load_query(name), given, times, steps=steps)
                     return with_path_numbers(connection, result)
 
                 return explain(ask, one, place, dead_ends)
@@ -520,22 +514,13 @@ class Database:
 
         Raises:
             UsageError: not exactly one start, or one that does not exist.
-            QueryError: the database could not run it.
-            DatabaseError: the file cannot be opened.
         """
         from msgflow.export.flow import read_flow
 
         given = (publication_id, take_id, callback_instance_id, request_id, response_id)
-        connection = self.connection
+        start = self._ask(_start, place, given, at, run)
         return self._ask(
-            lambda: read_flow(
-                connection,
-                _start(connection, place, given, at, run),
-                direction=direction,
-                depth=depth,
-                limit=limit,
-                internal=internal,
-            )
+            read_flow, start, direction=direction, depth=depth, limit=limit, internal=internal
         )
 
     def flow_why(
@@ -567,16 +552,11 @@ class Database:
 
         Raises:
             UsageError: not exactly one message, or one that does not exist or was not taken.
-            QueryError: the database could not run it.
-            DatabaseError: the file cannot be opened.
         """
         from msgflow.query.flow import find_take
 
         given = (publication_id, take_id, callback_instance_id, None, None)
-        connection = self.connection
-        number, topic, run_id = self._ask(
-            lambda: find_take(connection, _start(connection, place, given, at, run))
-        )
+        number, topic, run_id = self._ask(find_take, self._ask(_start, place, given, at, run))
         return self.query(
             "critical-path", run=run_id, take=number, from_=from_, to=topic, case=case, by=by,
             detail=detail, internal=internal,
@@ -593,49 +573,32 @@ class Database:
 
         Raises:
             UsageError: the file cannot be written.
-            QueryError: the database could not run it.
-            DatabaseError: the file cannot be opened.
         """
         from msgflow.view.flow_page import write_flow_page
 
-        connection = self.connection
         return self._ask(
-            lambda: write_flow_page(
-                connection,
-                Path(path),
-                flow.run,
-                *flow.start_key,
-                direction=flow.direction,
-                depth=flow.depth,
-                limit=flow.limit,
-            ),
+            write_flow_page,
+            Path(path),
+            flow.run,
+            *flow.start_key,
+            direction=flow.direction,
+            depth=flow.depth,
+            limit=flow.limit,
         )
 
-    def graph(
-        self,
-        *,
-        run: str | int | None = None,
-        start: str | int | None = None,
-        end: str | int | None = None,
-        skip_first: float | None = None,
-        internal: bool = False,
-    ) -> Graph:
+    def graph(self, *, internal: bool = False, **part: Unpack[SliceWords]) -> Graph:
         """Return the graph of nodes, topics, services and actions, for DOT, Mermaid or JSON.
 
         Args:
-            run, start, end, skip_first: what to read, see `msgflow.Slice`; one run.
             internal: show ROS's own topics and services, too.
+            **part: what to read, see `msgflow.Slice`; one run.
 
         Raises:
             UsageError: not exactly one run, or a time that cannot be read.
-            QueryError: the database could not run it.
-            DatabaseError: the file cannot be opened.
         """
         from msgflow.export.graph import read_graph
 
-        connection = self.connection
-        part = Slice(run, start, end, skip_first)
-        return self._ask(lambda: read_graph(connection, part, internal=internal))
+        return self._ask(read_graph, Slice(**part), internal=internal)
 
     def compare(
         self,
@@ -654,50 +617,50 @@ class Database:
         max_depth: int = 32,
         max_paths: int = 1_000,
     ) -> Comparison:
-        """Compare run B with run A: by path, callback or topic, with intervals and effect sizes.
+        """Compare run B with run A: medians, means, percentiles, and whether it may be chance.
+
+        low and high enclose the difference with the given confidence. If both have the same sign,
+        the verdict is that B is longer or shorter. This concerns chance within these two recordings
+        only: it does not say how much the same system differs when it is started again.
 
         Args:
-            run_a: name or id of the baseline.
-            run_b: name or id of the run to compare with it.
-            what: 'paths' (end-to-end latency), 'callbacks' (duration) or 'topics' (transport
-                latency).
-            from_: topic where paths start; every source when None.
-            to: topic where paths end; wherever they end when None.
-            case: the arrivals of paths that count: 'first', 'last', 'newest' or 'every_pair'.
-            skip_first: seconds to leave out at the begin of each run.
+            run_a: baseline run: name or id.
+            run_b: run to compare with it: name or id.
+            what: 'paths' (end-to-end latency), 'callbacks' (duration) or 'topics' (time from
+                publication to take).
+            from_: topics or nodes where paths start; globs.
+            to: topics or nodes where paths end; globs.
+            case: first or last arrival of each root, newest root of each arrival, or all pairs:
+                'first', 'last', 'newest' or 'every_pair'.
+            skip_first: seconds to leave out at the begin of each run, as a warm-up.
             confidence: of the intervals, between 0 and 1.
-            resamples: number behind the intervals, at least 20 / (1 - confidence); when None, 1000
+            resamples: number behind the intervals, at least 20 / (1 - confidence); by default 1000
                 or that minimum; 0 leaves out intervals and verdicts, which take longest.
             seed: of the resampling; the same seed gives the same intervals.
-            internal: compare what ROS does for itself, too.
+            internal: also compare what ROS does for itself.
             max_depth: longest path, in topics.
             max_paths: most paths, shortest first, and most chains per length.
 
         Raises:
             UsageError: a run, topic or choice that does not exist, or runs with nothing in common.
-            QueryError: the database could not run it.
-            DatabaseError: the file cannot be opened.
         """
         from msgflow.query.compare import compare
 
-        connection = self.connection
         return self._ask(
-            lambda: compare(
-                connection,
-                run_a,
-                run_b,
-                what=what,
-                from_=from_,
-                to=to,
-                case=case,
-                skip_first=skip_first,
-                confidence=confidence,
-                resamples=resamples,
-                seed=seed,
-                internal=internal,
-                max_depth=max_depth,
-                max_paths=max_paths,
-            ),
+            compare,
+            run_a,
+            run_b,
+            what=what,
+            from_=from_,
+            to=to,
+            case=case,
+            skip_first=skip_first,
+            confidence=confidence,
+            resamples=resamples,
+            seed=seed,
+            internal=internal,
+            max_depth=max_depth,
+            max_paths=max_paths,
         )
 
     def verify(
@@ -706,132 +669,94 @@ class Database:
         *,
         paths: str | Path = DEFAULT_PATHS,
         case: str = "first",
-        run: str | int | None = None,
-        start: str | int | None = None,
-        end: str | int | None = None,
-        skip_first: float | None = None,
+        **part: Unpack[SliceWords],
     ) -> Verification:
-        """Verify a run against the requirements of a file.
+        """Check a run against a file of requirements: passed, failed, not measured, no data.
 
         Args:
-            targets: YAML, see docs/verify.md.
-            paths: the file with the named paths of `targets`.
+            targets: requirements, as YAML; docs/verify.md has their form.
+            paths: the file with the paths that have names.
             case: the arrivals of paths that count: 'first', 'last', 'newest' or 'every_pair'.
-            run, start, end, skip_first: what to read, see `msgflow.Slice`; one run.
+            **part: what to read, see `msgflow.Slice`; one run.
 
         Returns:
             The verdicts: one row per requirement and measured thing of the run.
 
         Raises:
             UsageError: not such a file, no such run or time, or a name that nothing in the run has.
-            QueryError: the database could not run a query.
-            DatabaseError: the file cannot be opened.
         """
         from msgflow.verify import read_targets, verify
 
         file = read_targets(Path(targets))
-        connection = self.connection
-        part = Slice(run, start, end, skip_first)
-        places = self._ask(lambda: self._places(file, Path(paths), part))
-        found = self._ask(lambda: verify(connection, file, part, paths=places, case=case))
+        chosen = Slice(**part)
+        places = self._ask(_places, file, Path(paths), chosen)
+        found = self._ask(verify, file, chosen, paths=places, case=case)
         return replace(found, paths=str(paths))
 
-    def _places(
-        self, targets: TargetsFile, file: Path, part: Slice
-    ) -> dict[str, dict[str, list[str]]]:
-        """Return topics and nodes of the named paths of requirements."""
-        from msgflow.paths import read_paths
-
-        called = [target.path_name for target in targets.targets if target.path_name is not None]
-        if not called:
-            return {}
-        named = read_paths(file)
-        runs = part.runs(self.connection)
-        found = {}
-        for text in called:
-            try:
-                path = named.named(text.value)
-            except UsageError as error:
-                targets.file.fail(text.line, error.message, error.hint)
-            named.require(self.connection, runs, path)
-            found[text.value] = {
-                word: [place.value for place in places] for word, places in path.places.items()
-            }
-        return found
-
     def suggest_targets(
-        self, *, run: str | int | None = None, skip_first: float | None = None, margin: float = 0.2
+        self,
+        *,
+        run: str | int | None = None,
+        start: str | int | None = None,
+        margin: float = 0.2,
     ) -> str:
         """Return the text of a file of requirements that a run meets, to review and change.
 
         Args:
-            run, skip_first: what to read, see `msgflow.Slice`; one run.
+            run, start: what to read, see `msgflow.Slice`; one run.
             margin: how much more than measured is allowed, as a share.
 
         Raises:
             UsageError: no such run, or a margin below 0.
-            QueryError: the database could not run a query.
-            DatabaseError: the file cannot be opened.
         """
         from msgflow.verify.suggested_targets import QUERIES, suggest_targets
 
         if not margin >= 0:
             raise UsageError(f"a margin is 0 or more — {margin}", "0.2 allows a fifth more")
-        connection = self.connection
-        one = self._ask(lambda: Slice(run).one_run(connection, "a file of requirements"))
+        one = self._ask(Slice(run).one_run, "a file of requirements")
         results = {
-            name: self.query(name, run=one.run_id, skip_first=skip_first).to_arrow().to_pylist()
+            name: self.query(name, run=one.run_id, start=start).to_arrow().to_pylist()
             for name in QUERIES
         }
         return suggest_targets(one, results, margin)
 
     def report(
         self,
-        path: str | Path,
+        output: str | Path,
         *,
-        run: str | int | None = None,
         compare: str | int | None = None,
         targets: str | Path | None = None,
         paths: str | Path = DEFAULT_PATHS,
-        start: str | int | None = None,
-        end: str | int | None = None,
-        path_text: str | None = None,
+        through: str | None = None,
         max_size: int = DEFAULT_REPORT_SIZE,
+        **part: Unpack[SliceWords],
     ) -> Report:
         """Write the pages of a run, with their data, into one file that any browser opens.
 
         Args:
-            path: the file; one that exists is replaced. If its name ends with .md, it gets the
+            output: the file; one that exists is replaced. If its name ends with .md, it gets the
                 summary alone, as Markdown.
-            run, start, end: what to read, see `msgflow.Slice`; one run.
             compare: another run to compare it with.
             targets: requirements, as YAML: the summary has the verdicts on them.
-            paths: the file with the named paths of `targets`.
-            path_text: only paths with this text in them: a topic, or a node.
+            paths: the file with the paths that have names.
+            through: only paths with this text in them: a topic, or a node.
             max_size: most bytes of the file; the page says what it leaves out to fit.
+            **part: what to read, see `msgflow.Slice`; one run.
 
         Raises:
             UsageError: no such run or path, nothing in the window, or a size that is too small.
-            QueryError: the database could not run a query.
-            DatabaseError: the file cannot be opened.
         """
         from msgflow.view.report import write_report
 
-        connection = self.connection
-        part = Slice(run, start, end)
-        verification = None
-        if targets is not None:
-            verification = self.verify(targets, paths=paths, run=run, start=start, end=end)
+        found = None if targets is None else self.verify(targets, paths=paths, **part)
         return self._ask(
-            lambda: write_report(
-                connection,
-                Path(path),
-                part,
-                compare=compare,
-                verification=verification,
-                through=path_text,
-                max_size=max_size,
-            ),
+            write_report,
+            Path(output),
+            Slice(**part),
+            compare=compare,
+            verification=found,
+            through=through,
+            max_size=max_size,
         )
 
     def sql(self, text: str, *, limit: int | None = DEFAULT_LIMIT) -> QueryResult:
@@ -845,18 +770,20 @@ class Database:
             UsageError: there is no SQL.
             QueryError: a statement that may do more than read, several statements, or one that the
                 database could not run.
-            DatabaseError: the file cannot be opened.
         """
-        connection = self.connection
+        import duckdb
+
+        from msgflow.sql.failure import in_words
+
+        example = 'msgflow sql "SELECT * FROM run"'
         try:
-            return guarded_rows(connection, text, 'msgflow sql "SELECT * FROM run"', limit)
+            return guarded_rows(self.connection, text, example, limit)
         except duckdb.Error as error:
             raise in_words(error, self.path) or sql_error(error) from error
 
     def views(self) -> QueryResult:
         """Return the public views, a row each, with the number of columns and a sentence."""
-        connection = self.connection
-        return self._ask(lambda: QueryResult(connection.sql(_VIEWS).to_arrow_table()))
+        return self._ask(_rows_of, _VIEWS)
 
     def schema(self, view: str | None = None) -> QueryResult:
         """Return the columns of public views, a row each, with type and meaning.
@@ -867,10 +794,9 @@ class Database:
         Raises:
             UsageError: there is no such view.
         """
-        connection = self.connection
-        result = self._ask(
-            lambda: QueryResult(connection.sql(_SCHEMA, params={"view": view}).to_arrow_table())
-        )
+        from msgflow.db.objects import public_names
+
+        result = self._ask(_rows_of, _SCHEMA, view=view)
         if view is not None and not len(result):
             hint = did_you_mean(view, list(public_names()), "msgflow db schema lists them")
             raise UsageError(f"there is no such view — {view}", hint)
@@ -882,15 +808,15 @@ class Database:
 
     def runs(self) -> tuple[Run, ...]:
         """Return the runs in the database, oldest first."""
-        connection = self.connection
-        return self._ask(lambda: read_runs(connection))
+        from msgflow.run.choice import read_runs
+
+        return self._ask(read_runs)
 
     def check(self) -> list[Finding]:
         """Return the broken rules of the database, as findings; a sound database breaks none."""
         from msgflow.db.finding import broken_rules
 
-        connection = self.connection
-        return self._ask(lambda: broken_rules(connection))
+        return self._ask(broken_rules)
 
     def findings(self, *, run: str | int | None = None, detail: bool = False) -> list[Finding]:
         """Return what is wrong with a recording: errors, then warnings, with cause and cure.
@@ -901,15 +827,9 @@ class Database:
         """
         from msgflow.db.finding import read_findings
 
-        connection = self.connection
-        found = self._ask(
-            lambda: read_findings(
-                connection, [one.run_id for one in Slice(run).runs(connection)], info=detail
-            )
-        )
-        if not detail:
-            return found
-        return [*self.check(), *found]
+        runs = [one.run_id for one in self._ask(Slice(run).runs)]
+        found = self._ask(read_findings, runs, info=detail)
+        return [*self.check(), *found] if detail else found
 
     def clock_verdicts(
         self, *, run: str | int | None = None, only_several: bool = False
@@ -922,105 +842,131 @@ class Database:
         """
         from msgflow.query.clock_notes import clock_verdicts
 
-        connection = self.connection
-        return self._ask(
-            lambda: clock_verdicts(
-                connection, Slice(run).runs(connection), only_several=only_several
-            )
-        )
+        runs = self._ask(Slice(run).runs)
+        return self._ask(clock_verdicts, runs, only_several=only_several)
 
     def export_parquet(
         self,
-        directory: str | Path,
+        output: str | Path = "msgflow-parquet",
         views: Sequence[str] = (),
         *,
         run: str | int | None = "all",
-        start: str | int | None = None,
-        end: str | int | None = None,
-        skip_first: float | None = None,
         force: bool = False,
+        **times: Unpack[TimeWords],
     ) -> tuple[ExportedView, ...]:
-        """Write public views to `directory/VIEW/run_id=ID/data.parquet`, all of them or none.
+        """Write public views to DIR/VIEW/run_id=ID/data.parquet.
+
+        If anything fails, nothing is written. The metadata of each file have the view, the schema
+        revision and the version of msgflow. A time window selects what happened in it (links by
+        their cause); objects, runs and traces are always written.
 
         Args:
-            directory: created if missing.
-            views: names of views; all when empty.
-            run, start, end, skip_first: what to read, see `msgflow.Slice` (all runs
-                without a `run`). Links belong to the time of their cause; objects, runs and traces
-                are always written.
-            force: replace views that an export has written there.
+            output (DIR): directory, created if missing.
+            views (VIEW...): public views to export; all by default, see msgflow db schema.
+            run: run to export.
+            force: replace an earlier export of these views.
+            **times: what to read, see `msgflow.Slice`.
 
         Raises:
             UsageError: a view, run or time that does not exist, or a file that does.
-            DatabaseError: the file cannot be opened.
         """
         from msgflow.export.parquet import export_parquet
 
-        part = Slice(run, start, end, skip_first)
-        return self._export(export_parquet, directory, views, part, force)
+        return self._export(export_parquet, output, views, Slice(run, **times), force)
 
-    def export_perfetto(
+    def export_csv(
         self,
-        path: str | Path,
+        output: str | Path = "msgflow-csv",
+        views: Sequence[str] = (),
         *,
-        run: str | int | None = None,
-        start: str | int | None = None,
-        end: str | int | None = None,
-        skip_first: float | None = None,
-    ) -> PerfettoTrace:
-        """Write a run as a trace for the Perfetto UI.
+        run: str | int | None = "all",
+        force: bool = False,
+        **times: Unpack[TimeWords],
+    ) -> tuple[ExportedView, ...]:
+        """Write public views to DIR/VIEW.csv. If anything fails, nothing is written.
+
+        Text is quoted; a missing value is an empty field without quotes. A time window selects what
+        happened in it (links by their cause); objects, runs and traces are always written.
 
         Args:
-            path: the file; one that exists is replaced.
-            run, start, end, skip_first: what to read, see `msgflow.Slice`; one run.
-                Everything that begins in the time window is written.
+            output (DIR): directory, created if missing.
+            views (VIEW...): public views to export; all by default, see msgflow db schema.
+            run: run to export.
+            force: replace files that exist.
+            **times: what to read, see `msgflow.Slice`.
+
+        Raises:
+            UsageError: a view, run or time that does not exist, or a file that does.
+        """
+        from msgflow.export.csv_files import export_csv
+
+        return self._export(export_csv, output, views, Slice(run, **times), force)
+
+    def _export(
+        self,
+        write: Callable[..., tuple[ExportedView, ...]],
+        output: str | Path,
+        views: Sequence[str],
+        part: Slice,
+        force: bool,
+    ) -> tuple[ExportedView, ...]:
+        from msgflow.export.views import select_views
+
+        selection = self._ask(select_views, views, part)
+        return self._ask(write, Path(output), selection, force=force)
+
+    def export_perfetto(
+        self, output: str | Path = "msgflow.pftrace", **part: Unpack[SliceWords]
+    ) -> PerfettoTrace:
+        """Write a run as a trace for the Perfetto UI (ui.perfetto.dev, in the browser).
+
+        Each thread is a track with its callbacks, publications, takes, requests and responses.
+        Also: executor states, arrows for all links, gaps, events of your own tracepoints, and
+        counters for rates and for messages not yet taken.
+
+        Args:
+            output: the file; one that exists is replaced.
+            **part: what to read, see `msgflow.Slice`; one run.
 
         Raises:
             UsageError: not exactly one run, a time that cannot be read, a file that cannot be
                 written, or the package perfetto is not installed.
-            DatabaseError: the file cannot be opened.
         """
         from msgflow.export.perfetto import write_perfetto
 
-        connection = self.connection
-        part = Slice(run, start, end, skip_first)
-        return self._ask(lambda: write_perfetto(connection, Path(path), part))
+        return self._ask(write_perfetto, Path(output), Slice(**part))
 
     def export_mcap(
         self,
-        path: str | Path,
+        output: str | Path = "msgflow.mcap",
         *,
-        run: str | int | None = None,
-        start: str | int | None = None,
-        end: str | int | None = None,
-        skip_first: float | None = None,
         targets: str | Path | None = None,
         paths: str | Path = DEFAULT_PATHS,
+        **part: Unpack[SliceWords],
     ) -> ExportedMcap:
-        """Write measured values of a run, and what was lost, as messages of an MCAP file.
+        """Write measured values of a run for Foxglove, Lichtblick, PlotJuggler and Rerun.
+
+        They show them beside the bag of the same drive. Topics below /msgflow have latency and age
+        of paths, latency of topics, and duration and waits of callbacks, in milliseconds.
+        /msgflow/log has a warning for each message that was dropped or lost.
 
         Args:
-            path: the file; one that exists is replaced.
-            run, start, end, skip_first: what to read, see `msgflow.Slice`; one run.
-            targets: file with requirements (docs/verify.md): each that is not met is a message at
-                the time of its worst case, or at the end if it has none.
-            paths: the file with the named paths of `targets`.
+            output: the file; one that exists is replaced.
+            targets: requirements, as YAML: each that is not met gets a message at the time of its
+                worst case, or at the end if it has none.
+            paths: the file with the paths that have names.
+            **part: what to read, see `msgflow.Slice`; one run.
 
         Raises:
             UsageError: not exactly one run, a time that cannot be read, a file that cannot be
                 written, requirements that cannot be read, or the package mcap-ros2-support is not
                 installed.
-            DatabaseError: the file cannot be opened.
         """
         from msgflow.export.mcap import Violation, write_mcap
 
-        connection = self.connection
-        part = Slice(run, start, end, skip_first)
         violations: list[Violation] = []
         if targets is not None:
-            verdicts = self.verify(
-                targets, paths=paths, run=run, start=start, end=end, skip_first=skip_first
-            )
+            verdicts = self.verify(targets, paths=paths, **part)
             violations = [
                 Violation(
                     row["worst_at_ns"],
@@ -1030,106 +976,92 @@ class Database:
                 for row in verdicts.result.to_arrow().to_pylist()
                 if row["verdict"] == "failed"
             ]
-        return self._ask(lambda: write_mcap(connection, Path(path), part, violations))
+        return self._ask(write_mcap, Path(output), Slice(**part), violations)
 
     def export_otlp(
         self,
-        target: str | Path,
+        output: str | Path = "msgflow-traces.json",
         *,
-        run: str | int | None = None,
-        start: str | int | None = None,
-        end: str | int | None = None,
-        skip_first: float | None = None,
-        from_: str | None = None,
-        to: str | None = None,
-        via: str | None = None,
-        without: str | None = None,
+        from_: str | Sequence[str] | None = None,
+        to: str | Sequence[str] | None = None,
+        via: str | Sequence[str] | None = None,
+        without: str | Sequence[str] | None = None,
         slowest: int | None = None,
         path: str | None = None,
         paths: str | Path = DEFAULT_PATHS,
+        **part: Unpack[SliceWords],
     ) -> ExportedTraces:
-        """Write a run, or some of its flows, as traces of OpenTelemetry.
+        """Write a run as traces of OpenTelemetry, for Jaeger, Grafana Tempo and others.
 
-        A trace is a root (a thing without a cause) and all that it led to. If flows are chosen,
-        it is a flow that reached the end of its path.
+        A trace is a root (a thing without a cause) and all that it led to: callbacks, publications,
+        takes, requests and responses are spans, and further causes are links. If flows are chosen,
+        a trace is a flow that reached the end of its path.
 
         Args:
-            target: a file (OTLP/JSON, a request per line), which is replaced.
-            run, start, end, skip_first: what to read, see `msgflow.Slice`; one run.
-            from_: topics or nodes where flows start: globs, with commas between.
-            to: topics or nodes where flows end.
+            output: the file (OTLP/JSON, a request per line); one that exists is replaced.
+            from_: topics or nodes where flows start; globs.
+            to: topics or nodes where flows end; globs.
             via: topics, nodes and services that all flows visit.
             without: those that they do not visit.
             slowest: number of the slowest flows.
-            path: name of a path in a file; in place of `from_`, `to`, `via` and `without`.
-            paths: that file.
+            path: name of a path in a file; in place of from, to, via and without.
+            paths: the file with the paths that have names.
+            **part: what to read, see `msgflow.Slice`; one run.
 
         Raises:
             UsageError: not exactly one run, a name or time that does not exist, or a file that
                 cannot be written.
-            DatabaseError: the file cannot be opened.
         """
         from msgflow.export.otlp import write_otlp
 
-        connection = self.connection
-        part = Slice(run, start, end, skip_first)
         words = {"from": from_, "to": to, "via": via, "without": without}
-        choice: dict[str, Value] = {word: text for word, text in words.items() if text}
+        choice: dict[str, Value] = {
+            word: text if isinstance(text, str) else ",".join(text)
+            for word, text in words.items()
+            if text
+        }
         if path is not None:
             if choice:
                 raise _path_and_others(path)
-            choice |= self._ask(lambda: self._words_of_path(path, Path(paths), part))
+            choice |= self._ask(_words_of_path, path, Path(paths), Slice(**part))
         if slowest is not None:
             choice["slowest"] = slowest
-        return self._ask(lambda: write_otlp(connection, Path(target), part, choice or None))
+        return self._ask(write_otlp, Path(output), Slice(**part), choice or None)
 
-    def export_csv(
-        self,
-        directory: str | Path,
-        views: Sequence[str] = (),
-        *,
-        run: str | int | None = "all",
-        start: str | int | None = None,
-        end: str | int | None = None,
-        skip_first: float | None = None,
-        force: bool = False,
-    ) -> tuple[ExportedView, ...]:
-        """Write public views to `directory/VIEW.csv`, all of them or none.
 
-        Args:
-            directory: created if missing.
-            views: names of views; all when empty.
-            run, start, end, skip_first: what to read, see `msgflow.Slice` (all runs
-                without a `run`). Links belong to the time of their cause; objects, runs and traces
-                are always written.
-            force: replace files that exist.
+def _words_of_path(
+    connection: duckdb.DuckDBPyConnection, name: str, file: Path, part: Slice
+) -> dict[str, str]:
+    from msgflow.paths import read_paths
 
-        Raises:
-            UsageError: a view, run or time that does not exist, or a file that does.
-            DatabaseError: the file cannot be opened.
-        """
-        from msgflow.export.csv_files import export_csv
+    named = read_paths(file)
+    path = named.named(name)
+    named.require(connection, part.runs(connection), path)
+    return path.words()
 
-        part = Slice(run, start, end, skip_first)
-        return self._export(export_csv, directory, views, part, force)
 
-    def _export(
-        self,
-        write: Callable[..., tuple[ExportedView, ...]],
-        directory: str | Path,
-        views: Sequence[str],
-        part: Slice,
-        force: bool,
-    ) -> tuple[ExportedView, ...]:
-        from msgflow.export.views import select_views
+def _places(
+    connection: duckdb.DuckDBPyConnection, targets: TargetsFile, file: Path, part: Slice
+) -> dict[str, dict[str, list[str]]]:
+    """Return topics and nodes of the named paths of requirements."""
+    from msgflow.paths import read_paths
 
-        connection = self.connection
-
-        def export() -> tuple[ExportedView, ...]:
-            selection = select_views(connection, views, part)
-            return write(connection, Path(directory), selection, force=force)
-
-        return self._ask(export)
+    called = [target.path_name for target in targets.targets if target.path_name is not None]
+    if not called:
+        return {}
+    named = read_paths(file)
+    runs = part.runs(connection)
+    found = {}
+    for text in called:
+        try:
+            path = named.named(text.value)
+        except UsageError as error:
+            targets.file.fail(text.line, error.message, error.hint)
+        named.require(connection, runs, path)
+        found[text.value] = {
+            word: [place.value for place in places] for word, places in path.places.items()
+        }
+    return found
 
 
 def _path_and_others(path: str) -> UsageError:
@@ -1147,6 +1079,12 @@ def guarded_rows(
     Raises:
         duckdb.Error: it is not SQL, or the database could not run it.
     """
+    import duckdb
+
+    from msgflow.db.sql_guard import guarded_query, in_own_lines
+    from msgflow.result.query_result import QueryResult
+    from msgflow.sql.interrupt import interruptible
+
     most = None if limit is None else limit + 1
     query = guarded_query(connection, text, example, most)
     try:
@@ -1159,7 +1097,15 @@ def guarded_rows(
     return QueryResult(table.slice(0, limit), notes=[note])
 
 
+def _rows_of(connection: duckdb.DuckDBPyConnection, query: str, **given: Value) -> QueryResult:
+    from msgflow.result.query_result import QueryResult
+
+    return QueryResult(connection.sql(query, params=given).to_arrow_table())
+
+
 def _rows(connection: duckdb.DuckDBPyConnection, query: str) -> pa.Table:
+    import duckdb
+
     try:
         return connection.sql(query).to_arrow_table()
     except (duckdb.BinderException, duckdb.CatalogException):
@@ -1170,6 +1116,10 @@ def _rows(connection: duckdb.DuckDBPyConnection, query: str) -> pa.Table:
 
 def sql_error(error: duckdb.Error, *more_memory: str) -> QueryError:
     """Return the error of a user's SQL in the words of DuckDB."""
+    import duckdb
+
+    from msgflow.sql.failure import first_line, out_of_memory
+
     if isinstance(error, duckdb.OutOfMemoryException):
         return out_of_memory("the SQL", *more_memory)
     if isinstance(error, duckdb.PermissionException):
@@ -1192,7 +1142,8 @@ def open_db(path: str | Path, *, memory_limit: str | None = None) -> Database:
 
     Args:
         path: the file; the first ingest creates it.
-        memory_limit: for DuckDB, such as '2GB'; chosen by msgflow when None.
+        memory_limit: for DuckDB, such as '2GB'; when None it is `MSGFLOW_MEMORY_LIMIT` in the
+            environment, or what msgflow chooses.
     """
     return Database(path, memory_limit=memory_limit)
 

@@ -7,9 +7,8 @@ from typing import Annotated
 
 import typer
 
-from msgflow.cli.options import output_option
+from msgflow.cli.operation import operation
 
-_RECORDING = "How it is recorded"
 _SECOND = 1_000_000_000
 
 
@@ -24,149 +23,52 @@ def _list(is_asked: bool) -> None:
     raise typer.Exit
 
 
+@operation
 def command(
-    scenario: Annotated[
-        str,
-        typer.Argument(
-            metavar="SCENARIO", help="Name of the system", autocompletion=lambda: _scenarios()
-        ),
-    ],
-    _: Annotated[
-        bool,
-        typer.Option(
-            "--list", callback=_list, is_eager=True, help="List the available systems and exit"
-        ),
-    ] = False,
-    factor: Annotated[
-        float,
-        typer.Option("--factor", min=0, help="Length, as a multiple of the scenario's default"),
-    ] = 1,
-    seed: Annotated[int, typer.Option("--seed", help="Random seed")] = 0,
-    layout: Annotated[
-        str | None,
-        typer.Option(
-            "--layout",
-            metavar="NAME",
-            help="Release of ROS 2 to imitate, such as jazzy, or humble-fastdds for an instrumented"
-            " DDS",
-            show_default="that of the scenario",
-            autocompletion=lambda: _layouts(),
-        ),
-    ] = None,
-    start_late: Annotated[
-        float,
-        typer.Option(
-            "--start-late",
-            metavar="SECONDS",
-            min=0,
-            help="Start recording after SECONDS: no initialisation events",
-            rich_help_panel=_RECORDING,
-        ),
-    ] = 0,
-    dual_session: Annotated[
-        bool,
-        typer.Option(
-            "--dual-session",
-            help="Also record a snapshot session with the initialisation events that --start-late"
-            " misses",
-            rich_help_panel=_RECORDING,
-        ),
-    ] = False,
-    pause: Annotated[
-        tuple[float, float] | None,
-        typer.Option(
-            "--pause",
-            metavar="START END",
-            help="Record nothing between these two times, in seconds",
-            rich_help_panel=_RECORDING,
-        ),
-    ] = None,
-    rotate: Annotated[
-        list[float] | None,
-        typer.Option(
-            "--rotate",
-            metavar="SECONDS",
-            help="Start a new chunk of the trace at this time; may be repeated",
-            rich_help_panel=_RECORDING,
-        ),
-    ] = None,
-    per_process: Annotated[
-        bool,
-        typer.Option("--per-process", help="One trace per process", rich_help_panel=_RECORDING),
-    ] = False,
-    lose_events: Annotated[
-        float,
-        typer.Option(
-            "--lose-events",
-            metavar="SHARE",
-            min=0,
-            max=1,
-            help="Share of packets after which events are lost",
-            rich_help_panel=_RECORDING,
-        ),
-    ] = 0,
-    lose_packets: Annotated[
-        float,
-        typer.Option(
-            "--lose-packets",
-            metavar="SHARE",
-            min=0,
-            max=1,
-            help="Share of packets that are missing",
-            rich_help_panel=_RECORDING,
-        ),
-    ] = 0,
-    cut: Annotated[
-        int,
-        typer.Option(
-            "--cut",
-            metavar="STREAMS",
-            min=0,
-            help="Number of streams per trace to truncate mid-packet",
-            rich_help_panel=_RECORDING,
-        ),
-    ] = 0,
-    perf: Annotated[
-        bool,
-        typer.Option(
-            "--perf",
-            help="perf, not LTTng, records the kernel, in systems with a kernel trace",
-            rich_help_panel=_RECORDING,
-        ),
-    ] = False,
-    slew: Annotated[
-        float,
-        typer.Option(
-            "--slew",
-            metavar="PPM",
-            help="Drift of source stamps against the clock of the trace (positive: faster)",
-            rich_help_panel=_RECORDING,
-        ),
-    ] = 0,
-    clock_offset: Annotated[
-        float,
-        typer.Option(
-            "--clock-offset",
-            metavar="SECONDS",
-            help="How far each host's clock is ahead of the previous host's",
-            rich_help_panel=_RECORDING,
-        ),
-    ] = 0,
-    clock_drift: Annotated[
-        float,
-        typer.Option(
-            "--clock-drift",
-            metavar="PPM",
-            help="How much faster each host's clock runs than the previous host's",
-            rich_help_panel=_RECORDING,
-        ),
-    ] = 0,
-    output: Annotated[
-        Path | None,
-        output_option("DIR", "Folder to write the trace into", show_default="SCENARIO"),
-    ] = None,
+    scenario: Annotated[str, typer.Argument(autocompletion=lambda: _scenarios())],
+    *,
+    _: Annotated[bool, typer.Option("--list", callback=_list, is_eager=True)] = False,
+    factor: Annotated[float, typer.Option(min=0)] = 1,
+    seed: int = 0,
+    layout: Annotated[str | None, typer.Option(autocompletion=lambda: _layouts())] = None,
+    start_late: Annotated[float, typer.Option(min=0)] = 0,
+    dual_session: bool = False,
+    pause: tuple[float, float] | None = None,
+    rotate: list[float] | None = None,
+    per_process: bool = False,
+    lose_events: Annotated[float, typer.Option(min=0, max=1)] = 0,
+    lose_packets: Annotated[float, typer.Option(min=0, max=1)] = 0,
+    cut: Annotated[int, typer.Option(min=0)] = 0,
+    perf: bool = False,
+    slew: float = 0,
+    clock_offset: float = 0,
+    clock_drift: float = 0,
+    output: Path | None = None,
 ) -> None:
-    """Write the trace of a simulated ROS 2 system, and the links that really happened."""
+    """Write the trace of a simulated ROS 2 system, and the links that really happened.
+
+    Args:
+        scenario (SCENARIO): Name of the system.
+        _: List the available systems and exit.
+        factor: Length, as a multiple of the scenario's default.
+        seed: Random seed.
+        layout (NAME): Release of ROS 2 to imitate, such as jazzy, or humble-fastdds for an
+            instrumented DDS; by default that of the scenario.
+        start_late (SECONDS): Start recording after SECONDS: no initialisation events.
+        dual_session: Also record a snapshot session with the initialisation events that
+            --start-late misses.
+        pause (START END): Record nothing between these two times, in seconds.
+        rotate (SECONDS): Start a new chunk of the trace at this time; may be repeated.
+        per_process: One trace per process.
+        lose_events (SHARE): Share of packets after which events are lost.
+        lose_packets (SHARE): Share of packets that are missing.
+        cut (STREAMS): Number of streams per trace to truncate mid-packet.
+        perf: perf, not LTTng, records the kernel, in systems with a kernel trace.
+        slew (PPM): Drift of source stamps against the clock of the trace (positive: faster).
+        clock_offset (SECONDS): How far each host's clock is ahead of the previous host's.
+        clock_drift (PPM): How much faster each host's clock runs than the previous host's.
+        output (DIR): Folder to write the trace into; by default SCENARIO.
+    """
     from msgflow.cli.output import print_status
     from msgflow.text.values import count
     from msgflow_sim import Buffers, Recording, simulate

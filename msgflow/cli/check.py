@@ -6,18 +6,14 @@ import shutil
 import textwrap
 from dataclasses import asdict
 from itertools import groupby
-from typing import TYPE_CHECKING, Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import typer
 
-from msgflow.cli.options import (
-    DatabaseOption,
-    FormatOption,
-    MemoryLimitOption,
-    OutputOption,
-    RunOption,
-)
+from msgflow.cli.operation import operation
 from msgflow.errors import ExitCode
+from msgflow.export.formats import Format
 from msgflow.files.default_files import DEFAULT_DATABASE
 
 if TYPE_CHECKING:
@@ -25,40 +21,36 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from msgflow.db.finding import Finding
-    from msgflow.export.formats import Format
     from msgflow.result.query_result import QueryResult
 
 _WIDTH = 100
 PLACES_SHOWN = 10
 
 
+@operation
 def command(
-    run: RunOption = None,
-    detail: Annotated[
-        bool,
-        typer.Option(
-            "--detail",
-            help="Also what is worth knowing but not wrong, what the database breaks now, and what"
-            " share of the answers each defect affects",
-        ),
-    ] = False,
-    form: FormatOption = None,
-    output: OutputOption = None,
-    memory_limit: MemoryLimitOption = None,
-    database: DatabaseOption = DEFAULT_DATABASE,
+    *,
+    run: str | None = None,
+    detail: bool = False,
+    form: Format | None = None,
+    output: Path | None = None,
+    database: Path = DEFAULT_DATABASE,
 ) -> None:
     """Show what is wrong with a recording, with cause and cure; exit code 1 on errors.
 
-    With warnings only, the exit code is 0. If a run has several clocks, the last
-    line says how far their times can be compared.
+    With warnings only, the exit code is 0. If a run has several clocks, the last line says how far
+    their times can be compared.
+
+    Args:
+        detail: Also what is worth knowing but not wrong, what the database breaks now, and what
+            share of the answers each defect affects.
     """
     from msgflow.cli.output import print_next
     from msgflow.database import Database
     from msgflow.db.finding import commands_after
-    from msgflow.export.formats import Format
     from msgflow.run.choice import choose_runs
 
-    with Database(database, memory_limit=memory_limit) as opened:
+    with Database(database) as opened:
         findings = opened.findings(run=run, detail=detail)
         is_text = output is None and form in (None, Format.TABLE)
         is_explained = detail and is_text
@@ -95,7 +87,6 @@ def _report(
 
     from msgflow.cli.output import print_lines, print_result, print_status
     from msgflow.db.finding import Finding
-    from msgflow.export.formats import Format
     from msgflow.result.query_result import QueryResult
     from msgflow.text.values import count
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import typer
 
-from msgflow.cli.options import DatabaseOption, RunOption
+from msgflow.cli.operation import operation
 from msgflow.cli.query_command import AskingGroup, print_rows
 from msgflow.files.default_files import DEFAULT_DATABASE
 
@@ -35,19 +36,14 @@ app = typer.Typer(cls=_ClocksGroup)
 
 
 @app.command("apply")
-def apply(
-    how: Annotated[
-        str,
-        typer.Argument(
-            metavar="none|messages|FILE",
-            help="As recorded, by the messages between hosts (and the network packets of their"
-            " kernel traces), or by the offsets in a YAML or TOML file",
-        ),
-    ],
-    run: RunOption = None,
-    database: DatabaseOption = DEFAULT_DATABASE,
-) -> None:
-    """Correct the clocks of a run, replacing any earlier correction; reads no trace."""
+@operation
+def apply(how: str, *, run: str | None = None, database: Path = DEFAULT_DATABASE) -> None:
+    """Correct the clocks of a run, replacing any earlier correction; reads no trace.
+
+    Args:
+        how (none|messages|FILE): As recorded, by the messages between hosts (and the network
+            packets of their kernel traces), or by the offsets in a YAML or TOML file.
+    """
     from msgflow.cli.output import print_note, print_runs, print_status
     from msgflow.database import Database
 

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from msgflow.cli.options import DatabaseOption, FormatOption, OutputOption, WideOption
+from msgflow.cli.completion import complete
+from msgflow.cli.operation import operation
+from msgflow.export.formats import Format
 from msgflow.files.default_files import DEFAULT_DATABASE
 
 app = typer.Typer()
 
 
 @app.command("upgrade")
-def upgrade(database: DatabaseOption = DEFAULT_DATABASE) -> None:
+@operation
+def upgrade(*, database: Path = DEFAULT_DATABASE) -> None:
     """Upgrade a database to the schema and views of this version of msgflow."""
     from msgflow.cli.output import print_status
     from msgflow.db.migration import upgrade as upgrade_database
@@ -29,16 +33,20 @@ def upgrade(database: DatabaseOption = DEFAULT_DATABASE) -> None:
 
 
 @app.command("schema")
+@operation
 def schema(
-    view: Annotated[
-        str | None, typer.Argument(metavar="[VIEW]", help="A view: list its columns")
-    ] = None,
-    form: FormatOption = None,
-    wide: WideOption = False,
-    output: OutputOption = None,
-    database: DatabaseOption = DEFAULT_DATABASE,
+    view: Annotated[str | None, typer.Argument(autocompletion=complete("view"))] = None,
+    *,
+    form: Format | None = None,
+    wide: bool = False,
+    output: Path | None = None,
+    database: Path = DEFAULT_DATABASE,
 ) -> None:
-    """List the public views; with the name of one, its columns with type and meaning."""
+    """List the public views; with the name of one, its columns with type and meaning.
+
+    Args:
+        view ([VIEW]): A view: list its columns.
+    """
     from msgflow.cli.output import print_result
     from msgflow.database import Database
 

@@ -24,6 +24,12 @@ _INSTEAD = {
     ("msgflow export", "series"): (
         "msgflow query flows --times relative -o FILE.csv; for PlotJuggler msgflow export mcap"
     ),
+    ("", "--skip-first"): "--start SECONDS",
+    ("", "--memory-limit"): "MSGFLOW_MEMORY_LIMIT in the environment",
+    **{
+        ("msgflow runs list", option): "msgflow info --section runs"
+        for option in ("--format", "-o", "--output", "--wide")
+    },
     ("msgflow query", "--list"): "msgflow query",
     ("msgflow query critical-path", "--take"): "msgflow flow --take ID --why",
     ("msgflow clocks", "pairs"): "msgflow clocks --by pair",

@@ -8,14 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from msgflow.cli.options import (
-    OUTPUT,
-    SELECTION,
-    Reader,
-    ReaderOption,
-    format_option,
-    output_option,
-)
+from msgflow.cli.operation import operation
+from msgflow.cli.options import Reader
 from msgflow.errors import UsageError
 from msgflow.events.formats import TABLES, EventFormat, format_of, is_directory
 from msgflow.export.formats import Format
@@ -27,72 +21,34 @@ if TYPE_CHECKING:
 _DAMAGES_SHOWN = 10
 
 
+@operation
 def command(
-    traces: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="TRACE...",
-            help="Directories with CTF traces, at any depth, or archives of such; all are merged",
-        ),
-    ],
-    event: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--event",
-            "-e",
-            metavar="PATTERN",
-            help="Name of events to list, such as 'ros2:rcl_*'; may be repeated",
-            show_default="all",
-            rich_help_panel=SELECTION,
-        ),
-    ] = None,
-    start: Annotated[
-        str | None,
-        typer.Option(
-            "--start",
-            metavar="TIME",
-            help="Start of the listing: 2.5s from the start of the trace, epoch ns, or ISO time",
-            rich_help_panel=SELECTION,
-        ),
-    ] = None,
-    end: Annotated[
-        str | None,
-        typer.Option(
-            "--end",
-            metavar="TIME",
-            help="End of the listing, in the same formats as --start",
-            rich_help_panel=SELECTION,
-        ),
-    ] = None,
-    count: Annotated[
-        bool,
-        typer.Option(
-            "--count", help="Print only how often each event occurs", rich_help_panel=OUTPUT
-        ),
-    ] = False,
-    form: Annotated[
-        EventFormat | None,
-        format_option(
-            "Output format",
-            show_default="by the suffix of PATH, else text, parquet for a directory",
-        ),
-    ] = None,
-    output: Annotated[
-        Path | None,
-        output_option(
-            "PATH",
-            "File to write or replace; or, for CSV and Parquet, a new directory (a name"
-            " without suffix) that gets one file per event name, with a column per field",
-            show_default="stdout",
-        ),
-    ] = None,
-    reader: ReaderOption = Reader.AUTO,
-    strict: Annotated[bool, typer.Option("--strict", help="Stop at the first damage")] = False,
+    traces: list[Path],
+    *,
+    event: Annotated[list[str] | None, typer.Option("--event", "-e")] = None,
+    start: str | None = None,
+    end: str | None = None,
+    count: bool = False,
+    form: EventFormat | None = None,
+    output: Path | None = None,
+    reader: Reader = Reader.AUTO,
+    strict: bool = False,
 ) -> None:
     """List the events of any CTF traces in order of time.
 
-    A line has the time (UTC), host, process name/vpid/vtid, CPU, event name and
-    fields.
+    A line has the time (UTC), host, process name/vpid/vtid, CPU, event name and fields.
+
+    Args:
+        traces (TRACE...): Directories with CTF traces, at any depth, or archives of such; all are
+            merged.
+        event (PATTERN): Name of events to list, such as 'ros2:rcl_*'; may be repeated.
+        start: Start of the listing: 2.5s from the start of the trace, epoch ns, or ISO time.
+        end: End of the listing, in the same formats as --start.
+        count: Print only how often each event occurs.
+        form (text|json|jsonl|csv|parquet): By default by the suffix of PATH, else text; parquet for
+            a directory.
+        output (PATH): File to write or replace; or, for CSV and Parquet, a new directory (a name
+            without suffix) that gets one file per event name, with a column per field.
     """
     from msgflow import trace
     from msgflow.cli.output import print_note

@@ -2,26 +2,18 @@
 
 from __future__ import annotations
 
-import os
 import re
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from msgflow.cli import fleet_queries
-from msgflow.cli.compare import fail_on_option, only_different_option, print_comparison
-from msgflow.cli.options import (
-    FormatOption,
-    LakeOption,
-    OutputOption,
-    OwnEventsOption,
-    Reader,
-    ReaderOption,
-    WideOption,
-    bytes_of,
-    case_option,
-)
+from msgflow.cli.compare import FailOn, OnlyDifferent, print_comparison
+from msgflow.cli.operation import operation
+from msgflow.cli.options import Reader, bytes_of
 from msgflow.errors import ExitCode, UsageError
+from msgflow.export.formats import Format
 
 if TYPE_CHECKING:
     from msgflow.fleet.ingest import FleetProgress
@@ -34,88 +26,48 @@ _MOST_FAILURES = 20
 
 
 @app.command("ingest")
+@operation
 def ingest(
-    sources: Annotated[
-        list[str],
-        typer.Argument(
-            metavar="SOURCE...",
-            help="Recordings: directories, archives, patterns ('s3://bucket/night/*'), or manifests"
-            " (.csv, .jsonl, .parquet) with a column path and labels",
-        ),
-    ],
-    lake: LakeOption,
-    label: Annotated[
-        list[str] | None,
-        typer.Option("--label", metavar="KEY=VALUE", help="Say so of all; may be repeated"),
-    ] = None,
-    ray: Annotated[
-        str | None,
-        typer.Option(
-            "--ray",
-            metavar="ADDRESS",
-            help="Ray cluster that does the work: its address, auto, or local",
-            show_default="this process",
-        ),
-    ] = None,
-    replace: Annotated[
-        bool, typer.Option("--replace", help="Ingest again what the lake has already")
-    ] = False,
-    retry_failed: Annotated[
-        bool, typer.Option("--retry-failed", help="Try again what failed before")
-    ] = False,
-    tries: Annotated[
-        int,
-        typer.Option("--tries", min=1, help="How often, where the next one may go better"),
-    ] = 3,
-    timeout: Annotated[
-        str, typer.Option("--timeout", metavar="TIME", help="What one recording may take: 90s, 2h")
-    ] = "1h",
-    memory: Annotated[
-        str | None,
-        typer.Option(
-            "--memory",
-            metavar="SIZE",
-            help="What one recording may take, such as 4GB",
-            show_default="no limit",
-        ),
-    ] = None,
-    scratch: Annotated[
-        str | None,
-        typer.Option(
-            "--scratch",
-            metavar="DIR",
-            parser=os.path.expanduser,
-            help="Folder of each worker",
-            show_default="that of the system",
-        ),
-    ] = None,
-    views: Annotated[
-        bool, typer.Option("--views/--no-views", help="Also write the public views")
-    ] = True,
-    database: Annotated[
-        bool, typer.Option("--database/--no-database", help="Also write the database of each run")
-    ] = True,
-    clock_sync: Annotated[
-        str,
-        typer.Option(
-            "--clock-sync", metavar="none|messages", help="As msgflow ingest has it, for each"
-        ),
-    ] = "none",
-    reader: ReaderOption = Reader.AUTO,
-    strict: Annotated[bool, typer.Option("--strict", help="Refuse damaged traces")] = False,
-    ignore: Annotated[
-        list[str] | None,
-        typer.Option("--ignore", metavar="PATTERN", help="Skip events with these names"),
-    ] = None,
-    events: OwnEventsOption = None,
-    quiet: Annotated[
-        bool, typer.Option("--quiet", "-q", help="Print only errors and failures")
-    ] = False,
+    sources: list[str],
+    *,
+    lake: str,
+    label: list[str] | None = None,
+    ray: str | None = None,
+    replace: bool = False,
+    retry_failed: bool = False,
+    tries: Annotated[int, typer.Option(min=1)] = 3,
+    timeout: str = "1h",
+    memory: str | None = None,
+    scratch: Path | None = None,
+    views: Annotated[bool, typer.Option()] = True,
+    database: Annotated[bool, typer.Option()] = True,
+    clock_sync: Annotated[str, typer.Option()] = "none",
+    reader: Reader = Reader.AUTO,
+    strict: bool = False,
+    ignore: list[str] | None = None,
+    events: list[str] | None = None,
+    quiet: bool = False,
 ) -> None:
     """Ingest many recordings into a lake, each as one run.
 
     What fails is noted in the lake, and the rest goes on. Started again it does what is left.
     Exit code 0: all are in the lake; 1: some are not; 3: none is.
+
+    Args:
+        sources (SOURCE...): Recordings: directories, archives, patterns ('s3://bucket/night/*'), or
+            manifests (.csv, .jsonl, .parquet) with a column path and labels.
+        label (KEY=VALUE): Say so of all; may be repeated.
+        ray (ADDRESS): Ray cluster that does the work: its address, auto, or local; by default this
+            process.
+        replace: Ingest again what the lake has already.
+        retry_failed: Try again what failed before.
+        tries: How often, where the next one may go better.
+        timeout (TIME): What one recording may take: 90s, 2h.
+        memory (SIZE): What one recording may take, such as 4GB; else no limit.
+        scratch (DIR): Folder of each worker; by default that of the system.
+        views: Also write the public views.
+        database: Also write the database of each run.
+        clock_sync (none|messages): As msgflow ingest has it, for each.
     """
     if clock_sync not in ("none", "messages"):
         raise UsageError(
@@ -142,7 +94,7 @@ def ingest(
         tries=tries,
         timeout=seconds,
         memory=most,
-        scratch=scratch,
+        scratch=None if scratch is None else str(scratch),
     )
     with fleet_progress(quiet) as progress:
         report = fleet_ingest(
@@ -184,11 +136,13 @@ def _print_report(report: FleetProgress, lake: str, quiet: bool) -> None:
 
 
 @app.command("runs")
+@operation
 def runs(
-    lake: LakeOption,
-    form: FormatOption = None,
-    output: OutputOption = None,
-    wide: WideOption = False,
+    *,
+    lake: str,
+    form: Format | None = None,
+    output: Path | None = None,
+    wide: bool = False,
 ) -> None:
     """List the runs of a lake."""
     from msgflow.cli.output import print_result
@@ -199,11 +153,13 @@ def runs(
 
 
 @app.command("failures")
+@operation
 def failures(
-    lake: LakeOption,
-    form: FormatOption = None,
-    output: OutputOption = None,
-    wide: WideOption = False,
+    *,
+    lake: str,
+    form: Format | None = None,
+    output: Path | None = None,
+    wide: bool = False,
 ) -> None:
     """List the recordings that did not go into a lake, and why."""
     from msgflow.cli.output import print_result
@@ -220,11 +176,13 @@ app.command("open")(fleet_queries.open_)
 
 
 @app.command("remove")
-def remove(
-    keys: Annotated[list[str], typer.Argument(metavar="RUN...", help="Keys of runs")],
-    lake: LakeOption,
-) -> None:
-    """Take runs out of a lake; their files go with the next `msgflow fleet compact`."""
+@operation
+def remove(keys: list[str], *, lake: str) -> None:
+    """Take runs out of a lake; their files go with the next `msgflow fleet compact`.
+
+    Args:
+        keys (RUN...): Keys of runs.
+    """
     from msgflow.cli.output import print_status
     from msgflow.fleet.lake import Lake
     from msgflow.text.values import count
@@ -234,19 +192,14 @@ def remove(
 
 
 @app.command("compact")
-def compact(
-    lake: LakeOption,
-    older_than: Annotated[
-        str,
-        typer.Option(
-            "--older-than",
-            metavar="TIME",
-            help="Delete files that have not been needed for so long: 2h, 1d. Longer than any"
-            " reader or ingest of a recording takes",
-        ),
-    ] = "1d",
-) -> None:
-    """Put the answers of many runs into few files, and delete those that nobody needs."""
+@operation
+def compact(*, lake: str, older_than: str = "1d") -> None:
+    """Put the answers of many runs into few files, and delete those that nobody needs.
+
+    Args:
+        older_than (TIME): Delete files that have not been needed for so long: 2h, 1d. Longer than
+            any reader or ingest of a recording takes.
+    """
     seconds = _time(older_than, "--older-than")
     from msgflow.cli.output import print_status
     from msgflow.fleet.compact import compact as compacted
@@ -261,69 +214,42 @@ def compact(
 
 
 @app.command("compare")
+@operation
 def compare(
-    lake: LakeOption,
-    by: Annotated[
-        str, typer.Option("--by", metavar="LABEL", help="Label that tells the two sides apart")
-    ],
-    base: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="BASE",
-            help="Its value on side A, which the other is compared with",
-            show_default="the lesser, where there are two",
-        ),
-    ] = None,
-    other: Annotated[
-        str | None, typer.Argument(metavar="OTHER", help="Its value on side B")
-    ] = None,
-    where: Annotated[
-        str | None,
-        typer.Option(
-            "--where",
-            metavar="SQL",
-            help="Only runs for which this holds: a condition on labels",
-            show_default="all",
-        ),
-    ] = None,
-    unit: Annotated[
-        str | None,
-        typer.Option(
-            "--unit",
-            metavar="LABEL",
-            help="All runs with one value of this label count as one, such as those of a robot",
-            show_default="each run for itself",
-        ),
-    ] = None,
-    case: Annotated[
-        str,
-        case_option("Flows that count"),
-    ] = "first",
-    confidence: Annotated[
-        float, typer.Option("--confidence", help="Confidence level of the intervals")
-    ] = 0.95,
-    fail_on: Annotated[
-        list[str] | None,
-        fail_on_option("side"),
-    ] = None,
-    only_different: Annotated[
-        bool | None,
-        only_different_option("path"),
-    ] = None,
-    form: FormatOption = None,
-    output: OutputOption = None,
-    wide: WideOption = False,
+    base: str | None = None,
+    other: str | None = None,
+    *,
+    lake: str,
+    by: str,
+    where: str | None = None,
+    unit: str | None = None,
+    case: str = "first",
+    confidence: float = 0.95,
+    fail_on: FailOn = None,
+    only_different: OnlyDifferent = None,
+    form: Format | None = None,
+    output: Path | None = None,
+    wide: bool = False,
 ) -> None:
     """Compare paths in runs of one version (robot, site) with those of another.
 
-    The run is the unit: how much runs of one side differ from each other tells
-    whether the two sides differ.
+    The run is the unit: how much runs of one side differ from each other tells whether the two
+    sides differ.
+
+    Args:
+        base (BASE): Its value on side A, which the other is compared with; by default the lesser,
+            where there are two.
+        other (OTHER): Its value on side B.
+        by (LABEL): Label that tells the two sides apart.
+        unit (LABEL): All runs with one value of this label count as one, such as those of a robot;
+            by default each run for itself.
+        case: Flows that count: first or last arrival of each root, newest root of each arrival, or
+            all.
+        confidence: Confidence level of the intervals.
     """
     from msgflow.fleet.compare import compare as compared
     from msgflow.fleet.lake import Lake
-    from msgflow.query.compare import parse_conditions
 
-    parse_conditions(fail_on or [])
     comparison = compared(
         Lake.open(lake),
         by,

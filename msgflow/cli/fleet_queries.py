@@ -7,80 +7,51 @@ from typing import Annotated
 
 import typer
 
-from msgflow.cli.options import (
-    ColumnsOption,
-    FormatOption,
-    InternalOption,
-    LakeOption,
-    LakeWhereOption,
-    OutputOption,
-    WideOption,
-    case_option,
-    output_option,
-)
-from msgflow.cli.row_options import LimitOption, SortOption, row_option
-from msgflow.cli.sql import (
-    DEFAULT_LIMIT,
-    PrintedRowsOption,
-    SqlArgument,
-    SqlFileOption,
-    sql_of,
-)
+from msgflow.cli.operation import operation
+from msgflow.cli.sql import DEFAULT_LIMIT, FileOption, sql_of
 from msgflow.errors import UsageError
+from msgflow.export.formats import Format
 
 _MOST_WORST = 1_000
 
 
+@operation
 def query(
-    name: Annotated[
-        str | None,
-        typer.Argument(metavar="[NAME]", help="Named query; without it they are listed"),
-    ] = None,
-    lake: LakeOption = "",
-    where: LakeWhereOption = None,
-    group_by: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--group-by",
-            metavar="LABEL",
-            help="One row for each value of this label (or column of run); several between commas",
-        ),
-    ] = None,
-    measure: Annotated[
-        str | None,
-        typer.Option("--measure", metavar="WHAT", help="What topics measures: see msgflow query"),
-    ] = None,
-    section: Annotated[
-        str | None,
-        typer.Option("--section", metavar="WHAT", help="What info lists: findings or quality"),
-    ] = None,
-    case: Annotated[
-        str | None,
-        case_option("With e2e-latency: flows that count"),
-    ] = None,
-    node: Annotated[list[str] | None, row_option("node", "NAME", "Name or glob")] = None,
-    topic: Annotated[list[str] | None, row_option("topic", "NAME", "Name or glob")] = None,
-    callback: Annotated[list[str] | None, row_option("callback", "NAME", "Name or glob")] = None,
-    host: Annotated[list[str] | None, row_option("host", "NAME", "Name or glob")] = None,
-    via: Annotated[
-        list[str] | None,
-        row_option("via", "NAME", "Paths through all of these topics and nodes"),
-    ] = None,
-    without: Annotated[
-        list[str] | None, row_option("without", "NAME", "Paths through none of these")
-    ] = None,
-    sort: SortOption = None,
-    limit: LimitOption = None,
-    internal: InternalOption = False,
-    form: FormatOption = None,
-    columns: ColumnsOption = None,
-    output: OutputOption = None,
-    wide: WideOption = False,
+    name: str | None = None,
+    *,
+    lake: str = "",
+    where: str | None = None,
+    group_by: list[str] | None = None,
+    measure: str | None = None,
+    section: str | None = None,
+    case: str | None = None,
+    node: list[str] | None = None,
+    topic: list[str] | None = None,
+    callback: list[str] | None = None,
+    host: list[str] | None = None,
+    via: list[str] | None = None,
+    without: list[str] | None = None,
+    sort: list[str] | None = None,
+    limit: int | None = None,
+    internal: bool = False,
+    form: Format | None = None,
+    columns: str | None = None,
+    output: Path | None = None,
+    wide: bool = False,
 ) -> None:
     """Ask a named query of many runs, as msgflow query asks it of one.
 
     Quantiles come from the latencies of all flows, or from counts in buckets that are off by less
     than 1 %; they are never averages of those of runs.
+
+    Args:
+        name ([NAME]): Named query; without it they are listed.
+        group_by (LABEL): One row for each value of this label (or column of run); several between
+            commas.
+        measure (WHAT): What topics measures: see msgflow query.
+        section (WHAT): What info lists: findings or quality.
+        case: With e2e-latency: flows that count: first or last arrival of each root, newest root of
+            each arrival, or all.
     """
     from msgflow.cli.output import print_list, print_result
     from msgflow.fleet.lake import Lake
@@ -117,20 +88,27 @@ def query(
     print_result(result, form, output, wide=wide, columns=columns, most_rows=limit or MOST_ROWS)
 
 
+@operation
 def sql(
-    text: SqlArgument = None,
-    lake: LakeOption = "",
-    where: LakeWhereOption = None,
-    file: SqlFileOption = None,
-    limit: PrintedRowsOption = DEFAULT_LIMIT,
-    form: FormatOption = None,
-    wide: WideOption = False,
-    output: OutputOption = None,
+    text: str | None = None,
+    *,
+    lake: str = "",
+    where: str | None = None,
+    file: FileOption = None,
+    limit: Annotated[int, typer.Option(min=0)] = DEFAULT_LIMIT,
+    form: Format | None = None,
+    wide: bool = False,
+    output: Path | None = None,
 ) -> None:
     """Run SQL on the tables of a lake, read-only and without access to anything else.
 
     Tables are run, flow, distribution and the others of docs/fleet.md, with the rows of the chosen
     runs that count; public views are view.publication and so on.
+
+    Args:
+        text ([SQL]): A query; - reads it from stdin.
+        file: Read the query from FILE.
+        limit (ROWS): Maximum number of rows to print; 0 for all.
     """
     from msgflow.cli.output import print_result
     from msgflow.fleet.lake import Lake
@@ -142,22 +120,24 @@ def sql(
     print_result(result, form, output, wide=wide)
 
 
+@operation
 def worst(
-    path: Annotated[
-        str, typer.Argument(metavar="PATH", help="Text of a path, a glob, or a part: a topic")
-    ],
-    lake: LakeOption,
-    where: LakeWhereOption = None,
-    limit: Annotated[
-        int,
-        typer.Option("--limit", metavar="N", min=1, max=_MOST_WORST, help="Number of flows"),
-    ] = 10,
-    form: FormatOption = None,
-    columns: ColumnsOption = None,
-    output: OutputOption = None,
-    wide: WideOption = False,
+    path: Annotated[str, typer.Argument()],
+    *,
+    lake: str,
+    where: str | None = None,
+    limit: Annotated[int, typer.Option(min=1, max=_MOST_WORST)] = 10,
+    form: Format | None = None,
+    columns: str | None = None,
+    output: Path | None = None,
+    wide: bool = False,
 ) -> None:
-    """Show the flows of a path that took longest, with what opens each."""
+    """Show the flows of a path that took longest, with what opens each.
+
+    Args:
+        path (PATH): Text of a path, a glob, or a part: a topic.
+        limit (N): Number of flows.
+    """
     from msgflow.cli.output import print_result
     from msgflow.fleet.lake import Lake
     from msgflow.fleet.lake_query import fleet_worst
@@ -166,20 +146,14 @@ def worst(
     print_result(result, form, output, wide=wide, columns=columns, most_rows=limit)
 
 
-def open_(
-    run: Annotated[
-        str, typer.Argument(metavar="RUN", help="Key of a run, the begin of it, or a name")
-    ],
-    lake: LakeOption,
-    output: Annotated[
-        Path | None,
-        output_option(
-            help="New database file; one that exists is not replaced",
-            show_default="RUN.duckdb",
-        ),
-    ] = None,
-) -> None:
-    """Bring one run of a lake back as an ordinary database, for flow, ui and all other commands."""
+@operation
+def open_(run: Annotated[str, typer.Argument()], *, lake: str, output: Path | None = None) -> None:
+    """Bring one run of a lake back as an ordinary database, for flow, ui and all other commands.
+
+    Args:
+        run (RUN): Key of a run, the begin of it, or a name.
+        output: New database file; one that exists is not replaced. By default RUN.duckdb.
+    """
     from msgflow.cli.output import print_status
     from msgflow.fleet.lake import Lake
     from msgflow.fleet.run_database import open_run

@@ -8,20 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from msgflow.cli.completion import complete
 from msgflow.cli.header_options import header_option
-from msgflow.cli.options import (
-    OUTPUT,
-    SELECTION,
-    DatabaseOption,
-    InternalOption,
-    MemoryLimitOption,
-    OutputOption,
-    RunOption,
-    WideOption,
-    case_option,
-    format_option,
-)
+from msgflow.cli.operation import operation
+from msgflow.cli.options import OUTPUT, SELECTION
 from msgflow.errors import UsageError
 from msgflow.files.default_files import DEFAULT_DATABASE
 from msgflow.query.catalogue import load_query
@@ -30,8 +19,6 @@ from msgflow.text.values import format_duration
 
 if TYPE_CHECKING:
     from msgflow.database import Database
-
-_START = "Which message"
 
 
 class FlowFormat(StrEnum):
@@ -54,127 +41,58 @@ _DECLARED = {param.name: param for param in internal_sql().header("flow_steps").
 _OF_WHY = {param.name: param for param in load_query("critical-path").params}
 
 
+@operation
 def command(
-    place: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="[TOPIC|NODE]",
-            help="Topic of the message, or node; or one of the options below",
-            show_default=False,
-            autocompletion=complete("place"),
-        ),
-    ] = None,
-    at: Annotated[
-        str | None,
-        typer.Option(
-            "--at",
-            metavar="TIME",
-            help="The first one then or after: seconds from the start of the run, ISO time, or ns",
-            show_default=False,
-            rich_help_panel=_START,
-        ),
-    ] = None,
-    publication: Annotated[
-        int | None,
-        typer.Option("--publication", metavar="ID", help="publication_id", rich_help_panel=_START),
-    ] = None,
-    take: Annotated[
-        int | None,
-        typer.Option("--take", metavar="ID", help="take_id", rich_help_panel=_START),
-    ] = None,
-    callback_instance: Annotated[
-        int | None,
-        typer.Option(
-            "--callback-instance",
-            metavar="ID",
-            help="callback_instance_id",
-            rich_help_panel=_START,
-        ),
-    ] = None,
-    request: Annotated[
-        int | None,
-        typer.Option("--request", metavar="ID", help="request_id", rich_help_panel=_START),
-    ] = None,
-    response: Annotated[
-        int | None,
-        typer.Option("--response", metavar="ID", help="response_id", rich_help_panel=_START),
-    ] = None,
-    slowest: Annotated[
-        int | None,
-        typer.Option(
-            "--slowest",
-            metavar="N",
-            min=1,
-            max=100,
-            help="The N slowest flows, each back from its last message",
-            rich_help_panel=_START,
-        ),
-    ] = None,
-    why: Annotated[
-        bool,
-        typer.Option(
-            "--why",
-            help="What the message waited for, as the query critical-path has it",
-            rich_help_panel=OUTPUT,
-        ),
-    ] = False,
+    place: str | None = None,
+    *,
+    at: str | None = None,
+    publication: int | None = None,
+    take: int | None = None,
+    callback_instance: int | None = None,
+    request: int | None = None,
+    response: int | None = None,
+    slowest: Annotated[int | None, typer.Option(min=1, max=100)] = None,
+    why: bool = False,
     by: Annotated[str | None, header_option(_OF_WHY["by"], OUTPUT)] = None,
     detail: Annotated[str | None, header_option(_OF_WHY["detail"], OUTPUT)] = None,
-    case: Annotated[
-        str | None,
-        case_option("With --slowest or --why: flows that count", rich_help_panel=_START),
-    ] = None,
-    from_: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--from",
-            metavar="NAME",
-            help="With --slowest or --why: where flows start; globs",
-            autocompletion=complete("place"),
-            rich_help_panel=_START,
-        ),
-    ] = None,
-    to: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--to",
-            metavar="NAME",
-            help="With --slowest: where flows end; globs",
-            autocompletion=complete("place"),
-            rich_help_panel=_START,
-        ),
-    ] = None,
-    run: RunOption = None,
+    case: str | None = None,
+    from_: list[str] | None = None,
+    to: list[str] | None = None,
+    run: str | None = None,
     direction: Annotated[str | None, header_option(_DECLARED["direction"], SELECTION)] = None,
     depth: Annotated[str | None, header_option(_DECLARED["depth"], SELECTION)] = None,
     limit: Annotated[str | None, header_option(_DECLARED["limit"], SELECTION)] = None,
-    internal: InternalOption = False,
-    absolute: Annotated[
-        bool,
-        typer.Option(
-            "--absolute",
-            help="Show points in time, in UTC",
-            rich_help_panel=OUTPUT,
-        ),
-    ] = False,
-    form: Annotated[
-        FlowFormat | None,
-        format_option(
-            "A tree, nodes and edges, or a page with its timeline",
-            show_default="by the suffix of FILE, else table",
-        ),
-    ] = None,
-    wide: WideOption = False,
-    output: OutputOption = None,
-    memory_limit: MemoryLimitOption = None,
-    database: DatabaseOption = DEFAULT_DATABASE,
+    internal: bool = False,
+    absolute: bool = False,
+    form: FlowFormat | None = None,
+    wide: bool = False,
+    output: Path | None = None,
+    database: Path = DEFAULT_DATABASE,
 ) -> None:
     """Print the flow of one message: what caused it, and what it caused.
 
-    A line is a publication, a taken message with its callback, a request, or a
-    response that its client took.
+    A line is a publication, a taken message with its callback, a request, or a response that its
+    client took.
 
     Times count from the first line. NA means that the trace does not show it.
+
+    Args:
+        place: Topic of the message, or node; or one of the options below.
+        at (TIME): The first one then or after: seconds from the start of the run, ISO time, or ns.
+        publication (ID): publication_id.
+        take (ID): take_id.
+        callback_instance (ID): callback_instance_id.
+        request (ID): request_id.
+        response (ID): response_id.
+        slowest (N): The N slowest flows, each back from its last message.
+        why: What the message waited for, as the query critical-path has it.
+        case: With --slowest or --why: flows that count: first or last arrival of each root, newest
+            root of each arrival, or all.
+        from_: With --slowest or --why: where flows start; globs.
+        to: With --slowest: where flows end; globs.
+        absolute: Show points in time, in UTC.
+        form (table|json|html): A tree, nodes and edges, or a page with its timeline; by default by
+            the suffix of FILE, else table.
     """
     from msgflow.cli.output import (
         print_drawing,
@@ -211,7 +129,7 @@ def command(
         )
     if slowest is not None and slowest > 1 and form in (FlowFormat.JSON, FlowFormat.HTML):
         raise UsageError(f"a file has one flow — --slowest {slowest}", "--slowest 1, or a tree")
-    with Database(database, memory_limit=memory_limit) as opened:
+    with Database(database) as opened:
         starts: dict[str, Any] = {
             "place": place,
             "at": at,

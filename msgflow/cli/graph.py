@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from enum import StrEnum
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-from msgflow.cli.options import format_option
+from msgflow.cli.operation import parameters_of
 from msgflow.cli.query_command import build_command, chosen_by, print_rows
 from msgflow.export.formats import Format
 from msgflow.export.graph import Graph, GraphFormat, graph_format
@@ -30,21 +30,22 @@ class AnyFormat(StrEnum):
     MARKDOWN = "markdown"
 
 
-_FormatOption = Annotated[
-    AnyFormat | None,
-    format_option(
-        "The graph as dot, mermaid or json; its rows as table, csv, csv-safe, jsonl, parquet,"
-        " markdown",
-        metavar="FORMAT",
-        show_default="by the suffix of FILE, else dot",
-    ),
-]
+def _options(*, form: AnyFormat | None = None) -> None:
+    """Have what is other than in a query.
+
+    Args:
+        form (FORMAT): The graph as dot, mermaid or json; its rows as table, csv, csv-safe, jsonl,
+            parquet, markdown. By default by the suffix of FILE, else dot.
+    """
 
 
 def asked(words: list[str]) -> Any:
     """Return the command of the query."""
     return build_command(
-        chosen_by("graph", words), option=_FormatOption, form_of=_form, write=_write
+        chosen_by("graph", words),
+        form=next(parameters_of(_options)),
+        form_of=_form,
+        write=_write,
     )
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from msgflow.cli.completion import complete
+from msgflow.cli.operation import escape
 from msgflow.query.names import PLACE_PARAMETERS
 
 if TYPE_CHECKING:
@@ -73,10 +74,3 @@ def given_of(words: Mapping[str, Any]) -> dict[str, Any]:
         for name, value in own.items()
         if value is not None and value != []
     }
-
-
-def escape(text: str) -> str:
-    """Return a text without markup: Rich prints it as it is."""
-    from rich import markup
-
-    return markup.escape(text)

@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Any
 
 from msgflow.cli.header_options import header_option
-from msgflow.cli.options import (
-    SELECTION,
-    DatabaseOption,
-    InternalOption,
-    OutputOption,
-    RunOption,
-    WideOption,
-)
+from msgflow.cli.operation import operation
+from msgflow.cli.options import SELECTION
 from msgflow.cli.query_command import build_command, choice_of, chosen_by
 from msgflow.cli.sections import (
     SectionsFormat,
-    SectionsFormatOption,
     json_lines,
     screen_sections,
     sections_format,
@@ -34,21 +28,23 @@ def asked(words: list[str]) -> Any:
     return build_command(chosen_by("info", words)) if choice_of(_SECTION, words) else None
 
 
+@operation
 def command(
-    section: Annotated[
-        str | None,
-        header_option(_SECTION, SELECTION),
-    ] = None,
-    run: RunOption = None,
-    internal: InternalOption = False,
-    form: SectionsFormatOption = None,
-    output: OutputOption = None,
-    wide: WideOption = False,
-    database: DatabaseOption = DEFAULT_DATABASE,
+    *,
+    section: Annotated[str | None, header_option(_SECTION, SELECTION)] = None,
+    run: str | None = None,
+    internal: bool = False,
+    form: SectionsFormat | None = None,
+    output: Path | None = None,
+    wide: bool = False,
+    database: Path = DEFAULT_DATABASE,
 ) -> None:
     """Print what a database holds: runs, hosts, processes, nodes, topics, counts, data quality.
 
     With --section it takes the options of queries: msgflow info --section nodes --help.
+
+    Args:
+        form (table|json|markdown): By default by the suffix of FILE, else table.
     """
     from msgflow.cli.output import is_screen, print_note, print_text
     from msgflow.database import Database

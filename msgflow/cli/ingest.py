@@ -6,21 +6,11 @@ import os
 import shlex
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from msgflow.cli.check import PLACES_SHOWN
-from msgflow.cli.options import (
-    ClockSyncOption,
-    DatabaseOption,
-    LinksOption,
-    OwnEventsOption,
-    Reader,
-    ReaderOption,
-    memory_limit_option,
-    path_of,
-)
+from msgflow.cli.operation import operation
+from msgflow.cli.options import Reader
 from msgflow.errors import UsageError
 from msgflow.files.default_files import DEFAULT_DATABASE
 from msgflow.sql.interrupt import noted_interrupts
@@ -32,76 +22,39 @@ ARCHIVES_SHOWN = 3
 """Most archives that a note names."""
 
 
+@operation
 def command(
-    traces: Annotated[
-        list[str],
-        typer.Argument(
-            metavar="TRACE...",
-            help="Directories with CTF traces, at any depth, or archives of such",
-        ),
-    ],
-    name: Annotated[
-        str | None,
-        typer.Option("--name", help="Name of the run", show_default="that of its folder"),
-    ] = None,
-    together: Annotated[
-        bool,
-        typer.Option(
-            "--together",
-            help="One run of all traces, though they are recordings of different times",
-        ),
-    ] = False,
-    replace: Annotated[
-        bool, typer.Option("--replace", help="Replace the run that already holds these traces")
-    ] = False,
-    host: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--host",
-            metavar="NAME=PATH",
-            help="Name the host of the traces below PATH; may be repeated, with the same name too;"
-            " the deepest PATH counts",
-        ),
-    ] = None,
-    keep_staging: Annotated[
-        Path | None,
-        typer.Option(
-            "--keep-staging",
-            metavar="DIR",
-            parser=path_of,
-            help="Keep the raw events, as Parquet files in DIR",
-        ),
-    ] = None,
-    links: LinksOption = None,
-    clock_sync: ClockSyncOption = "none",
-    reader: ReaderOption = Reader.AUTO,
-    strict: Annotated[
-        bool,
-        typer.Option("--strict", help="Refuse damaged traces instead of keeping what can be read"),
-    ] = False,
-    ignore: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--ignore",
-            metavar="PATTERN",
-            help="Skip events with these names, such as 'dds:*'; may be repeated",
-        ),
-    ] = None,
-    events: OwnEventsOption = None,
-    memory_limit: Annotated[
-        str | None,
-        memory_limit_option(
-            "Maximum memory for the database, such as 2GB; more makes large traces faster"
-        ),
-    ] = None,
-    quiet: Annotated[
-        bool, typer.Option("--quiet", "-q", help="Print only errors, and work that was lost")
-    ] = False,
-    database: DatabaseOption = DEFAULT_DATABASE,
+    traces: list[str],
+    *,
+    name: str | None = None,
+    together: bool = False,
+    replace: bool = False,
+    host: list[str] | None = None,
+    keep_staging: Path | None = None,
+    links: Path | None = None,
+    clock_sync: str = "none",
+    reader: Reader = Reader.AUTO,
+    strict: bool = False,
+    ignore: list[str] | None = None,
+    events: list[str] | None = None,
+    memory_limit: str | None = None,
+    quiet: bool = False,
+    database: Path = DEFAULT_DATABASE,
 ) -> None:
     """Read LTTng traces of a ROS 2 system into a database, each recording as a run.
 
     Traces of one session, and sessions whose times overlap, are one recording.
+
+    Args:
+        traces (TRACE...): Directories with CTF traces, at any depth, or archives of such.
+        name (NAME): Name of the run; by default that of its folder.
+        together: One run of all traces, though they are recordings of different times.
+        replace: Replace the run that already holds these traces.
+        host (NAME=PATH): Name the host of the traces below PATH; may be repeated, with the same
+            name too; the deepest PATH counts.
+        keep_staging (DIR): Keep the raw events, as Parquet files in DIR.
+        memory_limit: Maximum memory for the database, such as 2GB; more makes large traces faster.
+            By default a quarter of the machine's, 500MB to 4GB.
     """
     hosts = _hosts(host or [])
     # From before the imports, which may lose Ctrl-C, until the stored run is reported.

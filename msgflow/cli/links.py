@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
-from msgflow.cli.options import DatabaseOption, RunOption
+from msgflow.cli.operation import operation
 from msgflow.cli.query_command import AskingGroup
 from msgflow.files.default_files import DEFAULT_DATABASE
 
@@ -24,14 +24,14 @@ app = typer.Typer(cls=_LinksGroup)
 
 
 @app.command("apply")
-def apply(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="Links to declare, as YAML")],
-    run: RunOption = None,
-    database: DatabaseOption = DEFAULT_DATABASE,
-) -> None:
+@operation
+def apply(file: Path, *, run: str | None = None, database: Path = DEFAULT_DATABASE) -> None:
     """Declare the links and topics of a file and derive all links of the run again.
 
     The trace is not needed.
+
+    Args:
+        file: Links to declare, as YAML.
     """
     from msgflow.cli.output import print_runs
     from msgflow.database import Database

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from msgflow.cli.options import DatabaseOption
+from pathlib import Path
+
+from msgflow.cli.operation import operation
 from msgflow.files.default_files import DEFAULT_DATABASE
 
 
-def command(database: DatabaseOption = DEFAULT_DATABASE) -> None:
+@operation
+def command(*, database: Path = DEFAULT_DATABASE) -> None:
     """Serve the database to an agent, over stdin and stdout (Model Context Protocol).
 
     It only reads, and reaches no other file. It needs the extra mcp; in a checkout:
-    pip install '.\\[mcp]'. The agent's program starts it, not you.
+    pip install '.[mcp]'. The agent's program starts it, not you.
     """
     from msgflow.cli.signals import restore_default_actions
     from msgflow.mcp.server import make_server

@@ -1,7 +1,4 @@
-"""Options of several commands, and their types.
-
-A function makes an option whose help differs from command to command.
-"""
+"""What several commands take: options and arguments, by the name of their parameter."""
 
 from __future__ import annotations
 
@@ -9,15 +6,14 @@ import os
 import re
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 from typer.core import TyperGroup
 
-from msgflow.cli.completion import complete
+from msgflow.cli.completion import complete, complete_path
 from msgflow.export.formats import Format
-from msgflow.query.selection import CASES
-from msgflow.result.times import Times
+from msgflow.query.selection import CASES, KINDS
 
 SELECTION = "Which part of the data"
 OUTPUT = "Output"
@@ -57,188 +53,120 @@ class Reader(StrEnum):
     BT2 = "bt2"
 
 
-def memory_limit_option(
-    help: str, default: str = "a quarter of the machine's, 500MB to 4GB"
-) -> Any:
-    """Return the option for the memory of the database."""
+def _selecting(help: str, metavar: str | None = None, **more: Any) -> Any:
+    return typer.Option(help=help, metavar=metavar, rich_help_panel=SELECTION, **more)
+
+
+def _place(help: str) -> Any:
+    return _selecting(help, "NAME", autocompletion=complete("place"))
+
+
+def _printed(*names: str, help: str, **more: Any) -> Any:
+    return typer.Option(*names, help=help, rich_help_panel=OUTPUT, **more)
+
+
+def _words(*words: str) -> Any:
+    """Return an option with one of a few words: `Database` refuses others."""
     return typer.Option(
-        "--memory-limit",
-        envvar="MSGFLOW_MEMORY_LIMIT",
-        metavar="SIZE",
-        help=help,
-        show_default=default,
+        metavar="|".join(words), autocompletion=lambda: list(words), rich_help_panel=SELECTION
     )
 
 
-def format_option(help: str, **more: Any) -> Any:
-    """Return the option for the format of what is written."""
-    return typer.Option("--format", help=help, rich_help_panel=OUTPUT, **more)
+_RUN = complete("run")
 
-
-def case_option(help: str, **more: Any) -> Any:
-    """Return the option for the arrivals of flows that count."""
-    return typer.Option(
-        "--case",
-        metavar="|".join(CASES),
-        help=f"{help}: first or last arrival of each root, newest root of each arrival, or all",
-        show_default=CASES[0],
-        autocompletion=lambda: list(CASES),
-        **more,
-    )
-
-
-def output_option(
-    metavar: str = "FILE", help: str = "File to write or replace", **more: Any
-) -> Any:
-    """Return the option for the file to write."""
-    return typer.Option(
-        "-o",
-        "--output",
-        metavar=metavar,
-        parser=path_of,
-        help=help,
-        rich_help_panel=OUTPUT,
-        **more,
-    )
-
-
-DatabaseOption = Annotated[
-    Path,
-    typer.Option("--db", envvar="MSGFLOW_DB", metavar="FILE", parser=path_of, help="Database file"),
-]
-MemoryLimitOption = Annotated[
-    str | None,
-    memory_limit_option(
-        "Memory of the database, such as 2GB",
-        "four fifths of the machine",
+SHARED: dict[str, Any] = {
+    "database": typer.Option("--db", envvar="MSGFLOW_DB", help="Database file"),
+    "memory_limit": typer.Option(
+        envvar="MSGFLOW_MEMORY_LIMIT", metavar="SIZE", help="Memory of the database, such as 2GB"
     ),
-]
-RunOption = Annotated[
-    str | None,
-    typer.Option(
-        "--run",
-        metavar="NAME|ID|all",
-        help="Run to read",
+    "run": _selecting(
+        "Run to read",
+        "NAME|ID|all",
         autocompletion=complete("run", "all"),
         show_default="the latest",
-        rich_help_panel=SELECTION,
     ),
-]
-InternalOption = Annotated[
-    bool,
-    typer.Option(
-        "--internal",
-        help="Also show what ROS does for itself (/rosout, /parameter_events, …)",
-        rich_help_panel=SELECTION,
+    "start": _selecting(
+        "Start of the time window: seconds from the start of the run, 100ms, ISO time, or epoch ns"
+        " (16 digits or more)",
+        "TIME",
     ),
-]
-FormatOption = Annotated[
-    Format | None,
-    format_option(
-        ", ".join(Format), metavar="FORMAT", show_default="by the suffix of FILE, else table"
+    "end": _selecting("End of the time window, in the same formats as --start", "TIME"),
+    "internal": _selecting("Also show what ROS does for itself (/rosout, /parameter_events, …)"),
+    "place": typer.Argument(metavar="[TOPIC|NODE]", autocompletion=complete("place")),
+    "from_": _place("Topics or nodes where flows start"),
+    "to": _place("Topics or nodes where flows end"),
+    "via": _place("Flows through all of these topics and nodes"),
+    "without": _place("Flows through none of these"),
+    "case": _words(*CASES),
+    **{
+        kind: _selecting("A name, or a glob", "NAME", autocompletion=complete(kind))
+        for kind in KINDS
+    },
+    "sort": _selecting("Column to sort by, or several", "COLUMN[:desc]"),
+    "limit": _selecting("Maximum number of rows", "N", min=1),
+    "slowest": _selecting("Only the N slowest flows", "N", min=1),
+    "path": _selecting(
+        "A path by its name in a file, see msgflow suggest paths",
+        "NAME",
+        autocompletion=complete_path,
     ),
-]
-TimesOption = Annotated[
-    Times | None,
-    typer.Option(
-        "--times",
+    "paths": typer.Option(help="The file with the paths that have names"),
+    "compare": _selecting("Run to compare it with", "NAME|ID", autocompletion=_RUN),
+    "run_a": typer.Argument(metavar="RUN_A", autocompletion=_RUN),
+    "run_b": typer.Argument(metavar="RUN_B", autocompletion=_RUN),
+    "what": _words("paths", "callbacks", "topics"),
+    "views": typer.Argument(metavar="VIEW", autocompletion=complete("view")),
+    "form": _printed(
+        "--format",
+        help=", ".join(Format),
+        metavar="FORMAT",
+        show_default="by the suffix of FILE, else table",
+    ),
+    "output": _printed("-o", "--output", help="File to write or replace", show_default="stdout"),
+    "columns": _printed(
+        help="Only these columns, in this order",
+        metavar="A,B,…",
+        show_default="all; on a terminal, those that fit and are not empty",
+    ),
+    "wide": _printed(help="Show all columns and rows of a table, however wide"),
+    "times": _printed(
         help="Points in time: ns since the epoch, seconds since it, seconds since the start of the"
         " run (relative), or UTC as text (iso); with all but ns, durations are in seconds",
         show_default="ns; tables have units",
-        rich_help_panel=OUTPUT,
     ),
-]
-WideOption = Annotated[
-    bool,
-    typer.Option(
-        "--wide",
-        help="Show all columns and rows of a table, however wide",
-        rich_help_panel=OUTPUT,
-    ),
-]
-ColumnsOption = Annotated[
-    str | None,
-    typer.Option(
-        "--columns",
-        metavar="A,B,…",
-        help="Only these columns, in this order",
-        show_default="all; on a terminal, those that fit and are not empty",
-        rich_help_panel=OUTPUT,
-    ),
-]
-OutputOption = Annotated[Path | None, output_option(show_default="stdout")]
-LinksOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--links", metavar="FILE", parser=path_of, help="Indirect links to declare, as YAML"
-    ),
-]
-ClockSyncOption = Annotated[
-    str,
-    typer.Option(
-        "--clock-sync",
+    "links": typer.Option(help="Indirect links to declare, as YAML"),
+    "clock_sync": typer.Option(
         metavar="none|messages|FILE",
         parser=os.path.expanduser,
         help="Synchronise the clocks of several hosts: by their messages (and the network"
         " packets of kernel traces), or by offsets in a file",
     ),
-]
-PathsOption = Annotated[
-    Path,
-    typer.Option(
-        "--paths",
-        metavar="FILE",
-        parser=path_of,
-        help="The file with the paths that have names",
+    "events": typer.Option(
+        metavar="PATTERN", help="Also your own tracepoints, such as 'my_pkg:*'; repeatable"
     ),
-]
-
-
-def targets_option(effect: str) -> Any:
-    """Return the option `--targets`, a file of requirements; `effect` says what they change."""
-    return typer.Option(
-        "--targets", metavar="FILE", parser=path_of, help=f"Requirements, as YAML: {effect}"
-    )
-
-
-OwnEventsOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--events",
-        metavar="PATTERN",
-        help="Also your own tracepoints, such as 'my_pkg:*'; repeatable",
+    "ignore": typer.Option(
+        metavar="PATTERN", help="Skip events with these names, such as 'dds:*'; repeatable"
     ),
-]
-ReaderOption = Annotated[Reader, typer.Option("--reader", help="Decoder of the traces")]
-LakeOption = Annotated[
-    str,
-    typer.Option(
-        "--lake",
+    "reader": typer.Option(help="Decoder of the traces"),
+    "strict": typer.Option(help="Refuse damaged traces instead of keeping what can be read"),
+    "quiet": typer.Option("--quiet", "-q", help="Print only errors, and work that was lost"),
+    "lake": typer.Option(
         envvar="MSGFLOW_LAKE",
         metavar="PATH",
         parser=os.path.expanduser,
         help="The lake: a folder, or s3://BUCKET/PREFIX",
     ),
-]
-LakeWhereOption = Annotated[
-    str | None,
-    typer.Option(
-        "--where",
-        metavar="CONDITION",
-        help="Runs for which this is true: SQL on labels and columns of run, such as"
-        " \"robot = 'r1'\"",
-        show_default="all runs",
-        rich_help_panel=SELECTION,
+    "where": _selecting(
+        "Runs for which this is true: SQL on labels and columns of run, such as \"robot = 'r1'\"",
+        "CONDITION",
     ),
-]
+}
+"""What Typer should know of a parameter; the function says its type and its default."""
+
 # Not from MSGFLOW_LAKE: without this option these commands read a database.
-LakePageOption = Annotated[
-    str | None,
-    typer.Option(
-        "--lake",
-        metavar="PATH",
-        parser=os.path.expanduser,
-        help="A lake (a folder, or s3://BUCKET/PREFIX), in place of a database: paths by label"
-        " over time",
-    ),
-]
+LAKE_PAGE: Any = typer.Option(
+    metavar="PATH",
+    parser=os.path.expanduser,
+    help="A lake (a folder, or s3://BUCKET/PREFIX), in place of a database: paths by label over"
+    " time",
+)

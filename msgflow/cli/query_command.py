@@ -3,82 +3,70 @@
 from __future__ import annotations
 
 import textwrap
+from copy import copy
 from inspect import Parameter
 from itertools import pairwise
-from typing import TYPE_CHECKING, Annotated, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
 from typer.core import TyperCommand, TyperOption
 
-from msgflow.cli.header_options import escape, given_of, header_parameter
-from msgflow.cli.options import (
-    OUTPUT,
-    ColumnsOption,
-    DatabaseOption,
-    DefaultGroup,
-    FormatOption,
-    InternalOption,
-    MemoryLimitOption,
-    OutputOption,
-    TimesOption,
-    WideOption,
-)
-from msgflow.cli.row_options import row_options
-from msgflow.cli.slice_options import SLICE_OPTIONS, set_parameters
+from msgflow.cli.header_options import given_of, header_parameter
+from msgflow.cli.operation import escape, parameters_of, set_parameters
+from msgflow.cli.options import DefaultGroup
+from msgflow.database import Database
 from msgflow.errors import UsageError
 from msgflow.export.formats import Format, format_of
 from msgflow.files.default_files import DEFAULT_DATABASE
 from msgflow.query.catalogue import choose_query, load_query
-from msgflow.query.selection import KINDS
+from msgflow.query.selection import KINDS, PATH, columns_of
 from msgflow.result.layout import MOST_ROWS
+from msgflow.result.times import Times
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
-    from pathlib import Path
 
     from msgflow.result.query_result import QueryResult
     from msgflow.sql.header import Header, Param
     from msgflow.sql.value import Value
 
-# Options of every query, whose names no parameter of a query may have. Via, without and slowest are
-# missing: a query with such a parameter chooses its rows before it adds them up.
+
+def _printed(
+    *,
+    form: Format | None = None,
+    output: Path | None = None,
+    columns: str | None = None,
+    wide: bool = False,
+    times: Times | None = None,
+    show: bool = False,
+    memory_limit: str | None = None,
+    database: Path = DEFAULT_DATABASE,
+) -> None:
+    """Have the options of a query that are not those of `Database.query`.
+
+    Args:
+        show: Print the SQL and run nothing.
+    """
+
+
+_ASKED = list(parameters_of(Database.query, skipped=("self", "name", "parameters")))
+_PRINTED = list(parameters_of(_printed))
+_DEFAULTS = {each.name: each.default for each in _ASKED}
+# Options that choose the rows of a result, where a query does not do that before it adds them up.
+_CHOOSING = ("via", "without", "slowest")
 COMMON_OPTIONS = frozenset(
-    (
-        *KINDS,
-        *SLICE_OPTIONS,
-        "path",
-        "paths",
-        "limit",
-        "sort",
-        "where",
-        "db",
-        "format",
-        "help",
-        "internal",
-        "memory_limit",
-        "output",
-        "show",
-        "times",
-        "columns",
-        "wide",
-    )
+    {*_DEFAULTS, *(each.name for each in _PRINTED), "db", "format", "help"}
+    - {*_CHOOSING, "form", "database"}
 )
+"""Options of every query, whose names no parameter of a query may have."""
 # Parameters of queries without an option: msgflow flow --take ID --why asks for one flow.
 _WITHOUT_OPTION = frozenset(("take",))
-# Options that `Database.query` takes under the same names.
-_SELECTING = (*KINDS, "via", "without", "path", "paths", "where", "sort", "limit", "slowest")
 # Their help stands once, in that of `msgflow query`.
 _OF_EVERY_QUERY = frozenset(
-    (
-        *SLICE_OPTIONS,
-        *("internal", "form", "output", "columns", "wide", "times", "show"),
-        *("memory_limit", "database", "help"),
-    )
+    {"run", "start", "end", "internal", "where", "sort", "limit", "help"}
+    | {each.name for each in _PRINTED}
 )
-_ShowOption = Annotated[
-    bool,
-    typer.Option("--show", help="Print the SQL and run nothing", rich_help_panel=OUTPUT),
-]
 
 
 def choice_of(variant: Param | None, words: list[str]) -> dict[str, Value]:
@@ -148,7 +136,7 @@ class AskingGroup(DefaultGroup):
 def build_command(
     header: Header,
     *,
-    option: Any = FormatOption,
+    form: Parameter | None = None,
     form_of: Callable[[Any, Any], Any] = chosen_format,
     write: Callable[[QueryResult, Any, dict[str, Any]], None] = print_rows,
 ) -> Any:
@@ -171,31 +159,11 @@ def build_command(
         result = _result(header.name, own, given)
         write(result if times is None else result.with_times(times), form, given)
 
-    own_names = {param.name for param in header.params}
-    parameters = [
-        header_parameter(param) for param in header.params if param.name not in _WITHOUT_OPTION
-    ]
-    for name, annotation, default in (
-        *(
-            (name, annotation, None)
-            for name, annotation in row_options(header).items()
-            if name not in own_names
-        ),
-        *((name, annotation, None) for name, annotation in SLICE_OPTIONS.items()),
-        ("internal", InternalOption, False),
-        ("form", option, None),
-        ("output", OutputOption, None),
-        ("columns", ColumnsOption, None),
-        ("wide", WideOption, False),
-        ("times", TimesOption, None),
-        ("show", _ShowOption, False),
-        ("memory_limit", MemoryLimitOption, None),
-        ("database", DatabaseOption, DEFAULT_DATABASE),
-    ):
-        parameters.append(
-            Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
-        )
-    set_parameters(command, parameters)
+    own = {param.name for param in header.params}
+    chosen = [_fitting(each, header) for each in _ASKED if each.name not in own]
+    printed = [form if form and each.name == "form" else each for each in _PRINTED]
+    declared = (param for param in header.params if param.name not in _WITHOUT_OPTION)
+    set_parameters(command, [*map(header_parameter, declared), *chosen, *printed])
     single = typer.Typer(
         add_completion=False, context_settings={"help_option_names": ["-h", "--help"]}
     )
@@ -206,16 +174,28 @@ def build_command(
 
 
 def _result(name: str, own: dict[str, Any], given: dict[str, Any]) -> QueryResult:
-    asked: dict[str, Any] = {
-        **{option: given[option] for option in SLICE_OPTIONS},
-        "internal": given["internal"],
-        **{word: given[word] for word in _SELECTING if given.get(word)},
-        **own,
-    }
-    from msgflow.database import Database
-
+    asked = {word: given[word] for word in _DEFAULTS if word in given}
+    said = {word: value for word, value in asked.items() if value not in (_DEFAULTS[word], [])}
     with Database(given["database"], memory_limit=given["memory_limit"]) as database:
-        return database.query(name, **asked)
+        return database.query(name, **said, **own)
+
+
+def _fitting(parameter: Parameter, header: Header) -> Parameter:
+    """Return an option, hidden where the query has nothing to choose: it says so when used."""
+    kind, info = get_args(parameter.annotation)
+    info = copy(info)
+    info.hidden = not _chooses(parameter.name, header)
+    return parameter.replace(annotation=Annotated[kind, info])
+
+
+def _chooses(name: str, header: Header) -> bool:
+    if name in KINDS:
+        return bool(columns_of(header, name))
+    if name in ("via", "without"):
+        return bool(columns_of(header, PATH))
+    if name in ("path", "paths"):
+        return any(param.name == "from" for param in header.params)
+    return name != "slowest" or header.slowest is not None
 
 
 def _command_class(header: Header) -> type[TyperCommand]:

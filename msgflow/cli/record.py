@@ -9,13 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from msgflow.cli.options import (
-    ClockSyncOption,
-    DatabaseOption,
-    LinksOption,
-    OwnEventsOption,
-    output_option,
-)
+from msgflow.cli.operation import operation
 from msgflow.errors import ExitCode
 from msgflow.files.default_files import DEFAULT_DATABASE
 
@@ -30,66 +24,39 @@ EVENTS = ("ros2:*", "dds:*", "ros2_caret:*")
 _SECONDS_BETWEEN_LINES = 10.0
 
 
+@operation
 def command(
-    program: Annotated[
-        list[str] | None,
-        typer.Argument(
-            metavar="[-- COMMAND...]",
-            help="What to start and record, such as `-- ros2 launch …`; it ends with the recording",
-            show_default="record until Ctrl-C",
-        ),
-    ] = None,
-    directory: Annotated[
-        Path | None,
-        output_option("DIR", "Directory to record into", show_default="the name, here"),
-    ] = None,
-    name: Annotated[
-        str | None,
-        typer.Option(
-            "--name",
-            help="Name of the LTTng session, and of the run",
-            show_default="recording-DATE-TIME",
-        ),
-    ] = None,
-    duration: Annotated[
-        float | None,
-        typer.Option("--duration", metavar="SECONDS", min=0.1, help="How long to record"),
-    ] = None,
-    kernel: Annotated[
-        bool,
-        typer.Option(
-            "--kernel", help="Also record the scheduler, with LTTng or perf: why a thread waits"
-        ),
-    ] = False,
-    dual: Annotated[
-        str | None,
-        typer.Option(
-            "--dual",
-            metavar="SESSION",
-            help="Also write what this snapshot session has: how nodes that run already began",
-        ),
-    ] = None,
-    events: OwnEventsOption = None,
-    sub_buffer_size: Annotated[
-        str,
-        typer.Option(
-            "--subbuf-size", metavar="SIZE", help="Size of a sub-buffer of LTTng, per CPU"
-        ),
-    ] = "1M",
-    sub_buffers: Annotated[
-        int, typer.Option("--num-subbuf", min=2, help="Number of sub-buffers, per CPU")
-    ] = 4,
-    links: LinksOption = None,
-    clock_sync: ClockSyncOption = "none",
-    ingest: Annotated[
-        bool, typer.Option("--ingest/--no-ingest", help="Read the recording into the database")
-    ] = True,
-    database: DatabaseOption = DEFAULT_DATABASE,
+    program: list[str] | None = None,
+    *,
+    output: Path | None = None,
+    name: str | None = None,
+    duration: Annotated[float | None, typer.Option(min=0.1)] = None,
+    kernel: bool = False,
+    dual: str | None = None,
+    events: list[str] | None = None,
+    subbuf_size: str = "1M",
+    num_subbuf: Annotated[int, typer.Option(min=2)] = 4,
+    links: Path | None = None,
+    clock_sync: str = "none",
+    ingest: bool = True,
+    database: Path = DEFAULT_DATABASE,
 ) -> None:
     """Record a ROS 2 system with LTTng, then print what is wrong and how long messages took.
 
     Start the nodes after the recording, best as COMMAND: what starts earlier has no names. Ctrl-C
     ends the recording, then COMMAND.
+
+    Args:
+        program ([-- COMMAND...]): What to start and record, such as `-- ros2 launch …`; it ends
+            with the recording. Without it, Ctrl-C ends the recording.
+        output (DIR): Directory to record into; by default the name, here.
+        name (NAME): Name of the LTTng session, and of the run; by default recording-DATE-TIME.
+        duration (SECONDS): How long to record.
+        kernel: Also record the scheduler, with LTTng or perf: why a thread waits.
+        dual (SESSION): Also write what this snapshot session has: how nodes that run already began.
+        subbuf_size (SIZE): Size of a sub-buffer of LTTng, per CPU.
+        num_subbuf: Number of sub-buffers, per CPU.
+        ingest: Read the recording into the database.
     """
     from msgflow.cli.output import print_note, print_status
     from msgflow.clocks import read_clock_sync
@@ -105,12 +72,12 @@ def command(
     read_clock_sync(clock_sync)
     if ingest:
         _require_database(database, name)
-    target = directory or Path(name)
+    target = output or Path(name)
     with _status_shown(beside_program=bool(program)) as show:
         recorded = record(
             target.absolute(),
             name=name,
-            channel=Channel((*EVENTS, *(events or [])), sub_buffer_size, sub_buffers),
+            channel=Channel((*EVENTS, *(events or [])), subbuf_size, num_subbuf),
             program=program or (),
             seconds=duration,
             kernel=kernel,

@@ -3,77 +3,44 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Unpack
 
-import typer
-
-from msgflow.cli.options import (
-    OUTPUT,
-    SELECTION,
-    DatabaseOption,
-    LakePageOption,
-    LakeWhereOption,
-    MemoryLimitOption,
-    PathsOption,
-    bytes_of,
-    output_option,
-    targets_option,
-)
-from msgflow.cli.slice_options import with_slice
+from msgflow.cli.operation import operation
+from msgflow.cli.options import LAKE_PAGE, bytes_of
 from msgflow.cli.ui import require_no_where
 from msgflow.errors import UsageError
 from msgflow.files.default_files import DEFAULT_DATABASE, DEFAULT_PATHS
-from msgflow.run.slice import LATEST, Slice
+from msgflow.run.slice import SliceWords
 
 # Browsers unpack larger pages too slowly.
 _MOST = 1_000_000_000
 
 
-@with_slice("run", "start", "end")
+@operation
 def command(
-    output: Annotated[Path, output_option("FILE.html|FILE.md")] = Path("msgflow.html"),
-    part: Slice = LATEST,
-    compare: Annotated[
-        str | None,
-        typer.Option(
-            "--compare",
-            metavar="NAME|ID",
-            help="Run to compare it with",
-            rich_help_panel=SELECTION,
-        ),
-    ] = None,
-    through: Annotated[
-        str | None,
-        typer.Option(
-            "--through",
-            metavar="TEXT",
-            help="Only paths that contain this text: a topic, or a node",
-            rich_help_panel=SELECTION,
-        ),
-    ] = None,
-    max_size: Annotated[
-        str,
-        typer.Option(
-            "--max-size",
-            metavar="SIZE",
-            help="Maximum size of the file; what does not fit is left out, and the page says so",
-            rich_help_panel=OUTPUT,
-        ),
-    ] = "20MB",
-    lake: LakePageOption = None,
-    where: LakeWhereOption = None,
-    targets: Annotated[
-        Path | None,
-        targets_option("the summary has the verdicts on them"),
-    ] = None,
-    paths: PathsOption = Path(DEFAULT_PATHS),
-    memory_limit: MemoryLimitOption = None,
-    database: DatabaseOption = DEFAULT_DATABASE,
+    *,
+    output: Path = Path("msgflow.html"),
+    compare: str | None = None,
+    through: str | None = None,
+    max_size: str = "20MB",
+    lake: Annotated[str | None, LAKE_PAGE] = None,
+    where: str | None = None,
+    targets: Path | None = None,
+    paths: Path = DEFAULT_PATHS,
+    database: Path = DEFAULT_DATABASE,
+    **part: Unpack[SliceWords],
 ) -> None:
     """Write the pages of a run to one file that any browser opens, without a server.
 
     The first page is a summary. A file that ends with .md gets the summary alone, as Markdown.
     With --lake: a page of the paths of all its runs by label over time, outliers, failures.
+
+    Args:
+        output (FILE.html|FILE.md): File to write or replace.
+        through (TEXT): Only paths that contain this text: a topic, or a node.
+        max_size (SIZE): Maximum size of the file; what does not fit is left out, and the page says
+            so.
+        targets: Requirements, as YAML: the summary has the verdicts on them.
     """
     from msgflow.cli.output import print_note, print_runs, print_status
     from msgflow.database import Database
@@ -87,7 +54,8 @@ def command(
         )
     size = read_size(max_size)
     if lake is not None:
-        if part != LATEST or any(given is not None for given in (compare, through, targets)):
+        given = (*part.values(), compare, through, targets)
+        if any(value is not None for value in given):
             raise UsageError(
                 "the page of a lake is of all its runs", "--where chooses some of them"
             )
@@ -100,17 +68,15 @@ def command(
         print_status(f"{count(page.runs, 'run')} of {lake} in {output}: open it in a browser")
         return
     require_no_where(where)
-    with Database(database, memory_limit=memory_limit) as opened:
+    with Database(database) as opened:
         report = opened.report(
             output,
-            run=part.run,
             compare=compare,
             targets=targets,
             paths=paths,
-            start=part.start,
-            end=part.end,
-            path_text=through,
+            through=through,
             max_size=size,
+            **part,
         )
     print_runs([report.run])
     for note in report.notes:

@@ -3,30 +3,26 @@
 from __future__ import annotations
 
 import shlex
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from msgflow.cli.completion import complete
-from msgflow.cli.options import DatabaseOption, DefaultGroup, FormatOption, OutputOption, WideOption
+from msgflow.cli.operation import operation
+from msgflow.cli.options import DefaultGroup
 from msgflow.errors import ExitCode, UsageError
 from msgflow.files.default_files import DEFAULT_DATABASE
 
 app = typer.Typer(cls=DefaultGroup)
-_RunArgument = Annotated[
-    str,
-    typer.Argument(metavar="RUN", help="Name or id of the run", autocompletion=complete("run")),
-]
+_Run = Annotated[str, typer.Argument(metavar="RUN", autocompletion=complete("run"))]
+_Runs = Annotated[str, typer.Argument(metavar="RUN|all", autocompletion=complete("run", "all"))]
 
 
 @app.command("list")
-def list_runs(
-    form: FormatOption = None,
-    output: OutputOption = None,
-    wide: WideOption = False,
-    database: DatabaseOption = DEFAULT_DATABASE,
-) -> None:
-    """List the runs of a database."""
+@operation
+def list_runs(*, database: Path = DEFAULT_DATABASE) -> None:
+    """List the runs of a database; `msgflow info --section runs` writes them to a file."""
     from dataclasses import replace
 
     from msgflow.cli.output import print_result
@@ -35,16 +31,18 @@ def list_runs(
     with Database(database) as opened:
         result = opened.query("info", run="all")
     # The rows name the runs already.
-    print_result(replace(result, runs=()), form, output, wide=wide)
+    print_result(replace(result, runs=()), None, None)
 
 
 @app.command("rename")
-def rename(
-    run: _RunArgument,
-    name: Annotated[str, typer.Argument(metavar="NAME", help="Its new name")],
-    database: DatabaseOption = DEFAULT_DATABASE,
-) -> None:
-    """Give a run another name."""
+@operation
+def rename(run: _Run, name: str, *, database: Path = DEFAULT_DATABASE) -> None:
+    """Give a run another name.
+
+    Args:
+        run: Name or id of the run.
+        name: Its new name.
+    """
     from msgflow.cli.output import print_status
     from msgflow.database import Database
 
@@ -54,24 +52,15 @@ def rename(
 
 
 @app.command("label")
-def label(
-    run: Annotated[
-        str,
-        typer.Argument(
-            metavar="RUN|all",
-            help="Name or id of the run, or all",
-            autocompletion=complete("run", "all"),
-        ),
-    ],
-    labels: Annotated[
-        list[str],
-        typer.Argument(metavar="KEY=VALUE...", help="Labels; KEY= takes one away"),
-    ],
-    database: DatabaseOption = DEFAULT_DATABASE,
-) -> None:
+@operation
+def label(run: _Runs, labels: list[str], *, database: Path = DEFAULT_DATABASE) -> None:
     """Say something of a run: which robot, which build.
 
     `runs list` and `info` show it, and --run KEY=VALUE means all runs with that label.
+
+    Args:
+        run: Name or id of the run, or all.
+        labels (KEY=VALUE...): Labels; KEY= takes one away.
     """
     from msgflow.cli.output import print_status
     from msgflow.database import Database
@@ -94,24 +83,21 @@ def label(
 
 
 @app.command("remove")
+@operation
 def remove(
-    run: Annotated[
-        str,
-        typer.Argument(
-            metavar="RUN|all",
-            help="Name or id of the run, or all",
-            autocompletion=complete("run", "all"),
-        ),
-    ],
-    yes: Annotated[
-        bool, typer.Option("--yes", "-y", help="Ask nothing on a terminal either")
-    ] = False,
-    database: DatabaseOption = DEFAULT_DATABASE,
+    run: _Runs,
+    *,
+    yes: Annotated[bool, typer.Option("--yes", "-y")] = False,
+    database: Path = DEFAULT_DATABASE,
 ) -> None:
     """Remove a run with all that is known of it; what other runs have stays as it is.
 
     On a terminal it asks first, unless --yes is given; a script is not asked.
     The file keeps its size, and the next ingest uses the space again.
+
+    Args:
+        run: Name or id of the run, or all.
+        yes: Ask nothing on a terminal either.
     """
     from msgflow.cli.output import confirm, is_asked, print_status
     from msgflow.database import Database

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import json
 from enum import StrEnum
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-from msgflow.cli.options import format_option
 from msgflow.export.formats import by_suffix
 
 if TYPE_CHECKING:
@@ -24,10 +23,6 @@ class SectionsFormat(StrEnum):
     MARKDOWN = "markdown"
 
 
-SectionsFormatOption = Annotated[
-    SectionsFormat | None,
-    format_option("Output format", show_default="by the suffix of FILE, else table"),
-]
 _SUFFIXES = {
     ".txt": SectionsFormat.TABLE,
     ".json": SectionsFormat.JSON,

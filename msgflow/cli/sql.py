@@ -8,15 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from msgflow.cli.options import (
-    DatabaseOption,
-    FormatOption,
-    MemoryLimitOption,
-    OutputOption,
-    WideOption,
-    path_of,
-)
+from msgflow.cli.operation import operation
 from msgflow.errors import UsageError
+from msgflow.export.formats import Format
 from msgflow.files.default_files import DEFAULT_DATABASE
 from msgflow.files.text_file import read_text
 
@@ -24,41 +18,35 @@ if TYPE_CHECKING:
     from msgflow.result.query_result import QueryResult
 
 DEFAULT_LIMIT = 1_000
-SqlArgument = Annotated[
-    str | None, typer.Argument(metavar="[SQL]", help="A query; - reads it from stdin")
-]
-SqlFileOption = Annotated[
-    Path | None,
-    typer.Option("-f", "--file", metavar="FILE", parser=path_of, help="Read the query from FILE"),
-]
-PrintedRowsOption = Annotated[
-    int,
-    typer.Option(
-        "--limit", min=0, metavar="ROWS", help="Maximum number of rows to print; 0 for all"
-    ),
-]
+FileOption = Annotated[Path | None, typer.Option("-f", "--file")]
 
 
+@operation
 def command(
-    text: SqlArgument = None,
-    file: SqlFileOption = None,
-    limit: PrintedRowsOption = DEFAULT_LIMIT,
-    form: FormatOption = None,
-    wide: WideOption = False,
-    output: OutputOption = None,
-    memory_limit: MemoryLimitOption = None,
-    database: DatabaseOption = DEFAULT_DATABASE,
+    text: str | None = None,
+    *,
+    file: FileOption = None,
+    limit: Annotated[int, typer.Option(min=0)] = DEFAULT_LIMIT,
+    form: Format | None = None,
+    wide: bool = False,
+    output: Path | None = None,
+    database: Path = DEFAULT_DATABASE,
 ) -> None:
     """Run SQL on the public views, read-only and without access to other files.
 
     `msgflow db schema` lists the views. Without a query, a terminal gets a prompt.
+
+    Args:
+        text ([SQL]): A query; - reads it from stdin.
+        file: Read the query from FILE.
+        limit (ROWS): Maximum number of rows to print; 0 for all.
     """
     from msgflow.cli.output import print_result
     from msgflow.database import Database
 
     def answer(query: str) -> QueryResult:
         # Opened for each: at the prompt, others may write meanwhile.
-        with Database(database, memory_limit=memory_limit) as opened:
+        with Database(database) as opened:
             return opened.sql(query, limit=limit or None)
 
     if text is None and file is None and output is None and sys.stdin.isatty():

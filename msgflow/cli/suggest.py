@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import shlex
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from msgflow.cli.options import DatabaseOption, OutputOption, RunOption
-from msgflow.cli.slice_options import with_slice
+from msgflow.cli.operation import operation
 from msgflow.errors import UsageError
 from msgflow.files.default_files import DEFAULT_DATABASE, DEFAULT_LINKS, DEFAULT_PATHS
-from msgflow.run.slice import LATEST, Slice
 
 app = typer.Typer()
 
@@ -20,23 +19,21 @@ _TARGETS = "targets.yaml"
 
 
 @app.command("links")
+@operation
 def links(
-    run: RunOption = None,
-    apply: Annotated[
-        bool,
-        typer.Option(
-            "--apply",
-            help=f"Declare those without a doubt, and write the file (-o, else {DEFAULT_LINKS})",
-        ),
-    ] = False,
-    output: OutputOption = None,
-    database: DatabaseOption = DEFAULT_DATABASE,
+    *,
+    run: str | None = None,
+    apply: bool = False,
+    output: Path | None = None,
+    database: Path = DEFAULT_DATABASE,
 ) -> None:
     """Print links that the data suggest, as a file to review.
 
-    Doubtful ones are comments in it. Links that a file declared before stay in it.
-    Without --apply nothing is applied. With it, the file is written and its links
-    are declared, or nothing happens.
+    Doubtful ones are comments in it. Links that a file declared before stay in it. Without --apply
+    nothing is applied. With it, the file is written and its links are declared, or nothing happens.
+
+    Args:
+        apply: Declare those without a doubt, and write the file (-o, else msgflow-links.yaml).
     """
     from msgflow.cli.links import print_applied
     from msgflow.cli.output import (
@@ -96,10 +93,9 @@ def links(
 
 
 @app.command("paths")
+@operation
 def paths(
-    run: RunOption = None,
-    output: OutputOption = None,
-    database: DatabaseOption = DEFAULT_DATABASE,
+    *, run: str | None = None, output: Path | None = None, database: Path = DEFAULT_DATABASE
 ) -> None:
     """Print the paths of a run as a file with names, to choose from: paths.yaml."""
     from msgflow.cli.output import print_next, print_note, print_runs, print_text
@@ -119,35 +115,35 @@ def paths(
 
 
 @app.command("targets")
-@with_slice("run", "skip_first")
+@operation
 def targets(
-    part: Slice = LATEST,
-    margin: Annotated[
-        float,
-        typer.Option(
-            "--margin", metavar="PERCENT", min=0, help="How much more than measured is allowed"
-        ),
-    ] = 20.0,
-    output: OutputOption = None,
-    database: DatabaseOption = DEFAULT_DATABASE,
+    *,
+    run: str | None = None,
+    start: str | None = None,
+    margin: Annotated[float, typer.Option(min=0)] = 20.0,
+    output: Path | None = None,
+    database: Path = DEFAULT_DATABASE,
 ) -> None:
     """Print requirements that a good run meets, as a file to review: -o targets.yaml.
 
     `msgflow verify targets.yaml` applies them to a run.
     It covers paths, timers, topics, services and actions with at least 20 values. A note and a
     comment in the file name topics that delivered less than 99 % of their messages.
+
+    Args:
+        margin (PERCENT): How much more than measured is allowed.
     """
     from msgflow.cli.output import print_next, print_note, print_text
     from msgflow.database import Database
 
     with Database(database) as opened:
-        text = opened.suggest_targets(run=part.run, skip_first=part.skip_first, margin=margin / 100)
+        text = opened.suggest_targets(run=run, start=start, margin=margin / 100)
     print_text(text, output)
     for line in text.splitlines()[1:]:
         if line.startswith("# "):
             print_note(line.removeprefix("# "))
     if output is None:
-        print_next([*_SUGGEST, "targets", "-o", _TARGETS], database, part.run)
+        print_next([*_SUGGEST, "targets", "-o", _TARGETS], database, run)
     else:
         # Another run is what they are for.
         print_next(["msgflow", "verify", str(output)], database)

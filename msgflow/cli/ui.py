@@ -4,43 +4,41 @@ from __future__ import annotations
 
 import os
 from contextlib import closing
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from msgflow.cli.options import DatabaseOption, LakePageOption, LakeWhereOption, memory_limit_option
+from msgflow.cli.operation import operation
+from msgflow.cli.options import LAKE_PAGE
 from msgflow.errors import UsageError
 from msgflow.files.default_files import DEFAULT_DATABASE
 
 
+@operation
 def command(
-    browser: Annotated[
-        bool, typer.Option("--browser/--no-browser", help="Open the address in the browser")
-    ] = True,
-    port: Annotated[
-        int | None,
-        typer.Option(
-            "--port",
-            metavar="NUMBER",
-            min=0,
-            max=65535,
-            help="Port on 127.0.0.1; 0 for any free one",
-            show_default="8642, else any free one",
-        ),
-    ] = None,
-    memory_limit: Annotated[str | None, memory_limit_option("Maximum memory for queries")] = None,
-    lake: LakePageOption = None,
-    where: LakeWhereOption = None,
-    database: DatabaseOption = DEFAULT_DATABASE,
+    *,
+    browser: bool = True,
+    port: Annotated[int | None, typer.Option(min=0, max=65535)] = None,
+    memory_limit: str | None = None,
+    lake: Annotated[str | None, LAKE_PAGE] = None,
+    where: str | None = None,
+    database: Path = DEFAULT_DATABASE,
 ) -> None:
     """Show the database in the browser: timeline, paths, graph, executors, comparison.
 
     With --lake: paths of all runs of a lake by label over time, outliers, failures.
 
-    The printed address contains a token; without it, nothing is shown. The
-    server answers this machine only: from another one, open the same address
-    through ssh -L. Ctrl-C stops it. While it runs, other programs can read the
-    database, and write to it when no page has asked for some seconds.
+    The printed address contains a token; without it, nothing is shown. The server answers this
+    machine only: from another one, open the same address through ssh -L. Ctrl-C stops it. While it
+    runs, other programs can read the database, and write to it when no page has asked for some
+    seconds.
+
+    Args:
+        browser: Open the address in the browser.
+        port (NUMBER): Port on 127.0.0.1; 0 for any free one. By default 8642, else any free one.
+        memory_limit: Maximum memory for queries. By default a quarter of the machine's, 500MB to
+            4GB.
     """
     from msgflow.cli.output import print_note, print_status
     from msgflow.confined.query import WarmSql

@@ -2,25 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
-from msgflow.cli.options import (
-    DatabaseOption,
-    OutputOption,
-    PathsOption,
-    WideOption,
-    case_option,
-    format_option,
-)
-from msgflow.cli.slice_options import with_slice
+from msgflow.cli.operation import asks
+from msgflow.database import Database
 from msgflow.errors import ExitCode
-from msgflow.files.default_files import DEFAULT_DATABASE, DEFAULT_PATHS
-from msgflow.run.slice import LATEST, Slice
+
+if TYPE_CHECKING:
+    from msgflow.verify import Verification
 
 
 class VerifyFormat(StrEnum):
@@ -33,42 +26,27 @@ class VerifyFormat(StrEnum):
     JUNIT = "junit"
 
 
-@with_slice()
+@asks(Database.verify)
 def command(
-    targets: Annotated[Path, typer.Argument(metavar="TARGETS", help="Requirements, as YAML")],
-    part: Slice = LATEST,
-    paths: PathsOption = Path(DEFAULT_PATHS),
-    case: Annotated[
-        str,
-        case_option("Flows that count for latencies of paths"),
-    ] = "first",
-    allow_not_measured: Annotated[
-        bool,
-        typer.Option(
-            "--allow-not-measured",
-            help="Exit with 0 if nothing failed, even if something has no value",
-        ),
-    ] = False,
-    form: Annotated[
-        VerifyFormat | None,
-        format_option("Output format", show_default="junit into FILE.xml, else table"),
-    ] = None,
-    output: OutputOption = None,
-    wide: WideOption = False,
-    database: DatabaseOption = DEFAULT_DATABASE,
+    verification: Verification,
+    *,
+    allow_not_measured: bool = False,
+    form: VerifyFormat | None = None,
+    output: Path | None = None,
+    wide: bool = False,
 ) -> None:
-    """Check a run against a file of requirements: passed, failed, not measured, no data.
+    """Exit code: 0 if all passed, 1 if one failed, 5 if none failed but one has no value.
 
-    Exit code: 0 if all passed, 1 if one failed, 5 if none failed but one has no value.
     `msgflow suggest targets` writes such a file from a good run.
+
+    Args:
+        allow_not_measured: Exit with 0 if nothing failed, even if something has no value.
+        form (table|json|csv|markdown|junit): By default junit into FILE.xml, else table.
     """
     from msgflow.cli.output import print_result, print_runs, print_status, print_text
-    from msgflow.database import Database
     from msgflow.export.formats import Format
     from msgflow.verify import Verdict
 
-    with Database(database) as opened:
-        verification = opened.verify(targets, paths=paths, case=case, **asdict(part))
     if form is None and output is not None and output.suffix.lower() == ".xml":
         form = VerifyFormat.JUNIT
     if form is VerifyFormat.JUNIT:

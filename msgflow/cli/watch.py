@@ -15,15 +15,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperCommand
 
-from msgflow.cli.options import (
-    OUTPUT,
-    ClockSyncOption,
-    LinksOption,
-    PathsOption,
-    output_option,
-    path_of,
-    targets_option,
-)
+from msgflow.cli.operation import operation
+from msgflow.cli.options import path_of
 from msgflow.cli.record import EVENTS
 from msgflow.errors import ExitCode, TraceError, UsageError
 from msgflow.files.default_files import DEFAULT_PATHS
@@ -51,102 +44,52 @@ class Command(TyperCommand):
         return program
 
 
+@operation
 def command(
     context: typer.Context,
-    words: Annotated[
-        list[str] | None,
-        typer.Argument(
-            metavar="SESSION|DIR|-- COMMAND...",
-            help="An LTTng session, a directory into which rotated recordings come, or what to"
-            " start, record and watch",
-            show_default="the only session",
-        ),
-    ] = None,
-    window: Annotated[
-        str, typer.Option("--window", metavar="TIME", help="Length of a window")
-    ] = "10s",
-    step: Annotated[
-        str, typer.Option("--step", metavar="TIME", help="How far a window is from the one before")
-    ] = "2s",
-    late: Annotated[
-        str | None,
-        typer.Option(
-            "--late",
-            metavar="TIME",
-            help="How long a window waits for chunks and messages that are late",
-            show_default="two steps",
-        ),
-    ] = None,
-    links: LinksOption = None,
-    clock_sync: ClockSyncOption = "none",
-    once: Annotated[
-        bool,
-        typer.Option("--once", help="Read a finished recording from its first to its last chunk"),
-    ] = False,
-    targets: Annotated[
-        Path | None,
-        targets_option("what is violated is said at once"),
-    ] = None,
-    paths: PathsOption = Path(DEFAULT_PATHS),
-    keep: Annotated[
-        Path | None,
-        typer.Option(
-            "--keep-on-violation",
-            metavar="DIR",
-            parser=path_of,
-            help="Keep the chunks around a violation there, with a database of them",
-        ),
-    ] = None,
-    earlier: Annotated[
-        str | None,
-        typer.Option(
-            "--keep-before",
-            metavar="TIME",
-            help="Also keep what came so long before the window of a violation, such as 5min",
-            show_default="nothing",
-        ),
-    ] = None,
-    most_kept: Annotated[
-        int,
-        typer.Option("--keep-most", min=1, help="Most violations that are kept, the last ones"),
-    ] = 20,
-    prometheus: Annotated[
-        str | None,
-        typer.Option(
-            "--prometheus",
-            metavar="[ADDRESS:]PORT",
-            help="Serve metrics for Prometheus, on 127.0.0.1 without an address",
-        ),
-    ] = None,
-    ui: Annotated[
-        int | None,
-        typer.Option(
-            "--ui",
-            metavar="PORT",
-            min=0,
-            max=65535,
-            help="Show the window in the browser, like `msgflow ui`, at this port of 127.0.0.1; 0"
-            " takes any that is free",
-        ),
-    ] = None,
-    as_json: Annotated[
-        bool,
-        typer.Option("--json", help="Print one JSON object per window", rich_help_panel=OUTPUT),
-    ] = False,
-    directory: Annotated[
-        Path | None,
-        output_option(
-            "DIR",
-            "Directory to record COMMAND into",
-            show_default="a temporary one, of the last chunks",
-        ),
-    ] = None,
+    words: list[str] | None = None,
+    *,
+    window: str = "10s",
+    step: str = "2s",
+    late: str | None = None,
+    links: Path | None = None,
+    clock_sync: str = "none",
+    once: bool = False,
+    targets: Path | None = None,
+    paths: Path = DEFAULT_PATHS,
+    keep_on_violation: Path | None = None,
+    keep_before: str | None = None,
+    keep_most: Annotated[int, typer.Option(min=1)] = 20,
+    prometheus: str | None = None,
+    ui: Annotated[int | None, typer.Option(min=0, max=65535)] = None,
+    json: bool = False,
+    output: Path | None = None,
 ) -> None:
     """See a ROS 2 system while it runs: latency of every path, window by window.
 
     Ctrl-C ends it. `msgflow watch -- ros2 launch …` starts, records and watches a system; Ctrl-C
     ends that, too. With --targets the exit code is that of `msgflow verify`. It is 1 if COMMAND
     failed.
+
+    Args:
+        words (SESSION|DIR|-- COMMAND...): An LTTng session, a directory into which rotated
+            recordings come, or what to start, record and watch. By default the only session.
+        window (TIME): Length of a window.
+        step (TIME): How far a window is from the one before.
+        late (TIME): How long a window waits for chunks and messages that are late; by default
+            two steps.
+        once: Read a finished recording from its first to its last chunk.
+        targets: Requirements, as YAML: what is violated is said at once.
+        keep_on_violation (DIR): Keep the chunks around a violation there, with a database of them.
+        keep_before (TIME): Also keep what came so long before the window of a violation, such as
+            5min.
+        keep_most: Most violations that are kept, the last ones.
+        prometheus ([ADDRESS:]PORT): Serve metrics for Prometheus, on 127.0.0.1 without an address.
+        ui (PORT): Show the window in the browser, like `msgflow ui`, at this port of 127.0.0.1; 0
+            takes any that is free.
+        json: Print one JSON object per window.
+        output (DIR): Directory to record COMMAND into; by default a temporary one, of the last
+            chunks.
     """
     from msgflow.cli.output import is_screen, print_lines, print_note
     from msgflow.cli.show.watch_screen import show_screen
@@ -170,19 +113,19 @@ def command(
     )
 
     program = context.args
-    word = _only_word(words or [], program, once=once, directory=directory)
-    earlier_ns = 0 if earlier is None else duration_ns(earlier, "--keep-before")
+    word = _only_word(words or [], program, once=once, directory=output)
+    earlier_ns = 0 if keep_before is None else duration_ns(keep_before, "--keep-before")
     step_ns = duration_ns(step, "--step")
     window_ns = duration_ns(window, "--window")
     late_ns = 2 * step_ns if late is None else duration_ns(late, "--late", least_ns=0)
-    if earlier is not None and keep is None:
+    if keep_before is not None and keep_on_violation is None:
         raise UsageError(
             "--keep-before is about violations that are kept",
-            f"--keep-on-violation DIR --keep-before {earlier}",
+            f"--keep-on-violation DIR --keep-before {keep_before}",
         )
     alarm = None if targets is None else _alarm(targets, paths)
     # Where stdout is closed, nothing starts.
-    on_screen = is_screen() and not as_json
+    on_screen = is_screen() and not json
     exporter = None
     if prometheus is not None:
         exporter = Exporter()
@@ -190,10 +133,10 @@ def command(
     has_failed = False
     with _pages(ui, clock_sync) as database, ExitStack() as stack:
         recorder = None
-        if keep is not None:
+        if keep_on_violation is not None:
             recorder = FlightRecorder(
-                keep.absolute(),
-                most=most_kept,
+                keep_on_violation.absolute(),
+                most=keep_most,
                 window_ns=window_ns,
                 earlier_ns=earlier_ns,
                 clock_sync=clock_sync,
@@ -215,7 +158,7 @@ def command(
         stack.callback(watcher.close)
 
         def show(reports: Iterator[WindowReport]) -> None:
-            if as_json:
+            if json:
                 for report in reports:
                     print_lines([report.to_json()])
             elif on_screen:
@@ -232,10 +175,10 @@ def command(
             show(watch_live(place, watcher, step_ns=step_ns, is_over=is_over, note=print_note))
 
         if program:
-            if directory is None:
+            if output is None:
                 # The recording is ours alone: it need not grow.
                 watcher.on_passed = remove_chunk
-            has_failed = _record(program, directory, step_ns, live, on_screen=on_screen)
+            has_failed = _record(program, output, step_ns, live, on_screen=on_screen)
         elif once:
             show(watch_finished(_finished(word), watcher))
         else:

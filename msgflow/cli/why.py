@@ -3,28 +3,23 @@
 from __future__ import annotations
 
 import shlex
-from dataclasses import asdict
-from typing import TYPE_CHECKING, Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Unpack
 
-import typer
-
-from msgflow.cli.completion import complete
-from msgflow.cli.options import DatabaseOption, MemoryLimitOption, OutputOption, WideOption
+from msgflow.cli.operation import asks
 from msgflow.cli.sections import (
     SectionsFormat,
-    SectionsFormatOption,
     json_lines,
     screen_sections,
     sections_format,
     whole_sections,
 )
-from msgflow.cli.slice_options import with_slice
+from msgflow.database import Database
 from msgflow.files.default_files import DEFAULT_DATABASE
-from msgflow.run.slice import LATEST, Slice
+from msgflow.run.slice import SliceWords
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-    from pathlib import Path
 
     from msgflow.query.why import Explanation
     from msgflow.result.query_result import QueryResult
@@ -49,37 +44,25 @@ _SHOWN = {
 }
 
 
-@with_slice()
+@asks(Database.why)
 def command(
-    place: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="[TOPIC|NODE]",
-            help="Where the flows end; a glob is possible",
-            show_default="the end of the path with the slowest flow",
-            autocompletion=complete("place"),
-        ),
-    ] = None,
-    part: Slice = LATEST,
-    form: SectionsFormatOption = None,
-    output: OutputOption = None,
-    wide: WideOption = False,
-    memory_limit: MemoryLimitOption = None,
-    database: DatabaseOption = DEFAULT_DATABASE,
+    found: Explanation,
+    *,
+    form: SectionsFormat | None = None,
+    output: Path | None = None,
+    wide: bool = False,
+    database: Path = DEFAULT_DATABASE,
+    **part: Unpack[SliceWords],
 ) -> None:
-    """Explain why a topic is late: its slowest path, where the time goes, what to ask next.
+    """The last lines are the commands to ask next.
 
-    The first path is that of the slowest flow: all other sections are about it. Each
-    section is part of a named query, with the same numbers: e2e-latency,
-    path-breakdown, critical-path, waits --by pair, and topics --measure delivery.
+    Args:
+        form (table|json|markdown): By default by the suffix of FILE, else table.
     """
     from msgflow.cli.output import print_note, print_runs, print_status, print_text
-    from msgflow.database import Database
     from msgflow.result.layout import screen_width
 
     form = form or sections_format(output)
-    with Database(database, memory_limit=memory_limit) as opened:
-        found = opened.why(place, **asdict(part))
     print_runs([found.run])
     if form is SectionsFormat.JSON:
         lines = json_lines(found.sections)
@@ -107,19 +90,19 @@ def _shown(found: Explanation) -> dict[str, QueryResult]:
     return shown
 
 
-def _more(found: Explanation, part: Slice, database: Path) -> Iterator[str]:
+def _more(found: Explanation, part: SliceWords, database: Path) -> Iterator[str]:
     if (more := len(found.paths) - _PATHS) > 0:
         ends = ("--to", found.place) if found.place else ()
         paths = "1 more path" if more == 1 else f"{more} more paths"
         yield f"{paths}: {_command(('query', 'e2e-latency', *ends), part, database)}"
 
 
-def _command(step: tuple[str, ...], part: Slice, database: Path) -> str:
+def _command(step: tuple[str, ...], part: SliceWords, database: Path) -> str:
     """Return a command that runs as it is printed."""
     from msgflow.cli.output import database_option
 
     # Of a flow the identity tells the run; suggestions are from all of a run.
-    taken = {"query": asdict(part), "suggest": {"run": part.run}}.get(step[0], {})
+    taken = {"query": part, "suggest": {"run": part.get("run")}}.get(step[0], {})
     words = ["msgflow", *step]
     for name, value in taken.items():
         if value is not None:

@@ -85,7 +85,7 @@ def run_query(
     if part.has_window and not header.has_window:
         raise UsageError(
             f"the query has no time window — {header.words}",
-            "leave out --start, --end and --skip-first",
+            "leave out --start and --end",
         )
     runs = part.runs(connection)
     window = part.window(runs)

@@ -3,16 +3,33 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypedDict
 
 from msgflow.errors import UsageError
 from msgflow.run.choice import Run, choose_one, choose_runs, read_runs
-from msgflow.run.window import Window, skipped_to, time_point
+from msgflow.run.window import Window, time_point
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import duckdb
+
+
+class TimeWords(TypedDict, total=False):
+    """The times of a slice, as keywords of a method."""
+
+    start: str | int | None
+    end: str | int | None
+
+
+class RunWords(TypedDict, total=False):
+    """The runs of a slice, as a keyword of a method."""
+
+    run: str | int | None
+
+
+class SliceWords(RunWords, TimeWords, total=False):
+    """A slice, as keywords of a method."""
 
 
 @dataclass(frozen=True)
@@ -25,20 +42,18 @@ class Slice:
 
     Attributes:
         run: a name, an id, a label KEY=VALUE of several runs, or 'all'; the latest run when None.
-        start: begin of the time window; no limit when None.
+        start: begin of the time window; no limit when None. '2s' leaves out a warm-up.
         end: its end, exclusive; no limit when None.
-        skip_first: seconds to leave out at the begin of the run, in place of `start`.
     """
 
     run: str | int | None = None
     start: str | int | None = None
     end: str | int | None = None
-    skip_first: float | None = None
 
     @property
     def has_window(self) -> bool:
         """Whether it limits the time."""
-        return not self.start is self.end is self.skip_first is None
+        return not self.start is self.end is None
 
     def runs(self, connection: duckdb.DuckDBPyConnection) -> tuple[Run, ...]:
         """Return the runs, none if the database holds none.
@@ -70,11 +85,7 @@ class Slice:
             UsageError: a time that cannot be read or is out of range, or an empty window.
         """
         limits = {}
-        if self.start is not None and self.skip_first is not None:
-            raise UsageError("--start and --skip-first exclude each other", "give one of them")
-        if self.skip_first is not None:
-            limits["start_ns"] = skipped_to(self.skip_first, runs)
-        elif self.start is not None:
+        if self.start is not None:
             limits["start_ns"] = time_point(self.start, runs, "--start")
         if self.end is not None:
             limits["end_ns"] = time_point(self.end, runs, "--end")

@@ -77,18 +77,7 @@ def duration_ns(text: str, option: str, *, least_ns: int = 1) -> int:
     return length
 
 
-def skipped_to(seconds: float, runs: Sequence[Run]) -> int:
-    """Return the point in time, in epoch ns, so many seconds after the start of a run."""
-    start_ns = _run_start(runs, "--skip-first")
-    # Some floats are too large for an integer of 64 bits.
-    if not 0 <= seconds <= MAXIMUM_NS / 1_000_000_000:
-        raise UsageError(
-            f"--skip-first takes the seconds to leave out — {seconds}", "--skip-first 2.5"
-        )
-    return _in_range(start_ns + round(seconds * 1_000_000_000), seconds, "--skip-first")
-
-
-def _in_range(time_ns: int, given: str | float, option: str) -> int:
+def _in_range(time_ns: int, given: str | int, option: str) -> int:
     if not MINIMUM_NS <= time_ns <= MAXIMUM_NS:
         raise UsageError(
             f"the time of {option} is out of range — {given}", "times reach from 1677 to 2262"

@@ -129,7 +129,7 @@ def test_options_of_a_query_reach_it(
             assert f"is at least 1 — {least}" in refused.stderr
     whole, late = (
         json.loads(msgflow(*arguments, *options).stdout)[0]["roots"]
-        for options in ((), ("--skip-first", "0.5"))
+        for options in ((), ("--start", "0.5"))
     )
     assert late < whole
     refused = msgflow("query", "e2e-latency", "--case", "middle")

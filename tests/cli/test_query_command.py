@@ -55,18 +55,13 @@ def test_what_is_not_given_is_left_to_the_header(
         {
             "name": "example",
             "topic": "/a",
-            "run": None,
-            "start": None,
-            "end": None,
-            "skip_first": None,
-            "internal": False,
         }
     ]
 
 
 def test_everything_that_is_given_arrives(msgflow: Msgflow, calls: list[dict[str, Any]]) -> None:
     own = ("--from", "/b", "--max-depth", "3", "--case", "last", "--is-strict", "--topic", "/a")
-    common = ("--run", "x", "--start", "1s", "--end", "2s", "--skip-first", "1.5", "--internal")
+    common = ("--run", "x", "--start", "1s", "--end", "2s", "--internal")
     assert msgflow("query", "example", *own, *common).exit_code == 0
     assert calls == [
         {
@@ -79,7 +74,6 @@ def test_everything_that_is_given_arrives(msgflow: Msgflow, calls: list[dict[str
             "run": "x",
             "start": "1s",
             "end": "2s",
-            "skip_first": 1.5,
             "internal": True,
         }
     ]

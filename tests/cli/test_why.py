@@ -129,14 +129,14 @@ def test_it_fits_and_its_next_steps_run(
     msgflow: Msgflow, demo: Path, monkeypatch: pytest.MonkeyPatch, width: int
 ) -> None:
     monkeypatch.setenv("COLUMNS", str(width))
-    result = msgflow("why", "/control/cmd", "--skip-first", "0.1")
+    result = msgflow("why", "/control/cmd", "--start", "0.1")
     assert result.exit_code == 0
     assert max(map(cell_len, result.stdout.splitlines())) <= width
     for title in ("PATHS", "TIME BY NODE", "ITS SLOWEST FLOW", "WAITING", "NOT DELIVERED"):
         assert title in result.stdout
     steps = [line for line in result.stderr.splitlines() if line.startswith("next: msgflow ")]
     assert len(steps) >= 2
-    assert any(line.endswith(f"--skip-first 0.1 --db {demo}") for line in steps)
+    assert any(line.endswith(f"--start 0.1 --db {demo}") for line in steps)
     if width == 80:
         for line in steps:
             again = msgflow(*shlex.split(line.removeprefix("next: msgflow ")))

@@ -72,7 +72,7 @@ def database(simulated: Callable[..., Path]) -> Iterator[Database]:
 def test_every_value_stands_once_in_its_topic(
     database: Database, tmp_path: Path, begin: str, end: str, expected: str
 ) -> None:
-    database.export_mcap(tmp_path / "run.mcap", skip_first=0.3)
+    database.export_mcap(tmp_path / "run.mcap", start="0.3")
     ((start,),) = database.connection.sql("SELECT start_ns + 300_000_000 FROM run").fetchall()
     rows = database.connection.execute(expected, {"start": start}).fetchall()
     assert values(read(tmp_path / "run.mcap"), begin, end) == sorted(rows)

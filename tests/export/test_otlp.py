@@ -212,7 +212,7 @@ def test_flows_are_chosen_by_their_paths(simulated: Callable[..., Path], tmp_pat
         ]
         written = database.export_otlp(tmp_path / "traces.json", path="drive", paths=named)
         some = database.export_otlp(
-            tmp_path / "some.json", path="drive", paths=named, skip_first=0.5
+            tmp_path / "some.json", path="drive", paths=named, start="0.5"
         )
         assert 0 < some.traces < written.traces
         with pytest.raises(UsageError, match="a path with a name goes without others — drive"):

@@ -79,7 +79,7 @@ def test_runs_window_and_parameters_select(connection: duckdb.DuckDBPyConnection
     assert starts(connection, run="first") == [100, 200, 400]
     assert starts(connection, run="all") == [100, 200, 400, 1_000_000_000, 2_500_000_000]
     assert starts(connection, run="first", start=150, end="300ns") == [200, 400]
-    assert starts(connection, skip_first=1.0) == [2_500_000_000]
+    assert starts(connection, start="1.0") == [2_500_000_000]
     assert starts(connection, run="first", parameters={"channel": "/b"}) == [200]
 
 
@@ -133,7 +133,7 @@ def test_a_window_without_data_is_said(
 def test_a_query_without_a_window_refuses_one(connection: duckdb.DuckDBPyConnection) -> None:
     plain = header("-- name: example\n-- description: x\nSELECT 1 AS one\n")
     with pytest.raises(UsageError, match="no time window — example"):
-        run_query(connection, plain, {}, Slice(skip_first=0.0))
+        run_query(connection, plain, {}, Slice(start="0"))
     assert run_query(connection, plain, {}).to_arrow().to_pylist() == [{"one": 1}]
 
 

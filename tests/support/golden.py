@@ -7,7 +7,7 @@
                              fills the store beside the rows of BASE
         == derive            if this section is there, links are derived before; without it only
                              what the graph of flows makes of the links given
-        == params            parameters of the query, and run, start, end, skip_first, internal; or
+        == params            parameters of the query, and run, start, end, internal; or
                              arguments of the macro, as JSON
         == TABLE             rows of store.TABLE as CSV; columns left out are NULL, or where it
                              forbids NULL 1 for a key, else 0, false or an empty text
