@@ -26,10 +26,6 @@ _INSTEAD = {
     ),
     ("", "--skip-first"): "--start SECONDS",
     ("", "--memory-limit"): "MSGFLOW_MEMORY_LIMIT in the environment",
-    **{
-        ("msgflow runs list", option): "msgflow info --section runs"
-        for option in ("--format", "-o", "--output", "--wide")
-    },
     ("msgflow query", "--list"): "msgflow query",
     ("msgflow query critical-path", "--take"): "msgflow flow --take ID --why",
     ("msgflow clocks", "pairs"): "msgflow clocks --by pair",
@@ -88,7 +84,8 @@ def _usage(error: typer.TyperException) -> tuple[str, str | None]:
     hint = None if context is None else f"{context.command_path} --help"
     if suggestion:
         hint = f"did you mean {suggestion}"
-    words = re.findall(r"[\w-]+", message)
+    # Behind a bracket stand other options.
+    words = re.findall(r"[\w-]+", message.partition(" (")[0])
     for (command, word), instead in _INSTEAD.items():
         if word in words and context is not None and context.command_path.endswith(command):
             hint = instead

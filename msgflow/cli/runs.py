@@ -12,6 +12,7 @@ from msgflow.cli.completion import complete
 from msgflow.cli.operation import operation
 from msgflow.cli.options import DefaultGroup
 from msgflow.errors import ExitCode, UsageError
+from msgflow.export.formats import Format
 from msgflow.files.default_files import DEFAULT_DATABASE
 
 app = typer.Typer(cls=DefaultGroup)
@@ -21,8 +22,14 @@ _Runs = Annotated[str, typer.Argument(metavar="RUN|all", autocompletion=complete
 
 @app.command("list")
 @operation
-def list_runs(*, database: Path = DEFAULT_DATABASE) -> None:
-    """List the runs of a database; `msgflow info --section runs` writes them to a file."""
+def list_runs(
+    *,
+    form: Format | None = None,
+    output: Path | None = None,
+    wide: bool = False,
+    database: Path = DEFAULT_DATABASE,
+) -> None:
+    """List the runs of a database."""
     from dataclasses import replace
 
     from msgflow.cli.output import print_result
@@ -31,7 +38,7 @@ def list_runs(*, database: Path = DEFAULT_DATABASE) -> None:
     with Database(database) as opened:
         result = opened.query("info", run="all")
     # The rows name the runs already.
-    print_result(replace(result, runs=()), None, None)
+    print_result(replace(result, runs=()), form, output, wide=wide)
 
 
 @app.command("rename")

@@ -112,8 +112,6 @@ def test_a_command_asks_a_method_of_the_database(monkeypatch: pytest.MonkeyPatch
         ("why --skip-first 2", "--start SECONDS"),
         ("query flows --skip-first 2", "--start SECONDS"),
         ("export mcap --memory-limit 1GB", "MSGFLOW_MEMORY_LIMIT in the environment"),
-        ("runs list --format csv", "msgflow info --section runs"),
-        ("runs list -o runs.csv", "msgflow info --section runs"),
     ],
 )
 def test_an_option_of_before_says_what_is_in_its_place(
