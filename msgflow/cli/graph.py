@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 from msgflow.cli.operation import parameters_of
 from msgflow.cli.query_command import build_command, chosen_by, print_rows
 from msgflow.export.formats import Format
-from msgflow.export.graph import Graph, GraphFormat, graph_format
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from msgflow.export.graph import GraphFormat
     from msgflow.result.query_result import QueryResult
 
 
@@ -50,6 +50,8 @@ def asked(words: list[str]) -> Any:
 
 
 def _form(form: AnyFormat | None, path: Path | None) -> GraphFormat | Format:
+    from msgflow.export.graph import GraphFormat, graph_format
+
     if form is None:
         return graph_format(path)
     languages = [each.value for each in GraphFormat]
@@ -58,6 +60,7 @@ def _form(form: AnyFormat | None, path: Path | None) -> GraphFormat | Format:
 
 def _write(result: QueryResult, form: Any, given: dict[str, Any]) -> None:
     from msgflow.cli.output import print_note, print_runs, print_text
+    from msgflow.export.graph import Graph
     from msgflow.run.choice import choose_one
 
     if isinstance(form, Format):

@@ -27,7 +27,7 @@ _BYTES_PER_THREAD = 125_000_000
 # least. DuckDB's own limit is 80 % of the memory that there is.
 _SHARE_BESIDE = 0.25
 _LEAST_BESIDE = 1 << 28
-_EXAMPLE = "--memory-limit 2GB"
+_EXAMPLE = "MSGFLOW_MEMORY_LIMIT=2GB"
 
 
 def default_limit() -> str:

@@ -68,7 +68,7 @@ def in_words(error: BaseException, path: Path) -> DatabaseError | None:
 
 
 def out_of_memory(
-    what: str, hint: str = "give more with --memory-limit, or ask for less at a time"
+    what: str, hint: str = "give more with MSGFLOW_MEMORY_LIMIT, or ask for less at a time"
 ) -> QueryError:
     """Return the error of a query that needs more memory than DuckDB has."""
     return QueryError(f"more memory is needed than the database may take — {what}", hint)

@@ -294,6 +294,6 @@ def test_completion_imports_no_more_than_it_needs(small_database: Path, tmp_path
     assert done.stdout.split() == ["/chatter"]
     heavy = {
         "pyarrow", "numpy", "sqlalchemy", "alembic",
-        "msgflow.database", "msgflow.ingest", "msgflow.cli.ingest", "msgflow.db.connection",
+        "msgflow.query.runner", "msgflow.ingest", "msgflow.cli.ingest", "msgflow.db.connection",
     }  # fmt: skip
     assert heavy & set(done.stderr.split()) == set()

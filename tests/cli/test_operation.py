@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Unpack
@@ -120,3 +122,13 @@ def test_an_option_of_before_says_what_is_in_its_place(
     refused = msgflow(*words.split())
     assert refused.exit_code == 2
     assert instead in refused.stderr
+
+
+def test_a_command_is_made_without_what_it_runs() -> None:
+    code = (
+        "import sys; from importlib import import_module; from msgflow.cli.app import COMMANDS;"
+        "[import_module(f'msgflow.cli.{name}') for name in COMMANDS]; print(*sys.modules)"
+    )
+    words = [sys.executable, "-c", code]
+    done = subprocess.run(words, capture_output=True, text=True, check=True)
+    assert {"duckdb", "pyarrow", "numpy", "sqlalchemy"} & set(done.stdout.split()) == set()

@@ -107,13 +107,13 @@ def test_what_needs_more_memory_than_it_may_take_says_so(small_database: Path) -
         pytest.raises(QueryError, match=r"more memory is needed .* — the SQL") as raised,
     ):
         database.sql(all_at_once)
-    assert "--memory-limit" in str(raised.value.hint)
+    assert "MSGFLOW_MEMORY_LIMIT" in str(raised.value.hint)
     with (
         msgflow.open_db(small_database, memory_limit="60MB") as database,
         pytest.raises(QueryError, match=r"more memory is needed .* — callbacks") as raised,
     ):
         database.query("callbacks-each", where=f"start_ns > ({all_at_once})")
-    assert "--memory-limit" in str(raised.value.hint)
+    assert "MSGFLOW_MEMORY_LIMIT" in str(raised.value.hint)
 
 
 def test_a_limit_that_is_no_amount_is_not_blamed_on_the_file(fresh_database: Path) -> None:
