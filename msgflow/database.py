@@ -459,8 +459,8 @@ class Database:
         from msgflow.query.steps import Steps
         from msgflow.query.why import explain
 
-        one = self._ask(Slice(part.pop("run", None)).one_run, "an explanation")
-        times = Slice(one.run_id, **part)
+        one = self._ask(Slice(part.get("run")).one_run, "an explanation")
+        times = Slice(one.run_id, part.get("start"), part.get("end"))
         dead_ends = [
             (finding.subject, finding.detail)
             for finding in self.findings(run=one.run_id)
@@ -1097,7 +1097,7 @@ def guarded_rows(
     return QueryResult(table.slice(0, limit), notes=[note])
 
 
-def _rows_of(connection: duckdb.DuckDBPyConnection, query: str, **given: Value) -> QueryResult:
+def _rows_of(connection: duckdb.DuckDBPyConnection, /, query: str, **given: Value) -> QueryResult:
     from msgflow.result.query_result import QueryResult
 
     return QueryResult(connection.sql(query, params=given).to_arrow_table())

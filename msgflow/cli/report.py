@@ -26,7 +26,7 @@ def command(
     lake: Annotated[str | None, LAKE_PAGE] = None,
     where: str | None = None,
     targets: Path | None = None,
-    paths: Path = DEFAULT_PATHS,
+    paths: Path = Path(DEFAULT_PATHS),
     database: Path = DEFAULT_DATABASE,
     **part: Unpack[SliceWords],
 ) -> None:

@@ -56,7 +56,7 @@ def command(
     clock_sync: str = "none",
     once: bool = False,
     targets: Path | None = None,
-    paths: Path = DEFAULT_PATHS,
+    paths: Path = Path(DEFAULT_PATHS),
     keep_on_violation: Path | None = None,
     keep_before: str | None = None,
     keep_most: Annotated[int, typer.Option(min=1)] = 20,

@@ -69,7 +69,7 @@ class Flow(FlowVertices):
         return f'<pre style="line-height: 1.2">{escape(str(self))}</pre>'
 
 
-def read_flow(connection: duckdb.DuckDBPyConnection, start: Start, **given: Value) -> Flow:
+def read_flow(connection: duckdb.DuckDBPyConnection, /, start: Start, **given: Value) -> Flow:
     """Return the flow that goes through `start`.
 
     Args:

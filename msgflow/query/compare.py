@@ -237,7 +237,7 @@ def _ms(nanoseconds: float) -> str:
 
 
 def compare(
-    connection: duckdb.DuckDBPyConnection, run_a: str | int, run_b: str | int, **given: Value
+    connection: duckdb.DuckDBPyConnection, /, run_a: str | int, run_b: str | int, **given: Value
 ) -> Comparison:
     """Compare two runs of a database; see `Database.compare`."""
     runs = read_runs(connection)

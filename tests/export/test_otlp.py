@@ -211,9 +211,7 @@ def test_flows_are_chosen_by_their_paths(simulated: Callable[..., Path], tmp_pat
             if row["take_id"] is not None
         ]
         written = database.export_otlp(tmp_path / "traces.json", path="drive", paths=named)
-        some = database.export_otlp(
-            tmp_path / "some.json", path="drive", paths=named, start="0.5"
-        )
+        some = database.export_otlp(tmp_path / "some.json", path="drive", paths=named, start="0.5")
         assert 0 < some.traces < written.traces
         with pytest.raises(UsageError, match="a path with a name goes without others — drive"):
             database.export_otlp(tmp_path / "traces.json", path="drive", paths=named, to="/x")
