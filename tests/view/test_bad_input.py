@@ -320,13 +320,13 @@ def test_a_report_says_what_it_left_out(demo: Path, tmp_path: Path, page: Page) 
         middle = stretches[0]
         page.go(f"#/timeline?from={middle['start']}&to={middle['end']}")
         assert page.page.evaluate("msgflow.page.held.bin ?? null") is None
-        cut = opened.report(target, start="1s", end="2s", path_text="/camera/image")
+        cut = opened.report(target, start="1s", end="2s", through="/camera/image")
         assert len(cut.notes) == 2
         page.page.goto("about:blank")
         page.open(f"{target.as_uri()}#/timeline")
         first = page.page.evaluate("Math.min(...msgflow.page.renderer.bars.table.start_at)")
         assert first > 900_000_000
         with pytest.raises(UsageError, match="no path has this text"):
-            opened.report(target, path_text="/nothing")
+            opened.report(target, through="/nothing")
         with pytest.raises(UsageError, match="nothing was recorded"):
             opened.report(target, start="20s")

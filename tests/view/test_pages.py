@@ -264,7 +264,7 @@ def test_compare_shows_what_was_measured_before_intervals(
 
 @pytest.mark.thorough
 def test_compare_overlays_a_path(systems: Path, report: Report, page: Page) -> None:
-    page.open(report(systems, run=3, compare=2, path_text="/BehaviorPlanner"))
+    page.open(report(systems, run=3, compare=2, through="/BehaviorPlanner"))
     page.go("#/compare")
     page.page.locator(".chart canvas").wait_for(timeout=180_000)
     labels = page.page.locator(".u-legend").inner_text()

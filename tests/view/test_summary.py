@@ -127,13 +127,13 @@ def test_markdown_of_some_paths_is_about_these(dropping: Path, tmp_path: Path) -
     with open_db(dropping) as opened:
         paths = opened.query("e2e-latency", where="pairs > 0").to_arrow()["path"].to_pylist()
         text = paths[0].split(" → ")[1]
-        report = opened.report(output, path_text=text)
+        report = opened.report(output, through=text)
         assert f"Its slowest paths are those with {text} (--through)." in report.notes
         rows = [line for line in output.read_text("utf-8").splitlines() if " → " in line]
         assert rows
         assert all(text in row for row in rows)
         with pytest.raises(UsageError, match="no path has this text"):
-            opened.report(output, path_text="/nowhere")
+            opened.report(output, through="/nowhere")
 
 
 def test_names_in_markdown_are_only_ever_text(systems: Path, tmp_path: Path) -> None:
