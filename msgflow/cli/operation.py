@@ -18,6 +18,7 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import docstring_parser
 import typer
+from typer.models import OptionInfo
 
 from msgflow.cli.options import SHARED, path_of
 from msgflow.files.default_files import DEFAULT_DATABASE
@@ -119,7 +120,7 @@ def _annotated(
         text = " ".join((said.description or "").split()).removesuffix(".")
         info.help = escape(text[:1].upper() + text[1:])
         info.metavar = said.type_name or info.metavar
-    if isinstance(info, type(typer.Option())) and info.default is ...:
+    if isinstance(info, OptionInfo) and info.default is ...:
         word = parameter.name.strip("_").replace("_", "-")
         info.default = f"--{word}/--no-{word}" if parameter.default is True else f"--{word}"
     kind = _plain(kind)
