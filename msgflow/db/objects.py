@@ -31,6 +31,9 @@ if TYPE_CHECKING:
 PUBLIC = "public"
 # Findings, of whose headers a view is made.
 HEALTH = "health"
+# Folders whose objects are made of staged events: which clock a kernel trace is of, all that any
+# recording tells, and what kernel traces tell besides.
+MODEL_LAYERS = ("alignment", "model", "kernel")
 VIEW_LAYERS = ("link", "clock", "delivery", "flow", "stat", PUBLIC)
 
 # Modules that make tables and views besides `schema/`; the hash reads them as text.
@@ -83,6 +86,12 @@ def sources(by_name: Mapping[str, Header], name: str) -> list[str]:
     needs = dict.fromkeys(by_name[name].needs)
     needs |= dict.fromkeys(need.replace("store.", "derive.", 1) for need in needs)
     return [need for need in needs if need in by_name and need != name]
+
+
+@cache
+def model() -> tuple[Header, ...]:
+    """Return all that an ingest makes of staged events, in the order of creation."""
+    return sort(header for layer in MODEL_LAYERS for header in load(layer))
 
 
 @cache

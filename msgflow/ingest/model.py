@@ -1,6 +1,7 @@
 """The model of a run: executes `schema/model`, from staged events to rows with ids from 1.
 
-What cannot have a row in this recording is not planned: `schema/model.sql` has its empty table.
+Before it comes `schema/alignment`, and after it `schema/kernel`: both have rows only where a kernel
+trace was read. What cannot have a row in this recording is not planned: `schema/model.sql` has its empty table.
 """
 
 from __future__ import annotations
@@ -30,8 +31,8 @@ _TABLE = re.compile(r"CREATE TABLE ([a-z_.]+) \([^;]*;")
 
 
 def build(con: duckdb.DuckDBPyConnection, *, keep: bool = False, findings: bool = True) -> None:
-    """Create every object of `schema/model`, each from those before it."""
-    headers = objects.load("model")
+    """Create every object of these folders, each from those before it."""
+    headers = objects.model()
     if not findings:
         headers = tuple(header for header in headers if header.name != _FINDING)
     empty = staging.empty_tables(con)

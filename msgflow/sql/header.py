@@ -32,7 +32,7 @@ The header ends at the first line that is not a `--` comment. Two spaces end a p
 - `slowest`: the column that `--slowest N` goes by.
 - `zero`: the column that is 0 in rows that a terminal leaves out.
 - `when`: tables, views, or macros of a run. If none of them has a row, this object has none either,
-  and an ingest does not run its SQL. In `schema/model` only tables count, and the empty table is
+  and an ingest does not run its SQL. In the model only tables count, and the empty table is
   made by its statement in `schema/model.sql`. Elsewhere a condition may follow a name, as in
   `store.gap WHERE kind = 'loss'`: then only such rows count.
 - `also`: objects whose rows are stored in the table of this one, too. Each has a `when` of its own,
@@ -159,7 +159,7 @@ class Header:
         title: a few words for lists; the name where the file has none.
         description: what it means.
         grain: "one row per …"; empty for scalar macros.
-        kind: 'view' (the body is a SELECT; in `schema/model` a table is made of it), 'inline' (the
+        kind: 'view' (the body is a SELECT; in the model a table is made of it), 'inline' (the
             same, but never made a table) or 'macro' (the body is the whole statement).
         params: parameters in the order of the file.
         columns: output columns in the order of the file.

@@ -22,6 +22,7 @@ ROOMS = [
         "simulator",
         "schema",
         "schema/model",
+        "schema/kernel",
         "schema/link",
         "schema/stat",
         "schema/health",

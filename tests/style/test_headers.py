@@ -98,7 +98,7 @@ def test_each_layer_reads_only_to_its_left(file: SqlFile) -> None:
     for name in file.references:
         # What is stored of an object of `derive` is as far to the right as that.
         stored_of = LAYER_OF.get(name.replace("store.", "derive.", 1), "store")
-        layer = stored_of if name.startswith("store.") else LAYER_OF.get(name, "model")
+        layer = stored_of if name.startswith("store.") else LAYER_OF.get(name, LAYERS[0])
         assert LAYERS.index(layer) <= position, f"{file} reads {name}"
 
 

@@ -115,7 +115,7 @@ class Analysis:
         assert self._built is not None
         missing = [
             header
-            for header in objects.load("model")
+            for header in objects.model()
             if header.name in needed and header.name not in self._built
         ]
         if not missing:
@@ -211,7 +211,7 @@ Analyse = Callable[[StagedEvents], Analysis]
 @cache
 def _needs() -> dict[str, frozenset[str]]:
     """Return what every object of the model and of the database needs, tables of it included."""
-    needs = {header.name: frozenset(header.needs) for header in objects.load("model")}
+    needs = {header.name: frozenset(header.needs) for header in objects.model()}
     needs |= {name.replace("staging.", "store."): frozenset({name}) for name in needs}
     needs |= {name: frozenset({name.replace("store.", "derive.")}) for name in _DERIVED}
     return needs | {header.name: frozenset(header.needs) for header in objects.views()}
@@ -225,7 +225,7 @@ def _needed(sql: str) -> frozenset[str]:
 
 @cache
 def _everything() -> frozenset[str]:
-    return _closure([*(header.name for header in objects.load("model")), *_DERIVED])
+    return _closure([*(header.name for header in objects.model()), *_DERIVED])
 
 
 def _closure(names: Iterable[str]) -> frozenset[str]:

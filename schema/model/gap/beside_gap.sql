@@ -7,7 +7,7 @@
 -- when: staging.gap
 WITH last_gap AS (
     SELECT recording_index, cpu_id, max(covered_until_ns) AS end_ns
-    FROM staging.recording_gap
+    FROM staging.gap
     GROUP BY recording_index, cpu_id
 )
 SELECT event_id, thread_id, true AS is_behind
@@ -22,7 +22,7 @@ UNION
 SELECT e.event_id, t.thread_id, false
 FROM staging.event AS e
 JOIN staging.thread AS t ON e.event_id = t.last_event_id
-JOIN staging.exposed_trace AS x ON e.trace_index = x.trace_index
+JOIN staging.placed_source AS x ON e.trace_index = x.trace_index
 JOIN last_gap AS g
     ON x.recording_index = g.recording_index
     AND g.cpu_id IN (e.cpu_id, -1)
@@ -32,8 +32,8 @@ SELECT e.event_id, t.thread_id, true
 FROM staging.event AS e
 JOIN staging.thread AS t ON e.event_id = t.first_event_id
 JOIN staging.process AS p ON t.process_id = p.process_id
-JOIN staging.exposed_trace AS x ON e.trace_index = x.trace_index
-JOIN staging.recording_gap AS g
+JOIN staging.placed_source AS x ON e.trace_index = x.trace_index
+JOIN staging.gap AS g
     ON x.recording_index = g.recording_index
     AND g.cpu_id IN (e.cpu_id, -1)
     AND g.start_ns < e.ts_ns

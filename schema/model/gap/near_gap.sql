@@ -5,19 +5,24 @@
 --     CPUs, which the thread may have visited meanwhile.
 -- grain: one row per event and sequence
 -- when: staging.gap
-WITH exposed AS (
+WITH exposed_trace AS (
+    SELECT trace_index, recording_index
+    FROM staging.placed_source
+    WHERE recording_index IN (SELECT recording_index FROM staging.gap)
+),
+exposed AS (
     SELECT
         e.event_id, e.thread_index, e.trace_index, e.sequence, e.ts_ns, e.cpu_id,
         p.ts_ns AS previous_ns, p.cpu_id AS previous_cpu_id
     FROM staging.predecessor AS e
     JOIN staging.event AS p ON e.previous_event_id = p.event_id
-    WHERE e.trace_index IN (SELECT trace_index FROM staging.exposed_trace)
+    WHERE e.trace_index IN (SELECT trace_index FROM exposed_trace)
     UNION ALL
     SELECT
         event_id, thread_index, trace_index, 'thread', ts_ns, cpu_id,
         lag(ts_ns) OVER on_thread, lag(cpu_id) OVER on_thread
     FROM staging.event
-    WHERE trace_index IN (SELECT trace_index FROM staging.exposed_trace)
+    WHERE trace_index IN (SELECT trace_index FROM exposed_trace)
     WINDOW on_thread AS (PARTITION BY thread_index ORDER BY event_id)
 ),
 -- Few events are near a gap, and to order all of them would take longer than all else. So time is
@@ -29,13 +34,12 @@ stretch AS (
 ),
 gap_stretch AS (
     SELECT DISTINCT
-        r.recording_index,
+        g.recording_index,
         -- In damaged traces, a gap may end before it starts.
         unnest(
             range(g.start_ns // s.length_ns, greatest(g.start_ns, g.end_ns) // s.length_ns + 1)
         ) AS number
     FROM staging.gap AS g
-    JOIN staging.recording AS r ON g.trace_id - 1 = r.trace_index
     CROSS JOIN stretch AS s
 ),
 candidate AS (
@@ -45,7 +49,7 @@ candidate AS (
             e.*, t.recording_index, e.ts_ns // s.length_ns AS number,
             e.previous_ns // s.length_ns AS previous_number
         FROM exposed AS e
-        JOIN staging.exposed_trace AS t ON e.trace_index = t.trace_index
+        JOIN exposed_trace AS t ON e.trace_index = t.trace_index
         CROSS JOIN stretch AS s
     ) AS x
     WHERE x.number > x.previous_number + 1
@@ -57,7 +61,7 @@ near AS (
         e.event_id, e.thread_index, e.sequence, e.recording_index, e.ts_ns, e.cpu_id,
         e.previous_ns, e.previous_cpu_id
     FROM candidate AS e
-    ASOF JOIN staging.recording_gap AS g
+    ASOF JOIN staging.gap AS g
         ON e.recording_index = g.recording_index AND e.ts_ns > g.start_ns
     WHERE g.start_ns >= e.previous_ns OR g.any_covered_until_ns > e.previous_ns
 ),
@@ -70,7 +74,7 @@ place AS (
 between_the_two AS (
     SELECT DISTINCT e.event_id, e.sequence
     FROM place AS e
-    ASOF JOIN staging.recording_gap AS g
+    ASOF JOIN staging.gap AS g
         ON e.recording_index = g.recording_index AND e.cpu_id = g.cpu_id AND e.ts_ns > g.start_ns
     WHERE g.start_ns >= e.previous_ns OR g.covered_until_ns > e.previous_ns
 )

@@ -53,10 +53,9 @@ snapshot AS (
     GROUP BY recording_index
     HAVING bool_or(previous_end_ns IS NULL AND lost_packet_count IS DISTINCT FROM 0)
     UNION
-    SELECT r.recording_index
-    FROM staging.source AS s
-    JOIN staging.recording AS r ON s.trace_index = r.trace_index
-    WHERE regexp_matches(s.path, '(^|/)snapshot-\d+-[^/]*(/|$)')
+    SELECT recording_index
+    FROM staging.placed_source
+    WHERE regexp_matches(path, '(^|/)snapshot-\d+-[^/]*(/|$)')
 ),
 silence AS (
     SELECT
@@ -74,7 +73,7 @@ silence AS (
 heard AS (
     SELECT r.recording_index, min(e.ts_ns) AS first_ns, max(e.ts_ns) AS last_ns
     FROM staging.event AS e
-    JOIN staging.recording AS r ON e.trace_index = r.trace_index
+    JOIN staging.placed_source AS r ON e.trace_index = r.trace_index
     WHERE r.recording_index IN (SELECT recording_index FROM silence WHERE NOT is_certain)
     GROUP BY r.recording_index, e.ts_ns // staging.pause_limit().least_ns
 ),

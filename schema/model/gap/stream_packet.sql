@@ -13,13 +13,12 @@ SELECT
 FROM (
     SELECT
         p.*,
-        r.recording_index,
+        s.recording_index,
         coalesce(p.end_ns, p.last_event_ns, p.begin_ns) AS known_end_ns,
         -- One that is filled to the last byte ends with its last event, one that opens a chunk when
         -- it begins.
         coalesce(p.end_ns > greatest(p.last_event_ns, p.begin_ns), false) AS is_ended_early
     FROM staging.packet AS p
-    JOIN staging.recording AS r ON p.trace_index = r.trace_index
-    JOIN staging.source AS s ON p.trace_index = s.trace_index
+    JOIN staging.placed_source AS s ON p.trace_index = s.trace_index
     WHERE s.domain IS DISTINCT FROM 'kernel'
 )

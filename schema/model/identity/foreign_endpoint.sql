@@ -5,10 +5,10 @@
 -- grain: one row per initialisation of such an object
 -- when: raw.ros2_rmw_publisher_init, raw.ros2_rmw_subscription_init
 WITH thread AS (
-    SELECT
+    SELECT DISTINCT
         thread_index, host_id, pid_ns, vpid,
         dense_rank() OVER (ORDER BY host_id, pid_ns, vpid) AS process
-    FROM staging.thread_seen
+    FROM staging.thread_presence
 ),
 made AS (
     SELECT event_id, ts_ns, trace_index, thread_index, rmw_publisher_handle AS handle, gid
@@ -28,7 +28,7 @@ identified AS (
 SELECT
     i.process, i.event_id, i.handle, i.prefix, min(g.start_ns) AS gap_ns
 FROM identified AS i
-JOIN staging.recording AS r ON i.trace_index = r.trace_index
-LEFT JOIN staging.recording_gap AS g
+JOIN staging.placed_source AS r ON i.trace_index = r.trace_index
+LEFT JOIN staging.gap AS g
     ON r.recording_index = g.recording_index AND i.ts_ns < g.covered_until_ns
 GROUP BY ALL

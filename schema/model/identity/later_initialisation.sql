@@ -1,7 +1,6 @@
 -- name: staging.later_initialisation
--- description: Initialisations of ROS before which their process already had an event. Most have
---     none, and are left out. `is_other_main`: by another thread, or under another name, than the
---     one before. `gap_ns`: begin of the first gap after it.
+-- description: Initialisations of ROS that are not the first event of their process, which most
+--     are. `is_other_main`: by another thread, or under another name, than the one before.
 -- grain: one row per such rcl_init
 -- when: raw.ros2_rcl_init
 WITH initialisation AS (
@@ -26,14 +25,8 @@ WITH initialisation AS (
             PARTITION BY p.host_id, p.pid_ns, p.vpid, i.context_handle ORDER BY i.event_id
         )
 )
-SELECT
-    i.host_id, i.pid_ns, i.vpid, i.vtid, i.event_id, i.is_other_main, i.is_same_context,
-    i.is_repeated,
-    coalesce(min(g.start_ns), 9223372036854775807) AS gap_ns
+SELECT i.*
 FROM initialisation AS i
-JOIN staging.recording AS r ON i.trace_index = r.trace_index
-LEFT JOIN staging.recording_gap AS g
-    ON r.recording_index = g.recording_index AND i.ts_ns < g.covered_until_ns
 WHERE EXISTS (
     SELECT 1
     FROM staging.thread_presence AS p
@@ -42,4 +35,3 @@ WHERE EXISTS (
         AND p.vpid = i.vpid
         AND p.first_event_id < i.event_id
 )
-GROUP BY ALL

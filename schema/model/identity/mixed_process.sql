@@ -6,10 +6,10 @@
 -- grain: one row per host, PID namespace and pid
 -- when: raw.cpu_return, staging.foreign_endpoint
 WITH thread AS (
-    SELECT
+    SELECT DISTINCT
         thread_index, host_id, pid_ns, vpid,
         dense_rank() OVER (ORDER BY host_id, pid_ns, vpid) AS process
-    FROM staging.thread_seen
+    FROM staging.thread_presence
 ),
 suspect AS (
     SELECT thread_index, process

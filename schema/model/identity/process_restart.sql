@@ -10,9 +10,21 @@
 -- grain: one row per such rcl_init
 -- when: staging.later_initialisation
 
+-- `gap_ns`: begin of the first gap behind it.
+WITH initialisation AS (
+    SELECT i.*, coalesce(min(g.start_ns), 9223372036854775807) AS gap_ns
+    FROM staging.later_initialisation AS i
+    JOIN staging.placed_source AS r ON i.trace_index = r.trace_index
+    LEFT JOIN staging.gap AS g
+        ON r.recording_index = g.recording_index AND i.ts_ns < g.covered_until_ns
+    GROUP BY ALL
+),
+thread AS (
+    SELECT DISTINCT thread_index, host_id, pid_ns, vpid, vtid FROM staging.thread_presence
+),
 -- A callback that starts was registered, whether that was recorded or not. A publication shows no
 -- object: what logs to /rosout publishes on a handle that is never made.
-WITH handled AS (
+handled AS (
     SELECT
         thread_index, event_id, ts_ns, publisher_handle AS handle, true AS is_made,
         true AS shows_object
@@ -35,8 +47,8 @@ old AS (
             NOT h.is_made AND h.event_id > c.event_id AND h.ts_ns <= c.gap_ns
         ) AS used_event_id,
         min(h.event_id) FILTER (h.is_made AND h.event_id > c.event_id) AS made_event_id
-    FROM staging.later_initialisation AS c
-    JOIN staging.thread_seen AS s
+    FROM initialisation AS c
+    JOIN thread AS s
         ON c.host_id = s.host_id AND c.pid_ns IS NOT DISTINCT FROM s.pid_ns AND c.vpid = s.vpid
     JOIN handled AS h ON s.thread_index = h.thread_index
     GROUP BY c.event_id, h.handle
@@ -51,8 +63,8 @@ surviving AS (
     WHERE used_event_id < coalesce(made_event_id, 9223372036854775807)
     UNION
     SELECT c.event_id
-    FROM staging.later_initialisation AS c
-    JOIN staging.thread_seen AS s
+    FROM initialisation AS c
+    JOIN thread AS s
         ON c.host_id = s.host_id
         AND c.pid_ns IS NOT DISTINCT FROM s.pid_ns
         AND c.vpid = s.vpid
@@ -66,7 +78,7 @@ surviving AS (
         ON e.previous_callback_event_id = b.event_id AND e.callback = b.callback
 )
 SELECT i.host_id, i.pid_ns, i.vpid, i.event_id
-FROM staging.later_initialisation AS i
+FROM initialisation AS i
 WHERE (
         CASE
             WHEN i.is_repeated THEN i.is_same_context

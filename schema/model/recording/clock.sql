@@ -2,9 +2,9 @@
 -- description: Clocks by uuid (LTTng: the boot). A trace without one has a clock of its own, by
 --     hostname. No correction is known at ingest.
 -- grain: one row per clock
--- when: staging.source
+-- when: staging.placed_source
 SELECT
-    row_number() OVER (ORDER BY min(trace_index)) AS clock_id,
+    clock_id,
     arg_min(clock_uuid, coalesce(domain = 'kernel', false)) AS uuid,
     clock_key,
     0::BIGINT AS offset_ns,
@@ -15,4 +15,4 @@ SELECT
     NULL::BIGINT AS drift_uncertainty_ppb,
     NULL::BIGINT AS reference_clock_id
 FROM staging.placed_source
-GROUP BY clock_key
+GROUP BY clock_id, clock_key

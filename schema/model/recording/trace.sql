@@ -1,7 +1,7 @@
 -- name: staging.trace
 -- description: Traces read, with what their packets and events say of their extent.
 -- grain: one row per CTF trace
--- when: staging.source
+-- when: staging.placed_source
 WITH extent AS (
     SELECT
         trace_index,
@@ -24,7 +24,7 @@ with_requests AS (
 )
 SELECT
     s.trace_index + 1 AS trace_id,
-    h.host_id,
+    s.host_id,
     s.path,
     s.uuid,
     s.tracer,
@@ -35,7 +35,5 @@ SELECT
     coalesce(e.discarded_event_count, 0) AS discarded_event_count,
     s.trace_index IN (FROM with_requests) AS has_request_events
 FROM staging.placed_source AS s
-JOIN staging.clock AS c ON s.clock_key = c.clock_key
-JOIN staging.host AS h ON c.clock_id = h.clock_id AND s.hostname = h.hostname
 LEFT JOIN extent AS e ON s.trace_index = e.trace_index
 ORDER BY trace_id

@@ -1,0 +1,29 @@
+-- name: staging.placed_source
+-- description: Traces with the numbers of their clock, host and recording. Traces of one recording
+--     are the chunks of a rotated one, or its snapshots. `shift_ns` has to be added to their times.
+--     All is as recorded, but for what kernel traces tell of themselves.
+-- grain: one row per CTF trace
+-- when: staging.source
+WITH placed AS (
+    SELECT
+        s.* REPLACE (
+            CASE WHEN p.trace_index IS NULL THEN s.clock_key ELSE p.clock_key END AS clock_key,
+            CASE WHEN p.trace_index IS NULL THEN s.hostname ELSE p.hostname END AS hostname
+        ),
+        CASE WHEN p.trace_index IS NULL THEN 0 ELSE p.shift_ns END AS shift_ns
+    FROM staging.source AS s
+    LEFT JOIN staging.placement AS p ON s.trace_index = p.trace_index
+),
+first AS (
+    SELECT
+        *,
+        min(trace_index) OVER (PARTITION BY clock_key) AS first_of_clock,
+        min(trace_index) OVER (PARTITION BY clock_key, hostname) AS first_of_host,
+        min(trace_index) OVER (PARTITION BY coalesce(uuid, path)) AS recording_index
+    FROM placed
+)
+SELECT
+    * EXCLUDE (first_of_clock, first_of_host),
+    dense_rank() OVER (ORDER BY first_of_clock) AS clock_id,
+    dense_rank() OVER (ORDER BY first_of_host) AS host_id
+FROM first
