@@ -15,8 +15,6 @@ CREATE TABLE staging.annotation_output (annotation_id BIGINT, publisher_id BIGIN
 CREATE TABLE staging.beside_gap (event_id BIGINT, thread_id BIGINT, is_behind BOOLEAN);
 CREATE TABLE staging.buffer_owner (process_id BIGINT, buffer_handle UBIGINT,
     subscription_event_id BIGINT, is_inferred BOOLEAN);
-CREATE TABLE staging.buffer_subscription (event_id BIGINT, process_id BIGINT, buffer_handle UBIGINT,
-    subscription_event_id BIGINT);
 CREATE TABLE staging.callback (callback_id BIGINT, process_id BIGINT, node_id BIGINT, kind VARCHAR,
     subscription_id BIGINT, timer_id BIGINT, service_id BIGINT, callback_handle UBIGINT,
     symbol VARCHAR, created_ns BIGINT, event_id BIGINT);
@@ -51,6 +49,9 @@ CREATE TABLE staging.callback_left_over (event_id BIGINT, thread_id BIGINT, trac
 CREATE TABLE staging.callback_loss (start_event_id BIGINT);
 CREATE TABLE staging.callback_number (start_event_id BIGINT, callback_instance_id BIGINT,
     callback_id BIGINT, take_id BIGINT);
+CREATE TABLE staging.callback_object (callback_id BIGINT, event_id BIGINT, callback_event_id BIGINT,
+    process_id BIGINT, kind VARCHAR, subscription_event_id BIGINT, timer_event_id BIGINT,
+    service_event_id BIGINT, callback_handle UBIGINT, symbol VARCHAR, created_ns BIGINT);
 CREATE TABLE staging.callback_open (start_event_id BIGINT, thread_id BIGINT,
     previous_executor_event_id BIGINT);
 CREATE TABLE staging.callback_outer (start_event_id BIGINT, thread_id BIGINT,
@@ -58,7 +59,7 @@ CREATE TABLE staging.callback_outer (start_event_id BIGINT, thread_id BIGINT,
 CREATE TABLE staging.callback_owner (process_id BIGINT, callback_handle UBIGINT,
     callback_event_id BIGINT, kind VARCHAR, handle UBIGINT, owner_event_id BIGINT,
     is_inferred BOOLEAN, is_eliminated BOOLEAN);
-CREATE TABLE staging.callback_parent (start_event_id BIGINT, parent_id BIGINT);
+CREATE TABLE staging.callback_parent (start_event_id BIGINT, parent_event_id BIGINT);
 CREATE TABLE staging.callback_plain (start_event_id BIGINT, end_event_id BIGINT, start_ns BIGINT,
     end_ns BIGINT, trace_index INTEGER, thread_id BIGINT, process_id BIGINT,
     callback_handle UBIGINT, is_intra_process BOOLEAN, previous_event_id BIGINT,
@@ -87,13 +88,11 @@ CREATE TABLE staging.client_event (event_id BIGINT, ts_ns BIGINT, thread_id BIGI
 CREATE TABLE staging.client_gid (client_event_id BIGINT, gid BLOB);
 CREATE TABLE staging.client_gid_init (event_id BIGINT, process_id BIGINT, rmw_handle UBIGINT,
     gid BLOB);
-CREATE TABLE staging.client_known (event_id BIGINT, process_id BIGINT, node_id BIGINT,
-    service_name VARCHAR, client_handle UBIGINT, rmw_handle UBIGINT, gid BLOB, created_ns BIGINT);
+CREATE TABLE staging.client_known (event_id BIGINT, process_id BIGINT, service_name VARCHAR,
+    client_handle UBIGINT, rmw_handle UBIGINT, gid BLOB, created_ns BIGINT);
 CREATE TABLE staging.clock (clock_id BIGINT, uuid VARCHAR, clock_key VARCHAR, offset_ns BIGINT,
     drift_ppb BIGINT, reference_ns BIGINT, uncertainty_ns BIGINT, method VARCHAR,
     drift_uncertainty_ppb BIGINT, reference_clock_id BIGINT);
-CREATE TABLE staging.construction (event_id BIGINT, process_id BIGINT, kind VARCHAR,
-    node_handle UBIGINT, precedes_own_node BOOLEAN);
 CREATE TABLE staging.context (thread_index INTEGER, host_id BIGINT, pid_ns BIGINT, vpid INTEGER,
     life BIGINT, from_event_id BIGINT, until_event_id BIGINT, vtid INTEGER, name VARCHAR,
     first_event_id BIGINT, last_event_id BIGINT, first_seen_ns BIGINT, last_seen_ns BIGINT,
@@ -195,9 +194,9 @@ CREATE TABLE staging.publisher (publisher_id BIGINT, process_id BIGINT, node_id 
     topic_name VARCHAR, publisher_handle UBIGINT, rmw_handle UBIGINT, gid BLOB, queue_depth BIGINT,
     created_ns BIGINT, is_internal BOOLEAN, is_inferred BOOLEAN, is_topic_learned BOOLEAN,
     is_topic_declared BOOLEAN, event_id BIGINT);
-CREATE TABLE staging.publisher_known (event_id BIGINT, process_id BIGINT, node_id BIGINT,
-    topic_name VARCHAR, publisher_handle UBIGINT, rmw_handle UBIGINT, writer UBIGINT, gid BLOB,
-    queue_depth BIGINT, created_ns BIGINT, is_internal BOOLEAN);
+CREATE TABLE staging.publisher_known (event_id BIGINT, process_id BIGINT, topic_name VARCHAR,
+    publisher_handle UBIGINT, rmw_handle UBIGINT, writer UBIGINT, gid BLOB, queue_depth BIGINT,
+    created_ns BIGINT, is_internal BOOLEAN);
 CREATE TABLE staging.request (request_id BIGINT, client_id BIGINT, service_id BIGINT,
     sequence_number BIGINT, sent_ns BIGINT, taken_ns BIGINT, sender_thread_id BIGINT,
     receiver_thread_id BIGINT, callback_instance_id BIGINT);
@@ -239,8 +238,8 @@ CREATE TABLE staging.service_event (event_id BIGINT, ts_ns BIGINT, thread_id BIG
     source_timestamp_ns BIGINT, service_event_id BIGINT, is_inferred BOOLEAN);
 CREATE TABLE staging.service_inferred (event_id BIGINT, process_id BIGINT, service_name VARCHAR,
     service_handle UBIGINT, rmw_handle UBIGINT);
-CREATE TABLE staging.service_known (event_id BIGINT, process_id BIGINT, node_id BIGINT,
-    service_name VARCHAR, service_handle UBIGINT, rmw_handle UBIGINT, created_ns BIGINT);
+CREATE TABLE staging.service_known (event_id BIGINT, process_id BIGINT, service_name VARCHAR,
+    service_handle UBIGINT, rmw_handle UBIGINT, created_ns BIGINT);
 CREATE TABLE staging.service_use (client_event_id BIGINT, service_event_id BIGINT);
 CREATE TABLE staging.silence (trace_id INTEGER, recording_index INTEGER, start_ns BIGINT,
     end_ns BIGINT, is_flushed BOOLEAN);
@@ -257,22 +256,21 @@ CREATE TABLE staging.subscription (subscription_id BIGINT, process_id BIGINT, no
     queue_depth BIGINT, created_ns BIGINT, is_internal BOOLEAN, is_inferred BOOLEAN,
     is_topic_learned BOOLEAN, is_topic_declared BOOLEAN, event_id BIGINT);
 CREATE TABLE staging.subscription_known (event_id BIGINT, process_id BIGINT, thread_id BIGINT,
-    node_id BIGINT, topic_name VARCHAR, subscription_handle UBIGINT, rmw_handle UBIGINT, gid BLOB,
+    topic_name VARCHAR, subscription_handle UBIGINT, rmw_handle UBIGINT, gid BLOB,
     queue_depth BIGINT, created_ns BIGINT, is_internal BOOLEAN);
 CREATE TABLE staging.subscription_object (event_id BIGINT, subscription_event_id BIGINT);
 CREATE TABLE staging.take_chain (start_event_id BIGINT, end_event_id BIGINT, trace_index INTEGER,
     thread_id BIGINT, process_id BIGINT, taken_ns BIGINT, method VARCHAR, rmw_handle UBIGINT,
-    callback_handle UBIGINT, buffer_handle UBIGINT, source_timestamp_ns BIGINT);
+    buffer_handle UBIGINT, source_timestamp_ns BIGINT, subscription_event_id BIGINT,
+    is_known BOOLEAN);
 CREATE TABLE staging.take_inferred (start_event_id BIGINT, process_id BIGINT,
     subscription_event_id BIGINT, is_inferred BOOLEAN);
-CREATE TABLE staging.take_number (start_event_id BIGINT, take_id BIGINT, subscription_id BIGINT,
-    callback_start_event_id BIGINT);
-CREATE TABLE staging.take_origin (start_event_id BIGINT, process_id BIGINT, rmw_handle UBIGINT,
-    subscription_event_id BIGINT, callback_start_event_id BIGINT);
+CREATE TABLE staging.take_number (start_event_id BIGINT, process_id BIGINT, rmw_handle UBIGINT,
+    subscription_event_id BIGINT, callback_start_event_id BIGINT,
+    callback_subscription_event_id BIGINT, take_id BIGINT);
 CREATE TABLE staging.take_remnant (event_id BIGINT);
-CREATE TABLE staging.take_subscription (start_event_id BIGINT, end_event_id BIGINT,
-    process_id BIGINT, method VARCHAR, rmw_handle UBIGINT, buffer_handle UBIGINT,
-    subscription_event_id BIGINT, is_known BOOLEAN);
+CREATE TABLE staging.take_subscription (start_event_id BIGINT, take_id BIGINT,
+    callback_start_event_id BIGINT, subscription_id BIGINT);
 CREATE TABLE staging.thread (thread_id BIGINT, process_id BIGINT, tid INTEGER, name VARCHAR,
     first_event_id BIGINT, last_event_id BIGINT, first_seen_ns BIGINT, last_seen_ns BIGINT);
 CREATE TABLE staging.thread_break (thread_id BIGINT, resumed_event_id BIGINT, resumed_ns BIGINT,

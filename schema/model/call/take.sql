@@ -8,14 +8,14 @@ WITH every_take AS NOT MATERIALIZED (
         c.source_timestamp_ns, c.method, c.start_event_id, c.end_event_id,
         n.callback_start_event_id
     FROM staging.take_chain AS c
-    JOIN staging.take_number AS n ON c.start_event_id = n.start_event_id
+    JOIN staging.take_subscription AS n ON c.start_event_id = n.start_event_id
     UNION ALL
     SELECT
         n.take_id, p.trace_index, n.subscription_id, p.process_id, p.thread_id, p.start_ns,
         NULL, 'callback_only', p.start_event_id, p.start_event_id, p.start_event_id
     FROM staging.callback_pair AS p
     JOIN (
-        SELECT * FROM staging.take_number WHERE start_event_id = callback_start_event_id
+        SELECT * FROM staging.take_subscription WHERE start_event_id = callback_start_event_id
     ) AS n ON p.start_event_id = n.start_event_id
 ),
 elsewhere AS (

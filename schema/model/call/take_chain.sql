@@ -1,8 +1,11 @@
 -- name: staging.take_chain
--- description: Layers of one take stitched together, as for publications. A take whose rmw layer
---     failed does not count, although upper layers may report it. Nor does a take of the middleware
---     itself: it has no rcl layer, although rcl takes are traced, and its reader belongs to no rcl
---     subscription and never had an rcl layer.
+-- description: Layers of one take stitched together, as for publications, and the subscription that
+--     took. A take whose rmw layer failed does not count, although upper layers may report it. Nor
+--     does a take of the middleware itself: it has no rcl layer, although rcl takes are traced, and
+--     its reader belongs to no rcl subscription and never had an rcl layer. The subscription is the
+--     one of the rmw handle or ring buffer that was initialised last before the take; NULL where
+--     that was not traced. Of a ring buffer, which one it belongs to may be known (`is_known`), but
+--     not the subscription. The buffer that a transient-local publisher keeps belongs to none.
 -- grain: one row per successful take, or dequeue
 -- when: raw.ros2_rmw_take, raw.ros2_rcl_take, raw.ros2_rclcpp_take,
 --     raw.ros2_dispatch_subscription_callback, raw.ros2_rclcpp_ring_buffer_dequeue
@@ -54,7 +57,6 @@ chain AS (
         r.taken, r.rmw_ns, r.rcl_ns,
         c.ts_ns AS caret_ns,
         r.rmw_handle,
-        c.callback AS callback_handle,
         coalesce(r.stamp, nullif(c.source_stamp, 0)::BIGINT) AS stamp
     FROM rclcpp AS r
     FULL JOIN staging.call('ros2_dispatch_subscription_callback') AS c
@@ -63,7 +65,7 @@ chain AS (
 located AS (
     SELECT
         h.start_event_id, h.end_event_id, h.trace_index, c.thread_id, c.process_id, h.rmw_ns,
-        h.rcl_ns, h.caret_ns, h.rmw_handle, h.callback_handle, h.stamp
+        h.rcl_ns, h.caret_ns, h.rmw_handle, h.stamp
     FROM chain AS h
     JOIN staging.context AS c
         ON h.thread_index = c.thread_index
@@ -81,31 +83,51 @@ known_reader AS (
 ),
 rcl_traced AS (
     SELECT DISTINCT process_id FROM rcl_reader
+),
+taken AS (
+    SELECT
+        t.start_event_id AS event_id,
+        t.end_event_id,
+        t.trace_index,
+        t.thread_id,
+        t.process_id,
+        coalesce(t.rmw_ns, t.rcl_ns, t.caret_ns) AS taken_ns,
+        CASE WHEN t.rmw_ns IS NULL AND t.rcl_ns IS NULL THEN 'caret' ELSE 'rmw' END AS method,
+        t.rmw_handle AS handle,
+        t.stamp
+    FROM located AS t
+    LEFT JOIN rcl_traced AS r ON t.process_id = r.process_id
+    LEFT JOIN known_reader AS k ON t.process_id = k.process_id AND t.rmw_handle = k.rmw_handle
+    WHERE t.rcl_ns IS NOT NULL
+        OR t.caret_ns IS NOT NULL
+        OR (
+            t.rmw_ns IS NOT NULL
+            AND t.stamp IS NOT NULL
+            AND (k.process_id IS NOT NULL OR r.process_id IS NULL)
+        )
+),
+subscription AS (
+    SELECT event_id, process_id, rmw_handle AS handle FROM staging.subscription_known
+),
+buffer AS (
+    SELECT b.event_id, b.process_id, b.buffer, o.subscription_event_id
+    FROM staging.located('ros2_rclcpp_buffer_to_ipb') AS b
+    ASOF JOIN staging.located('ros2_rclcpp_ipb_to_subscription') AS i
+        ON b.process_id = i.process_id AND b.ipb = i.ipb AND b.event_id <= i.event_id
+    JOIN staging.subscription_object AS o ON i.event_id = o.event_id
 )
 SELECT
-    t.start_event_id,
-    t.end_event_id,
-    t.trace_index,
-    t.thread_id,
-    t.process_id,
-    coalesce(t.rmw_ns, t.rcl_ns, t.caret_ns) AS taken_ns,
-    CASE WHEN t.rmw_ns IS NULL AND t.rcl_ns IS NULL THEN 'caret' ELSE 'rmw' END AS method,
-    t.rmw_handle,
-    t.callback_handle,
+    event_id AS start_event_id, end_event_id, trace_index, thread_id, process_id, taken_ns, method,
+    handle AS rmw_handle,
     NULL::UBIGINT AS buffer_handle,
-    t.stamp AS source_timestamp_ns
-FROM located AS t
-LEFT JOIN rcl_traced AS r ON t.process_id = r.process_id
-LEFT JOIN known_reader AS k ON t.process_id = k.process_id AND t.rmw_handle = k.rmw_handle
-WHERE t.rcl_ns IS NOT NULL
-    OR t.caret_ns IS NOT NULL
-    OR (
-        t.rmw_ns IS NOT NULL
-        AND t.stamp IS NOT NULL
-        AND (k.process_id IS NOT NULL OR r.process_id IS NULL)
-    )
+    stamp AS source_timestamp_ns,
+    object_event_id AS subscription_event_id,
+    object_event_id IS NOT NULL AS is_known
+FROM staging.with_latest('taken', 'subscription')
 UNION ALL
 SELECT
-    event_id, event_id, trace_index, thread_id, process_id, ts_ns, 'ring_buffer', NULL, NULL,
-    buffer, NULL
-FROM staging.located('ros2_rclcpp_ring_buffer_dequeue')
+    d.event_id, d.event_id, d.trace_index, d.thread_id, d.process_id, d.ts_ns, 'ring_buffer', NULL,
+    d.buffer, NULL, b.subscription_event_id, b.event_id IS NOT NULL
+FROM staging.located('ros2_rclcpp_ring_buffer_dequeue') AS d
+ASOF LEFT JOIN buffer AS b
+    ON d.process_id = b.process_id AND d.buffer = b.buffer AND d.event_id >= b.event_id

@@ -7,7 +7,7 @@
 -- when: staging.buffer_owner, staging.callback_handed
 WITH dequeue AS (
     SELECT t.start_event_id, t.process_id, o.subscription_event_id, o.is_inferred
-    FROM staging.take_subscription AS t
+    FROM staging.take_chain AS t
     JOIN staging.buffer_owner AS o
         ON t.process_id = o.process_id AND t.buffer_handle = o.buffer_handle
     WHERE t.method = 'ring_buffer'

@@ -1,24 +1,20 @@
 -- name: staging.take_number
--- description: The number of each take, in the order in which they began, with its subscription and
---     the callback that it led to; of one that is only known by that callback, both are the same.
+-- description: The number of each take, in the order in which they began, and the callback that it
+--     led to. A subscription callback that ran without any take traced was handed its message all
+--     the same: then both are the same. The subscription may be known from either.
 -- grain: one row per message handed over to a subscription
--- when: staging.take_origin
-WITH named AS (
+-- when: staging.take_chain, staging.callback_binding
+WITH every_take AS (
     SELECT
-        o.start_event_id, o.callback_start_event_id,
-        coalesce(s.subscription_id, i.subscription_id) AS subscription_id
-    FROM staging.take_origin AS o
-    LEFT JOIN staging.subscription AS s ON o.subscription_event_id = s.event_id
-    LEFT JOIN (
-        SELECT process_id, rmw_handle, subscription_id
-        FROM staging.subscription
-        WHERE is_inferred
-    ) AS i
-        ON o.subscription_event_id IS NULL
-        AND o.process_id = i.process_id
-        AND o.rmw_handle = i.rmw_handle
+        c.start_event_id, c.process_id, c.rmw_handle, c.subscription_event_id,
+        b.start_event_id AS callback_start_event_id,
+        b.subscription_event_id AS callback_subscription_event_id
+    FROM staging.take_chain AS c
+    LEFT JOIN staging.callback_binding AS b ON c.start_event_id = b.take_event_id
+    UNION ALL
+    SELECT start_event_id, process_id, NULL, NULL, start_event_id, subscription_event_id
+    FROM staging.callback_binding
+    WHERE take_event_id IS NULL AND (kind = 'subscription' OR is_intra_process)
 )
-SELECT
-    start_event_id, row_number() OVER (ORDER BY start_event_id) AS take_id, subscription_id,
-    callback_start_event_id
-FROM named
+SELECT *, row_number() OVER (ORDER BY start_event_id) AS take_id
+FROM every_take

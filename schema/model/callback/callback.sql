@@ -1,9 +1,9 @@
 -- name: staging.callback
--- description: Callback objects. One that ran but whose creation was not traced gets a row, and
---     learns its subscription or service from the messages that it was called with (the most
---     frequent), else what it belongs to from the executor.
+-- description: Callback objects with what they belong to. One whose creation was not traced learns
+--     its subscription or service from the messages that it was called with (the most frequent),
+--     else what it belongs to from the executor.
 -- grain: one row per callback object
--- when: staging.callback_known, staging.callback_binding
+-- when: staging.callback_object
 WITH learned AS (
     SELECT
         b.process_id,
@@ -11,29 +11,14 @@ WITH learned AS (
         b.callback_event_id,
         mode(t.subscription_id ORDER BY t.subscription_id) AS subscription_id
     FROM staging.callback_binding AS b
-    JOIN staging.take_number AS t ON b.start_event_id = t.callback_start_event_id
+    JOIN staging.take_subscription AS t ON b.start_event_id = t.callback_start_event_id
     WHERE b.kind IS NULL OR b.kind IN ('unknown', 'subscription')
     GROUP BY b.process_id, b.callback_handle, b.callback_event_id
 ),
-never_added AS (
-    SELECT min(start_event_id) AS event_id, process_id, callback_handle
-    FROM staging.callback_binding
-    WHERE callback_event_id IS NULL
-    GROUP BY process_id, callback_handle
-),
-every_callback AS (
-    SELECT
-        event_id, event_id AS callback_event_id, process_id, kind, subscription_event_id,
-        timer_event_id, service_event_id, callback_handle, symbol, created_ns
-    FROM staging.callback_known
-    UNION ALL
-    SELECT
-        event_id, NULL, process_id, 'unknown', NULL, NULL, NULL, callback_handle, NULL, NULL
-    FROM never_added
-),
 owned AS (
     SELECT
-        c.event_id, c.callback_event_id, c.process_id, c.callback_handle, c.symbol, c.created_ns,
+        c.callback_id, c.event_id, c.callback_event_id, c.process_id, c.callback_handle, c.symbol,
+        c.created_ns,
         CASE WHEN c.kind = 'unknown' THEN coalesce(o.kind, c.kind) ELSE c.kind END AS kind,
         CASE WHEN o.kind = 'subscription' THEN o.owner_event_id ELSE c.subscription_event_id END
             AS subscription_event_id,
@@ -41,7 +26,7 @@ owned AS (
             AS timer_event_id,
         CASE WHEN o.kind = 'service' THEN o.owner_event_id ELSE c.service_event_id END
             AS service_event_id
-    FROM every_callback AS c
+    FROM staging.callback_object AS c
     LEFT JOIN staging.callback_owner AS o
         ON c.process_id = o.process_id
         AND c.callback_handle = o.callback_handle
@@ -49,7 +34,8 @@ owned AS (
 ),
 complete AS (
     SELECT
-        c.event_id, c.process_id, t.timer_id, c.callback_handle, c.symbol, c.created_ns,
+        c.callback_id, c.event_id, c.process_id, t.timer_id, c.callback_handle, c.symbol,
+        c.created_ns,
         coalesce(s.subscription_id, l.subscription_id) AS subscription_id,
         coalesce(e.service_id, v.service_id) AS service_id,
         CASE
@@ -77,7 +63,7 @@ complete AS (
         AND c.callback_event_id IS NOT DISTINCT FROM v.callback_event_id
 )
 SELECT
-    row_number() OVER (ORDER BY c.event_id) AS callback_id,
+    c.callback_id,
     c.process_id,
     coalesce(c.node_id, s.node_id, v.node_id) AS node_id,
     c.kind,

@@ -39,7 +39,7 @@ SELECT
     t.start_event_id AS take_event_id,
     coalesce(r.subscription_event_id, t.subscription_event_id) AS subscription_event_id
 FROM run AS r
-LEFT JOIN staging.take_subscription AS t
+LEFT JOIN staging.take_chain AS t
     ON r.take_end_event_id = t.end_event_id
     AND r.is_intra_process = (t.method = 'ring_buffer')
     AND coalesce(r.subscription_event_id = t.subscription_event_id, true)

@@ -5,13 +5,15 @@
 -- grain: one row per callback instance
 -- when: staging.callback_binding
 WITH never_added AS (
-    SELECT process_id, callback_handle, callback_id FROM staging.callback WHERE created_ns IS NULL
+    SELECT process_id, callback_handle, callback_id
+    FROM staging.callback_object
+    WHERE callback_event_id IS NULL
 ),
 -- What is sorted should be narrow.
 run AS (
     SELECT b.start_event_id, coalesce(c.callback_id, n.callback_id) AS callback_id
     FROM staging.callback_binding AS b
-    LEFT JOIN staging.callback AS c ON b.callback_event_id = c.event_id
+    LEFT JOIN staging.callback_object AS c ON b.callback_event_id = c.callback_event_id
     LEFT JOIN never_added AS n
         ON b.process_id = n.process_id AND b.callback_handle = n.callback_handle
 ),

@@ -1,16 +1,54 @@
 -- name: staging.node_use
 -- description: Which initialisation of a node handle each object belongs to: the latest before
 --     it, except that an object created inside its node belongs to the one right after, and that
---     any later one is better than none.
+--     any later one is better than none. A publisher may be created inside its node, right before
+--     the node's own event: before Jazzy /rosout is. Where a node handle is used again, what came
+--     first on the handle tells the two orders apart.
 -- grain: one row per object or timer link that names a node
--- when: staging.construction
-WITH use AS (
+-- when: raw.ros2_rcl_publisher_init, raw.ros2_rcl_subscription_init, raw.ros2_rcl_service_init,
+--     raw.ros2_rcl_client_init, raw.ros2_rclcpp_timer_link_node,
+--     raw.ros2_rcl_lifecycle_state_machine_init
+WITH initialisation AS (
+    SELECT event_id, process_id, thread_id, 'node' AS kind, node_handle
+    FROM staging.located('ros2_rcl_node_init')
+    UNION ALL
+    SELECT event_id, process_id, thread_id, 'publisher', node_handle
+    FROM staging.located('ros2_rcl_publisher_init')
+    UNION ALL
+    SELECT event_id, process_id, thread_id, 'subscription', node_handle
+    FROM staging.located('ros2_rcl_subscription_init')
+    UNION ALL
+    SELECT event_id, process_id, thread_id, 'service', node_handle
+    FROM staging.located('ros2_rcl_service_init')
+    UNION ALL
+    SELECT event_id, process_id, thread_id, 'client', node_handle
+    FROM staging.located('ros2_rcl_client_init')
+    UNION ALL
+    SELECT event_id, process_id, thread_id, 'timer', node_handle
+    FROM staging.located('ros2_rclcpp_timer_link_node')
+    UNION ALL
+    SELECT event_id, process_id, thread_id, 'lifecycle', node_handle
+    FROM staging.located('ros2_rcl_lifecycle_state_machine_init')
+),
+construction AS (
+    SELECT
+        event_id, process_id, kind, node_handle,
+        kind = 'publisher'
+        AND lead(kind) OVER on_thread = 'node'
+        AND lead(node_handle) OVER on_thread = node_handle
+        AND first_value(kind) OVER of_handle <> 'node' AS precedes_own_node
+    FROM initialisation
+    WINDOW
+        on_thread AS (PARTITION BY thread_id ORDER BY event_id),
+        of_handle AS (PARTITION BY process_id, node_handle ORDER BY event_id)
+),
+use AS (
     SELECT event_id, process_id, node_handle, precedes_own_node
-    FROM staging.construction
+    FROM construction
     WHERE kind <> 'node'
 ),
 node_init AS (
-    SELECT event_id, process_id, node_handle FROM staging.construction WHERE kind = 'node'
+    SELECT event_id, process_id, node_handle FROM construction WHERE kind = 'node'
 ),
 earlier AS (
     SELECT u.event_id, n.event_id AS node_event_id

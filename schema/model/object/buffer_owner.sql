@@ -7,7 +7,7 @@
 -- when: raw.ros2_rclcpp_ring_buffer_dequeue
 WITH dequeue AS (
     SELECT t.start_event_id, t.process_id, t.buffer_handle
-    FROM staging.take_subscription AS t
+    FROM staging.take_chain AS t
     WHERE t.method = 'ring_buffer' AND NOT t.is_known
 ),
 used AS (

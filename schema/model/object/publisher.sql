@@ -5,14 +5,13 @@
 -- when: staging.publisher_known, staging.publication_origin
 WITH every_publisher AS (
     SELECT
-        event_id, process_id, node_id, topic_name, publisher_handle, rmw_handle, gid, queue_depth,
+        event_id, process_id, topic_name, publisher_handle, rmw_handle, gid, queue_depth,
         created_ns, is_internal, false AS is_inferred
     FROM staging.publisher_known
     UNION ALL
     SELECT
         min(start_event_id),
         process_id,
-        NULL,
         CASE WHEN bool_and(is_rosout) THEN '/rosout' END,
         unknown_handle,
         NULL,
@@ -26,8 +25,9 @@ WITH every_publisher AS (
     GROUP BY process_id, unknown_handle
 )
 SELECT
-    row_number() OVER (ORDER BY event_id) AS publisher_id,
-    process_id, node_id, topic_name, publisher_handle, rmw_handle, gid, queue_depth, created_ns,
-    is_internal, is_inferred, false AS is_topic_learned,
-    false AS is_topic_declared, event_id
-FROM every_publisher
+    row_number() OVER (ORDER BY p.event_id) AS publisher_id,
+    p.process_id, n.node_id, p.topic_name, p.publisher_handle, p.rmw_handle, p.gid, p.queue_depth,
+    p.created_ns, p.is_internal, p.is_inferred, false AS is_topic_learned,
+    false AS is_topic_declared, p.event_id
+FROM every_publisher AS p
+LEFT JOIN staging.object_node AS n ON p.event_id = n.event_id

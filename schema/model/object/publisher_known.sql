@@ -56,7 +56,6 @@ with_writer AS (
 SELECT
     p.event_id,
     p.process_id,
-    n.node_id,
     p.topic_name,
     p.publisher_handle,
     p.rmw_handle,
@@ -66,4 +65,3 @@ SELECT
     least(p.ts_ns, p.rmw_created_ns, p.writer_created_ns) AS created_ns,
     staging.is_internal_topic(p.topic_name) AS is_internal
 FROM with_writer AS p
-LEFT JOIN staging.object_node AS n ON p.event_id = n.event_id

@@ -2,29 +2,33 @@
 -- description: Subscriptions. A handle that messages were taken with but that was never
 --     initialised in the trace gets a row without topic, as does the reader of a ring buffer.
 -- grain: one row per subscription
--- when: staging.subscription_known, staging.take_origin
+-- when: staging.subscription_known, staging.take_number
 WITH every_subscription AS (
     SELECT
-        event_id, process_id, node_id, topic_name, subscription_handle, rmw_handle, gid,
-        queue_depth, created_ns, is_internal, false AS is_inferred
+        event_id, process_id, topic_name, subscription_handle, rmw_handle, gid, queue_depth,
+        created_ns, is_internal, false AS is_inferred
     FROM staging.subscription_known
     UNION ALL
     SELECT
-        min(start_event_id), process_id, NULL, NULL, NULL, rmw_handle, NULL, NULL, NULL, false,
-        true
-    FROM staging.take_origin
-    WHERE subscription_event_id IS NULL AND rmw_handle IS NOT NULL
-    GROUP BY process_id, rmw_handle
+        min(n.start_event_id), n.process_id, NULL, NULL, n.rmw_handle, NULL, NULL, NULL, false, true
+    FROM staging.take_number AS n
+    LEFT JOIN staging.take_inferred AS i ON n.start_event_id = i.start_event_id
+    WHERE n.rmw_handle IS NOT NULL
+        AND coalesce(
+            n.subscription_event_id, i.subscription_event_id, n.callback_subscription_event_id
+        ) IS NULL
+    GROUP BY n.process_id, n.rmw_handle
     UNION ALL
     SELECT DISTINCT
-        subscription_event_id, process_id, NULL, NULL, NULL, NULL::UBIGINT, NULL, NULL,
-        NULL::BIGINT, false, true
+        subscription_event_id, process_id, NULL, NULL, NULL::UBIGINT, NULL, NULL, NULL::BIGINT,
+        false, true
     FROM staging.take_inferred
     WHERE is_inferred
 )
 SELECT
-    row_number() OVER (ORDER BY event_id) AS subscription_id,
-    process_id, node_id, topic_name, subscription_handle, rmw_handle, gid, queue_depth,
-    created_ns, is_internal, is_inferred, false AS is_topic_learned,
-    false AS is_topic_declared, event_id
-FROM every_subscription
+    row_number() OVER (ORDER BY s.event_id) AS subscription_id,
+    s.process_id, n.node_id, s.topic_name, s.subscription_handle, s.rmw_handle, s.gid,
+    s.queue_depth, s.created_ns, s.is_internal, s.is_inferred, false AS is_topic_learned,
+    false AS is_topic_declared, s.event_id
+FROM every_subscription AS s
+LEFT JOIN staging.object_node AS n ON s.event_id = n.event_id

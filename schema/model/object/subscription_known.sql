@@ -12,7 +12,6 @@ SELECT
     s.event_id,
     s.process_id,
     s.thread_id,
-    n.node_id,
     s.topic_name,
     s.subscription_handle,
     s.rmw_subscription_handle AS rmw_handle,
@@ -25,4 +24,3 @@ ASOF LEFT JOIN rmw_init AS r
     ON s.process_id = r.process_id
     AND s.rmw_subscription_handle = r.rmw_subscription_handle
     AND s.event_id >= r.event_id
-LEFT JOIN staging.object_node AS n ON s.event_id = n.event_id

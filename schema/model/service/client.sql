@@ -10,10 +10,10 @@ WITH learned AS (
     GROUP BY u.client_event_id
 ),
 every_client AS (
-    SELECT event_id, process_id, node_id, service_name, client_handle, rmw_handle, created_ns
+    SELECT event_id, process_id, service_name, client_handle, rmw_handle, created_ns
     FROM staging.client_known
     UNION ALL
-    SELECT e.event_id, e.process_id, NULL, l.service_name, NULL, e.rmw_handle, NULL
+    SELECT e.event_id, e.process_id, l.service_name, NULL, e.rmw_handle, NULL
     FROM staging.client_event AS e
     LEFT JOIN learned AS l ON e.event_id = l.client_event_id
     WHERE e.is_inferred AND e.event_id = e.client_event_id
@@ -21,7 +21,7 @@ every_client AS (
 SELECT
     row_number() OVER (ORDER BY c.event_id) AS client_id,
     c.process_id,
-    c.node_id,
+    n.node_id,
     c.service_name,
     c.client_handle,
     c.rmw_handle,
@@ -30,4 +30,5 @@ SELECT
     staging.is_internal_service(c.service_name) AS is_internal,
     c.event_id
 FROM every_client AS c
+LEFT JOIN staging.object_node AS n ON c.event_id = n.event_id
 LEFT JOIN staging.client_gid AS g ON c.event_id = g.client_event_id

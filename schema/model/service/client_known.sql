@@ -6,7 +6,6 @@
 SELECT
     c.event_id,
     c.process_id,
-    n.node_id,
     c.service_name,
     c.client_handle,
     c.rmw_client_handle AS rmw_handle,
@@ -17,4 +16,3 @@ ASOF LEFT JOIN staging.client_gid_init AS r
     ON c.process_id = r.process_id
     AND c.rmw_client_handle = r.rmw_handle
     AND c.event_id >= r.event_id
-LEFT JOIN staging.object_node AS n ON c.event_id = n.event_id

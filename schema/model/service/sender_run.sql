@@ -10,12 +10,13 @@ WITH send AS (
 ),
 run AS (
     SELECT
-        n.callback_instance_id, p.parent_id, r.thread_id, r.depth, r.start_event_id,
-        r.effective_end_event_id
+        n.callback_instance_id, o.callback_instance_id AS parent_id, r.thread_id, r.depth,
+        r.start_event_id, r.effective_end_event_id
     FROM staging.callback_run AS r
     SEMI JOIN send AS s ON r.thread_id = s.thread_id
     JOIN staging.callback_number AS n ON r.start_event_id = n.start_event_id
     LEFT JOIN staging.callback_parent AS p ON r.start_event_id = p.start_event_id
+    LEFT JOIN staging.callback_number AS o ON p.parent_event_id = o.start_event_id
 ),
 nesting AS (
     SELECT DISTINCT thread_id FROM run WHERE parent_id IS NOT NULL

@@ -5,10 +5,8 @@
 SELECT
     s.event_id,
     s.process_id,
-    n.node_id,
     s.service_name,
     s.service_handle,
     s.rmw_service_handle AS rmw_handle,
     s.ts_ns AS created_ns
 FROM staging.located('ros2_rcl_service_init') AS s
-LEFT JOIN staging.object_node AS n ON s.event_id = n.event_id
