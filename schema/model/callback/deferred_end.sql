@@ -4,13 +4,12 @@
 --     event of the thread is the end, at the latest: a thread of a multi-threaded executor may be
 --     blocked before. No gap lies between.
 -- grain: one row per callback instance of such a service that an executor event closes
--- when: staging.callback_open
+-- when: staging.callback_outer
 WITH closed AS (
-    SELECT o.start_event_id, b.callback_event_id, e.effective_end_event_id
-    FROM staging.callback_open AS o
+    SELECT o.start_event_id, b.callback_event_id, o.effective_end_event_id
+    FROM staging.callback_outer AS o
     JOIN staging.callback_binding AS b ON o.start_event_id = b.start_event_id
-    JOIN staging.callback_outer AS e ON o.start_event_id = e.start_event_id
-    WHERE b.kind = 'service'
+    WHERE b.kind = 'service' AND o.end_event_id IS NULL
 ),
 ended AS (
     SELECT DISTINCT b.callback_event_id
