@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import re
 import textwrap
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -274,7 +275,7 @@ def model_tables() -> str:
         staging.attach(con, None)
         staging.narrow(con, staging.empty_tables(con))
         for header in objects.model():
-            model.create(con, header, set())
+            model.create(con, replace(header, sources=()), set())
         tables = con.execute(
             "SELECT table_name, string_agg(column_name || chr(160) || data_type, ', ' "
             "ORDER BY column_index) FROM duckdb_columns() WHERE list_contains(?, "

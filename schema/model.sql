@@ -7,8 +7,6 @@ CREATE TABLE staging.annotation (annotation_id BIGINT, kind VARCHAR, source VARC
 CREATE TABLE staging.annotation_event (event_id BIGINT, process_id BIGINT, kind VARCHAR,
     inputs UBIGINT[], outputs UBIGINT[]);
 CREATE TABLE staging.annotation_input (annotation_id BIGINT, subscription_id BIGINT);
-CREATE TABLE staging.annotation_merged (event_id BIGINT, process_id BIGINT, kind VARCHAR,
-    first_event_id BIGINT, annotation_id BIGINT);
 CREATE TABLE staging.annotation_object (event_id BIGINT, side VARCHAR, handle UBIGINT,
     object_id BIGINT);
 CREATE TABLE staging.annotation_output (annotation_id BIGINT, publisher_id BIGINT);
@@ -26,17 +24,15 @@ CREATE TABLE staging.callback_binding (start_event_id BIGINT, process_id BIGINT,
     callback_handle UBIGINT, is_intra_process BOOLEAN, callback_event_id BIGINT, kind VARCHAR,
     take_event_id BIGINT, subscription_event_id BIGINT);
 CREATE TABLE staging.callback_depth (start_event_id BIGINT, depth INTEGER, parent_event_id BIGINT);
-CREATE TABLE staging.callback_executor (callback_id BIGINT, executor_event_id BIGINT);
 CREATE TABLE staging.callback_gap (event_id BIGINT, thread_id BIGINT, is_between BOOLEAN,
     segment BIGINT);
 CREATE TABLE staging.callback_group (callback_group_id BIGINT, process_id BIGINT,
     executor_id BIGINT, kind VARCHAR, event_id BIGINT);
-CREATE TABLE staging.callback_group_entry (callback_id BIGINT, group_event_id BIGINT);
+CREATE TABLE staging.callback_group_entry (callback_id BIGINT, group_event_id BIGINT,
+    executor_event_id BIGINT);
 CREATE TABLE staging.callback_group_member (callback_group_id BIGINT, callback_id BIGINT);
 CREATE TABLE staging.callback_group_owner (event_id BIGINT, process_id BIGINT,
     callback_group_addr UBIGINT, executor_event_id BIGINT, kind VARCHAR);
-CREATE TABLE staging.callback_handed (start_event_id BIGINT, process_id BIGINT,
-    callback_handle UBIGINT, callback_event_id BIGINT);
 CREATE TABLE staging.callback_known (event_id BIGINT, created_ns BIGINT, process_id BIGINT,
     callback_handle UBIGINT, kind VARCHAR, subscription_event_id BIGINT, timer_event_id BIGINT,
     service_event_id BIGINT, service_handle UBIGINT, symbol VARCHAR);
@@ -68,8 +64,6 @@ CREATE TABLE staging.callback_schedule (callback_instance_id BIGINT, running_ns 
     unknown_ns BIGINT, irq_ns BIGINT, softirq_ns BIGINT, preemption_count BIGINT,
     migration_count BIGINT, is_loss_affected BOOLEAN);
 CREATE TABLE staging.callback_segment (event_id BIGINT, segment BIGINT);
-CREATE TABLE staging.callback_service (process_id BIGINT, callback_handle UBIGINT,
-    callback_event_id BIGINT, service_id BIGINT);
 CREATE TABLE staging.callback_state (callback_instance_id BIGINT, state_number BIGINT,
     start_ns BIGINT, end_ns BIGINT, is_begin BOOLEAN);
 CREATE TABLE staging.callback_trigger (start_event_id BIGINT, process_id BIGINT,
@@ -82,8 +76,6 @@ CREATE TABLE staging.client_event (event_id BIGINT, ts_ns BIGINT, thread_id BIGI
     process_id BIGINT, is_request BOOLEAN, rmw_handle UBIGINT, sequence_number BIGINT,
     source_timestamp_ns BIGINT, client_event_id BIGINT, is_inferred BOOLEAN);
 CREATE TABLE staging.client_gid (client_event_id BIGINT, gid BLOB);
-CREATE TABLE staging.client_gid_init (event_id BIGINT, process_id BIGINT, rmw_handle UBIGINT,
-    gid BLOB);
 CREATE TABLE staging.client_known (event_id BIGINT, process_id BIGINT, service_name VARCHAR,
     client_handle UBIGINT, rmw_handle UBIGINT, gid BLOB, created_ns BIGINT);
 CREATE TABLE staging.clock (clock_id BIGINT, uuid VARCHAR, clock_key VARCHAR, offset_ns BIGINT,
@@ -179,13 +171,12 @@ CREATE TABLE staging.publication_call (start_event_id BIGINT, end_event_id BIGIN
     intra_ns BIGINT, rclcpp_ns BIGINT, rcl_ns BIGINT, rmw_ns BIGINT, dds_ns BIGINT,
     publisher_handle UBIGINT, rmw_handle UBIGINT, writer UBIGINT, source_timestamp_ns BIGINT,
     callback_event_id BIGINT);
+CREATE TABLE staging.publication_loss (start_event_id BIGINT);
 CREATE TABLE staging.publication_next (start_event_id BIGINT, next_event_ns BIGINT);
 CREATE TABLE staging.publication_number (start_event_id BIGINT, publication_id BIGINT,
     publisher_id BIGINT);
 CREATE TABLE staging.publication_origin (start_event_id BIGINT, process_id BIGINT,
     unknown_handle UBIGINT, publisher_event_id BIGINT, is_rosout BOOLEAN);
-CREATE TABLE staging.publication_unstamped (start_event_id BIGINT, end_event_id BIGINT,
-    thread_id BIGINT);
 CREATE TABLE staging.publisher (publisher_id BIGINT, process_id BIGINT, node_id BIGINT,
     topic_name VARCHAR, publisher_handle UBIGINT, rmw_handle UBIGINT, gid BLOB, queue_depth BIGINT,
     created_ns BIGINT, is_internal BOOLEAN, is_inferred BOOLEAN, is_topic_learned BOOLEAN,
@@ -202,7 +193,6 @@ CREATE TABLE staging.request_origin (request_id BIGINT, send_event_id BIGINT, ta
     sequence_number BIGINT, sent_ns BIGINT, taken_ns BIGINT, sender_thread_id BIGINT,
     receiver_thread_id BIGINT);
 CREATE TABLE staging.request_pair (send_event_id BIGINT, take_event_id BIGINT);
-CREATE TABLE staging.requester_gid (client_gid UTINYINT[], gid BLOB);
 CREATE TABLE staging.response (response_id BIGINT, client_id BIGINT, service_id BIGINT,
     request_id BIGINT, sequence_number BIGINT, sent_ns BIGINT, taken_ns BIGINT,
     sender_thread_id BIGINT, receiver_thread_id BIGINT, callback_instance_id BIGINT);
@@ -261,10 +251,10 @@ CREATE TABLE staging.take_chain (start_event_id BIGINT, end_event_id BIGINT, tra
     is_known BOOLEAN);
 CREATE TABLE staging.take_inferred (start_event_id BIGINT, process_id BIGINT,
     subscription_event_id BIGINT, is_inferred BOOLEAN);
+CREATE TABLE staging.take_loss (start_event_id BIGINT);
 CREATE TABLE staging.take_number (start_event_id BIGINT, process_id BIGINT, rmw_handle UBIGINT,
     subscription_event_id BIGINT, callback_start_event_id BIGINT,
     callback_subscription_event_id BIGINT, take_id BIGINT);
-CREATE TABLE staging.take_remnant (event_id BIGINT);
 CREATE TABLE staging.take_subscription (start_event_id BIGINT, take_id BIGINT,
     callback_start_event_id BIGINT, subscription_id BIGINT);
 CREATE TABLE staging.thread (thread_id BIGINT, process_id BIGINT, tid INTEGER, name VARCHAR,

@@ -42,7 +42,7 @@ def build(con: duckdb.DuckDBPyConnection, *, keep: bool = False, findings: bool 
     last_uses = {} if keep else _last_uses(headers)
     for position, header in enumerate(headers):
         if header.name == _FINDING:
-            kinds = [kind for kind in kinds_of("input") if _may_be_found(con, kind, empty)]
+            kinds = [kind for kind in kinds_of("input") if may_have_rows(con, kind, empty)]
             header = replace(header, body=statement(kinds))
         create(con, header, empty)
         for name, last_use in last_uses.items():
@@ -60,7 +60,7 @@ def create(con: duckdb.DuckDBPyConnection, header: Header, empty: set[str]) -> N
         con.execute(header.body)
     elif header.kind == "inline":
         con.execute(f"CREATE OR REPLACE VIEW {header.name} AS\n{header.body}")
-    elif _has_no_row(header, empty):
+    elif not may_have_rows(con, header, empty):
         if header.name not in empty:
             con.execute(_empty_tables()[header.name])
             empty.add(header.name)
@@ -73,20 +73,15 @@ def create(con: duckdb.DuckDBPyConnection, header: Header, empty: set[str]) -> N
             empty.add(header.name)
 
 
-def _has_no_row(header: Header, empty: set[str]) -> bool:
-    """Tell whether an object cannot have a row, by what `when` of its header says."""
-    return bool(header.when) and empty.issuperset(header.when)
-
-
-def _may_be_found(con: duckdb.DuckDBPyConnection, kind: Header, empty: set[str]) -> bool:
-    """Tell whether a kind of finding may have a row, by what `when` of its header says."""
-    return not kind.sources or any(
+def may_have_rows(con: duckdb.DuckDBPyConnection, header: Header, empty: set[str]) -> bool:
+    """Tell whether an object may have a row, by what `when` of its header says."""
+    return not header.sources or any(
         name not in empty
         and (
             not condition
             or con.execute(f"SELECT 1 FROM {name} WHERE {condition} LIMIT 1").fetchall()
         )
-        for name, condition in kind.sources
+        for name, condition in header.sources
     )
 
 

@@ -32,9 +32,9 @@ The header ends at the first line that is not a `--` comment. Two spaces end a p
 - `slowest`: the column that `--slowest N` goes by.
 - `zero`: the column that is 0 in rows that a terminal leaves out.
 - `when`: tables, views, or macros of a run. If none of them has a row, this object has none either,
-  and an ingest does not run its SQL. In the model only tables count, and the empty table is
-  made by its statement in `schema/model.sql`. Elsewhere a condition may follow a name, as in
-  `store.gap WHERE kind = 'loss'`: then only such rows count.
+  and an ingest does not run its SQL. A condition may follow a name, as in
+  `store.gap WHERE kind = 'loss'`: then only such rows count. In the model only tables count, and
+  the empty table is made by its statement in `schema/model.sql`.
 - `also`: objects whose rows are stored in the table of this one, too. Each has a `when` of its own,
   so that what few recordings have is planned only there.
 - `unites`: objects whose rows a macro reads as one table. Its first argument is the name of that

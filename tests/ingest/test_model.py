@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -53,21 +54,23 @@ def read(con: duckdb.DuckDBPyConnection, source: Path | StagedEvents) -> None:
 def built(source: Path | StagedEvents, without: Header | None = None) -> dict[str, Any]:
     """Build the model, nothing skipped, and return (columns, count) of each `when` object.
 
-    Where an object is given, only what it needs is built, and the tables of its `when` lose their
-    rows before anything reads them.
+    Where an object is given, only what it needs is built, and the tables of its `when` lose the
+    rows that it names before anything reads them.
     """
-    emptied = without.when if without else ()
+    emptied = {
+        name: f"DELETE FROM {name}" + (f" WHERE {condition}" if condition else "")
+        for name, condition in (without.sources if without else ())
+    }
     headers = without_others(without) if without else objects.model()
     with duckdb.connect() as con:
         read(con, source)
         staging.narrow(con, staging.empty_tables(con))
-        for name in emptied:
-            if name in INPUT:
-                con.execute(f"DELETE FROM {name}")
+        for name in emptied.keys() & INPUT:
+            con.execute(emptied[name])
         for header in headers:
-            model.create(con, header, set())
+            model.create(con, replace(header, sources=()), set())
             if header.name in emptied:
-                con.execute(f"DELETE FROM {header.name}")
+                con.execute(emptied[header.name])
         return {
             header.name: (
                 con.execute(
@@ -191,13 +194,13 @@ def wrongly_left_out(source: Path | StagedEvents) -> list[str]:
         read(con, source)
         staging.narrow(con, staging.empty_tables(con))
         for header in objects.model():
-            model.create(con, header, set())
+            model.create(con, replace(header, sources=()), set())
         empty = staging.empty_tables(con)
-    return [
-        header.name
-        for header in SOMETIMES_EMPTY
-        if empty.issuperset(header.when) and header.name not in empty
-    ]
+        return [
+            header.name
+            for header in SOMETIMES_EMPTY
+            if header.name not in empty and not model.may_have_rows(con, header, empty)
+        ]
 
 
 def of_schedules(header: Header) -> bool:

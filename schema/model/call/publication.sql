@@ -22,20 +22,6 @@ placed AS (
         FROM staging.callback_pair
         WHERE end_event_id IS NOT NULL AND thread_id IN (SELECT thread_id FROM stray)
     ) AS e ON s.thread_id = e.thread_id AND s.start_event_id > e.event_id
-),
-elsewhere AS (
-    SELECT thread_id, event_id FROM staging.callback_gap WHERE NOT is_between
-),
--- Calls with a gap of other CPUs between their events, which may belong to two calls.
-interrupted AS (
-    SELECT c.start_event_id
-    FROM (
-        SELECT * FROM staging.publication_call WHERE thread_id IN (SELECT thread_id FROM elsewhere)
-    ) AS c
-    ASOF JOIN elsewhere AS g
-        ON c.thread_id = g.thread_id
-        AND c.end_event_id >= g.event_id
-    WHERE g.event_id > c.start_event_id
 )
 SELECT
     n.publication_id,
@@ -55,15 +41,10 @@ SELECT
     c.end_event_id,
     CASE WHEN q.start_event_id IS NULL THEN c.callback_event_id ELSE q.callback_event_id END
         AS callback_event_id,
-    behind.event_id IS NOT NULL OR before.event_id IS NOT NULL OR inside.start_event_id IS NOT NULL
-        AS is_loss_affected,
+    l.start_event_id IS NOT NULL AS is_loss_affected,
     x.next_event_ns
 FROM staging.publication_call AS c
 JOIN staging.publication_number AS n ON c.start_event_id = n.start_event_id
 LEFT JOIN placed AS q ON c.start_event_id = q.start_event_id
-LEFT JOIN (SELECT event_id FROM staging.beside_gap WHERE is_behind) AS behind
-    ON c.start_event_id = behind.event_id
-LEFT JOIN (SELECT event_id FROM staging.beside_gap WHERE NOT is_behind) AS before
-    ON c.end_event_id = before.event_id
+LEFT JOIN staging.publication_loss AS l ON c.start_event_id = l.start_event_id
 LEFT JOIN staging.publication_next AS x ON c.start_event_id = x.start_event_id
-LEFT JOIN interrupted AS inside ON c.start_event_id = inside.start_event_id

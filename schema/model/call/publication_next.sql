@@ -3,11 +3,17 @@
 --     stamped later is another message. Not known where the thread did nothing more, or where a
 --     gap may hide what it did.
 -- grain: one row per publish() call without a stamp after which the thread went on
--- when: staging.publication_unstamped
-WITH next_call AS (
+-- when: staging.publication_call
+--     WHERE source_timestamp_ns IS NULL AND coalesce(rmw_ns, rcl_ns) IS NOT NULL
+WITH unstamped AS MATERIALIZED (
+    SELECT start_event_id, end_event_id, thread_id
+    FROM staging.publication_call
+    WHERE source_timestamp_ns IS NULL AND coalesce(rmw_ns, rcl_ns) IS NOT NULL
+),
+next_call AS (
     SELECT u.start_event_id, min(e.event_id) AS event_id, min(e.ts_ns) AS ts_ns
     FROM staging.predecessor AS e
-    JOIN staging.publication_unstamped AS u ON e.previous_event_id = u.end_event_id
+    JOIN unstamped AS u ON e.previous_event_id = u.end_event_id
     -- What the user's own code records may be inside the call.
     ANTI JOIN raw.user_event AS o ON e.event_id = o.event_id
     WHERE e.sequence = 'call'
@@ -15,11 +21,11 @@ WITH next_call AS (
 ),
 next_executor AS (
     SELECT u.start_event_id, x.event_id, x.ts_ns
-    FROM staging.publication_unstamped AS u
+    FROM unstamped AS u
     ASOF JOIN (
         SELECT event_id, thread_id, ts_ns
         FROM staging.executor_event
-        WHERE thread_id IN (SELECT thread_id FROM staging.publication_unstamped)
+        WHERE thread_id IN (SELECT thread_id FROM unstamped)
     ) AS x
         ON u.thread_id = x.thread_id AND u.end_event_id < x.event_id
 ),

@@ -4,8 +4,17 @@
 --     the message without a traced take. A callback that none was traced for is a subscription of
 --     its own, a placeholder by its first instance.
 -- grain: one row per such take or callback instance
--- when: staging.buffer_owner, staging.callback_handed
-WITH dequeue AS (
+-- when: staging.buffer_owner, staging.callback_binding WHERE take_event_id IS NULL
+--     AND subscription_event_id IS NULL
+--     AND (kind = 'subscription' OR (is_intra_process AND coalesce(kind = 'unknown', true)))
+WITH handed_over AS (
+    SELECT start_event_id, process_id, callback_handle, callback_event_id
+    FROM staging.callback_binding
+    WHERE take_event_id IS NULL
+        AND subscription_event_id IS NULL
+        AND (kind = 'subscription' OR (is_intra_process AND coalesce(kind = 'unknown', true)))
+),
+dequeue AS (
     SELECT t.start_event_id, t.process_id, o.subscription_event_id, o.is_inferred
     FROM staging.take_chain AS t
     JOIN staging.buffer_owner AS o
@@ -16,7 +25,7 @@ WITH dequeue AS (
 ),
 callback AS (
     SELECT process_id, callback_handle, callback_event_id, min(start_event_id) AS event_id
-    FROM staging.callback_handed
+    FROM handed_over
     GROUP BY process_id, callback_handle, callback_event_id
 ),
 handed AS (
@@ -38,7 +47,7 @@ SELECT
     l.start_event_id, l.process_id,
     CASE WHEN h.process_id IS NULL THEN c.event_id ELSE h.subscription_event_id END,
     coalesce(h.is_inferred, true)
-FROM staging.callback_handed AS l
+FROM handed_over AS l
 JOIN callback AS c
     ON l.process_id = c.process_id
     AND l.callback_handle = c.callback_handle

@@ -1,7 +1,7 @@
 -- name: staging.callback
 -- description: Callback objects with what they belong to. One whose creation was not traced learns
---     its subscription or service from the messages that it was called with (the most frequent),
---     else what it belongs to from the executor.
+--     its subscription or service from the messages or requests that it was called with (the most
+--     frequent), else what it belongs to from the executor.
 -- grain: one row per callback object
 -- when: staging.callback_object
 WITH learned AS (
@@ -13,6 +13,18 @@ WITH learned AS (
     FROM staging.callback_binding AS b
     JOIN staging.take_subscription AS t ON b.start_event_id = t.callback_start_event_id
     WHERE b.kind IS NULL OR b.kind IN ('unknown', 'subscription')
+    GROUP BY b.process_id, b.callback_handle, b.callback_event_id
+),
+asked AS (
+    SELECT
+        b.process_id,
+        b.callback_handle,
+        b.callback_event_id,
+        mode(s.service_id ORDER BY s.service_id) AS service_id
+    FROM staging.callback_binding AS b
+    JOIN staging.request_callback AS r ON b.start_event_id = r.start_event_id
+    JOIN staging.service_event AS e ON r.take_event_id = e.event_id
+    JOIN staging.service AS s ON e.service_event_id = s.event_id
     GROUP BY b.process_id, b.callback_handle, b.callback_event_id
 ),
 owned AS (
@@ -55,7 +67,7 @@ complete AS (
         AND c.process_id = l.process_id
         AND c.callback_handle = l.callback_handle
         AND c.callback_event_id IS NOT DISTINCT FROM l.callback_event_id
-    LEFT JOIN staging.callback_service AS v
+    LEFT JOIN asked AS v
         ON e.service_id IS NULL
         AND c.kind IN ('unknown', 'service')
         AND c.process_id = v.process_id

@@ -6,7 +6,8 @@
 --     service, where the requests that services take were not enabled. Where this was decided by
 --     elimination, or the service was not seen to be initialised, the owner is a placeholder.
 -- grain: one row per callback whose owner is decided
--- when: staging.callback_announced, staging.callback_known
+-- when: staging.callback_announced,
+--     staging.callback_known WHERE kind = 'service' AND service_event_id IS NULL
 WITH decided AS (
     SELECT
         a.process_id, a.callback_handle, a.callback_event_id, a.start_event_id, a.handle,

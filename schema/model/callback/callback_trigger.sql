@@ -4,7 +4,7 @@
 --     it. The executor names the handle that it executes, if that is a timer or a subscription;
 --     else it only looks for what is ready. Where another event comes in between, it is neither.
 -- grain: one row per such callback instance that an executor event precedes in the trace
--- when: staging.callback_binding
+-- when: staging.callback_binding WHERE coalesce(kind = 'unknown', true)
 WITH unowned AS (
     SELECT start_event_id, process_id, callback_handle, callback_event_id, is_intra_process,
         take_event_id

@@ -1,6 +1,6 @@
 -- name: staging.callback_group_entry
--- description: Callbacks in callback groups (CARET). A group usually is filled before it is added
---     to an executor; else it was added to it last.
+-- description: Callbacks in callback groups (CARET), and the executor of each. A group usually is
+--     filled before it is added to an executor; else it was added to it last.
 -- grain: one row per callback in a callback group
 -- when: staging.callback_group_owner
 WITH entry AS (
@@ -51,16 +51,21 @@ owned AS (
     JOIN staging.callback_group_owner AS g
         ON e.process_id = g.process_id AND e.callback_group_addr = g.callback_group_addr
     GROUP BY e.event_id
+),
+entered AS (
+    SELECT c.callback_id, min(w.group_event_id) AS group_event_id
+    FROM filled AS f
+    JOIN owned AS w ON f.event_id = w.event_id
+    JOIN object AS o ON f.kind = o.kind AND f.object_event_id = o.event_id
+    JOIN staging.callback AS c
+        ON o.kind = c.kind
+        AND o.object_id = CASE c.kind
+            WHEN 'timer' THEN c.timer_id
+            WHEN 'subscription' THEN c.subscription_id
+            WHEN 'service' THEN c.service_id
+        END
+    GROUP BY c.callback_id
 )
-SELECT c.callback_id, min(w.group_event_id) AS group_event_id
-FROM filled AS f
-JOIN owned AS w ON f.event_id = w.event_id
-JOIN object AS o ON f.kind = o.kind AND f.object_event_id = o.event_id
-JOIN staging.callback AS c
-    ON o.kind = c.kind
-    AND o.object_id = CASE c.kind
-        WHEN 'timer' THEN c.timer_id
-        WHEN 'subscription' THEN c.subscription_id
-        WHEN 'service' THEN c.service_id
-    END
-GROUP BY c.callback_id
+SELECT e.callback_id, e.group_event_id, g.executor_event_id
+FROM entered AS e
+JOIN staging.callback_group_owner AS g ON e.group_event_id = g.event_id

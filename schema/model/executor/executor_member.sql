@@ -12,7 +12,8 @@ WITH RECURSIVE runs AS (
     SELECT DISTINCT r.thread_id, n.callback_id
     FROM staging.callback_pair AS r
     JOIN staging.callback_number AS n ON r.start_event_id = n.start_event_id
-    ANTI JOIN staging.callback_executor AS s ON n.callback_id = s.callback_id
+    ANTI JOIN staging.callback_group_entry AS s
+        ON n.callback_id = s.callback_id AND s.executor_event_id IS NOT NULL
 ),
 -- Each thread is tied to the smallest one that shares something with it, not to all.
 neighbour AS (

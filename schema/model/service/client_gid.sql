@@ -11,13 +11,13 @@ WITH inferred AS (
 stated AS (
     SELECT event_id AS client_event_id, gid FROM staging.client_known WHERE gid IS NOT NULL
     UNION ALL
-    SELECT c.event_id, r.gid
+    SELECT c.event_id, staging.gid_bytes(r.gid)
     FROM inferred AS c
-    ASOF JOIN staging.client_gid_init AS r
+    ASOF JOIN staging.located('ros2_rmw_client_init') AS r
         ON c.process_id = r.process_id
-        AND c.rmw_handle = r.rmw_handle
+        AND c.rmw_handle = r.rmw_client_handle
         AND c.event_id >= r.event_id
-    WHERE r.gid IS NOT NULL
+    WHERE staging.gid_bytes(r.gid) IS NOT NULL
 ),
 taken AS (
     SELECT e.client_event_id, e.sequence_number, e.source_timestamp_ns

@@ -3,6 +3,10 @@
 --     them (since Kilted).
 -- grain: one row per rcl_client_init
 -- when: raw.ros2_rcl_client_init
+WITH rmw_init AS (
+    SELECT event_id, process_id, rmw_client_handle, staging.gid_bytes(gid) AS gid
+    FROM staging.located('ros2_rmw_client_init')
+)
 SELECT
     c.event_id,
     c.process_id,
@@ -12,7 +16,7 @@ SELECT
     r.gid,
     c.ts_ns AS created_ns
 FROM staging.located('ros2_rcl_client_init') AS c
-ASOF LEFT JOIN staging.client_gid_init AS r
+ASOF LEFT JOIN rmw_init AS r
     ON c.process_id = r.process_id
-    AND c.rmw_client_handle = r.rmw_handle
+    AND c.rmw_client_handle = r.rmw_client_handle
     AND c.event_id >= r.event_id

@@ -3,7 +3,7 @@
 --     callback_start directly follows its rmw_take_request on the thread, with no event of the
 --     executor between the two, and the services agree where both are known.
 -- grain: one row per request that was taken and led to a callback instance
--- when: staging.service_event
+-- when: staging.service_event WHERE is_request
 SELECT e.event_id AS take_event_id, r.start_event_id
 FROM staging.service_event AS e
 JOIN staging.callback_pair AS r ON e.event_id = r.previous_event_id

@@ -15,6 +15,12 @@ WITH event AS NOT MATERIALIZED (
         nullif(timestamp, 0)
     FROM raw.ros2_rmw_send_response
 ),
+-- There are few clients, and many events of each.
+requester AS (
+    SELECT client_gid, staging.gid_bytes(client_gid) AS gid
+    FROM event
+    GROUP BY client_gid
+),
 service AS (
     SELECT event_id, process_id, rmw_handle AS handle FROM staging.service_known
 )
@@ -22,4 +28,4 @@ SELECT
     e.event_id, e.ts_ns, e.thread_id, e.process_id, e.is_request, e.handle AS rmw_handle, g.gid,
     e.sequence_number, e.source_timestamp_ns, e.object_event_id AS service_event_id, e.is_inferred
 FROM staging.endpoint_event('event', 'service') AS e
-LEFT JOIN staging.requester_gid AS g ON e.client_gid = g.client_gid
+LEFT JOIN requester AS g ON e.client_gid = g.client_gid

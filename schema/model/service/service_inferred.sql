@@ -2,7 +2,7 @@
 -- description: Services that were used but never initialised in the trace, with the name that
 --     their clients call them by.
 -- grain: one row per such service
--- when: staging.service_event, staging.callback_owner
+-- when: staging.service_event WHERE is_inferred, staging.callback_owner WHERE kind = 'service'
 WITH learned AS (
     SELECT u.service_event_id, mode(c.service_name ORDER BY c.service_name) AS service_name
     FROM staging.service_use AS u
