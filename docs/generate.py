@@ -34,8 +34,8 @@ HERE = Path(__file__).parent
 MODEL = HERE.parent / "schema" / "model.sql"
 
 _MODEL = """\
--- The tables of the model. `python docs/generate.py` writes this from the folders `alignment`, `model`
--- and `kernel`; do not edit.
+-- The tables of the model. `python docs/generate.py` writes this from `schema/alignment`,
+-- `schema/model` and `schema/kernel`; do not edit.
 -- An ingest makes those with it that cannot have a row in a recording.
 
 """

@@ -1,5 +1,5 @@
--- The tables of the model. `python docs/generate.py` writes this from the folders `alignment`, `model`
--- and `kernel`; do not edit.
+-- The tables of the model. `python docs/generate.py` writes this from `schema/alignment`,
+-- `schema/model` and `schema/kernel`; do not edit.
 -- An ingest makes those with it that cannot have a row in a recording.
 
 CREATE TABLE staging.annotation (annotation_id BIGINT, kind VARCHAR, source VARCHAR,
@@ -95,8 +95,6 @@ CREATE TABLE staging.cpu_usage (host_id BIGINT, cpu INTEGER, start_ns BIGINT, th
 CREATE TABLE staging.cpu_wait (number BIGINT, thread_id BIGINT, tid INTEGER, state_start_ns BIGINT,
     start_ns BIGINT, end_ns BIGINT, state VARCHAR, trace_index INTEGER, cpu INTEGER,
     priority INTEGER);
-CREATE TABLE staging.declared_tid (clock_key VARCHAR, tid INTEGER, vpid INTEGER, vtid INTEGER,
-    ns_inum BIGINT, declared_ns BIGINT, until_ns BIGINT, source VARCHAR);
 CREATE TABLE staging.deferred_end (start_event_id BIGINT, end_ns BIGINT);
 CREATE TABLE staging.executor (executor_id BIGINT, process_id BIGINT, kind VARCHAR,
     is_inferred BOOLEAN, first_thread_id BIGINT, executor_event_id BIGINT);
@@ -119,7 +117,6 @@ CREATE TABLE staging.gap (trace_id INTEGER, cpu INTEGER, kind VARCHAR, start_ns 
     end_ns BIGINT, event_count BIGINT, recording_index INTEGER, cpu_id INTEGER,
     covered_until_ns BIGINT, any_covered_until_ns BIGINT);
 CREATE TABLE staging.host (host_id BIGINT, clock_id BIGINT, hostname VARCHAR);
-CREATE TABLE staging.kernel_loss (clock_key VARCHAR, start_ns BIGINT, until_ns BIGINT);
 CREATE TABLE staging.later_initialisation (host_id BIGINT, pid_ns BIGINT, vpid INTEGER,
     vtid INTEGER, event_id BIGINT, ts_ns BIGINT, trace_index INTEGER, is_other_main BOOLEAN,
     is_same_context BOOLEAN, is_repeated BOOLEAN);
@@ -262,8 +259,6 @@ CREATE TABLE staging.thread (thread_id BIGINT, process_id BIGINT, tid INTEGER, n
 CREATE TABLE staging.thread_break (thread_id BIGINT, resumed_event_id BIGINT, resumed_ns BIGINT,
     is_elsewhere BOOLEAN);
 CREATE TABLE staging.thread_executor (thread_id BIGINT, executor_event_id BIGINT);
-CREATE TABLE staging.thread_interrupt (state_number BIGINT, kind VARCHAR, start_ns BIGINT,
-    end_ns BIGINT);
 CREATE TABLE staging.thread_presence (thread_index INTEGER, host_id BIGINT, pid_ns BIGINT,
     vpid INTEGER, vtid INTEGER, procname VARCHAR, first_event_id BIGINT, last_event_id BIGINT,
     first_seen_ns BIGINT, last_seen_ns BIGINT);

@@ -31,12 +31,28 @@ part AS (
     JOIN step AS m ON c.state_number = m.number
     GROUP BY c.callback_instance_id
 ),
+-- While a thread of a ROS process had the CPU.
+interrupt AS (
+    SELECT
+        r.number AS state_number, i.kind::VARCHAR AS kind, i.start_ns + s.shift_ns AS start_ns,
+        i.end_ns + s.shift_ns AS end_ns
+    FROM raw.interrupt AS i
+    JOIN staging.schedule AS s ON i.trace_index = s.trace_index
+    JOIN staging.thread_tid AS t
+        ON s.clock_key = t.clock_key
+        AND i.tid = t.tid
+        AND i.start_ns + s.shift_ns >= t.from_ns
+        AND i.start_ns + s.shift_ns < t.until_ns
+    ASOF JOIN (SELECT * FROM staging.thread_state WHERE state = 'running') AS r
+        ON t.thread_id = r.thread_id AND i.start_ns + s.shift_ns >= r.start_ns
+    WHERE s.is_joined AND i.kind <> 'timer'
+),
 handled AS (
     SELECT
         c.callback_instance_id,
         i.kind,
         sum(least(i.end_ns, c.end_ns) - greatest(i.start_ns, c.start_ns)) AS length_ns
-    FROM staging.thread_interrupt AS i
+    FROM interrupt AS i
     JOIN staging.callback_state AS c ON i.state_number = c.state_number
     WHERE i.end_ns > c.start_ns AND i.start_ns < c.end_ns
     GROUP BY ALL

@@ -2,7 +2,32 @@
 -- description: States of threads of ROS processes, with what took the CPU and what woke them.
 -- grain: one row per interval in which a thread had one state
 -- when: staging.schedule_interval
-WITH interval AS (
+WITH packet AS (
+    SELECT
+        s.clock_key,
+        p.discarded_event_count,
+        coalesce(p.last_event_ns, p.begin_ns) + s.shift_ns AS start_ns,
+        coalesce(
+            lead(p.begin_ns) OVER (
+                PARTITION BY p.trace_index, p.stream_index ORDER BY p.position
+            ),
+            p.end_ns
+        ) + s.shift_ns AS end_ns
+    FROM raw.packet AS p
+    JOIN staging.schedule AS s ON p.trace_index = s.trace_index
+    WHERE s.is_joined
+),
+-- When kernel events were lost on some CPU, by the time until which any earlier loss of the clock
+-- reaches as well.
+loss AS (
+    SELECT
+        clock_key,
+        start_ns,
+        max(end_ns) OVER (PARTITION BY clock_key ORDER BY start_ns) AS until_ns
+    FROM packet
+    WHERE discarded_event_count <> 0
+),
+interval AS (
     SELECT thread_id, start_ns, end_ns, state, cpu, priority, waking_event_id
     FROM staging.schedule_interval
     WHERE state <> 'preempted'
@@ -41,5 +66,5 @@ LEFT JOIN staging.other_thread AS wo
     ON w.clock_key = wo.clock_key
     AND w.waker_tid = wo.tid
     AND w.waker_name IS NOT DISTINCT FROM wo.name
-ASOF LEFT JOIN staging.kernel_loss AS l ON t.clock_key = l.clock_key AND i.end_ns > l.start_ns
+ASOF LEFT JOIN loss AS l ON t.clock_key = l.clock_key AND i.end_ns > l.start_ns
 ORDER BY i.thread_id, i.start_ns

@@ -1,6 +1,6 @@
 -- name: staging.publication_loss
--- description: Publications that a gap may have cut or mixed: with a gap right before, right behind,
---     or of other CPUs inside, as the events may then be of two calls.
+-- description: Publications that a gap may have cut or mixed. A gap lies right before or right
+--     behind their events; or one of other CPUs inside, so that the events may be of two calls.
 -- grain: one row per such publication
 -- when: staging.beside_gap, staging.callback_gap
 WITH elsewhere AS (

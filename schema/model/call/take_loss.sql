@@ -1,7 +1,7 @@
 -- name: staging.take_loss
--- description: Takes that a gap may have cut or mixed: with a gap right before, right behind, or of
---     other CPUs inside, as the events may then be of two takes; and callbacks right behind the last
---     layer of a take whose other layers are in a gap.
+-- description: Takes that a gap may have cut or mixed. A gap lies right before or right behind
+--     their events; or one of other CPUs inside, so that the events may be of two takes; or a
+--     callback is right behind the last layer of a take whose other layers are in a gap.
 -- grain: one row per such take
 -- when: staging.beside_gap, staging.callback_gap
 WITH take AS (

@@ -1,10 +1,11 @@
 -- name: staging.callback_left_over
--- description: Begins and ends of callbacks that are not plain, paired. On the thread, the next event
---     of the same callback must be the end of a begin. Ends left over (recursion) belong to the latest
---     begin left over (a callback that spins and is called again), repeated until nothing pairs.
---     Nothing pairs across a gap: `segment` counts the gaps that the thread has seen. Each has what
---     comes before it on its thread: directly (`previous_event_id`), of callbacks, and of the
---     executor. `executor_event_id` is that of the executor, unless a gap lies between the two.
+-- description: Begins and ends of callbacks that are not plain, each with its partner. On the
+--     thread, the next event of the same callback has to be the end of a begin. Ends left over
+--     (recursion) belong to the latest begin left over (a callback that spins and is called again).
+--     This is repeated until nothing pairs. Nothing pairs across a gap: `segment` counts the gaps
+--     that the thread has seen. Three columns say what comes before an event on its thread: of
+--     calls (`previous_event_id`, not across a gap), of callbacks, and of the executor.
+--     `executor_event_id` is the last of these, but not across a gap.
 -- grain: one row per such callback_start or callback_end; `partner_event_id` is NULL where there is
 --     none
 -- when: raw.ros2_callback_start, raw.ros2_callback_end
