@@ -41,7 +41,6 @@ CREATE TABLE staging.callback_left_over (event_id BIGINT, ts_ns BIGINT, trace_in
     is_intra_process BOOLEAN, previous_event_id BIGINT, previous_callback_event_id BIGINT,
     previous_executor_event_id BIGINT, executor_event_id BIGINT, segment BIGINT,
     partner_event_id BIGINT, partner_ns BIGINT);
-CREATE TABLE staging.callback_loss (start_event_id BIGINT);
 CREATE TABLE staging.callback_number (start_event_id BIGINT, callback_instance_id BIGINT,
     callback_id BIGINT, take_id BIGINT);
 CREATE TABLE staging.callback_object (callback_id BIGINT, event_id BIGINT, callback_event_id BIGINT,
@@ -129,6 +128,7 @@ CREATE TABLE staging.link_packet (sent_trace_id INTEGER, received_trace_id INTEG
     destination_port INTEGER, identification INTEGER, sequence_number BIGINT);
 CREATE TABLE staging.link_request (request_id BIGINT, callback_instance_id BIGINT);
 CREATE TABLE staging.link_response (response_id BIGINT, callback_instance_id BIGINT);
+CREATE TABLE staging.loss_affected (kind VARCHAR, start_event_id BIGINT);
 CREATE TABLE staging.middleware_write (start_event_id BIGINT, end_event_id BIGINT, start_ns BIGINT,
     end_ns BIGINT, trace_index INTEGER, thread_index INTEGER, previous_event_id BIGINT,
     callback_event_id BIGINT, writer UBIGINT, message UBIGINT, dds_ns BIGINT, stamp BIGINT);
@@ -145,10 +145,12 @@ CREATE TABLE staging.node_use (event_id BIGINT, process_id BIGINT, node_handle U
 CREATE TABLE staging.object_node (event_id BIGINT, node_id BIGINT);
 CREATE TABLE staging.other_thread (other_thread_id BIGINT, host_id BIGINT, tid INTEGER,
     name VARCHAR, clock_key VARCHAR);
-CREATE TABLE staging.packet (trace_index INTEGER, trace_id INTEGER, stream_index INTEGER,
-    stream_class_id BIGINT, stream_instance_id BIGINT, cpu_id INTEGER, position BIGINT,
-    begin_ns BIGINT, end_ns BIGINT, last_event_ns BIGINT, event_count BIGINT,
-    discarded_event_count BIGINT, lost_packet_count BIGINT, is_numbered BOOLEAN);
+CREATE TABLE staging.packet (trace_index INTEGER, stream_index INTEGER, stream_class_id BIGINT,
+    stream_instance_id BIGINT, cpu_id INTEGER, position BIGINT, begin_ns BIGINT, end_ns BIGINT,
+    last_event_ns BIGINT, event_count BIGINT, discarded_event_count BIGINT,
+    lost_packet_count BIGINT, is_numbered BOOLEAN, recording_index INTEGER, domain VARCHAR,
+    known_end_ns BIGINT, is_ended_early BOOLEAN, trace_id INTEGER, previous_end_ns BIGINT,
+    covered_until_ns BIGINT);
 CREATE TABLE staging.pause (trace_id INTEGER, start_ns BIGINT, end_ns BIGINT);
 CREATE TABLE staging.placed_source (trace_index INTEGER, path VARCHAR, uuid VARCHAR, domain VARCHAR,
     hostname VARCHAR, tracer VARCHAR, clock_uuid VARCHAR, clock_key VARCHAR, begin_ns BIGINT,
@@ -168,12 +170,9 @@ CREATE TABLE staging.publication_call (start_event_id BIGINT, end_event_id BIGIN
     intra_ns BIGINT, rclcpp_ns BIGINT, rcl_ns BIGINT, rmw_ns BIGINT, dds_ns BIGINT,
     publisher_handle UBIGINT, rmw_handle UBIGINT, writer UBIGINT, source_timestamp_ns BIGINT,
     callback_event_id BIGINT);
-CREATE TABLE staging.publication_loss (start_event_id BIGINT);
 CREATE TABLE staging.publication_next (start_event_id BIGINT, next_event_ns BIGINT);
-CREATE TABLE staging.publication_number (start_event_id BIGINT, publication_id BIGINT,
-    publisher_id BIGINT);
-CREATE TABLE staging.publication_origin (start_event_id BIGINT, process_id BIGINT,
-    unknown_handle UBIGINT, publisher_event_id BIGINT, is_rosout BOOLEAN);
+CREATE TABLE staging.publication_number (start_event_id BIGINT, process_id BIGINT,
+    unknown_handle UBIGINT, publisher_event_id BIGINT, is_rosout BOOLEAN, publication_id BIGINT);
 CREATE TABLE staging.publisher (publisher_id BIGINT, process_id BIGINT, node_id BIGINT,
     topic_name VARCHAR, publisher_handle UBIGINT, rmw_handle UBIGINT, gid BLOB, queue_depth BIGINT,
     created_ns BIGINT, is_internal BOOLEAN, is_inferred BOOLEAN, is_topic_learned BOOLEAN,
@@ -192,11 +191,8 @@ CREATE TABLE staging.request_origin (request_id BIGINT, send_event_id BIGINT, ta
 CREATE TABLE staging.request_pair (send_event_id BIGINT, take_event_id BIGINT);
 CREATE TABLE staging.response (response_id BIGINT, client_id BIGINT, service_id BIGINT,
     request_id BIGINT, sequence_number BIGINT, sent_ns BIGINT, taken_ns BIGINT,
-    sender_thread_id BIGINT, receiver_thread_id BIGINT, callback_instance_id BIGINT);
-CREATE TABLE staging.response_origin (response_id BIGINT, send_event_id BIGINT,
-    take_event_id BIGINT, request_id BIGINT, callback_start_event_id BIGINT, client_event_id BIGINT,
-    service_event_id BIGINT, sequence_number BIGINT, sent_ns BIGINT, taken_ns BIGINT,
-    sender_thread_id BIGINT, receiver_thread_id BIGINT);
+    sender_thread_id BIGINT, receiver_thread_id BIGINT, callback_instance_id BIGINT,
+    send_event_id BIGINT);
 CREATE TABLE staging.response_pair (send_event_id BIGINT, take_event_id BIGINT);
 CREATE TABLE staging.response_request (event_id BIGINT, request_event_id BIGINT);
 CREATE TABLE staging.ring_buffer_event (trace_id INTEGER, process_id BIGINT, kind VARCHAR,
@@ -224,16 +220,8 @@ CREATE TABLE staging.service_inferred (event_id BIGINT, process_id BIGINT, servi
 CREATE TABLE staging.service_known (event_id BIGINT, process_id BIGINT, service_name VARCHAR,
     service_handle UBIGINT, rmw_handle UBIGINT, created_ns BIGINT);
 CREATE TABLE staging.service_use (client_event_id BIGINT, service_event_id BIGINT);
-CREATE TABLE staging.silence (trace_id INTEGER, recording_index INTEGER, start_ns BIGINT,
-    end_ns BIGINT, is_flushed BOOLEAN);
 CREATE TABLE staging.single_packet (event_id BIGINT, trace_id INTEGER, clock_id BIGINT,
     ts_ns BIGINT, is_sent BOOLEAN, key UBIGINT);
-CREATE TABLE staging.stream_packet (trace_index INTEGER, trace_id INTEGER, stream_index INTEGER,
-    stream_class_id BIGINT, stream_instance_id BIGINT, cpu_id INTEGER, position BIGINT,
-    begin_ns BIGINT, end_ns BIGINT, last_event_ns BIGINT, event_count BIGINT,
-    discarded_event_count BIGINT, lost_packet_count BIGINT, is_numbered BOOLEAN,
-    recording_index INTEGER, known_end_ns BIGINT, is_ended_early BOOLEAN, previous_end_ns BIGINT,
-    recording_begin_ns BIGINT);
 CREATE TABLE staging.subscription (subscription_id BIGINT, process_id BIGINT, node_id BIGINT,
     topic_name VARCHAR, subscription_handle UBIGINT, rmw_handle UBIGINT, gid BLOB,
     queue_depth BIGINT, created_ns BIGINT, is_internal BOOLEAN, is_inferred BOOLEAN,
@@ -248,7 +236,6 @@ CREATE TABLE staging.take_chain (start_event_id BIGINT, end_event_id BIGINT, tra
     is_known BOOLEAN);
 CREATE TABLE staging.take_inferred (start_event_id BIGINT, process_id BIGINT,
     subscription_event_id BIGINT, is_inferred BOOLEAN);
-CREATE TABLE staging.take_loss (start_event_id BIGINT);
 CREATE TABLE staging.take_number (start_event_id BIGINT, process_id BIGINT, rmw_handle UBIGINT,
     subscription_event_id BIGINT, callback_start_event_id BIGINT,
     callback_subscription_event_id BIGINT, take_id BIGINT);

@@ -26,7 +26,7 @@ placed AS (
 SELECT
     n.publication_id,
     c.trace_index + 1 AS trace_id,
-    n.publisher_id,
+    coalesce(p.publisher_id, i.publisher_id) AS publisher_id,
     c.process_id,
     c.thread_id,
     c.start_ns,
@@ -45,6 +45,10 @@ SELECT
     x.next_event_ns
 FROM staging.publication_call AS c
 JOIN staging.publication_number AS n ON c.start_event_id = n.start_event_id
+LEFT JOIN staging.publisher AS p ON n.publisher_event_id = p.event_id
+LEFT JOIN (SELECT * FROM staging.publisher WHERE is_inferred) AS i
+    ON n.process_id = i.process_id AND n.unknown_handle = i.publisher_handle
 LEFT JOIN placed AS q ON c.start_event_id = q.start_event_id
-LEFT JOIN staging.publication_loss AS l ON c.start_event_id = l.start_event_id
+LEFT JOIN (SELECT * FROM staging.loss_affected WHERE kind = 'publication') AS l
+    ON c.start_event_id = l.start_event_id
 LEFT JOIN staging.publication_next AS x ON c.start_event_id = x.start_event_id

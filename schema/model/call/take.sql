@@ -30,4 +30,5 @@ SELECT
     l.start_event_id IS NOT NULL AS is_loss_affected
 FROM every_take AS t
 JOIN staging.take_subscription AS s ON t.start_event_id = s.start_event_id
-LEFT JOIN staging.take_loss AS l ON t.start_event_id = l.start_event_id
+LEFT JOIN (SELECT * FROM staging.loss_affected WHERE kind = 'take') AS l
+    ON t.start_event_id = l.start_event_id

@@ -28,5 +28,6 @@ LEFT JOIN (
     JOIN staging.callback_number AS o ON d.parent_event_id = o.start_event_id
 ) AS p ON r.start_event_id = p.start_event_id
 LEFT JOIN staging.deferred_end AS d ON r.start_event_id = d.start_event_id
-LEFT JOIN staging.callback_loss AS g ON r.start_event_id = g.start_event_id
+LEFT JOIN (SELECT * FROM staging.loss_affected WHERE kind = 'callback') AS g
+    ON r.start_event_id = g.start_event_id
 LEFT JOIN staging.request_origin AS q ON r.start_event_id = q.callback_start_event_id

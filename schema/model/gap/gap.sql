@@ -10,14 +10,21 @@
 --     the last gap that starts before its end starts at or after its begin, or the one or another
 --     before it ends after its begin. CPU -1: all of them.
 -- grain: one row per gap in a recording
--- when: staging.stream_packet
-WITH lossy_packet AS (
+-- when: staging.packet
+
+-- What kernel traces lost is missing from no process.
+WITH packet AS (
+    SELECT *, min(begin_ns) OVER (PARTITION BY recording_index) AS recording_begin_ns
+    FROM staging.packet
+    WHERE domain IS DISTINCT FROM 'kernel'
+),
+lossy_packet AS (
     SELECT
         *,
         lost_packet_count IS NOT DISTINCT FROM 0 AND coalesce(begin_ns > previous_end_ns, false)
             AS is_opened_late,
         known_end_ns <= begin_ns AS is_instant
-    FROM staging.stream_packet
+    FROM packet
     WHERE discarded_event_count IS DISTINCT FROM 0
 ),
 lost_event AS (
@@ -47,7 +54,7 @@ lost_packet AS (
         least(coalesce(previous_end_ns, recording_begin_ns), begin_ns) AS start_ns,
         begin_ns AS end_ns,
         NULL::BIGINT AS event_count
-    FROM staging.stream_packet
+    FROM packet
     WHERE lost_packet_count IS DISTINCT FROM 0
         AND (previous_end_ns IS NOT NULL OR begin_ns > recording_begin_ns)
 ),
@@ -57,7 +64,7 @@ stream_end AS (
         arg_max(trace_id, begin_ns) AS trace_id,
         arg_max(cpu_id, begin_ns) AS cpu,
         max(known_end_ns) AS end_ns
-    FROM staging.stream_packet
+    FROM packet
     GROUP BY recording_index, stream_class_id, stream_instance_id
 ),
 recording_end AS (
@@ -65,7 +72,7 @@ recording_end AS (
         recording_index,
         max(last_event_ns) AS last_event_ns,
         max(greatest(known_end_ns, last_event_ns)) AS end_ns
-    FROM staging.stream_packet
+    FROM packet
     GROUP BY recording_index
     HAVING bool_or(end_ns IS NOT NULL)
 ),

@@ -1,17 +1,68 @@
 -- name: staging.pause
--- description: Silences in which nothing was recorded: tracing had been stopped. It was so where it
---     can be nothing else: packets of one trace ended before they were full, not at equal
---     distances, and no snapshot is recorded, whose buffers keep what earlier ones did to them.
---     Else it was one if the recording is nowhere else silent for as long, within four times that
---     or a second before and after. Nor is it one where the numbers of all streams skip packets
+-- description: Silences in which nothing was recorded: tracing had been stopped. All streams of a
+--     recording are silent at once between packets, for a millisecond or longer. A silence is a
+--     pause where it can be nothing else: packets of one trace ended before they were full, not at
+--     equal distances, and no snapshot is recorded, whose buffers keep what earlier ones did to
+--     them. Else it is one if the recording is nowhere else silent for as long, within four times
+--     that or a second before and after. It is none where the numbers of all streams skip packets
 --     meanwhile: those are lost.
 -- grain: one row per pause of a recording
--- when: staging.silence
+-- when: staging.packet WHERE begin_ns - covered_until_ns >= staging.pause_limit().least_ns
 
+-- Kernel traces pause no process.
+WITH packet AS (
+    SELECT * FROM staging.packet WHERE domain IS DISTINCT FROM 'kernel'
+),
+covered AS (
+    SELECT
+        trace_id,
+        recording_index,
+        begin_ns,
+        covered_until_ns,
+        max(CASE WHEN event_count > 0 THEN begin_ns END) OVER (PARTITION BY recording_index)
+            AS last_begin_ns,
+        max(CASE WHEN is_ended_early THEN end_ns END) OVER earlier AS ended_early_ns,
+        -- LTTng opens a chunk with an empty packet of every stream that has no event in it yet.
+        max(
+            CASE
+                WHEN position = 0 AND event_count = 0 AND end_ns = begin_ns
+                    AND previous_end_ns IS NOT NULL
+                    THEN end_ns
+            END
+        ) OVER earlier AS opened_ns,
+        lag(trace_id) OVER earlier_of_recording AS previous_trace_id
+    FROM packet
+    WINDOW
+        earlier_of_recording AS (
+            PARTITION BY recording_index ORDER BY begin_ns, trace_index, stream_index, position
+        ),
+        earlier AS (
+            PARTITION BY recording_index ORDER BY begin_ns, trace_index, stream_index, position
+            ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING
+        )
+),
+-- Something ended the packets before: stopping, a rotation, a snapshot, or a timer of the tracer.
+-- The next ones begin with their first events. What comes after the last packet with events is left
+-- out, and what comes right behind the packets that open a later chunk: these were written while
+-- the session recorded, and stopping would have written further ones.
+silent AS (
+    SELECT
+        trace_id,
+        recording_index,
+        covered_until_ns AS start_ns,
+        begin_ns AS end_ns,
+        -- Packets of one trace ended before they were full.
+        coalesce(ended_early_ns = covered_until_ns, false)
+        AND coalesce(previous_trace_id = trace_id, false) AS is_flushed
+    FROM covered
+    WHERE begin_ns - covered_until_ns >= staging.pause_limit().least_ns
+        AND begin_ns <= last_begin_ns
+        AND coalesce(covered_until_ns - opened_ns >= staging.pause_limit().least_ns, true)
+),
 -- When packets were ended before they were full.
-WITH ending AS (
+ending AS (
     SELECT recording_index, end_ns
-    FROM staging.stream_packet
+    FROM packet
     WHERE is_ended_early
     GROUP BY recording_index, end_ns
 ),
@@ -49,7 +100,7 @@ regular AS (
 -- Buffers that were recorded once, with what was in them at that moment.
 snapshot AS (
     SELECT recording_index
-    FROM staging.stream_packet
+    FROM packet
     GROUP BY recording_index
     HAVING bool_or(previous_end_ns IS NULL AND lost_packet_count IS DISTINCT FROM 0)
     UNION
@@ -65,7 +116,7 @@ silence AS (
             staging.pause_limit().usual_ns
         ) AS around_ns,
         c.is_flushed AND s.recording_index IS NULL AND r.recording_index IS NULL AS is_certain
-    FROM staging.silence AS c
+    FROM silent AS c
     LEFT JOIN snapshot AS s ON c.recording_index = s.recording_index
     LEFT JOIN regular AS r ON c.recording_index = r.recording_index AND c.start_ns = r.end_ns
 ),
@@ -118,7 +169,7 @@ explained AS (
     UNION
     SELECT s.recording_index, s.start_ns
     FROM silence AS s
-    JOIN staging.stream_packet AS p
+    JOIN packet AS p
         ON s.recording_index = p.recording_index
         AND s.start_ns >= p.previous_end_ns
         AND s.end_ns <= p.begin_ns

@@ -2,7 +2,7 @@
 -- description: Publishers. A handle that was published on but never initialised in the trace gets a
 --     row without topic, or with /rosout where nothing else is possible.
 -- grain: one row per publisher
--- when: staging.publisher_known, staging.publication_origin
+-- when: staging.publisher_known, staging.publication_number
 WITH every_publisher AS (
     SELECT
         event_id, process_id, topic_name, publisher_handle, rmw_handle, gid, queue_depth,
@@ -20,7 +20,7 @@ WITH every_publisher AS (
         NULL,
         bool_and(is_rosout),
         true
-    FROM staging.publication_origin
+    FROM staging.publication_number
     WHERE unknown_handle IS NOT NULL
     GROUP BY process_id, unknown_handle
 )

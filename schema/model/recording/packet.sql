@@ -1,21 +1,34 @@
 -- name: staging.packet
--- description: Packets as read. What opens without a begin is taken to begin with its trace.
+-- description: Packets as read. What opens without a begin is taken to begin with its trace. Each
+--     has when the one before it in its stream ended, and until when all earlier ones of its
+--     recording cover the time.
 -- grain: one row per packet of a trace
 -- when: raw.packet
+WITH begun AS (
+    SELECT
+        p.* REPLACE (coalesce(p.begin_ns, s.begin_ns, p.last_event_ns) AS begin_ns),
+        s.recording_index, s.domain
+    FROM raw.packet AS p
+    JOIN staging.placed_source AS s ON p.trace_index = s.trace_index
+),
+ended AS (
+    SELECT
+        *,
+        coalesce(end_ns, last_event_ns, begin_ns) AS known_end_ns,
+        -- One that is filled to the last byte ends with its last event, one that opens a chunk when
+        -- it begins.
+        coalesce(end_ns > greatest(last_event_ns, begin_ns), false) AS is_ended_early
+    FROM begun
+)
 SELECT
-    p.trace_index,
-    p.trace_index + 1 AS trace_id,
-    p.stream_index,
-    p.stream_class_id,
-    p.stream_instance_id,
-    p.cpu_id,
-    p.position,
-    coalesce(p.begin_ns, s.begin_ns, p.last_event_ns) AS begin_ns,
-    p.end_ns,
-    p.last_event_ns,
-    p.event_count,
-    p.discarded_event_count,
-    p.lost_packet_count,
-    p.is_numbered
-FROM raw.packet AS p
-JOIN staging.source AS s ON p.trace_index = s.trace_index
+    *,
+    trace_index + 1 AS trace_id,
+    lag(known_end_ns) OVER (
+        PARTITION BY recording_index, stream_class_id, stream_instance_id
+        ORDER BY begin_ns, trace_index, position
+    ) AS previous_end_ns,
+    max(greatest(coalesce(end_ns, begin_ns), coalesce(last_event_ns, begin_ns))) OVER (
+        PARTITION BY recording_index ORDER BY begin_ns, trace_index, stream_index, position
+        ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING
+    ) AS covered_until_ns
+FROM ended
