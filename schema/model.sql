@@ -10,7 +10,6 @@ CREATE TABLE staging.annotation_input (annotation_id BIGINT, subscription_id BIG
 CREATE TABLE staging.annotation_object (event_id BIGINT, side VARCHAR, handle UBIGINT,
     object_id BIGINT);
 CREATE TABLE staging.annotation_output (annotation_id BIGINT, publisher_id BIGINT);
-CREATE TABLE staging.beside_gap (event_id BIGINT, thread_id BIGINT, is_behind BOOLEAN);
 CREATE TABLE staging.buffer_owner (process_id BIGINT, buffer_handle UBIGINT,
     subscription_event_id BIGINT, is_inferred BOOLEAN);
 CREATE TABLE staging.callback (callback_id BIGINT, process_id BIGINT, node_id BIGINT, kind VARCHAR,
@@ -245,7 +244,6 @@ CREATE TABLE staging.thread (thread_id BIGINT, process_id BIGINT, tid INTEGER, n
     first_event_id BIGINT, last_event_id BIGINT, first_seen_ns BIGINT, last_seen_ns BIGINT);
 CREATE TABLE staging.thread_break (thread_id BIGINT, resumed_event_id BIGINT, resumed_ns BIGINT,
     is_elsewhere BOOLEAN);
-CREATE TABLE staging.thread_executor (thread_id BIGINT, executor_event_id BIGINT);
 CREATE TABLE staging.thread_presence (thread_index INTEGER, host_id BIGINT, pid_ns BIGINT,
     vpid INTEGER, vtid INTEGER, procname VARCHAR, first_event_id BIGINT, last_event_id BIGINT,
     first_seen_ns BIGINT, last_seen_ns BIGINT);
@@ -267,7 +265,6 @@ CREATE TABLE staging.timer_use (event_id BIGINT, process_id BIGINT, timer_handle
 CREATE TABLE staging.trace (trace_id INTEGER, host_id BIGINT, path VARCHAR, uuid VARCHAR,
     tracer VARCHAR, domain VARCHAR, start_ns BIGINT, end_ns BIGINT, event_count BIGINT,
     discarded_event_count BIGINT, has_request_events BOOLEAN);
-CREATE TABLE staging.untraced_take (process_id BIGINT);
 CREATE TABLE staging.user_event (user_event_id BIGINT, trace_id INTEGER, process_id BIGINT,
     thread_id BIGINT, cpu INTEGER, at_ns BIGINT, name VARCHAR, callback_instance_id BIGINT,
     fields VARCHAR, is_loss_affected BOOLEAN);

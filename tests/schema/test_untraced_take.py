@@ -9,12 +9,18 @@ import pytest
 from rules import modelled
 
 # Thread 1 serves a message, waits, and runs what would be a timer; then it serves another message.
+# Callback 6 would be another timer, and is one unless takes are not traced.
 STAGE = """
 CREATE SCHEMA staging;
 CREATE SCHEMA raw;
 CREATE TABLE staging.callback_announced AS
-    SELECT 1 AS process_id, 7 AS callback_handle, NULL::INTEGER AS callback_event_id, 70 AS handle,
-        NULL::VARCHAR AS kind;
+    SELECT 1 AS process_id, unnest([7, 6]) AS callback_handle, NULL::INTEGER AS callback_event_id,
+        unnest([70, 60]) AS handle, NULL::VARCHAR AS kind, unnest([100, 900]) AS start_event_id,
+        NULL::INTEGER AS owner_event_id, false AS is_disputed, true AS has_takes,
+        true AS has_executions, true AS has_requests;
+CREATE TABLE staging.callback_known (event_id INTEGER, process_id INTEGER, kind VARCHAR,
+    service_event_id INTEGER, service_handle INTEGER);
+CREATE TABLE staging.request_callback (start_event_id INTEGER);
 CREATE TABLE staging.callback_trigger AS
     SELECT 100 AS start_event_id, 1 AS process_id, 1 AS thread_id, 7 AS callback_handle,
         NULL::INTEGER AS callback_event_id;
@@ -23,8 +29,9 @@ CREATE TABLE staging.callback_run (start_event_id INTEGER, callback_handle INTEG
     thread_id INTEGER DEFAULT 1, depth INTEGER DEFAULT 1, is_intra_process BOOLEAN DEFAULT false);
 INSERT INTO staging.callback_run (start_event_id, callback_handle, previous_event_id,
     executor_event_id) VALUES (50, 8, 45, 44), (100, 7, 80, 90), (200, 9, 195, 190);
-CREATE TABLE staging.callback_binding AS FROM (VALUES (50, 'subscription', 45), (100, NULL, NULL),
-    (200, 'subscription', 195)) AS b (start_event_id, kind, take_event_id);
+CREATE TABLE staging.callback_binding AS SELECT *, NULL::INTEGER AS callback_event_id
+    FROM (VALUES (50, 'subscription', 45), (100, NULL, NULL), (200, 'subscription', 195))
+        AS b (start_event_id, kind, take_event_id);
 CREATE TABLE staging.callback_gap (thread_id INTEGER, event_id INTEGER);
 CREATE TABLE waited AS SELECT 1 AS process_id, 1 AS thread_id, 80 AS event_id;
 CREATE TABLE raw.ros2_rclcpp_executor_execute AS FROM (VALUES (44), (90), (190)) AS e (event_id);
@@ -38,7 +45,7 @@ SERVED = "UPDATE staging.callback_run SET"
 
 @pytest.fixture
 def staged() -> Iterator[duckdb.DuckDBPyConnection]:
-    with modelled(STAGE, "untraced_take", "found") as con:
+    with modelled(STAGE, "callback_owner", "owned") as con:
         yield con
 
 
@@ -62,20 +69,20 @@ def staged() -> Iterator[duckdb.DuckDBPyConnection]:
             [NO_WAIT, "UPDATE staging.callback_binding SET take_event_id = NULL, kind = 'timer'"],
             False,
         ),
-        ([NO_WAIT, f"{ANNOUNCED} handle = NULL"], False),
-        ([NO_WAIT, f"{ANNOUNCED} kind = 'timer'"], False),
-        ([NO_WAIT, f"{ANNOUNCED} callback_event_id = 5"], False),
+        ([NO_WAIT, f"{ANNOUNCED} handle = NULL WHERE callback_handle = 7"], False),
+        ([NO_WAIT, f"{ANNOUNCED} kind = 'timer' WHERE callback_handle = 7"], False),
+        ([NO_WAIT, f"{ANNOUNCED} callback_event_id = 5 WHERE callback_handle = 7"], False),
         (
             [
                 NO_WAIT,
                 "INSERT INTO staging.callback_run (start_event_id, callback_handle, thread_id) "
                 "VALUES (300, 8, 2)",
-                "INSERT INTO staging.callback_binding VALUES (300, 'subscription', 295)",
+                "INSERT INTO staging.callback_binding VALUES (300, 'subscription', 295, NULL)",
             ],
             False,
         ),
         # A subscription runs without a take.
-        ([f"{ANNOUNCED} kind = 'subscription'"], True),
+        ([f"{ANNOUNCED} kind = 'subscription' WHERE callback_handle = 7"], True),
         ([NO_TAKE, f"{SERVED} previous_event_id = 150 WHERE start_event_id = 200"], True),
         ([NO_TAKE, f"{SERVED} previous_event_id = NULL WHERE start_event_id = 200"], True),
         ([NO_TAKE], False),
@@ -111,4 +118,7 @@ def test_messages_reach_callbacks_although_none_is_taken(
 ) -> None:
     for change in changes:
         staged.execute(change)
-    assert staged.execute("FROM found").fetchall() == [(1,)] * is_found
+    timers = staged.execute(
+        "SELECT process_id FROM owned WHERE callback_handle = 6 AND kind = 'timer'"
+    ).fetchall()
+    assert timers == [(1,)] * (not is_found)

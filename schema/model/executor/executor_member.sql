@@ -4,10 +4,26 @@
 --     smallest thread of such a group stands for it.
 -- grain: one row per thread that runs callbacks or emits executor events
 -- when: staging.callback_number, staging.executor_first
-
+WITH RECURSIVE
+-- Threads of the executors that name themselves. If a thread serves several of them, it belongs to
+-- the one whose callbacks it ran most.
+thread_executor AS MATERIALIZED (
+    SELECT thread_id, executor_event_id
+    FROM (
+        SELECT r.thread_id, s.executor_event_id, count(*) AS run_count
+        FROM staging.callback_run AS r
+        JOIN staging.callback_number AS n ON r.start_event_id = n.start_event_id
+        JOIN staging.callback_group_entry AS s ON n.callback_id = s.callback_id
+        WHERE r.depth = 1 AND s.executor_event_id IS NOT NULL
+        GROUP BY r.thread_id, s.executor_event_id
+    )
+    QUALIFY row_number() OVER (
+        PARTITION BY thread_id ORDER BY run_count DESC, executor_event_id
+    ) = 1
+),
 -- What ties threads: an executor by its event, or a callback by its (never negative) identity.
-WITH RECURSIVE runs AS (
-    SELECT thread_id, -1 - executor_event_id AS tie_id FROM staging.thread_executor
+runs AS (
+    SELECT thread_id, -1 - executor_event_id AS tie_id FROM thread_executor
     UNION ALL
     SELECT DISTINCT r.thread_id, n.callback_id
     FROM staging.callback_pair AS r
@@ -52,4 +68,4 @@ SELECT
 FROM labelled AS l
 JOIN staging.thread AS t ON l.thread_id = t.thread_id
 LEFT JOIN spinning AS s ON l.thread_id = s.thread_id
-LEFT JOIN staging.thread_executor AS m ON l.thread_id = m.thread_id
+LEFT JOIN thread_executor AS m ON l.thread_id = m.thread_id
