@@ -22,7 +22,6 @@ CREATE TABLE staging.callback_announced (process_id BIGINT, callback_handle UBIG
 CREATE TABLE staging.callback_binding (start_event_id BIGINT, process_id BIGINT,
     callback_handle UBIGINT, is_intra_process BOOLEAN, callback_event_id BIGINT, kind VARCHAR,
     take_event_id BIGINT, subscription_event_id BIGINT);
-CREATE TABLE staging.callback_depth (start_event_id BIGINT, depth INTEGER, parent_event_id BIGINT);
 CREATE TABLE staging.callback_gap (event_id BIGINT, thread_id BIGINT, is_between BOOLEAN,
     segment BIGINT);
 CREATE TABLE staging.callback_group (callback_group_id BIGINT, process_id BIGINT,
@@ -40,13 +39,13 @@ CREATE TABLE staging.callback_left_over (event_id BIGINT, ts_ns BIGINT, trace_in
     is_intra_process BOOLEAN, previous_event_id BIGINT, previous_callback_event_id BIGINT,
     previous_executor_event_id BIGINT, executor_event_id BIGINT, segment BIGINT,
     partner_event_id BIGINT, partner_ns BIGINT);
+CREATE TABLE staging.callback_nesting (start_event_id BIGINT, end_event_id BIGINT,
+    effective_end_event_id BIGINT, depth INTEGER, parent_event_id BIGINT);
 CREATE TABLE staging.callback_number (start_event_id BIGINT, callback_instance_id BIGINT,
     callback_id BIGINT, take_id BIGINT);
 CREATE TABLE staging.callback_object (callback_id BIGINT, event_id BIGINT, callback_event_id BIGINT,
     process_id BIGINT, kind VARCHAR, subscription_event_id BIGINT, timer_event_id BIGINT,
     service_event_id BIGINT, callback_handle UBIGINT, symbol VARCHAR, created_ns BIGINT);
-CREATE TABLE staging.callback_outer (start_event_id BIGINT, thread_id BIGINT, end_event_id BIGINT,
-    effective_end_event_id BIGINT);
 CREATE TABLE staging.callback_owner (process_id BIGINT, callback_handle UBIGINT,
     callback_event_id BIGINT, kind VARCHAR, handle UBIGINT, owner_event_id BIGINT,
     is_inferred BOOLEAN, is_eliminated BOOLEAN);

@@ -18,8 +18,8 @@ CREATE TABLE staging.callback_announced AS
         unnest([70, 60]) AS handle, NULL::VARCHAR AS kind, unnest([100, 900]) AS start_event_id,
         NULL::INTEGER AS owner_event_id, false AS is_disputed, true AS has_takes,
         true AS has_executions, true AS has_requests;
-CREATE TABLE staging.callback_known (event_id INTEGER, process_id INTEGER, kind VARCHAR,
-    service_event_id INTEGER, service_handle INTEGER);
+CREATE TABLE staging.callback_known (event_id INTEGER, process_id INTEGER, callback_handle INTEGER,
+    kind VARCHAR, service_event_id INTEGER, service_handle INTEGER);
 CREATE TABLE staging.request_callback (start_event_id INTEGER);
 CREATE TABLE staging.callback_trigger AS
     SELECT 100 AS start_event_id, 1 AS process_id, 1 AS thread_id, 7 AS callback_handle,

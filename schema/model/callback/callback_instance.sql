@@ -24,7 +24,7 @@ FROM staging.callback_run AS r
 JOIN staging.callback_number AS n ON r.start_event_id = n.start_event_id
 LEFT JOIN (
     SELECT d.start_event_id, o.callback_instance_id AS parent_id
-    FROM staging.callback_depth AS d
+    FROM staging.callback_nesting AS d
     JOIN staging.callback_number AS o ON d.parent_event_id = o.start_event_id
 ) AS p ON r.start_event_id = p.start_event_id
 LEFT JOIN staging.deferred_end AS d ON r.start_event_id = d.start_event_id

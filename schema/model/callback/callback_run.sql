@@ -5,7 +5,7 @@
 SELECT
     p.start_event_id,
     p.end_event_id,
-    coalesce(p.end_event_id, o.effective_end_event_id) AS effective_end_event_id,
+    coalesce(p.end_event_id, n.effective_end_event_id) AS effective_end_event_id,
     p.start_ns,
     p.end_ns,
     p.trace_index,
@@ -16,7 +16,6 @@ SELECT
     p.previous_event_id,
     p.executor_event_id,
     p.is_plain,
-    coalesce(d.depth, 1) AS depth
+    coalesce(n.depth, 1) AS depth
 FROM staging.callback_pair AS p
-LEFT JOIN staging.callback_outer AS o ON p.start_event_id = o.start_event_id
-LEFT JOIN staging.callback_depth AS d ON p.start_event_id = d.start_event_id
+LEFT JOIN staging.callback_nesting AS n ON p.start_event_id = n.start_event_id

@@ -4,10 +4,10 @@
 --     event of the thread is the end, at the latest: a thread of a multi-threaded executor may be
 --     blocked before. No gap lies between.
 -- grain: one row per callback instance of such a service that an executor event closes
--- when: staging.callback_outer WHERE end_event_id IS NULL
+-- when: staging.callback_nesting WHERE end_event_id IS NULL
 WITH closed AS (
     SELECT o.start_event_id, b.callback_event_id, o.effective_end_event_id
-    FROM staging.callback_outer AS o
+    FROM staging.callback_nesting AS o
     JOIN staging.callback_binding AS b ON o.start_event_id = b.start_event_id
     WHERE b.kind = 'service' AND o.end_event_id IS NULL
 ),

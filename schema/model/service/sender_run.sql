@@ -15,7 +15,7 @@ run AS (
     FROM staging.callback_run AS r
     SEMI JOIN send AS s ON r.thread_id = s.thread_id
     JOIN staging.callback_number AS n ON r.start_event_id = n.start_event_id
-    LEFT JOIN staging.callback_depth AS p ON r.start_event_id = p.start_event_id
+    LEFT JOIN staging.callback_nesting AS p ON r.start_event_id = p.start_event_id
     LEFT JOIN staging.callback_number AS o ON p.parent_event_id = o.start_event_id
 ),
 nesting AS (
