@@ -15,10 +15,6 @@ CREATE TABLE staging.buffer_owner (process_id BIGINT, buffer_handle UBIGINT,
 CREATE TABLE staging.callback (callback_id BIGINT, process_id BIGINT, node_id BIGINT, kind VARCHAR,
     subscription_id BIGINT, timer_id BIGINT, service_id BIGINT, callback_handle UBIGINT,
     symbol VARCHAR, created_ns BIGINT, event_id BIGINT);
-CREATE TABLE staging.callback_announced (process_id BIGINT, callback_handle UBIGINT,
-    callback_event_id BIGINT, handle UBIGINT, start_event_id BIGINT, has_takes BOOLEAN,
-    has_executions BOOLEAN, has_requests BOOLEAN, kind VARCHAR, owner_event_id BIGINT,
-    is_disputed BOOLEAN);
 CREATE TABLE staging.callback_binding (start_event_id BIGINT, process_id BIGINT,
     callback_handle UBIGINT, is_intra_process BOOLEAN, callback_event_id BIGINT, kind VARCHAR,
     take_event_id BIGINT, subscription_event_id BIGINT);
@@ -34,11 +30,6 @@ CREATE TABLE staging.callback_group_owner (event_id BIGINT, process_id BIGINT,
 CREATE TABLE staging.callback_known (event_id BIGINT, created_ns BIGINT, process_id BIGINT,
     callback_handle UBIGINT, kind VARCHAR, subscription_event_id BIGINT, timer_event_id BIGINT,
     service_event_id BIGINT, service_handle UBIGINT, symbol VARCHAR);
-CREATE TABLE staging.callback_left_over (event_id BIGINT, ts_ns BIGINT, trace_index INTEGER,
-    thread_id BIGINT, process_id BIGINT, callback_handle UBIGINT, is_start BOOLEAN,
-    is_intra_process BOOLEAN, previous_event_id BIGINT, previous_callback_event_id BIGINT,
-    previous_executor_event_id BIGINT, executor_event_id BIGINT, segment BIGINT,
-    partner_event_id BIGINT, partner_ns BIGINT);
 CREATE TABLE staging.callback_nesting (start_event_id BIGINT, end_event_id BIGINT,
     effective_end_event_id BIGINT, depth INTEGER, parent_event_id BIGINT);
 CREATE TABLE staging.callback_number (start_event_id BIGINT, callback_instance_id BIGINT,
@@ -49,10 +40,23 @@ CREATE TABLE staging.callback_object (callback_id BIGINT, event_id BIGINT, callb
 CREATE TABLE staging.callback_owner (process_id BIGINT, callback_handle UBIGINT,
     callback_event_id BIGINT, kind VARCHAR, handle UBIGINT, owner_event_id BIGINT,
     is_inferred BOOLEAN, is_eliminated BOOLEAN);
-CREATE TABLE staging.callback_plain (start_event_id BIGINT, end_event_id BIGINT, start_ns BIGINT,
-    end_ns BIGINT, trace_index INTEGER, thread_id BIGINT, process_id BIGINT,
+CREATE TABLE staging.callback_owner_announced (process_id BIGINT, callback_handle UBIGINT,
+    callback_event_id BIGINT, handle UBIGINT, start_event_id BIGINT, has_takes BOOLEAN,
+    has_executions BOOLEAN, has_requests BOOLEAN, kind VARCHAR, owner_event_id BIGINT,
+    is_disputed BOOLEAN);
+CREATE TABLE staging.callback_owner_trigger (start_event_id BIGINT, process_id BIGINT,
+    callback_handle UBIGINT, callback_event_id BIGINT, trace_index INTEGER, thread_id BIGINT,
+    handle UBIGINT, is_ready BOOLEAN);
+CREATE TABLE staging.callback_pair_left_over (event_id BIGINT, ts_ns BIGINT, trace_index INTEGER,
+    thread_id BIGINT, process_id BIGINT, callback_handle UBIGINT, is_start BOOLEAN,
+    is_intra_process BOOLEAN, previous_event_id BIGINT, previous_callback_event_id BIGINT,
+    previous_executor_event_id BIGINT, executor_event_id BIGINT, segment BIGINT,
+    partner_event_id BIGINT, partner_ns BIGINT);
+CREATE TABLE staging.callback_pair_plain (start_event_id BIGINT, end_event_id BIGINT,
+    start_ns BIGINT, end_ns BIGINT, trace_index INTEGER, thread_id BIGINT, process_id BIGINT,
     callback_handle UBIGINT, is_intra_process BOOLEAN, previous_event_id BIGINT,
     previous_callback_event_id BIGINT, previous_executor_event_id BIGINT, executor_event_id BIGINT);
+CREATE TABLE staging.callback_pair_segment (event_id BIGINT, segment BIGINT);
 CREATE TABLE staging.callback_preemptor (callback_instance_id BIGINT, preemptor_thread_id BIGINT,
     preemptor_other_thread_id BIGINT, preemptor_priority INTEGER, preempted_ns BIGINT,
     runnable_ns BIGINT);
@@ -60,12 +64,8 @@ CREATE TABLE staging.callback_schedule (callback_instance_id BIGINT, running_ns 
     preempted_ns BIGINT, runnable_ns BIGINT, sleeping_ns BIGINT, uninterruptible_ns BIGINT,
     unknown_ns BIGINT, irq_ns BIGINT, softirq_ns BIGINT, preemption_count BIGINT,
     migration_count BIGINT, is_loss_affected BOOLEAN);
-CREATE TABLE staging.callback_segment (event_id BIGINT, segment BIGINT);
 CREATE TABLE staging.callback_state (callback_instance_id BIGINT, state_number BIGINT,
     start_ns BIGINT, end_ns BIGINT, is_begin BOOLEAN);
-CREATE TABLE staging.callback_trigger (start_event_id BIGINT, process_id BIGINT,
-    callback_handle UBIGINT, callback_event_id BIGINT, trace_index INTEGER, thread_id BIGINT,
-    handle UBIGINT, is_ready BOOLEAN);
 CREATE TABLE staging.client (client_id BIGINT, process_id BIGINT, node_id BIGINT,
     service_name VARCHAR, client_handle UBIGINT, rmw_handle UBIGINT, gid BLOB, created_ns BIGINT,
     is_internal BOOLEAN, event_id BIGINT);

@@ -1,7 +1,7 @@
 -- name: derive.stretch
 -- kind: macro
--- description: The stretch of time that a moment is in. Moments of few stretches have to be looked
---     at one by one; of any other, one row stands for all. Its length decides nothing else: with a
---     tenth of a second, a recording has far fewer stretches than messages, and a stretch few of
---     them.
+-- description: The number of the stretch of time that a moment is in: a tenth of a second. Where
+--     only a few messages are asked for, what is around them is read one by one. Everywhere else
+--     one row stands for all of a stretch. The length changes no answer. It only decides how many
+--     rows are left: a recording has far fewer stretches than messages, and a stretch has few.
 CREATE OR REPLACE MACRO derive.stretch(at_ns) AS at_ns // 100_000_000

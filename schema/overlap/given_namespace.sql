@@ -1,7 +1,10 @@
 -- name: overlap.given_namespace
 -- kind: inline
--- description: PID namespaces of processes whose events lack them: those that other sessions
---     recorded, else a negative number for each container that must be another one.
+-- description: PID namespaces for processes whose events have none. If the sessions of a host are
+--     of several containers, each container but the first gets a number. Else, if several processes
+--     ran under one pid at the same time, each of their names gets one. These numbers are negative,
+--     so that they differ from all that were recorded. Else the namespace counts that another
+--     session recorded for the pid.
 -- grain: one row per session, pid and name of a thread
 WITH named AS (
     SELECT DISTINCT s.host, r.vpid, n.procname

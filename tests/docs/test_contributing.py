@@ -22,6 +22,7 @@ ROOMS = [
         "simulator",
         "schema",
         "schema/model",
+        "schema/model/callback",
         "schema/kernel",
         "schema/link",
         "schema/stat",

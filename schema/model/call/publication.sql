@@ -7,7 +7,7 @@
 WITH stray AS (
     SELECT c.start_event_id, c.thread_id
     FROM staging.publication_call AS c
-    JOIN staging.callback_left_over AS e ON c.callback_event_id = e.event_id
+    JOIN staging.callback_pair_left_over AS e ON c.callback_event_id = e.event_id
     WHERE NOT e.is_start AND e.partner_event_id IS NULL
 ),
 placed AS (

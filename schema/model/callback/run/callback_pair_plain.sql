@@ -1,4 +1,4 @@
--- name: staging.callback_plain
+-- name: staging.callback_pair_plain
 -- description: Begins of callbacks whose end is the next begin or end of any callback on their
 --     thread, with that end. No gap lies between.
 -- grain: one row per such begin and end
@@ -24,8 +24,8 @@ JOIN staging.context AS c
     ON s.thread_index = c.thread_index
     AND s.event_id >= c.from_event_id
     AND e.event_id < c.until_event_id
-LEFT JOIN staging.callback_segment AS m ON s.event_id = m.event_id
-LEFT JOIN staging.callback_segment AS n ON e.event_id = n.event_id
+LEFT JOIN staging.callback_pair_segment AS m ON s.event_id = m.event_id
+LEFT JOIN staging.callback_pair_segment AS n ON e.event_id = n.event_id
 LEFT JOIN (SELECT event_id FROM staging.behind_gap WHERE sequence = 'call') AS g
     ON s.event_id = g.event_id
 LEFT JOIN (SELECT event_id FROM staging.behind_gap WHERE sequence = 'executor') AS x

@@ -1,4 +1,4 @@
--- name: staging.callback_left_over
+-- name: staging.callback_pair_left_over
 -- description: Begins and ends of callbacks that are not plain, each with its partner. On the
 --     thread, the next event of the same callback has to be the end of a begin. Ends left over
 --     (recursion) belong to the latest begin left over (a callback that spins and is called again).
@@ -15,13 +15,13 @@ WITH RECURSIVE event AS (
         true AS is_start, coalesce(s.is_intra_process = 1, false) AS is_intra_process,
         s.previous_call_event_id, s.previous_callback_event_id, s.previous_executor_event_id
     FROM raw.ros2_callback_start AS s
-    ANTI JOIN staging.callback_plain AS p ON s.event_id = p.start_event_id
+    ANTI JOIN staging.callback_pair_plain AS p ON s.event_id = p.start_event_id
     UNION ALL
     SELECT
         e.event_id, e.ts_ns, e.trace_index, e.thread_index, e.callback, false, false,
         e.previous_call_event_id, e.previous_callback_event_id, NULL
     FROM raw.ros2_callback_end AS e
-    ANTI JOIN staging.callback_plain AS p ON e.event_id = p.end_event_id
+    ANTI JOIN staging.callback_pair_plain AS p ON e.event_id = p.end_event_id
 ),
 located AS (
     SELECT e.*, c.thread_id, c.process_id
@@ -47,7 +47,7 @@ callback_event AS MATERIALIZED (
         CASE WHEN x.event_id IS NULL THEN e.previous_executor_event_id END AS executor_event_id,
         coalesce(i.segment, 0) AS segment
     FROM located AS e
-    LEFT JOIN staging.callback_segment AS i ON e.event_id = i.event_id
+    LEFT JOIN staging.callback_pair_segment AS i ON e.event_id = i.event_id
     LEFT JOIN (SELECT event_id FROM staging.behind_gap WHERE sequence = 'call') AS c
         ON e.event_id = c.event_id
     LEFT JOIN (SELECT event_id FROM staging.behind_gap WHERE sequence = 'executor') AS x

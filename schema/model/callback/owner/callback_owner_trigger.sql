@@ -1,4 +1,4 @@
--- name: staging.callback_trigger
+-- name: staging.callback_owner_trigger
 -- description: Executor events directly before callback instances without a known owner: the
 --     creation of the callback was not traced, and no message or request was ever seen to be for
 --     it. The executor names the handle that it executes, if that is a timer or a subscription;

@@ -4,7 +4,7 @@
 --     of the executor between the two; an rmw take is not for an intra-process call, nor a dequeue
 --     for another; the subscriptions agree where both are known.
 -- grain: one row per callback_start
--- when: staging.callback_plain, staging.callback_left_over
+-- when: staging.callback_pair_plain, staging.callback_pair_left_over
 WITH begun AS NOT MATERIALIZED (
     SELECT
         start_event_id AS event_id, process_id, callback_handle AS handle, is_intra_process,

@@ -7,11 +7,11 @@ SELECT
     start_event_id, end_event_id, start_ns, end_ns, trace_index, thread_id, process_id,
     callback_handle, is_intra_process, previous_event_id, previous_callback_event_id,
     previous_executor_event_id, executor_event_id, true AS is_plain
-FROM staging.callback_plain
+FROM staging.callback_pair_plain
 UNION ALL
 SELECT
     event_id, partner_event_id, ts_ns, partner_ns, trace_index, thread_id, process_id,
     callback_handle, is_intra_process, previous_event_id, previous_callback_event_id,
     previous_executor_event_id, executor_event_id, false
-FROM staging.callback_left_over
+FROM staging.callback_pair_left_over
 WHERE is_start

@@ -1,9 +1,9 @@
--- name: staging.callback_announced
+-- name: staging.callback_owner_announced
 -- description: Callbacks without a known owner, if the executor said the same before each of their
 --     instances: the handle that it named (NULL if it named none), the timer or subscription of
 --     that handle if the trace has it, and which tracepoints were enabled meanwhile.
 -- grain: one row per such callback
--- when: staging.callback_trigger
+-- when: staging.callback_owner_trigger
 WITH enabled AS (
     SELECT
         trace_index,
@@ -18,7 +18,7 @@ agreed AS (
         t.process_id, t.callback_handle, t.callback_event_id, any_value(t.handle) AS handle,
         min(t.start_event_id) AS start_event_id, bool_and(e.has_takes) AS has_takes,
         bool_and(e.has_executions) AS has_executions, bool_or(e.has_requests) AS has_requests
-    FROM staging.callback_trigger AS t
+    FROM staging.callback_owner_trigger AS t
     LEFT JOIN enabled AS e ON t.trace_index = e.trace_index
     GROUP BY t.process_id, t.callback_handle, t.callback_event_id
     HAVING sum(t.is_ready::INTEGER) = count(*)

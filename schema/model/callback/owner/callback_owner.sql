@@ -6,7 +6,7 @@
 --     service, where the requests that services take were not enabled. Where this was decided by
 --     elimination, or the service was not seen to be initialised, the owner is a placeholder.
 -- grain: one row per callback whose owner is decided
--- when: staging.callback_announced,
+-- when: staging.callback_owner_announced,
 --     staging.callback_known WHERE kind = 'service' AND service_event_id IS NULL
 
 -- Messages may reach callbacks although no take is traced, as loaned messages do. Processes show
@@ -15,8 +15,8 @@
 -- its wait first, if it has one thread.
 WITH candidate AS (
     SELECT t.start_event_id, t.process_id, t.thread_id
-    FROM staging.callback_trigger AS t
-    JOIN staging.callback_announced AS a
+    FROM staging.callback_owner_trigger AS t
+    JOIN staging.callback_owner_announced AS a
         ON t.process_id = a.process_id
         AND t.callback_handle = a.callback_handle
         AND t.callback_event_id IS NOT DISTINCT FROM a.callback_event_id
@@ -40,7 +40,7 @@ subscription_without_take AS (
         AND NOT r.is_intra_process
         AND coalesce(r.previous_event_id < r.executor_event_id, true)
     UNION ALL
-    SELECT process_id FROM staging.callback_announced WHERE kind = 'subscription'
+    SELECT process_id FROM staging.callback_owner_announced WHERE kind = 'subscription'
 ),
 several_threads AS (
     SELECT DISTINCT r.thread_id
@@ -103,7 +103,7 @@ decided AS (
             WHEN a.handle IS NULL AND a.has_executions AND NOT a.has_requests THEN 'service'
             WHEN a.handle IS NOT NULL AND a.has_takes AND u.process_id IS NULL THEN 'timer'
         END AS kind
-    FROM staging.callback_announced AS a
+    FROM staging.callback_owner_announced AS a
     LEFT JOIN untraced_take AS u ON a.process_id = u.process_id
 ),
 asked AS (

@@ -6,19 +6,21 @@
 --     begin or end of a callback, executor event, or event behind a gap of any CPU. Where none can
 --     have others inside, none is nested.
 -- grain: one row per callback instance on a thread with one that others may be nested in
--- when: staging.callback_left_over
+-- when: staging.callback_pair_left_over
 WITH never_ended AS MATERIALIZED (
     SELECT event_id AS start_event_id, thread_id, previous_executor_event_id
-    FROM staging.callback_left_over
+    FROM staging.callback_pair_left_over
     WHERE is_start AND partner_event_id IS NULL
 ),
 closed_by AS (
     SELECT o.start_event_id, min(e.event_id) AS event_id
     FROM never_ended AS o
     JOIN (
-        SELECT event_id, thread_id, previous_callback_event_id FROM staging.callback_left_over
+        SELECT event_id, thread_id, previous_callback_event_id
+        FROM staging.callback_pair_left_over
         UNION ALL
-        SELECT start_event_id, thread_id, previous_callback_event_id FROM staging.callback_plain
+        SELECT start_event_id, thread_id, previous_callback_event_id
+        FROM staging.callback_pair_plain
     ) AS e
         ON o.start_event_id = e.previous_callback_event_id AND o.thread_id = e.thread_id
     GROUP BY o.start_event_id
@@ -51,7 +53,7 @@ outer_run AS MATERIALIZED (
         p.event_id AS start_event_id,
         p.thread_id,
         coalesce(p.partner_event_id, e.event_id, t.last_event_id + 1) AS effective_end_event_id
-    FROM staging.callback_left_over AS p
+    FROM staging.callback_pair_left_over AS p
     JOIN staging.thread AS t ON p.thread_id = t.thread_id
     LEFT JOIN effective_end AS e ON p.event_id = e.start_event_id
     WHERE p.is_start
