@@ -17,7 +17,7 @@ CREATE TABLE staging.callback (callback_id BIGINT, process_id BIGINT, node_id BI
     symbol VARCHAR, created_ns BIGINT, event_id BIGINT);
 CREATE TABLE staging.callback_binding (start_event_id BIGINT, process_id BIGINT,
     callback_handle UBIGINT, is_intra_process BOOLEAN, callback_event_id BIGINT, kind VARCHAR,
-    take_event_id BIGINT, subscription_event_id BIGINT);
+    take_event_id BIGINT, subscription_event_id BIGINT, request_event_id BIGINT);
 CREATE TABLE staging.callback_gap (event_id BIGINT, thread_id BIGINT, is_between BOOLEAN,
     segment BIGINT);
 CREATE TABLE staging.callback_group (callback_group_id BIGINT, process_id BIGINT,
@@ -114,9 +114,6 @@ CREATE TABLE staging.gap (trace_id INTEGER, cpu INTEGER, kind VARCHAR, start_ns 
     end_ns BIGINT, event_count BIGINT, recording_index INTEGER, cpu_id INTEGER,
     covered_until_ns BIGINT, any_covered_until_ns BIGINT);
 CREATE TABLE staging.host (host_id BIGINT, clock_id BIGINT, hostname VARCHAR);
-CREATE TABLE staging.later_initialisation (host_id BIGINT, pid_ns BIGINT, vpid INTEGER,
-    vtid INTEGER, event_id BIGINT, ts_ns BIGINT, trace_index INTEGER, is_other_main BOOLEAN,
-    is_same_context BOOLEAN, is_repeated BOOLEAN);
 CREATE TABLE staging.lifecycle_service (event_id BIGINT, service_event_id BIGINT);
 CREATE TABLE staging.lifecycle_transition (node_id BIGINT, at_ns BIGINT, start_state VARCHAR,
     goal_state VARCHAR);
@@ -132,7 +129,7 @@ CREATE TABLE staging.middleware_write (start_event_id BIGINT, end_event_id BIGIN
     callback_event_id BIGINT, writer UBIGINT, message UBIGINT, dds_ns BIGINT, stamp BIGINT);
 CREATE TABLE staging.mixed_process (host_id BIGINT, pid_ns BIGINT, vpid INTEGER);
 CREATE TABLE staging.near_gap (event_id BIGINT, thread_index INTEGER, sequence VARCHAR,
-    ts_ns BIGINT, is_between BOOLEAN);
+    ts_ns BIGINT, is_between BOOLEAN, is_behind BOOLEAN);
 CREATE TABLE staging.network_packet (event_id BIGINT, trace_id INTEGER, clock_id BIGINT,
     ts_ns BIGINT, is_sent BOOLEAN, key UBIGINT);
 CREATE TABLE staging.node (node_id BIGINT, process_id BIGINT, name VARCHAR, namespace VARCHAR,
@@ -181,7 +178,6 @@ CREATE TABLE staging.publisher_known (event_id BIGINT, process_id BIGINT, topic_
 CREATE TABLE staging.request (request_id BIGINT, client_id BIGINT, service_id BIGINT,
     sequence_number BIGINT, sent_ns BIGINT, taken_ns BIGINT, sender_thread_id BIGINT,
     receiver_thread_id BIGINT, callback_instance_id BIGINT);
-CREATE TABLE staging.request_callback (take_event_id BIGINT, start_event_id BIGINT);
 CREATE TABLE staging.request_origin (request_id BIGINT, send_event_id BIGINT, take_event_id BIGINT,
     callback_start_event_id BIGINT, client_event_id BIGINT, service_event_id BIGINT,
     sequence_number BIGINT, sent_ns BIGINT, taken_ns BIGINT, sender_thread_id BIGINT,

@@ -66,8 +66,13 @@ def built(source: Path | StagedEvents, without: Header | None = None) -> dict[st
         read(con, source)
         staging.narrow(con, staging.empty_tables(con))
         for name in emptied.keys() & INPUT:
-            con.execute(emptied[name])
+            if "staging." not in emptied[name]:
+                con.execute(emptied[name])
         for header in headers:
+            if header is without:
+                # What names an object of the model can only be told once that is there.
+                for statement in emptied.values():
+                    con.execute(statement)
             model.create(con, replace(header, sources=()), set())
             if header.name in emptied:
                 con.execute(emptied[header.name])

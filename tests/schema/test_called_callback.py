@@ -13,19 +13,25 @@ CREATE SCHEMA staging;
 CREATE TABLE staging.service_event AS
     SELECT 10 AS event_id, true AS is_request, 1 AS service_event_id;
 CREATE TABLE staging.callback_pair AS
-    SELECT 20 AS start_event_id, 10 AS previous_event_id,
+    SELECT 20 AS start_event_id, 1 AS process_id, 7 AS callback_handle, 10 AS previous_event_id,
         NULL::INTEGER AS previous_executor_event_id,
         false AS is_intra_process;
-CREATE TABLE staging.callback_binding AS
-    SELECT 20 AS start_event_id, 'service' AS kind, 2 AS callback_event_id;
-CREATE TABLE staging.callback_known AS SELECT 2 AS event_id, 1 AS service_event_id;
+CREATE TABLE staging.callback_known AS
+    SELECT 2 AS event_id, 1 AS process_id, 7 AS callback_handle, 'service' AS kind,
+        1 AS service_event_id, NULL::INTEGER AS subscription_event_id;
+CREATE TABLE staging.take_chain (start_event_id INTEGER, end_event_id INTEGER, method VARCHAR,
+    subscription_event_id INTEGER);
+CREATE MACRO staging.with_latest(uses, objects) AS TABLE
+    SELECT u.*, o.event_id AS object_event_id
+    FROM query_table(uses) AS u
+    LEFT JOIN query_table(objects) AS o USING (handle);
 """
 
 
 @pytest.fixture
 def staged() -> Iterator[duckdb.DuckDBPyConnection]:
     """One request, and directly behind it the run of a callback of its service."""
-    with modelled(STAGE, "request_callback", "called") as con:
+    with modelled(STAGE, "callback_binding", "bound") as con:
         yield con
 
 
@@ -36,10 +42,10 @@ def staged() -> Iterator[duckdb.DuckDBPyConnection]:
         ("callback_pair SET previous_executor_event_id = 11", False),
         ("callback_pair SET previous_event_id = 11", False),
         ("callback_pair SET is_intra_process = true", False),
-        ("callback_binding SET kind = 'unknown'", True),
-        ("callback_binding SET kind = NULL", True),
-        ("callback_binding SET kind = 'timer'", False),
-        ("callback_binding SET callback_event_id = NULL", True),
+        ("callback_known SET kind = 'unknown'", True),
+        ("callback_known SET kind = NULL", True),
+        ("callback_known SET kind = 'timer'", False),
+        ("callback_known SET callback_handle = 8", True),
         ("callback_known SET service_event_id = NULL", True),
         ("callback_known SET service_event_id = 3", False),
         ("service_event SET service_event_id = NULL", True),
@@ -50,6 +56,7 @@ def staged() -> Iterator[duckdb.DuckDBPyConnection]:
 def test_a_callback_directly_behind_the_request_of_its_service(
     staged: duckdb.DuckDBPyConnection, change: str, *, is_called: bool
 ) -> None:
-    assert staged.execute("FROM called").fetchall() == [(10, 20)]
+    asked = "SELECT request_event_id, start_event_id FROM bound WHERE request_event_id IS NOT NULL"
+    assert staged.execute(asked).fetchall() == [(10, 20)]
     staged.execute(f"UPDATE staging.{change}")
-    assert staged.execute("FROM called").fetchall() == [(10, 20)] * is_called
+    assert staged.execute(asked).fetchall() == [(10, 20)] * is_called

@@ -20,7 +20,6 @@ CREATE TABLE staging.callback_owner_announced AS
         true AS has_executions, true AS has_requests;
 CREATE TABLE staging.callback_known (event_id INTEGER, process_id INTEGER, callback_handle INTEGER,
     kind VARCHAR, service_event_id INTEGER, service_handle INTEGER);
-CREATE TABLE staging.request_callback (start_event_id INTEGER);
 CREATE TABLE staging.callback_owner_trigger AS
     SELECT 100 AS start_event_id, 1 AS process_id, 1 AS thread_id, 7 AS callback_handle,
         NULL::INTEGER AS callback_event_id;
@@ -29,7 +28,8 @@ CREATE TABLE staging.callback_run (start_event_id INTEGER, callback_handle INTEG
     thread_id INTEGER DEFAULT 1, depth INTEGER DEFAULT 1, is_intra_process BOOLEAN DEFAULT false);
 INSERT INTO staging.callback_run (start_event_id, callback_handle, previous_event_id,
     executor_event_id) VALUES (50, 8, 45, 44), (100, 7, 80, 90), (200, 9, 195, 190);
-CREATE TABLE staging.callback_binding AS SELECT *, NULL::INTEGER AS callback_event_id
+CREATE TABLE staging.callback_binding AS SELECT *, NULL::INTEGER AS callback_event_id,
+    NULL::INTEGER AS request_event_id
     FROM (VALUES (50, 'subscription', 45), (100, NULL, NULL), (200, 'subscription', 195))
         AS b (start_event_id, kind, take_event_id);
 CREATE TABLE staging.callback_gap (thread_id INTEGER, event_id INTEGER);
@@ -77,7 +77,7 @@ def staged() -> Iterator[duckdb.DuckDBPyConnection]:
                 NO_WAIT,
                 "INSERT INTO staging.callback_run (start_event_id, callback_handle, thread_id) "
                 "VALUES (300, 8, 2)",
-                "INSERT INTO staging.callback_binding VALUES (300, 'subscription', 295, NULL)",
+                "INSERT INTO staging.callback_binding VALUES (300, 'subscription', 295, NULL, NULL)",
             ],
             False,
         ),

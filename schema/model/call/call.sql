@@ -8,5 +8,5 @@ SELECT
     e.*,
     CASE WHEN g.event_id IS NULL THEN e.previous_call_event_id END AS previous_event_id
 FROM query_table('raw.' || tracepoint) AS e
-LEFT JOIN (SELECT event_id FROM staging.behind_gap WHERE sequence = 'call') AS g
+LEFT JOIN (SELECT event_id FROM staging.near_gap WHERE sequence = 'call' AND is_behind) AS g
     ON e.event_id = g.event_id

@@ -41,5 +41,5 @@ earlier AS (
 SELECT e.start_event_id, e.ts_ns AS next_event_ns
 FROM earlier AS e
 ANTI JOIN (
-    SELECT event_id FROM staging.behind_gap WHERE sequence IN ('call', 'executor')
+    SELECT event_id FROM staging.near_gap WHERE sequence IN ('call', 'executor') AND is_behind
 ) AS g ON e.event_id = g.event_id

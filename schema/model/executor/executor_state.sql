@@ -11,7 +11,7 @@ WITH state AS (
         CASE WHEN g.event_id IS NULL THEN e.ts_ns END AS end_ns,
         e.previous_event_id AS start_event_id
     FROM staging.executor_event AS e
-    LEFT JOIN (SELECT event_id FROM staging.behind_gap WHERE sequence = 'executor') AS g
+    LEFT JOIN (SELECT event_id FROM staging.near_gap WHERE sequence = 'executor' AND is_behind) AS g
         ON e.event_id = g.event_id
     WHERE e.previous_event_id >= e.from_event_id
     UNION ALL

@@ -2,7 +2,10 @@
 -- description: Events with a gap between themselves and their predecessor in a sequence of their
 --     thread; the sequence 'thread' has all its events. `is_between`: the gap is on the CPU of
 --     either event, or a pause, and so interrupts the record of the thread. Else it is on other
---     CPUs, which the thread may have visited meanwhile.
+--     CPUs, which the thread may have visited meanwhile. `is_behind`: the two are not paired, as
+--     the gap may hide an event. For what executors say of themselves, any gap does: nothing else
+--     tells that a state lasted. A callback that begins and ends is most likely one instance, and
+--     marked.
 -- grain: one row per event and sequence
 -- when: staging.gap
 WITH exposed_trace AS (
@@ -79,6 +82,7 @@ between_the_two AS (
     WHERE g.start_ns >= e.previous_ns OR g.covered_until_ns > e.previous_ns
 )
 SELECT
-    n.event_id, n.thread_index, n.sequence, n.ts_ns, b.event_id IS NOT NULL AS is_between
+    n.event_id, n.thread_index, n.sequence, n.ts_ns, b.event_id IS NOT NULL AS is_between,
+    b.event_id IS NOT NULL OR n.sequence = 'executor' AS is_behind
 FROM near AS n
 LEFT JOIN between_the_two AS b ON n.event_id = b.event_id AND n.sequence = b.sequence

@@ -8,15 +8,42 @@
 --     its object may have been made again in it, and a restart is likelier than a second context.
 --     In (3), the life goes on if another thread does.
 -- grain: one row per such rcl_init
--- when: staging.later_initialisation
+-- when: raw.ros2_rcl_init WHERE event_id NOT IN (
+--     SELECT min(first_event_id) FROM staging.thread_presence GROUP BY host_id, pid_ns, vpid)
 
--- `gap_ns`: begin of the first gap behind it.
-WITH initialisation AS (
+-- `is_other_main`: by another thread, or under another name, than the one before.
+WITH every_initialisation AS (
+    SELECT
+        p.host_id,
+        p.pid_ns,
+        p.vpid,
+        p.vtid,
+        i.event_id,
+        i.ts_ns,
+        i.trace_index,
+        lag(p.vtid) OVER process IS DISTINCT FROM p.vtid
+        OR lag(p.procname) OVER process IS DISTINCT FROM p.procname AS is_other_main,
+        row_number() OVER context > 1 AS is_same_context,
+        row_number() OVER process > 1 AS is_repeated
+    FROM raw.ros2_rcl_init AS i
+    ASOF JOIN staging.thread_presence AS p
+        ON i.thread_index = p.thread_index AND i.event_id >= p.first_event_id
+    WINDOW
+        process AS (PARTITION BY p.host_id, p.pid_ns, p.vpid ORDER BY i.event_id),
+        context AS (
+            PARTITION BY p.host_id, p.pid_ns, p.vpid, i.context_handle ORDER BY i.event_id
+        )
+),
+-- Most are the first event of their process. `gap_ns`: begin of the first gap behind it.
+initialisation AS (
     SELECT i.*, coalesce(min(g.start_ns), 9223372036854775807) AS gap_ns
-    FROM staging.later_initialisation AS i
+    FROM every_initialisation AS i
     JOIN staging.placed_source AS r ON i.trace_index = r.trace_index
     LEFT JOIN staging.gap AS g
         ON r.recording_index = g.recording_index AND i.ts_ns < g.covered_until_ns
+    WHERE i.event_id NOT IN (
+        SELECT min(first_event_id) FROM staging.thread_presence GROUP BY host_id, pid_ns, vpid
+    )
     GROUP BY ALL
 ),
 thread AS (

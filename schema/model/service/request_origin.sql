@@ -41,4 +41,4 @@ FROM found AS f
 LEFT JOIN staging.client_event AS c ON f.send_event_id = c.event_id
 LEFT JOIN staging.service_event AS s ON f.take_event_id = s.event_id
 LEFT JOIN single_gid AS g ON s.gid = g.gid
-LEFT JOIN staging.request_callback AS b ON f.take_event_id = b.take_event_id
+LEFT JOIN staging.callback_binding AS b ON f.take_event_id = b.request_event_id

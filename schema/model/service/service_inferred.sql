@@ -12,8 +12,7 @@ WITH learned AS (
 attached AS (
     SELECT e.service_event_id, mode(k.service_handle ORDER BY k.service_handle) AS service_handle
     FROM staging.service_event AS e
-    JOIN staging.request_callback AS q ON e.event_id = q.take_event_id
-    JOIN staging.callback_binding AS b ON q.start_event_id = b.start_event_id
+    JOIN staging.callback_binding AS b ON e.event_id = b.request_event_id
     JOIN staging.callback_known AS k ON b.callback_event_id = k.event_id
     WHERE e.is_inferred
     GROUP BY e.service_event_id

@@ -1,8 +1,9 @@
 -- name: staging.callback_binding
--- description: Callback instances with their callback object and the take that they were called
---     with. The callback_start directly follows the take's last layer on its thread, with no event
---     of the executor between the two; an rmw take is not for an intra-process call, nor a dequeue
---     for another; the subscriptions agree where both are known.
+-- description: Callback instances with their callback object, and the take or the request that
+--     they were called with. The callback_start directly follows the take's last layer, or the
+--     rmw_take_request, on its thread, with no event of the executor between the two. Neither an
+--     rmw take nor a request is for an intra-process call, nor is a dequeue for another one. The
+--     subscriptions, or services, agree where both are known.
 -- grain: one row per callback_start
 -- when: staging.callback_pair_plain, staging.callback_pair_left_over
 WITH begun AS NOT MATERIALIZED (
@@ -18,14 +19,13 @@ run AS (
     SELECT
         b.event_id AS start_event_id, b.process_id, b.handle AS callback_handle,
         b.is_intra_process, b.object_event_id AS callback_event_id, k.kind,
-        k.subscription_event_id,
+        k.subscription_event_id, k.service_event_id,
         -- As recorded: what the executor said after the take stands, whatever else was lost. It is
         -- NULL only where the thread had no executor event at all.
         CASE
-            WHEN coalesce(k.kind IN ('subscription', 'unknown'), true)
-                AND coalesce(b.previous_executor_event_id < b.previous_event_id, true)
+            WHEN coalesce(b.previous_executor_event_id < b.previous_event_id, true)
                 THEN b.previous_event_id
-        END AS take_end_event_id
+        END AS called_by_event_id
     FROM staging.with_latest('begun', 'known') AS b
     LEFT JOIN staging.callback_known AS k ON b.object_event_id = k.event_id
 )
@@ -37,9 +37,16 @@ SELECT
     r.callback_event_id,
     r.kind,
     t.start_event_id AS take_event_id,
-    coalesce(r.subscription_event_id, t.subscription_event_id) AS subscription_event_id
+    coalesce(r.subscription_event_id, t.subscription_event_id) AS subscription_event_id,
+    q.event_id AS request_event_id
 FROM run AS r
 LEFT JOIN staging.take_chain AS t
-    ON r.take_end_event_id = t.end_event_id
+    ON r.called_by_event_id = t.end_event_id
+    AND coalesce(r.kind IN ('subscription', 'unknown'), true)
     AND r.is_intra_process = (t.method = 'ring_buffer')
     AND coalesce(r.subscription_event_id = t.subscription_event_id, true)
+LEFT JOIN (SELECT * FROM staging.service_event WHERE is_request) AS q
+    ON r.called_by_event_id = q.event_id
+    AND coalesce(r.kind IN ('service', 'unknown'), true)
+    AND NOT r.is_intra_process
+    AND coalesce(r.service_event_id = q.service_event_id, true)

@@ -22,5 +22,5 @@ SELECT c.start_event_id, x.ts_ns AS end_ns
 FROM closed AS c
 ANTI JOIN ended AS n ON c.callback_event_id = n.callback_event_id
 JOIN staging.executor_event AS x ON c.effective_end_event_id = x.event_id
-ANTI JOIN (SELECT event_id FROM staging.behind_gap WHERE sequence = 'executor') AS g
+ANTI JOIN (SELECT event_id FROM staging.near_gap WHERE sequence = 'executor' AND is_behind) AS g
     ON c.effective_end_event_id = g.event_id

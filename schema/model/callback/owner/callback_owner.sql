@@ -107,9 +107,9 @@ decided AS (
     LEFT JOIN untraced_take AS u ON a.process_id = u.process_id
 ),
 asked AS (
-    SELECT DISTINCT b.callback_event_id
-    FROM staging.request_callback AS q
-    JOIN staging.callback_binding AS b ON q.start_event_id = b.start_event_id
+    SELECT DISTINCT callback_event_id
+    FROM staging.callback_binding
+    WHERE request_event_id IS NOT NULL
 ),
 service AS (
     SELECT process_id, service_handle, min(event_id) AS event_id

@@ -7,15 +7,14 @@
 -- when: staging.callback_binding WHERE coalesce(kind = 'unknown', true)
 WITH unowned AS (
     SELECT start_event_id, process_id, callback_handle, callback_event_id, is_intra_process,
-        take_event_id
+        take_event_id, request_event_id
     FROM staging.callback_binding
     WHERE coalesce(kind = 'unknown', true)
 ),
 explained AS (
-    SELECT DISTINCT u.process_id, u.callback_handle, u.callback_event_id
-    FROM unowned AS u
-    LEFT JOIN staging.request_callback AS q ON u.start_event_id = q.start_event_id
-    WHERE u.is_intra_process OR u.take_event_id IS NOT NULL OR q.start_event_id IS NOT NULL
+    SELECT DISTINCT process_id, callback_handle, callback_event_id
+    FROM unowned
+    WHERE is_intra_process OR take_event_id IS NOT NULL OR request_event_id IS NOT NULL
 ),
 run AS (
     SELECT

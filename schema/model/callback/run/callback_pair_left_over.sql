@@ -48,9 +48,9 @@ callback_event AS MATERIALIZED (
         coalesce(i.segment, 0) AS segment
     FROM located AS e
     LEFT JOIN staging.callback_pair_segment AS i ON e.event_id = i.event_id
-    LEFT JOIN (SELECT event_id FROM staging.behind_gap WHERE sequence = 'call') AS c
+    LEFT JOIN (SELECT event_id FROM staging.near_gap WHERE sequence = 'call' AND is_behind) AS c
         ON e.event_id = c.event_id
-    LEFT JOIN (SELECT event_id FROM staging.behind_gap WHERE sequence = 'executor') AS x
+    LEFT JOIN (SELECT event_id FROM staging.near_gap WHERE sequence = 'executor' AND is_behind) AS x
         ON e.event_id = x.event_id
 ),
 left_over AS (

@@ -26,8 +26,8 @@ JOIN staging.context AS c
     AND e.event_id < c.until_event_id
 LEFT JOIN staging.callback_pair_segment AS m ON s.event_id = m.event_id
 LEFT JOIN staging.callback_pair_segment AS n ON e.event_id = n.event_id
-LEFT JOIN (SELECT event_id FROM staging.behind_gap WHERE sequence = 'call') AS g
+LEFT JOIN (SELECT event_id FROM staging.near_gap WHERE sequence = 'call' AND is_behind) AS g
     ON s.event_id = g.event_id
-LEFT JOIN (SELECT event_id FROM staging.behind_gap WHERE sequence = 'executor') AS x
+LEFT JOIN (SELECT event_id FROM staging.near_gap WHERE sequence = 'executor' AND is_behind) AS x
     ON s.event_id = x.event_id
 WHERE m.segment IS NOT DISTINCT FROM n.segment
