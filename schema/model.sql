@@ -18,8 +18,6 @@ CREATE TABLE staging.callback (callback_id BIGINT, process_id BIGINT, node_id BI
 CREATE TABLE staging.callback_binding (start_event_id BIGINT, process_id BIGINT,
     callback_handle UBIGINT, is_intra_process BOOLEAN, callback_event_id BIGINT, kind VARCHAR,
     take_event_id BIGINT, subscription_event_id BIGINT, request_event_id BIGINT);
-CREATE TABLE staging.callback_gap (event_id BIGINT, thread_id BIGINT, is_between BOOLEAN,
-    segment BIGINT);
 CREATE TABLE staging.callback_group (callback_group_id BIGINT, process_id BIGINT,
     executor_id BIGINT, kind VARCHAR, event_id BIGINT);
 CREATE TABLE staging.callback_group_entry (callback_id BIGINT, group_event_id BIGINT,
@@ -128,8 +126,8 @@ CREATE TABLE staging.middleware_write (start_event_id BIGINT, end_event_id BIGIN
     end_ns BIGINT, trace_index INTEGER, thread_index INTEGER, previous_event_id BIGINT,
     callback_event_id BIGINT, writer UBIGINT, message UBIGINT, dds_ns BIGINT, stamp BIGINT);
 CREATE TABLE staging.mixed_process (host_id BIGINT, pid_ns BIGINT, vpid INTEGER);
-CREATE TABLE staging.near_gap (event_id BIGINT, thread_index INTEGER, sequence VARCHAR,
-    ts_ns BIGINT, is_between BOOLEAN, is_behind BOOLEAN);
+CREATE TABLE staging.near_gap (event_id BIGINT, thread_id BIGINT, sequence VARCHAR, ts_ns BIGINT,
+    is_between BOOLEAN, is_behind BOOLEAN);
 CREATE TABLE staging.network_packet (event_id BIGINT, trace_id INTEGER, clock_id BIGINT,
     ts_ns BIGINT, is_sent BOOLEAN, key UBIGINT);
 CREATE TABLE staging.node (node_id BIGINT, process_id BIGINT, name VARCHAR, namespace VARCHAR,

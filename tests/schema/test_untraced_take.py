@@ -32,7 +32,7 @@ CREATE TABLE staging.callback_binding AS SELECT *, NULL::INTEGER AS callback_eve
     NULL::INTEGER AS request_event_id
     FROM (VALUES (50, 'subscription', 45), (100, NULL, NULL), (200, 'subscription', 195))
         AS b (start_event_id, kind, take_event_id);
-CREATE TABLE staging.callback_gap (thread_id INTEGER, event_id INTEGER);
+CREATE TABLE staging.near_gap (thread_id INTEGER, event_id INTEGER, sequence VARCHAR);
 CREATE TABLE waited AS SELECT 1 AS process_id, 1 AS thread_id, 80 AS event_id;
 CREATE TABLE raw.ros2_rclcpp_executor_execute AS FROM (VALUES (44), (90), (190)) AS e (event_id);
 CREATE MACRO staging.located(tracepoint) AS TABLE FROM waited;
@@ -56,9 +56,10 @@ def staged() -> Iterator[duckdb.DuckDBPyConnection]:
         # In the round of a message.
         ([NO_WAIT], True),
         (["UPDATE waited SET event_id = 40"], True),
-        ([NO_WAIT, "INSERT INTO staging.callback_gap VALUES (1, 60)"], False),
-        ([NO_WAIT, "INSERT INTO staging.callback_gap VALUES (1, 30)"], True),
-        ([NO_WAIT, "INSERT INTO staging.callback_gap VALUES (2, 60)"], True),
+        ([NO_WAIT, "INSERT INTO staging.near_gap VALUES (1, 60, 'call')"], False),
+        ([NO_WAIT, "INSERT INTO staging.near_gap VALUES (1, 30, 'call')"], True),
+        ([NO_WAIT, "INSERT INTO staging.near_gap VALUES (2, 60, 'call')"], True),
+        ([NO_WAIT, "INSERT INTO staging.near_gap VALUES (1, 60, 'thread')"], True),
         ([NO_WAIT, f"{SERVED} depth = 2 WHERE start_event_id = 50"], False),
         ([NO_WAIT, f"{SERVED} thread_id = 2 WHERE start_event_id = 50"], False),
         (

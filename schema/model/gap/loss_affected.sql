@@ -16,13 +16,13 @@ WITH last_gap AS (
 -- one before, once its process was there.
 beside_gap AS MATERIALIZED (
     SELECT event_id, thread_id, true AS is_behind
-    FROM staging.callback_gap
-    WHERE is_between
+    FROM staging.near_gap
+    WHERE sequence = 'call' AND is_between
     UNION
     SELECT p.previous_event_id, g.thread_id, false
     FROM staging.predecessor AS p
-    JOIN staging.callback_gap AS g ON p.event_id = g.event_id
-    WHERE g.is_between AND p.sequence = 'call' AND p.previous_event_id IS NOT NULL
+    JOIN staging.near_gap AS g ON p.event_id = g.event_id AND p.sequence = g.sequence
+    WHERE g.is_between AND g.sequence = 'call' AND p.previous_event_id IS NOT NULL
     UNION
     SELECT e.event_id, t.thread_id, false
     FROM staging.event AS e
@@ -70,7 +70,9 @@ extent AS (
     FROM staging.callback_run
 ),
 elsewhere AS (
-    SELECT thread_id, event_id FROM staging.callback_gap WHERE NOT is_between
+    SELECT thread_id, event_id
+    FROM staging.near_gap
+    WHERE sequence = 'call' AND NOT is_between
 ),
 exposed AS MATERIALIZED (
     SELECT *

@@ -5,14 +5,10 @@
 -- grain: one row per event with a gap between itself and the one before on its thread
 -- when: staging.near_gap
 SELECT
-    c.thread_id,
+    g.thread_id,
     g.event_id AS resumed_event_id,
     g.ts_ns AS resumed_ns,
     NOT g.is_between AS is_elsewhere
 FROM staging.near_gap AS g
-JOIN staging.context AS c
-    ON g.thread_index = c.thread_index
-    AND g.event_id >= c.from_event_id
-    AND g.event_id < c.until_event_id
-JOIN staging.thread AS t ON c.thread_id = t.thread_id AND g.event_id > t.first_event_id
+JOIN staging.thread AS t ON g.thread_id = t.thread_id AND g.event_id > t.first_event_id
 WHERE g.sequence = 'thread'

@@ -75,7 +75,7 @@ waited AS (
 interrupted AS (
     SELECT b.start_event_id
     FROM behind AS b
-    ASOF JOIN staging.callback_gap AS g
+    ASOF JOIN (SELECT * FROM staging.near_gap WHERE sequence = 'call') AS g
         ON b.thread_id = g.thread_id AND b.start_event_id >= g.event_id
     WHERE g.event_id > b.served_event_id
 ),

@@ -40,7 +40,7 @@ closed_by AS (
     UNION ALL
     SELECT o.start_event_id, g.event_id
     FROM never_ended AS o
-    ASOF JOIN staging.callback_gap AS g
+    ASOF JOIN (SELECT * FROM staging.near_gap WHERE sequence = 'call') AS g
         ON o.thread_id = g.thread_id AND o.start_event_id < g.event_id
 ),
 effective_end AS (

@@ -2,9 +2,13 @@
 -- description: How many gaps threads had seen at each begin and end of a callback, where they saw
 --     any at all.
 -- grain: one row per callback_start or callback_end behind the first gap of its thread
--- when: staging.callback_gap
+-- when: staging.near_gap WHERE sequence = 'call' AND is_between
 WITH gap AS (
-    SELECT event_id, thread_id, segment FROM staging.callback_gap WHERE is_between
+    SELECT
+        event_id, thread_id,
+        row_number() OVER (PARTITION BY thread_id ORDER BY event_id) AS segment
+    FROM staging.near_gap
+    WHERE sequence = 'call' AND is_between
 ),
 event AS (
     SELECT event_id, thread_index FROM raw.ros2_callback_start
