@@ -8,6 +8,7 @@
 --     meanwhile: those are lost.
 -- grain: one row per pause of a recording
 -- when: staging.packet WHERE begin_ns - covered_until_ns >= staging.pause_limit().least_ns
+--     AND begin_ns <= last_begin_ns
 
 -- Kernel traces pause no process.
 WITH packet AS (
@@ -19,8 +20,7 @@ covered AS (
         recording_index,
         begin_ns,
         covered_until_ns,
-        max(CASE WHEN event_count > 0 THEN begin_ns END) OVER (PARTITION BY recording_index)
-            AS last_begin_ns,
+        last_begin_ns,
         max(CASE WHEN is_ended_early THEN end_ns END) OVER earlier AS ended_early_ns,
         -- LTTng opens a chunk with an empty packet of every stream that has no event in it yet.
         max(

@@ -1,7 +1,7 @@
 -- name: staging.packet
 -- description: Packets as read. What opens without a begin is taken to begin with its trace. Each
---     has when the one before it in its stream ended, and until when all earlier ones of its
---     recording cover the time.
+--     has when the one before it in its stream ended, until when all earlier ones of its recording
+--     cover the time, and when the last one with events begins.
 -- grain: one row per packet of a trace
 -- when: raw.packet
 WITH begun AS (
@@ -30,5 +30,7 @@ SELECT
     max(greatest(coalesce(end_ns, begin_ns), coalesce(last_event_ns, begin_ns))) OVER (
         PARTITION BY recording_index ORDER BY begin_ns, trace_index, stream_index, position
         ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING
-    ) AS covered_until_ns
+    ) AS covered_until_ns,
+    max(CASE WHEN event_count > 0 THEN begin_ns END) OVER (PARTITION BY recording_index)
+        AS last_begin_ns
 FROM ended
