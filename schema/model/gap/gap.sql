@@ -10,7 +10,9 @@
 --     the last gap that starts before its end starts at or after its begin, or the one or another
 --     before it ends after its begin. CPU -1: all of them.
 -- grain: one row per gap in a recording
--- when: staging.packet
+-- when: staging.pause, staging.packet WHERE domain IS DISTINCT FROM 'kernel'
+--     AND (discarded_event_count IS DISTINCT FROM 0 OR lost_packet_count IS DISTINCT FROM 0
+--     OR (is_last AND known_end_ns < recording_last_event_ns))
 
 -- What kernel traces lost is missing from no process.
 WITH packet AS (
