@@ -1,9 +1,9 @@
 -- name: staging.publication_number
 -- description: The number of each publication, in the order of the calls, and its publisher: by rcl
 --     handle, else rmw handle, else DDS writer, each as initialised last before the call. The rcl
---     handle of /rosout is that of a temporary object: a call without rclcpp layer whose handle was
---     never initialised, and that nothing else identifies, belongs to the process's only /rosout
---     publisher. What only the middleware publishes has none.
+--     handle of /rosout is that of a temporary object. So a call may have no rclcpp layer, a handle
+--     that was never initialised, and nothing else that identifies it: it belongs to the only
+--     /rosout publisher of its process. What only the middleware publishes has no publisher.
 -- grain: one row per publish() call
 -- when: staging.publication_call
 WITH call AS NOT MATERIALIZED (

@@ -1,14 +1,15 @@
 -- name: staging.gap
--- description: Gaps of the traces: what was lost of them, and when nothing was recorded. Packets
---     show losses. A packet counts what was lost since the one before ended: behind its own last
---     event until it ended, and, since the next packet is opened only when there is room, between
---     the end of the one before and its begin (only there, if the packet takes no time); on its CPU
---     only. Lost packets lie between the packets around them, in whichever chunks of the recording
---     these are; before the first packet of a stream, as its number tells; and behind the last,
---     where others have later events: stopping flushes a packet into every stream. The last three
---     columns are for ASOF joins: a stretch of time touches a gap of its recording exactly where
---     the last gap that starts before its end starts at or after its begin, or the one or another
---     before it ends after its begin. CPU -1: all of them.
+-- description: Gaps of the traces: what was lost of them, and when nothing was recorded. A packet
+--     counts the events that were lost since the packet before it ended, on its CPU. They were lost
+--     behind its own last event, until it ended. Where the next packet is opened late, since there
+--     was no room, they may as well have been lost between the end of the one before and its begin;
+--     a packet that takes no time leaves only that. Lost packets lie between the packets around
+--     them, in whichever chunks of the recording these are. Before the first packet of a stream,
+--     its number tells. Behind the last one they are missing where other streams have later events:
+--     stopping flushes a packet into every stream. The last three columns are for ASOF joins. A
+--     stretch of time touches a gap of its recording in two cases: the last gap that starts before
+--     its end starts at or after its begin, or this or an earlier gap ends after its begin. CPU -1
+--     means all CPUs.
 -- grain: one row per gap in a recording
 -- when: staging.pause, staging.packet WHERE domain IS DISTINCT FROM 'kernel'
 --     AND (discarded_event_count IS DISTINCT FROM 0 OR lost_packet_count IS DISTINCT FROM 0

@@ -1,9 +1,9 @@
 -- name: staging.loss_affected
 -- description: Publications, takes and callback instances that a gap may have cut or mixed. A gap
---     lies right before them, inside, or right behind; but behind an instance that was seen to end,
---     it is none of its own. Or one of other CPUs lies inside, which the thread may have visited:
---     two may look like one. Or a callback that was handed a message without a take is right behind
---     the last layer of a take whose other layers are in a gap.
+--     lies right before them or inside. A gap right behind counts as well, but not behind an
+--     instance that was seen to end. A gap of other CPUs counts inside, as the thread may have
+--     visited them: two may look like one. A callback that was handed a message without a take
+--     counts right behind the last layer of a take whose other layers are in a gap.
 -- grain: one row per such publication, take or callback instance
 -- when: staging.gap
 WITH last_gap AS (

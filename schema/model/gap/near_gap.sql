@@ -1,11 +1,11 @@
 -- name: staging.near_gap
 -- description: Events with a gap between themselves and their predecessor in a sequence of their
---     thread; the sequence 'thread' has all its events. `is_between`: the gap is on the CPU of
---     either event, or a pause, and so interrupts the record of the thread. Else it is on other
---     CPUs, which the thread may have visited meanwhile. `is_behind`: the two are not paired, as
---     the gap may hide an event. For what executors say of themselves, any gap does: nothing else
---     tells that a state lasted. A callback that begins and ends is most likely one instance, and
---     marked.
+--     thread. The sequence 'thread' has all events of a thread. `is_between`: the gap is on the CPU
+--     of either event, or a pause, and so interrupts the record of the thread. Else it is on other
+--     CPUs, which the thread may have visited meanwhile. `is_behind`: the event is not paired with
+--     its predecessor, as the gap may hide one between them. In the sequence 'executor' any gap
+--     does that, since nothing else tells that a state lasted. Elsewhere only a gap between the two
+--     does: a callback that begins and ends is most likely one instance, and marked.
 -- grain: one row per event and sequence
 -- when: staging.gap
 WITH exposed_trace AS (

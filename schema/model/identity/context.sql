@@ -1,7 +1,6 @@
 -- name: staging.context
--- description: Threads within the life of their process. An event is of the thread and the process
---     that its row has: by the thread index of the event, and by where the event lies in the order
---     of all.
+-- description: Threads within the life of their process. An event is of the thread and process of
+--     the row that has its thread index, and in whose stretch of event ids it lies.
 -- grain: one row per thread of a process life
 -- when: staging.thread_presence
 WITH start AS (

@@ -1,9 +1,8 @@
 -- name: staging.node_use
--- description: Which initialisation of a node handle each object belongs to: the latest before
---     it, except that an object created inside its node belongs to the one right after, and that
---     any later one is better than none. A publisher may be created inside its node, right before
---     the node's own event: before Jazzy /rosout is. Where a node handle is used again, what came
---     first on the handle tells the two orders apart.
+-- description: Which initialisation of a node handle each object belongs to: the latest before it.
+--     Any later one is better than none. A publisher may be created inside its node, right before
+--     the node's own event: before Jazzy /rosout is. It belongs to the one right after. Where a
+--     node handle is used again, what came first on the handle tells the two orders apart.
 -- grain: one row per object or timer link that names a node
 -- when: raw.ros2_rcl_publisher_init, raw.ros2_rcl_subscription_init, raw.ros2_rcl_service_init,
 --     raw.ros2_rcl_client_init, raw.ros2_rclcpp_timer_link_node,

@@ -1,7 +1,7 @@
 -- name: staging.packet
--- description: Packets as read. What opens without a begin is taken to begin with its trace. Each
---     has when the one before it in its stream ended, until when all earlier ones of its recording
---     cover the time, and when the last one with events begins.
+-- description: Packets as read. One that opens without a begin is taken to begin with its trace.
+--     `covered_until_ns`: when all earlier packets of the recording were over. `last_begin_ns`:
+--     when its last packet with events begins.
 -- grain: one row per packet of a trace
 -- when: raw.packet
 WITH begun AS (

@@ -1,7 +1,8 @@
 -- name: staging.placed_source
--- description: Traces with the numbers of their clock, host and recording. Traces of one recording
---     are the chunks of a rotated one, or its snapshots. `shift_ns` has to be added to their times.
---     All is as recorded, but for what kernel traces tell of themselves.
+-- description: Traces with the numbers of their clock, host and recording. A recording is one
+--     trace, or all chunks or snapshots of one. A kernel trace is of the clock and host that its
+--     schedule tells; all others are as recorded. `shift_ns` has to be added to the times of a
+--     trace.
 -- grain: one row per CTF trace
 -- when: staging.source
 WITH placed AS (

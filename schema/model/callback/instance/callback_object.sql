@@ -1,6 +1,6 @@
 -- name: staging.callback_object
--- description: Callback objects, numbered in the order in which they were made. One that ran but
---     whose creation was not traced counts from its first instance.
+-- description: Callback objects, numbered in the order in which they were made. One whose creation
+--     was not traced counts from its first instance.
 -- grain: one row per callback object
 -- when: staging.callback_known, staging.callback_binding
 WITH every_callback AS (

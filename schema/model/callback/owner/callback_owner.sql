@@ -1,10 +1,10 @@
 -- name: staging.callback_owner
 -- description: What callbacks belong to whose creation was not traced, and that no message or
---     request was seen to be for, as far as the executor tells. The handle that it names may be
---     known. Else a timer or a subscription is all that it names, and where takes were enabled,
---     what runs without one is a timer. A callback that runs without being named belongs to a
---     service, where the requests that services take were not enabled. Where this was decided by
---     elimination, or the service was not seen to be initialised, the owner is a placeholder.
+--     request was seen to be for. The executor tells, as far as it can. It may name a handle that
+--     is known. Else, what it names is a timer or a subscription: where takes were enabled, what
+--     runs without one is a timer. What runs without being named belongs to a service, where the
+--     requests that services take were not enabled. The owner is a placeholder where this was
+--     decided by elimination, or where the service was not seen to be initialised.
 -- grain: one row per callback whose owner is decided
 -- when: staging.callback_owner_announced,
 --     staging.callback_known WHERE kind = 'service' AND service_event_id IS NULL

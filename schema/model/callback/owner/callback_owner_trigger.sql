@@ -1,8 +1,8 @@
 -- name: staging.callback_owner_trigger
--- description: Executor events directly before callback instances without a known owner: the
---     creation of the callback was not traced, and no message or request was ever seen to be for
---     it. The executor names the handle that it executes, if that is a timer or a subscription;
---     else it only looks for what is ready. Where another event comes in between, it is neither.
+-- description: Executor events directly before callback instances without a known owner. The
+--     creation of such a callback was not traced, and no message or request was ever seen to be for
+--     it. The executor names the handle that it executes, if that is a timer or a subscription.
+--     Else it only looks for what is ready. Where another event comes in between, it is neither.
 -- grain: one row per such callback instance that an executor event precedes in the trace
 -- when: staging.callback_binding WHERE coalesce(kind = 'unknown', true)
 WITH unowned AS (

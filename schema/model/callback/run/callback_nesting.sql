@@ -1,10 +1,10 @@
 -- name: staging.callback_nesting
 -- description: How deep callback instances are nested on their thread, from 1, and the instance
---     that each is nested in. Others may be inside an instance that has anything of a callback
---     before its end, or that was never seen to end. The latter lasts, for what is inside it, until
---     the first event of its thread that cannot be inside (`effective_end_event_id`): the next
---     begin or end of a callback, executor event, or event behind a gap of any CPU. Where none can
---     have others inside, none is nested.
+--     around each. Others may be inside an instance that has a begin or an end of a callback before
+--     its own end, and inside one that was never seen to end. The latter lasts, for what is inside
+--     it, until the first event of its thread that cannot be inside (`effective_end_event_id`): the
+--     next begin or end of a callback, an executor event, or an event behind a gap of any CPU.
+--     Where no instance may have others inside, none is nested.
 -- grain: one row per callback instance on a thread with one that others may be nested in
 -- when: staging.callback_pair_left_over
 WITH never_ended AS MATERIALIZED (

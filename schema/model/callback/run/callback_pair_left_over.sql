@@ -1,10 +1,10 @@
 -- name: staging.callback_pair_left_over
--- description: Begins and ends of callbacks that are not plain, each with its partner. On the
---     thread, the next event of the same callback has to be the end of a begin. Ends left over
---     (recursion) belong to the latest begin left over (a callback that spins and is called again).
---     This is repeated until nothing pairs. Nothing pairs across a gap: `segment` counts the gaps
---     that the thread has seen. Three columns say what comes before an event on its thread: of
---     calls (`previous_event_id`, not across a gap), of callbacks, and of the executor.
+-- description: Begins and ends of callbacks that are not plain, each with its partner. A begin is
+--     paired with the next event of the same callback on its thread, if that is an end. Ends left
+--     over (recursion) belong to the latest begin left over (a callback that spins and is called
+--     again). This is repeated until nothing pairs. Nothing pairs across a gap: `segment` counts
+--     the gaps that the thread has seen. Three columns say what comes before an event on its
+--     thread: of calls (`previous_event_id`, not across a gap), of callbacks, and of the executor.
 --     `executor_event_id` is the last of these, but not across a gap.
 -- grain: one row per such callback_start or callback_end; `partner_event_id` is NULL where there is
 --     none
