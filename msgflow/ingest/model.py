@@ -1,7 +1,8 @@
 """The model of a run: executes `schema/model`, from staged events to rows with ids from 1.
 
-Before it comes `schema/alignment`, and after it `schema/kernel`: both have rows only where a kernel
-trace was read. What cannot have a row in this recording is not planned: `schema/model.sql` has its empty table.
+Before it comes `schema/alignment`, and after it `schema/kernel`. These two have rows only where a
+kernel trace was read. What cannot have a row in this recording is not planned: `schema/model.sql`
+has its empty table.
 """
 
 from __future__ import annotations

@@ -78,7 +78,8 @@ def staged() -> Iterator[duckdb.DuckDBPyConnection]:
                 NO_WAIT,
                 "INSERT INTO staging.callback_run (start_event_id, callback_handle, thread_id) "
                 "VALUES (300, 8, 2)",
-                "INSERT INTO staging.callback_binding VALUES (300, 'subscription', 295, NULL, NULL)",
+                "INSERT INTO staging.callback_binding (start_event_id, kind, take_event_id) "
+                "VALUES (300, 'subscription', 295)",
             ],
             False,
         ),
