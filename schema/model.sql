@@ -143,7 +143,8 @@ CREATE TABLE staging.packet (trace_index INTEGER, stream_index INTEGER, stream_c
     last_event_ns BIGINT, event_count BIGINT, discarded_event_count BIGINT,
     lost_packet_count BIGINT, is_numbered BOOLEAN, recording_index INTEGER, domain VARCHAR,
     known_end_ns BIGINT, is_ended_early BOOLEAN, trace_id INTEGER, previous_end_ns BIGINT,
-    is_last BOOLEAN, recording_last_event_ns BIGINT, covered_until_ns BIGINT, last_begin_ns BIGINT);
+    stream_end_ns BIGINT, recording_last_event_ns BIGINT, covered_until_ns BIGINT,
+    last_begin_ns BIGINT);
 CREATE TABLE staging.pause (trace_id INTEGER, start_ns BIGINT, end_ns BIGINT);
 CREATE TABLE staging.placed_source (trace_index INTEGER, path VARCHAR, uuid VARCHAR, domain VARCHAR,
     hostname VARCHAR, tracer VARCHAR, clock_uuid VARCHAR, clock_key VARCHAR, begin_ns BIGINT,

@@ -61,20 +61,24 @@ def built(source: Path | StagedEvents, without: Header | None = None) -> dict[st
         name: f"DELETE FROM {name}" + (f" WHERE {condition}" if condition else "")
         for name, condition in (without.sources if without else ())
     }
+    # What names an object of the model can only be told once that is there.
+    early = {
+        name
+        for name, condition in (without.sources if without else ())
+        if "staging." not in condition
+    }
     headers = without_others(without) if without else objects.model()
     with duckdb.connect() as con:
         read(con, source)
         staging.narrow(con, staging.empty_tables(con))
-        for name in emptied.keys() & INPUT:
-            if "staging." not in emptied[name]:
-                con.execute(emptied[name])
+        for name in early & INPUT:
+            con.execute(emptied[name])
         for header in headers:
             if header is without:
-                # What names an object of the model can only be told once that is there.
-                for statement in emptied.values():
-                    con.execute(statement)
+                for name in emptied.keys() - early:
+                    con.execute(emptied[name])
             model.create(con, replace(header, sources=()), set())
-            if header.name in emptied:
+            if header.name in early:
                 con.execute(emptied[header.name])
         return {
             header.name: (

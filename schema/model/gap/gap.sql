@@ -13,7 +13,7 @@
 -- grain: one row per gap in a recording
 -- when: staging.pause, staging.packet WHERE domain IS DISTINCT FROM 'kernel'
 --     AND (discarded_event_count IS DISTINCT FROM 0 OR lost_packet_count IS DISTINCT FROM 0
---     OR (is_last AND known_end_ns < recording_last_event_ns))
+--     OR stream_end_ns < recording_last_event_ns)
 
 -- What kernel traces lost is missing from no process.
 WITH packet AS (

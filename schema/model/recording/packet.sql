@@ -23,8 +23,12 @@ ended AS (
 SELECT
     *,
     trace_index + 1 AS trace_id,
-    lag(known_end_ns) OVER stream AS previous_end_ns,
-    lead(begin_ns) OVER stream IS NULL AS is_last,
+    lag(known_end_ns) OVER (
+        PARTITION BY recording_index, stream_class_id, stream_instance_id
+        ORDER BY begin_ns, trace_index, position
+    ) AS previous_end_ns,
+    max(known_end_ns) OVER (PARTITION BY recording_index, stream_class_id, stream_instance_id)
+        AS stream_end_ns,
     max(last_event_ns) OVER (PARTITION BY recording_index) AS recording_last_event_ns,
     max(greatest(coalesce(end_ns, begin_ns), coalesce(last_event_ns, begin_ns))) OVER (
         PARTITION BY recording_index ORDER BY begin_ns, trace_index, stream_index, position
@@ -33,7 +37,3 @@ SELECT
     max(CASE WHEN event_count > 0 THEN begin_ns END) OVER (PARTITION BY recording_index)
         AS last_begin_ns
 FROM ended
-WINDOW stream AS (
-    PARTITION BY recording_index, stream_class_id, stream_instance_id
-    ORDER BY begin_ns, trace_index, position
-)
