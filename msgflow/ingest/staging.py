@@ -14,7 +14,7 @@ that another trace holds as well),
 `staging.packet_read_once` (packets that a trace holds twice, or where it is NULL several traces),
 `staging.implausible` (values that were left out), `staging.damage`, `staging.event` (all events of
 the user and of known tracepoints, but those of the kernel, without payload), `staging.predecessor`
-(the pointers from event to event), and the objects of `schema/model`.
+(the pointers from event to event), and the objects of `schema/alignment`, `model` and `kernel`.
 """
 
 from __future__ import annotations
