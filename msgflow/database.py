@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar, Unpack
 
 from msgflow.errors import QueryError, UsageError
 from msgflow.files.default_files import DEFAULT_PATHS
-from msgflow.query.catalogue import choose_query, load_queries, query_names
+from msgflow.query.catalogue import choose_query, load_queries, queries_meant
 from msgflow.run.slice import Slice, SliceWords, TimeWords
 from msgflow.text.name_suggestions import did_you_mean
 
@@ -1132,8 +1132,8 @@ def sql_error(error: duckdb.Error, *more_memory: str) -> QueryError:
     place = next((at for at, line in enumerate(more) if line.startswith("LINE ")), len(more))
     hint = " ".join(line.strip() for line in more[:place] if line.strip())
     missing = _MISSING_TABLE.search(what)
-    if missing and (query := missing[1].replace("_", "-")) in query_names():
-        hint = f"it is a query: msgflow query {query}"
+    if missing and (meant := queries_meant(missing[1])):
+        hint = f"it is a query: {' or '.join(query.command for query in meant)}"
     return QueryError("\n".join([what, *more[place:]]), hint or None)
 
 

@@ -22,7 +22,7 @@ from msgflow.sql.interrupt import Terminated
 from msgflow.version import __version__
 
 if TYPE_CHECKING:
-    from importlib.metadata import EntryPoints
+    from importlib.metadata import EntryPoint, EntryPoints
 
 COMMANDS = {
     "record": (
@@ -62,10 +62,7 @@ Each is a module of `msgflow.cli` with a function `command`, or a group `app`. I
 if it has one, reads the words of the function. Its function `asked` returns the command of a query
 if the words behind the name ask that.
 """
-_SIMULATOR = (
-    "pip install ros2-msgflow-sim; or in a checkout of msgflow:"
-    " uv tool install . --with ./simulator"
-)
+_SIMULATOR = "in a checkout of msgflow: uv tool install . --with ./simulator"
 
 
 class RootGroup(TyperGroup):
@@ -87,12 +84,12 @@ class RootGroup(TyperGroup):
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Return the name, the imported command, and the words behind it."""
         if args[0] not in COMMANDS and args[0] not in self.list_commands(ctx):
-            from msgflow.query.catalogue import query_names
+            from msgflow.query.catalogue import queries_meant
 
             if args[0] == "simulate":
                 raise UsageError("the simulator is not installed", _SIMULATOR)
-            if args[0] in query_names():
-                hint = f"msgflow query {args[0]}"
+            if meant := queries_meant(args[0]):
+                hint = " or ".join(header.command for header in meant)
                 raise UsageError(f"there is no such command — {args[0]}", hint)
         name, summary, rest = super().resolve_command(ctx, args)
         return name, summary and _imported(str(name), rest), rest
@@ -136,7 +133,7 @@ def _added() -> EntryPoints:
 
 
 def _imported(name: str, words: list[str]) -> Any:
-    module = import_module(f"msgflow.cli.{name}") if name in COMMANDS else _added()[name].load()
+    module = import_module(f"msgflow.cli.{name}") if name in COMMANDS else _loaded(_added()[name])
     if (asked := getattr(module, "asked", None)) and (found := asked(words)):
         return found
     around = typer.Typer(add_completion=False)
@@ -146,6 +143,17 @@ def _imported(name: str, words: list[str]) -> Any:
     else:
         around.command(name, cls=getattr(module, "Command", None))(module.command)
     return typer.main.get_group(around).commands[name]
+
+
+def _loaded(point: EntryPoint) -> Any:
+    try:
+        return point.load()
+    except ImportError as error:
+        owner = point.dist.name if point.dist else point.value
+        raise UsageError(
+            f"the command {point.name} cannot be imported: {error} — {owner}",
+            f"pip install --upgrade {owner}",
+        ) from error
 
 
 app = typer.Typer(

@@ -109,8 +109,10 @@ def command(
         form = by_suffix(output, _SUFFIXES)
     if form is FlowFormat.HTML and output is None:
         output = Path("flow.html")
-    if slowest is None and (to or ((from_ or case) and not why)):
-        raise UsageError("--from, --to and --case choose among the slowest flows", "--slowest 1")
+    if slowest is None and to:
+        raise UsageError("--to chooses among the slowest flows", "--slowest 1")
+    if slowest is None and (from_ or case) and not why:
+        raise UsageError("--from and --case choose among flows", "--slowest 1, or --why")
     if why:
         unfit: dict[str, object] = {"direction": direction, "depth": depth, "limit": limit}
         unfit |= {"request": request, "response": response, "absolute": absolute or None}

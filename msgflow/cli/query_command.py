@@ -25,7 +25,7 @@ from msgflow.result.layout import MOST_ROWS
 from msgflow.result.times import Times
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Sequence, Set
 
     from msgflow.result.query_result import QueryResult
     from msgflow.sql.header import Header, Param
@@ -150,8 +150,11 @@ def build_command(
             print_lines(header.path.read_text(encoding="utf-8").splitlines())
             return
         form = form_of(given["form"], given["output"])
-        times, people = given["times"], (Format.TABLE, Format.MARKDOWN)
-        if times is not None and (not isinstance(form, Format) or form in people):
+        times = given["times"]
+        for word in () if isinstance(form, Format) else ("times", "columns", "wide"):
+            if given[word]:
+                raise UsageError(f"--{word} is about rows — {form.value}", "--format table")
+        if times is not None and form in (Format.TABLE, Format.MARKDOWN):
             raise UsageError(
                 "tables for people have times with their units — --times",
                 "--format csv, json, jsonl or parquet, or a file with such a suffix",
@@ -168,7 +171,10 @@ def build_command(
         add_completion=False, context_settings={"help_option_names": ["-h", "--help"]}
     )
     single.command(
-        header.words, cls=_command_class(header), help=_help(header), short_help=header.title
+        header.words,
+        cls=_command_class(header, {form.name} if form else set()),
+        help=_help(header),
+        short_help=header.title,
     )(command)
     return typer.main.get_command(single)
 
@@ -198,7 +204,9 @@ def _chooses(name: str, header: Header) -> bool:
     return name != "slowest" or header.slowest is not None
 
 
-def _command_class(header: Header) -> type[TyperCommand]:
+def _command_class(header: Header, own: Set[str]) -> type[TyperCommand]:
+    """Return the class of a command; `own` options are not those of every query."""
+
     class QueryCommand(TyperCommand):
         """A command whose help ends with the columns of the result."""
 
@@ -208,7 +216,7 @@ def _command_class(header: Header) -> type[TyperCommand]:
             common = [
                 param
                 for param in self.params
-                if isinstance(param, TyperOption) and param.name in _OF_EVERY_QUERY
+                if isinstance(param, TyperOption) and param.name in _OF_EVERY_QUERY - own
             ]
             for param in common:
                 param.hidden = True

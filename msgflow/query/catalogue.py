@@ -144,15 +144,21 @@ def _header(name: str) -> Header:
     return header if variant is None else replace(header, params=(variant, *header.params))
 
 
+def queries_meant(word: str) -> tuple[Header, ...]:
+    """Return the queries that a word means: the one of that name, or those that answer it."""
+    name = word.lower().replace("_", "-")
+    names = (name,) if name in _files() else QUERIES_BY_WORD.get(name.removesuffix("s"), ())
+    return tuple(map(load_query, names))
+
+
 def _meant(name: str, views: Callable[[], Collection[str]]) -> str:
     """Return a hint for a name that no query has: the commands that the user may mean."""
-    words = QUERIES_BY_WORD.get(name.lower().removesuffix("s").replace("_", "-"))
-    if words is None:
+    meant = queries_meant(name)
+    if not meant:
         if name in views():
             return f"it is a view: msgflow sql 'FROM {name}'"
-        words = tuple(nearest(name, query_names()))
-    commands = (load_query(other).command for other in words)
-    return " or ".join(commands) or "msgflow query"
+        meant = tuple(map(load_query, nearest(name, query_names())))
+    return " or ".join(header.command for header in meant) or "msgflow query"
 
 
 def load_queries() -> tuple[Header, ...]:

@@ -70,6 +70,37 @@ def test_another_distribution_adds_a_command_and_replaces_none(msgflow: Msgflow)
     assert msgflow("sql", "SELECT 1").exit_code == 4
 
 
+def test_one_that_cannot_be_imported_names_its_distribution(msgflow: Msgflow, other: Path) -> None:
+    (other / "other_command.py").write_text("import no_such_module\n")
+    result = msgflow("greet", "r1")
+    assert result.exit_code == 2
+    assert "the command greet cannot be imported: No module named 'no_such_module'" in result.stderr
+    assert "hint: pip install --upgrade" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("word", "command"),
+    [
+        ("e2e-latency", "msgflow query e2e-latency"),
+        ("wakeup-latency", "msgflow query scheduling --measure wakeup"),
+        ("bottleneck", "msgflow query critical-path or msgflow query path-breakdown"),
+    ],
+)
+def test_a_query_is_no_command_and_no_table(
+    msgflow: Msgflow, small_database: Path, word: str, command: str
+) -> None:
+    assert f"hint: {command}\n" in msgflow(word).stderr
+    table = msgflow("sql", f"FROM {word.replace('-', '_')}", "--db", small_database)
+    assert f"it is a query: {command}\n" in table.stderr
+
+
+def test_a_command_that_is_a_query_is_named_so(msgflow: Msgflow, small_database: Path) -> None:
+    assert (
+        "it is a query: msgflow graph\n"
+        in msgflow("sql", "FROM graph", "--db", small_database).stderr
+    )
+
+
 def test_its_name_is_completed(other: Path) -> None:
     program = "import sys; sys.argv = ['msgflow']; from msgflow.__main__ import main; main()"
     asked = {"_MSGFLOW_COMPLETE": "complete_bash", "COMP_WORDS": "msgflow gre", "COMP_CWORD": "1"}
@@ -91,7 +122,6 @@ def test_a_simulator_that_is_missing_is_named(
     assert result.exit_code == 2
     assert result.stderr == (
         "error: the simulator is not installed\n\n"
-        "hint: pip install ros2-msgflow-sim; or in a checkout of msgflow:"
-        " uv tool install . --with ./simulator\n"
+        "hint: in a checkout of msgflow: uv tool install . --with ./simulator\n"
     )
     assert "simulate" not in msgflow("--help").stdout

@@ -69,7 +69,7 @@ def test_json_and_files(msgflow: Msgflow, small_database: Path, tmp_path: Path) 
         (("/chatter", "--why"), "no subscription took this message"),
         (("/chatter", "--wide"), "a flow is a tree"),
         (("--slowest", "2", "--why"), "critical-path --slowest 2"),
-        (("--case", "last"), "choose among the slowest"),
+        (("--case", "last"), "choose among flows"),
         (("--slowest", "1", "--to", "/nothing"), "/nothing"),
     ],
 )

@@ -4,6 +4,7 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
+import pytest
 from typer.testing import Result
 
 from msgflow import Database
@@ -58,3 +59,18 @@ def test_it_has_rows_as_a_query(msgflow: Msgflow, small_database: Path, tmp_path
     result = msgflow("graph", "--format", "json", "--times", "iso", "--db", small_database)
     assert result.exit_code == 2
     assert "--times" in result.stderr
+
+
+@pytest.mark.parametrize("words", [("--columns", "from"), ("--wide",), ("--times", "ns")])
+def test_what_is_about_rows_is_refused_for_a_picture(
+    msgflow: Msgflow, small_database: Path, words: tuple[str, ...]
+) -> None:
+    result = msgflow("graph", *words, "--db", small_database)
+    assert result.exit_code == 2
+    assert f"{words[0]} is about rows — dot\n\nhint: --format table" in result.stderr
+
+
+def test_help_names_the_formats_of_a_picture(msgflow: Msgflow) -> None:
+    assert "dot, mermaid or json" in " ".join(
+        msgflow("graph", "--help").stdout.replace("│", " ").split()
+    )

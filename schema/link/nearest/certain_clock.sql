@@ -7,7 +7,6 @@
 --     back within a stretch.
 -- grain: one row per clock and stretch of time
 -- param: only_run BIGINT  Run to look at
--- when: store.stamp_clock
 CREATE OR REPLACE MACRO derive.certain_clock(only_run) AS TABLE
 WITH told AS (
     SELECT
