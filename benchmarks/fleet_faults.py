@@ -195,11 +195,9 @@ def ingest_alone(job: tuple[Path, str, str]) -> dict[str, Any]:
                 database,
                 Lake.open(url).store,
                 Path(name),
-                source=source,
-                options={"alone": True},
-                content=Content(views=False, database=False),
+                Content(views=False, database=False),
             )
-    return {**part.values, "generation": 1}
+    return {**part, "source": source}
 
 
 def equal(one: Path, other: Path) -> dict[str, int]:
@@ -211,8 +209,7 @@ def equal(one: Path, other: Path) -> dict[str, int]:
             for answer in answers():
                 con.execute(
                     f"CREATE VIEW {answer.table}_{side} AS SELECT a.* EXCLUDE (part) FROM"
-                    f" read_parquet('{folder}/{answer.table}/*/*.parquet',"
-                    " hive_partitioning = true, union_by_name = true) AS a"
+                    f" read_parquet('{folder}/{answer.table}/*.parquet', union_by_name = true) AS a"
                     f" JOIN run_{side} USING (run, part)"
                 )
         for answer in answers():

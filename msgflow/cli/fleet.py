@@ -74,7 +74,7 @@ def ingest(
             f"a fleet has no offsets in common — {clock_sync}", "--clock-sync messages, or none"
         )
     labels = _labels(label or [])
-    seconds, most = _time(timeout, "--timeout"), _size(memory)
+    seconds, most = _time(timeout), _size(memory)
     from msgflow.cli.progress import fleet_progress
     from msgflow.fleet.ingest import Options, fleet_ingest
 
@@ -178,7 +178,7 @@ app.command("open")(fleet_queries.open_)
 @app.command("remove")
 @operation
 def remove(keys: list[str], *, lake: str) -> None:
-    """Take runs out of a lake; their files go with the next `msgflow fleet compact`.
+    """Take runs out of a lake; their files go with the next `msgflow fleet pack`.
 
     Args:
         keys (RUN...): Keys of runs.
@@ -191,24 +191,21 @@ def remove(keys: list[str], *, lake: str) -> None:
     print_status(f"{count(removed, 'run')} removed from {lake}")
 
 
-@app.command("compact")
+@app.command("pack")
 @operation
-def compact(*, lake: str, older_than: str = "1d") -> None:
-    """Put the answers of many runs into few files, and delete those that nobody needs.
+def pack(*, lake: str) -> None:
+    """Put the answers of many runs into few files, and delete those that no run needs.
 
-    Args:
-        older_than (TIME): Delete files that have not been needed for so long: 2h, 1d. Longer than
-            any reader or ingest of a recording takes.
+    Nothing else may use the lake meanwhile: no ingest, and no query.
     """
-    seconds = _time(older_than, "--older-than")
     from msgflow.cli.output import print_status
-    from msgflow.fleet.compact import compact as compacted
     from msgflow.fleet.lake import Lake
+    from msgflow.fleet.pack import pack as packed
     from msgflow.text.values import count
 
-    done = compacted(Lake.open(lake), older_than=seconds)
+    done = packed(Lake.open(lake))
     print_status(
-        f"answers of {count(done.packed, 'run')} put into {count(done.packs, 'part')};"
+        f"answers of {count(done.runs, 'run')} put into {count(done.packs, 'part')};"
         f" {count(done.deleted, 'file')} deleted, {done.size / 1e6:,.1f} MB"
     )
 
@@ -288,8 +285,8 @@ def _size(text: str | None) -> int | None:
     return size
 
 
-def _time(text: str, option: str) -> float:
+def _time(text: str) -> float:
     match = _TIME.fullmatch(text.strip())
     if match is None:
-        raise UsageError(f"{option} takes a time — {text}", f"{option} 90s, {option} 2h")
+        raise UsageError(f"--timeout takes a time — {text}", "--timeout 90s, --timeout 2h")
     return float(match[1]) * _SECONDS[match[2]]

@@ -107,17 +107,10 @@ def _values(task: Task, directory: Path, enter: Callable[[str], None]) -> dict[s
             database,
             lake.store,
             directory,
-            source=task.source,
-            options={
-                **task.options,
-                "views": task.views,
-                "database": task.database,
-                "edition": task.edition,
-            },
-            content=Content(views=task.views, database=task.database),
+            Content(views=task.views, database=task.database),
         )
     return {
-        **part.values,
+        **part,
         "source": task.source,
         "source_signature": before.signature,
         "source_bytes": before.size,

@@ -130,8 +130,14 @@ class Store:
         with _reaching(self.url):
             found = self._patiently(lambda: self.filesystem.get_file_info(selector))
         files = [info for info in found if info.type == FileType.File]
-        if not self._follows_links:
-            files = [info for info in files if not self._is_elsewhere(self._below(info.path))]
+        if self.is_local and not self._follows_links:
+            folders = {info.path.rpartition("/")[0] for info in files}
+            here = {each for each in folders if not self._is_elsewhere(self._below(each))}
+            files = [
+                info
+                for info in files
+                if info.path.rpartition("/")[0] in here and not os.path.islink(info.path)
+            ]
         return sorted(
             (Entry(self._below(info.path), info.size, info.mtime_ns or 0) for info in files),
             key=lambda entry: entry.path,
@@ -252,13 +258,7 @@ class Store:
         self._require_here(path)
         with _reaching(self.url, writing=True):
             if self.is_local:
-                file = Path(self.full(path))
-                file.unlink(missing_ok=True)
-                # A bucket has no folders that could be left empty.
-                folder = file.parent
-                while folder != Path(self._root) and not any(folder.iterdir()):
-                    folder.rmdir()
-                    folder = folder.parent
+                Path(self.full(path)).unlink(missing_ok=True)
             elif self.entry(path) is not None:
                 self.filesystem.delete_file(self.full(path))
 

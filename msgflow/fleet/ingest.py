@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import heapq
 import itertools
 import json
 import os
 import random
-import secrets
 import time
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from msgflow.errors import MsgflowError, TraceError, UsageError
 from msgflow.fleet.failure import forget_failure, read_failures, write_failure
 from msgflow.fleet.file_store import S3, normal_url
-from msgflow.fleet.lake import Lake, visible
+from msgflow.fleet.lake import Lake
 from msgflow.fleet.recording import is_archive_name, look_at
 from msgflow.fleet.sources import find_recordings
 from msgflow.fleet.task import PASSING, Outcome, Reason, Task, needs, without_secrets
@@ -31,9 +31,6 @@ if TYPE_CHECKING:
     from msgflow.fleet.workers import Workers
 
 _LOOKING_AT_ONCE = 8
-SECONDS_BETWEEN_LOOKS_AT_RUNS = 1.0
-"""Time between two listings of the runs that other processes may have written."""
-
 _SECONDS_BETWEEN_LOOKS = 0.5
 _LONGEST_PAUSE = 60.0
 
@@ -139,7 +136,8 @@ def fleet_ingest(
     if not recordings:
         raise UsageError(f"the lake itself is no recording — {url}", "give other sources")
     opened = Lake.open_or_create(lake)
-    return _Ingest(opened, recordings, options or Options(), progress).run(ray)
+    with opened.writing():
+        return _Ingest(opened, recordings, options or Options(), progress).run(ray)
 
 
 @dataclass
@@ -167,10 +165,11 @@ class _Ingest:
         self._recordings = recordings
         self._report = progress
         self._begin = time.monotonic()
-        # Readers see the earlier part until the new one is committed.
-        self._edition = secrets.token_hex(4) if options.replace else ""
         self._progress = FleetProgress(len(recordings))
-        self._read_runs()
+        self._runs = {row["run"]: row for row in lake.runs().to_pylist()}
+        # Of two runs of a source, which a killed writer left, the earlier one is to go.
+        latest_first = sorted(self._runs.values(), key=lambda row: -row["committed_ns"])
+        self._sources = {row["source"]: row["run"] for row in latest_first}
         # Runs that this call wrote, and other sources with the packets of a run.
         self._written: set[str] = set()
         self._alike: dict[str, Mapping[str, Any]] = {}
@@ -178,27 +177,6 @@ class _Ingest:
         # (when, tie, item): recordings to try again after a pause.
         self._paused: list[tuple[float, int, _Item]] = []
         self._ties = itertools.count()
-
-    def _read_runs(self) -> None:
-        """Read the runs of the lake, which others may have changed since the last time."""
-        self._files = set(self._lake.run_files())
-        rows = self._lake.rows()
-        self._runs = {row["run"]: row for row in visible(rows).to_pylist()}
-        self._sources = {row["source"]: key for key, row in self._runs.items()}
-        self._generations: dict[str, int] = {}
-        for key, generation in zip(
-            rows["run"].to_pylist(), rows["generation"].to_pylist(), strict=True
-        ):
-            self._generations[key] = max(generation, self._generations.get(key, 0))
-        self._looked = time.monotonic()
-
-    def _look_again(self) -> None:
-        """Read the runs of the lake again if another process has written or removed some."""
-        if time.monotonic() - self._looked < SECONDS_BETWEEN_LOOKS_AT_RUNS:
-            return
-        if set(self._lake.run_files()) != self._files:
-            self._read_runs()
-        self._looked = time.monotonic()
 
     def run(self, ray: str | None) -> FleetProgress:
         """Ingest all recordings."""
@@ -233,8 +211,6 @@ class _Ingest:
                 pool.shutdown(wait=False, cancel_futures=True)
                 if workers is not None:
                     workers.close()
-        # Thousands of small files would take seconds to read, in every later call.
-        self._lake.put_together()
         self._tell()
         return self._progress
 
@@ -250,7 +226,6 @@ class _Ingest:
     def _new(self, index: int, recording: Recording, found: State | MsgflowError) -> _Item | None:
         """Return the item of a recording; None if there is nothing to do."""
         item = _Item(index, recording)
-        self._look_again()
         if isinstance(found, MsgflowError):
             item.tries = 1
             reason = Reason.BROKEN if isinstance(found, TraceError) else Reason.UNREACHABLE
@@ -266,8 +241,12 @@ class _Ingest:
             return None
         item.state = found
         run = self._runs.get(self._sources.get(recording.source, ""))
+        is_relabelled = run is not None and _is_relabelled(run, recording)
+        if run is not None and is_relabelled:
+            run = self._as_it_is_now(run["run"])
         if run is not None and self._is_there(run, found):
-            self._relabel(run, recording)
+            if is_relabelled:
+                self._commit({**run, "labels": dict(recording.labels)})
             self._forget(item)
             self._progress.there += 1
             self._tell()
@@ -293,10 +272,12 @@ class _Ingest:
             and (run["database_part"] is not None or not options.database)
         )
 
-    def _relabel(self, run: Mapping[str, Any], recording: Recording) -> None:
-        """Give a run the labels of its recording; its answers stay."""
-        if recording.labels and dict(run["labels"] or ()) != dict(recording.labels):
-            self._commit([{**run, "labels": dict(recording.labels)}])
+    def _as_it_is_now(self, key: str) -> Mapping[str, Any] | None:
+        """Read a run again, as another process may have written, replaced or removed it."""
+        known = self._runs.get(key)
+        row = self._lake.run(key, known and known["part"])
+        self._know(key, row)
+        return row
 
     def _submit(self, workers: Workers, item: _Item, running: dict[int, _Item]) -> None:
         options = self._options
@@ -319,7 +300,6 @@ class _Ingest:
             options.scratch and os.path.abspath(options.scratch),
             memory=min(memory, options.memory or memory),
             disk=disk,
-            edition=self._edition,
         )
         item.tries += 1
         if (words := workers.is_too_large(task)) is not None:
@@ -343,27 +323,30 @@ class _Ingest:
         if outcome.values is None:
             self._failed_now(item, outcome)
             return
-        self._look_again()
         key = outcome.values["run"]
-        there = self._runs.get(key)
+        # The earlier run of the source, if that had other packets.
+        before = self._runs.get(self._sources.get(item.recording.source, key))
+        before = None if before is None or before["run"] == key else before
+        there = self._as_it_is_now(key)
         if (
             there is not None
             and there["source"] != item.recording.source
             and (not self._options.replace or key in self._written)
         ):
-            self._same_packets(item, there, outcome, outcome.values)
+            self._same_packets(item, there, before, outcome)
             return
-        before = self._before(item, key)
         # A recording without labels keeps those that it had.
         labels = dict(item.recording.labels) or dict((there or before or {}).get("labels") or ())
         row = {
             **outcome.values,
             "labels": labels,
+            "committed_ns": there and there["committed_ns"],
             "seconds": outcome.seconds,
             "tries": item.tries,
             "worker": outcome.worker,
         }
-        self._commit([row, *self._gone(before)])
+        self._commit(row)
+        self._leave(before)
         self._written.add(key)
         self._forget(item)
         if there is not None or before is not None:
@@ -373,32 +356,32 @@ class _Ingest:
         self._progress.events += row["event_count"] or 0
         self._tell()
 
-    def _before(self, item: _Item, key: str) -> Mapping[str, Any] | None:
-        """Return the earlier run of the same source, if that had other packets."""
-        before = self._sources.get(item.recording.source)
-        return None if before is None or before == key else self._runs.get(before)
+    def _leave(self, before: Mapping[str, Any] | None) -> None:
+        """Remove the earlier run of a source with new packets.
 
-    def _gone(self, before: Mapping[str, Any] | None) -> list[dict[str, Any]]:
-        """Return the row that removes the earlier run of a source with new packets.
-
-        If another recording of this call has the packets of that run, the run stays.
+        If another recording of this call has the packets of that run, the run becomes that one's.
         """
         if before is None:
-            return []
-        if before["run"] not in self._alike:
-            return [{**before, "is_removed": True}]
-        other = self._alike[before["run"]]
-        own = {name: other[name] for name in ("source", "source_signature", "name")}
-        return [{**before, **own}]
+            return
+        if (other := self._alike.get(before["run"])) is not None:
+            own = {name: other[name] for name in ("source", "source_signature", "name")}
+            self._commit({**before, **own})
+            return
+        self._know(before["run"], None)
+        with contextlib.suppress(UsageError):  # another process has removed it
+            self._lake.remove([before["run"]])
 
     def _same_packets(
-        self, item: _Item, there: Mapping[str, Any], outcome: Outcome, values: Mapping[str, Any]
+        self,
+        item: _Item,
+        there: Mapping[str, Any],
+        before: Mapping[str, Any] | None,
+        outcome: Outcome,
     ) -> None:
         labels = dict(item.recording.labels)
         if not labels or labels == dict(there["labels"] or ()):
-            self._alike[there["run"]] = values
-            if gone := self._gone(self._before(item, there["run"])):
-                self._commit(gone)
+            self._alike[there["run"]] = outcome.values or {}
+            self._leave(before)
             self._forget(item)
             self._progress.same += 1
             self._tell()
@@ -417,22 +400,18 @@ class _Ingest:
             ),
         )
 
-    def _commit(self, rows: Sequence[Mapping[str, Any]]) -> None:
-        numbered = []
-        for row in rows:
-            key = row["run"]
-            self._generations[key] = self._generations.get(key, 0) + 1
-            numbered.append({**row, "generation": self._generations[key]})
-        self._files.add(self._lake.commit(numbered))
-        for row in numbered:
-            known = self._runs.get(row["run"])
-            if known is not None and self._sources.get(known["source"]) == row["run"]:
-                del self._sources[known["source"]]
-            if row["is_removed"]:
-                self._runs.pop(row["run"], None)
-            else:
-                self._runs[row["run"]] = row
-                self._sources[row["source"]] = row["run"]
+    def _commit(self, row: Mapping[str, Any]) -> None:
+        self._lake.commit([row])
+        self._know(row["run"], row)
+
+    def _know(self, key: str, row: Mapping[str, Any] | None) -> None:
+        """Remember the row of a run, None if the lake has no such run."""
+        known = self._runs.pop(key, None)
+        if known is not None and self._sources.get(known["source"]) == key:
+            del self._sources[known["source"]]
+        if row is not None:
+            self._runs[key] = row
+            self._sources[row["source"]] = key
 
     def _forget(self, item: _Item) -> None:
         if self._failed.pop(item.recording.source, None) is not None:
@@ -470,6 +449,10 @@ class _Ingest:
         self._progress.seconds = time.monotonic() - self._begin
         if self._report is not None:
             self._report(self._progress)
+
+
+def _is_relabelled(run: Mapping[str, Any], recording: Recording) -> bool:
+    return bool(recording.labels) and dict(run["labels"] or ()) != dict(recording.labels)
 
 
 def _look(recording: Recording) -> State | MsgflowError:

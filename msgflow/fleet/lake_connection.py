@@ -20,8 +20,6 @@ from msgflow.db.sandbox import open_memory, shut_in
 from msgflow.db.sql_guard import require_condition
 from msgflow.errors import DatabaseError, UsageError
 from msgflow.fleet.answers import answers
-from msgflow.fleet.compact import PACK
-from msgflow.fleet.lake import visible
 from msgflow.fleet.layout import RUN, VIEWS, part_path
 from msgflow.sql.failure import first_line
 from msgflow.sql.quoting import identifier
@@ -63,7 +61,7 @@ def choose(lake: Lake, where: str | None = None) -> Choice:
     """Return the runs of a lake that fit a condition."""
     with open_memory() as con:
         shut_in(con)
-        runs = visible(lake.rows(), con)
+        runs = lake.runs(con)
         if not len(runs):
             raise UsageError(f"the lake holds no run yet — {lake.store.url}", _NONE_YET)
         labels = tuple(
@@ -174,7 +172,7 @@ class Reading:
         # DuckDB looks at the files of a view when it makes the view, and when it reads the view.
         con.execute("SET parquet_metadata_cache = true")
         con.register("chosen_run", self.choice.runs)
-        con.execute(f"CREATE TABLE {RUN} AS SELECT * EXCLUDE (is_removed) FROM chosen_run")
+        con.execute(f"CREATE TABLE {RUN} AS FROM chosen_run")
         con.unregister("chosen_run")
         con.execute(f"CREATE SCHEMA {identifier(VIEWS)}")
         for table in tables:
@@ -184,72 +182,50 @@ class Reading:
             if not found:
                 continue
             self.tables.add(table)
-            rows = self._scan(table, found)
             name = ".".join(map(identifier, table.split("/")))
             con.execute(
-                f"CREATE VIEW {name} AS SELECT t.* EXCLUDE (part) FROM {rows} AS t "
-                f"SEMI JOIN main.{RUN} AS r ON t.run = r.run AND t.part = r.{key}"
+                f"CREATE VIEW {name} AS SELECT t.* EXCLUDE (part) FROM {self._scan(table, found)} "
+                f"AS t SEMI JOIN main.{RUN} AS r ON t.run = r.run AND t.part = r.{key}"
             )
 
-    def _files(self, table: str, key: str) -> dict[str, list[str]]:
-        """Return the parts with a table, grouped by equal columns.
-
-        Parts of earlier versions may lack the table or some of its columns. This looks at one part
-        of each version.
-        """
-        alike: dict[tuple[str, str], list[str]] = {}
-        seen = set()
+    def _files(self, table: str, key: str) -> dict[str, str]:
+        """Return the files of a table, each with the version that wrote it; earlier may lack it."""
         runs = self.choice.runs
-        for part, version in zip(
-            runs[key].to_pylist(), runs["msgflow_version"].to_pylist(), strict=True
-        ):
-            if part is not None and part not in seen:
-                seen.add(part)
-                kind = part if part.startswith(PACK) else ""
-                alike.setdefault((kind, version), []).append(part)
-        found = {}
-        for (_, version), parts in alike.items():
-            if self._has(table, parts[0]):
-                found[parts[0]] = sorted(parts)
-                continue
-            is_ours = version == __version__ and table in {each.table for each in answers()}
-            if is_ours or any(self._has(table, part) for part in parts[1:]):
-                raise FileNotFoundError(f"a file is gone: {part_path(table, parts[0])}")
-        return found
+        written_by = zip(runs[key].to_pylist(), runs["msgflow_version"].to_pylist(), strict=True)
+        wanted = {
+            part_path(table, part): version for part, version in written_by if part is not None
+        }
+        there = {entry.path for entry in self.choice.lake.store.entries(table, recursive=False)}
+        have_it = {version for path, version in wanted.items() if path in there}
+        if table in {answer.table for answer in answers()}:
+            have_it.add(__version__)
+        for path, version in sorted(wanted.items()):
+            if path not in there and version in have_it:
+                raise FileNotFoundError(f"a file is gone: {path}")
+        return {path: version for path, version in sorted(wanted.items()) if path in there}
 
-    def _has(self, table: str, part: str) -> bool:
-        return self.choice.lake.store.entry(part_path(table, part)) is not None
-
-    def _scan(self, table: str, found: dict[str, list[str]]) -> str:
-        """Return SQL for the rows of a table, with a column `part`."""
+    def _scan(self, table: str, files: dict[str, str]) -> str:
+        """Return SQL for the rows of a table."""
         store = self.choice.lake.store
         name = f"files of {table}"
-        parts = [part for alike in found.values() for part in alike]
-        paths = [store.full(part_path(table, part)) for part in parts]
+        paths = [store.full(path) for path in files]
         if store.is_local:
             self._local_files += paths
             self.connection.execute(f"SET VARIABLE {identifier(name)} = $paths", {"paths": paths})
-            return (
-                f"read_parquet(getvariable('{name}'), union_by_name = true,"
-                " hive_partitioning = true, hive_types_autocast = false)"
-            )
+            return f"read_parquet(getvariable('{name}'), union_by_name = true)"
         import pyarrow as pa
         import pyarrow.dataset as ds
         import pyarrow.parquet as pq
 
         system = store.filesystem
-        schemas = [
-            pq.read_schema(store.full(part_path(table, part)), filesystem=system) for part in found
-        ]
+        # Files of one version have the same columns.
+        one = {version: store.full(path) for path, version in files.items()}
+        schemas = [pq.read_schema(path, filesystem=system) for path in one.values()]
         schema = pa.unify_schemas(
             [each.remove_metadata() for each in schemas], promote_options="permissive"
         )
         dataset: Any = ds.FileSystemDataset.from_paths(
-            paths,
-            schema=schema.append(pa.field("part", pa.string())),
-            format=ds.ParquetFileFormat(),
-            filesystem=system,
-            partitions=[ds.field("part") == part for part in parts],
+            paths, schema=schema, format=ds.ParquetFileFormat(), filesystem=system
         )
         if len(self.choice.runs) < self.choice.total:
             # Large files: read only the groups of rows with one of the runs.

@@ -235,7 +235,7 @@ def _group(
 ) -> Header:
     """Make a table with the group of each run; return the query with the labels of groups."""
     taken = {column.name.lower() for column in header.columns}
-    fields = set(choice.runs.column_names) - {"labels", "is_removed"}
+    fields = set(choice.runs.column_names) - {"labels"}
     values, bound = [], {}
     columns: list[Column] = []
     for name in dict.fromkeys(group_by):

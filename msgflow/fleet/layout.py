@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import json
 import re
+import secrets
+import time
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -16,19 +18,18 @@ from msgflow.version import __version__
 if TYPE_CHECKING:
     import pyarrow as pa
 
-LAKE_REVISION = 1
+LAKE_REVISION = 2
 ABOUT = "lake.json"
 RUN = "run"
 FAILURE = "fleet_failure"
 VIEWS = "view"
 DATABASE = "database"
-FILE_NAME = "data.parquet"
-DATABASE_NAME = "msgflow.duckdb.zst"
 _FORMAT = "msgflow lake"
-# A writer that was killed leaves a name with a dot before and .part behind.
-_OURS = re.compile(
-    r"[^/]+(/[^/]+)?/part=[^/]+/"
-    r"((data\.parquet|msgflow\.duckdb\.zst)|\.(data\.parquet|msgflow\.duckdb\.zst)\..+\.part)"
+_PACK = re.compile(r"pack-[0-9a-f]{16}-(\d{1,9})")
+# A name without a part is one of a killed writer: it has a dot before it and .part behind.
+_FILE = re.compile(
+    rf"(?:.+/)?(?:(?P<part>[0-9a-f]{{20}}-[0-9a-f]{{10}}|{_PACK.pattern})\.(?:parquet|duckdb\.zst)"
+    r"|\.[^/]+\.(?:parquet|zst)\.[^/]+\.part)"
 )
 
 
@@ -48,17 +49,42 @@ def require_readable(content: bytes, url: str) -> None:
         is_ours, revision = False, 0
     if not is_ours:
         raise DatabaseError(f"its {ABOUT} is not that of a lake — {url}", "give another --lake")
+    if revision == LAKE_REVISION:
+        return
     if revision > LAKE_REVISION:
-        raise DatabaseError(
-            f"the lake has revision {revision}, newer than this msgflow knows ({LAKE_REVISION})"
-            f" — {url}",
-            "upgrade msgflow, or give another --lake",
-        )
+        words, hint = "newer than this msgflow knows", "upgrade msgflow, or give another --lake"
+    else:
+        words = "older than this msgflow reads"
+        hint = "ingest the recordings into a new lake: msgflow fleet ingest SOURCE --lake LAKE"
+    raise DatabaseError(
+        f"the lake has revision {revision}, {words} ({LAKE_REVISION}) — {url}", hint
+    )
+
+
+def new_part(run: str) -> str:
+    """Return the name of a new part with the files of one run."""
+    return f"{run}-{secrets.token_hex(5)}"
+
+
+def new_pack(runs: int) -> str:
+    """Return the name of a new part with the answers of many runs; later ones sort behind."""
+    return f"pack-{time.time_ns():016x}-{runs}"
+
+
+def packed_runs(part: str) -> int:
+    """Return how many runs were put into a part; 0 if it was written for one run."""
+    found = _PACK.fullmatch(part)
+    return int(found[1]) if found else 0
+
+
+def run_path(name: str) -> str:
+    """Return the path of a row of the table `run`, by its key, or of the rows of a pack."""
+    return f"{RUN}/{name}.parquet"
 
 
 def part_path(table: str, part: str) -> str:
     """Return the path of the rows of a table in a part."""
-    return f"{table}/part={part}/{FILE_NAME}"
+    return f"{table}/{part}.parquet"
 
 
 def view_path(view: str, part: str) -> str:
@@ -68,12 +94,13 @@ def view_path(view: str, part: str) -> str:
 
 def database_path(part: str) -> str:
     """Return the path of the database of one run, compressed with Zstandard."""
-    return f"{DATABASE}/part={part}/{DATABASE_NAME}"
+    return f"{DATABASE}/{part}.duckdb.zst"
 
 
-def is_file_of_part(path: str) -> bool:
-    """Tell whether msgflow writes files of such a path, other than those of the table `run`."""
-    return _OURS.fullmatch(path) is not None
+def part_of(path: str) -> str | None:
+    """Return the part of a file; '' if a writer was killed before it was whole; None: not ours."""
+    found = _FILE.fullmatch(path)
+    return found and (found["part"] or "")
 
 
 def metadata(table: str, schema_revision: str) -> dict[str, str]:
@@ -93,11 +120,9 @@ def run_schema() -> pa.Schema:
 
     columns = [
         ("run", pa.string(), "Key of the run, made of the identity of its packets"),
-        ("generation", pa.int64(), "The row with the highest counts; earlier ones are history"),
-        ("is_removed", pa.bool_(), "The run was taken out of the lake"),
-        ("part", pa.string(), "Where its answers lie: TABLE/part=…"),
-        ("view_part", pa.string(), "Where its public views lie: view/VIEW/part=…; NULL: nowhere"),
-        ("database_part", pa.string(), "Where its database lies: database/part=…; NULL: nowhere"),
+        ("part", pa.string(), "Where its answers lie: TABLE/PART.parquet"),
+        ("view_part", pa.string(), "Where its views lie: view/VIEW/PART.parquet; NULL: nowhere"),
+        ("database_part", pa.string(), "Where its database lies: database/PART…; NULL: nowhere"),
         ("name", pa.string(), "Name of the run, from that of its source"),
         ("source", pa.string(), "Path or address that it was read from"),
         ("source_signature", pa.string(), "Names, sizes and times of the files there, as a hash"),
@@ -113,7 +138,7 @@ def run_schema() -> pa.Schema:
         ("seconds", pa.float64(), "How long fetching, ingesting and writing took"),
         ("tries", pa.int32(), "How often it was tried"),
         ("worker", pa.string(), "Machine that did it"),
-        ("committed_ns", pa.int64(), "When this row was written [epoch ns]"),
+        ("committed_ns", pa.int64(), "When the run was put here [epoch ns]; the last counts"),
     ]
     return _schema(columns)
 

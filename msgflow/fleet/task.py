@@ -57,7 +57,6 @@ class Task:
         scratch: folder for temporary files; that of the system when None.
         memory: estimated bytes of memory.
         disk: estimated bytes of scratch space.
-        edition: makes the part different from earlier ones of the same recording.
     """
 
     index: int
@@ -71,7 +70,6 @@ class Task:
     scratch: str | None = None
     memory: int = 0
     disk: int = 0
-    edition: str = ""
 
     def as_dict(self) -> dict[str, Any]:
         """Return the attributes, as values for JSON."""

@@ -33,7 +33,7 @@ COMMANDS = (
     "db upgrade",
     "db schema",
     "fleet ingest",
-    "fleet compact",
+    "fleet pack",
 )
 
 

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import shutil
 from pathlib import Path
+from typing import Any
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -11,8 +12,8 @@ import pytest
 from msgflow import Database
 from msgflow.fleet.answers import answers
 from msgflow.fleet.lake import Lake
-from msgflow.fleet.layout import part_path
-from msgflow.fleet.part import Content, Part, write_part
+from msgflow.fleet.layout import new_part, part_path
+from msgflow.fleet.part import Content, write_part
 from msgflow.ingest import ingest
 from msgflow_sim import simulate
 
@@ -36,29 +37,21 @@ def databases(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
 @pytest.fixture(scope="session")
 def written(
     databases: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory
-) -> tuple[Path, Part, Part]:
-    """A lake with all files of both, without a commit."""
+) -> tuple[Path, dict[str, Any], dict[str, Any]]:
+    """A lake with all files of both, and what `run` is to have of each, without a commit."""
     folder = tmp_path_factory.mktemp("written")
     lake = Lake.open_or_create(folder / "lake")
     parts = []
     for database in databases:
         with Database(database) as opened:
-            parts.append(
-                write_part(
-                    opened.connection,
-                    database,
-                    lake.store,
-                    folder,
-                    source=f"/recordings/{database.stem}",
-                    options={},
-                    content=Content(),
-                )
-            )
+            parts.append(write_part(opened.connection, database, lake.store, folder, Content()))
     return folder / "lake", parts[0], parts[1]
 
 
 @pytest.fixture(scope="session")
-def night(written: tuple[Path, Part, Part], tmp_path_factory: pytest.TempPathFactory) -> Lake:
+def night(
+    written: tuple[Path, dict[str, Any], dict[str, Any]], tmp_path_factory: pytest.TempPathFactory
+) -> Lake:
     """A lake of three runs, not to be changed: both databases, and the first once more.
 
     The copy has a key of its own, and takes twice as long for its flows; it has no views.
@@ -67,19 +60,14 @@ def night(written: tuple[Path, Part, Part], tmp_path_factory: pytest.TempPathFac
     lake = Lake.open(shutil.copytree(place, tmp_path_factory.mktemp("night") / "lake"))
     labels = ({"robot": "r1", "software_version": "1.0"}, {"robot": "r2", "soft-ware": "a'b"})
     rows = [
-        {
-            **part.values,
-            "generation": 1,
-            "labels": given,
-            "source": f"/recordings/{part.values['name']}",
-        }
+        {**part, "labels": given, "source": f"/recordings/{part['name']}"}
         for part, given in zip(parts, labels, strict=True)
     ]
     first = rows[0]
     copy = {
         **first,
         "run": COPY,
-        "part": f"{COPY}-x",
+        "part": new_part(COPY),
         "view_part": None,
         "database_part": None,
         "name": "copy",
@@ -87,7 +75,9 @@ def night(written: tuple[Path, Part, Part], tmp_path_factory: pytest.TempPathFac
     }
     for answer in answers():
         table = pq.ParquetFile(lake.store.full(part_path(answer.table, first["part"]))).read()
-        table = table.set_column(0, "run", pa.array([COPY] * len(table), pa.string()))
+        for place, name in enumerate(("run", "part")):
+            names = pa.array([copy[name]] * len(table), pa.string())
+            table = table.set_column(place, name, names)
         if answer.table == "flow":
             place = table.column_names.index("latency_ns")
             table = table.set_column(place, "latency_ns", pc.multiply(table["latency_ns"], 2))

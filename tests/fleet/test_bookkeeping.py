@@ -15,14 +15,14 @@ import pytest
 from typer.testing import CliRunner
 
 from msgflow.cli.app import app
-from msgflow.errors import UsageError
-from msgflow.fleet import ingest as ingesting
+from msgflow.errors import DatabaseError, UsageError
 from msgflow.fleet import task_process, workers
-from msgflow.fleet.compact import compact
 from msgflow.fleet.failure import read_failures
 from msgflow.fleet.file_store import Store
 from msgflow.fleet.ingest import FleetProgress, Options, fleet_ingest
 from msgflow.fleet.lake import Lake
+from msgflow.fleet.layout import new_part
+from msgflow.fleet.pack import pack
 from msgflow.fleet.recording import look_at
 from msgflow.fleet.task import Outcome, Task
 
@@ -37,8 +37,7 @@ def run_task(given: dict[str, Any]) -> dict[str, Any]:
         return Outcome(reason="broken", stage="ingesting", error="no trace").as_dict()
     values = {
         "run": key,
-        "is_removed": False,
-        "part": f"{key}-{task.edition}",
+        "part": new_part(key),
         "name": Path(task.source).name,
         "source": task.source,
         "source_signature": look_at(task.source).signature,
@@ -52,7 +51,6 @@ def run_task(given: dict[str, Any]) -> dict[str, Any]:
 @pytest.fixture(autouse=True)
 def no_work(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(workers, "run_task", run_task)
-    monkeypatch.setattr(ingesting, "SECONDS_BETWEEN_LOOKS_AT_RUNS", 0)
 
 
 @pytest.fixture
@@ -164,18 +162,16 @@ def test_what_others_do_meanwhile_stays_done(place: Path) -> None:
 
 def test_labels_are_those_of_the_part_that_counts(place: Path) -> None:
     ingest(record("a", "first"), record("b", "second"))
-    seen: list[str] = []
 
     def replace(progress: FleetProgress) -> None:
-        if not seen:
-            lake = Lake.open("lake")
-            (row,) = [each for each in lake.runs().to_pylist() if each["run"] == "second"]
-            new = {"part": "packed", "generation": row["generation"] + 1, "labels": {}}
-            seen.append(lake.commit([row | new]))
+        lake = Lake.open("lake")
+        row = lake.run("second", None)
+        if row is not None and row["part"] != "other":
+            lake.commit([row | {"part": "other", "labels": {}}])
 
     ingest("a", "b", labels={"robot": "A"}, progress=replace)
     rows = {row["run"]: row for row in Lake.open("lake").runs().to_pylist()}
-    assert rows["second"]["part"] == "packed"
+    assert rows["second"]["part"] == "other"
     assert labels_of("second") == {"robot": "A"}
 
 
@@ -231,17 +227,58 @@ def test_what_others_write_is_read_once(place: Path, monkeypatch: pytest.MonkeyP
     def write(progress: FleetProgress) -> None:
         Lake.open("lake").commit([{**row, "run": f"other {progress.done}", "labels": {}}])
 
+    read.clear()
     done = ingest(*(f"r{number}" for number in range(5)), progress=write)
+    assert max(read.count(path) for path in set(read) if path.startswith("run/")) == 1
     assert done.there == 5
     assert len(runs()) == 10
-    assert max(read.count(path) for path in set(read) if path.startswith("run/")) <= 3
 
 
-def test_compaction_keeps_what_counts(place: Path) -> None:
+def test_packing_keeps_what_counts(place: Path) -> None:
     ingest(record("a", "first"), labels={"robot": "A"})
-    compact(Lake.open("lake"), older_than=0)
+    pack(Lake.open("lake"))
     ingest("a", labels={"robot": "B"})
     assert labels_of("first") == {"robot": "B"}
+
+
+def test_of_two_runs_of_a_source_the_earlier_one_goes(
+    place: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A writer was killed when the new run was there and the earlier one not yet removed."""
+    ingest(record("a", "first"))
+
+    def killed(self: Lake, keys: object) -> int:
+        raise KeyboardInterrupt
+
+    record("a", "second")
+    with monkeypatch.context() as patch:
+        patch.setattr(Lake, "remove", killed)
+        with pytest.raises(KeyboardInterrupt):
+            ingest("a")
+    assert runs() == {"first": "a", "second": "a"}
+    assert ingest("a").replaced == 1
+    assert runs() == {"second": "a"}
+
+
+def test_nobody_packs_while_others_write(place: Path) -> None:
+    record("a", "first")
+    refused: list[DatabaseError] = []
+
+    def try_it(progress: FleetProgress) -> None:
+        with pytest.raises(DatabaseError, match="another msgflow writes to the lake") as raised:
+            pack(Lake.open("lake"))
+        refused.append(raised.value)
+        # Others may write.
+        ingest(record("b", "second"))
+
+    ingest("a", progress=lambda progress: None if refused else try_it(progress))
+    assert refused
+    assert runs() == {"first": "a", "second": "b"}
+    lake = Lake.open("lake")
+    with lake.writing(alone=True):
+        given = ["fleet", "ingest", "a", "--lake", "lake"]
+        assert CliRunner().invoke(app, given).exit_code == 4
+    assert pack(lake).runs == 2
 
 
 def test_scratch_space_that_cannot_be_made_is_not_full(place: Path) -> None:

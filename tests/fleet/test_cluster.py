@@ -118,10 +118,8 @@ def test_much_goes_wrong(
                 database,
                 other.store,
                 tmp_path,
-                source=run["source"],
-                options={},
-                content=Content(views=False, database=False),
-            ).values["part"]
+                Content(views=False, database=False),
+            )["part"]
         for table in ("flow", "callbacks", "topics_delivery", "distribution", "finding"):
             alone = read_part(other, table, part, run["run"])
             assert alone is not None

@@ -35,12 +35,12 @@ def fill(folder: Path, runs: Iterable[tuple[Mapping[str, str], Mapping[str, floa
     for number, (labels, medians) in enumerate(runs):
         run = f"{number:020x}"
         rows.append(
-            {"run": run, "part": "all", "generation": 1, "is_removed": False, "labels": labels}
+            {"run": run, "part": "all", "labels": labels}
             | {"msgflow_version": "1", "schema_revision": "1", "name": f"n{number}"}
         )
-        paths += [{"run": run, "path": path, "is_cut": False} for path in medians]
+        paths += [{"run": run, "part": "all", "path": path, "is_cut": False} for path in medians]
         flows += [
-            {"run": run, "path": path, "latency_ns": round(1e6 * median * part)}
+            {"run": run, "part": "all", "path": path, "latency_ns": round(1e6 * median * part)}
             for path, median in medians.items()
             for part in SHAPE
         ]

@@ -17,14 +17,15 @@ from typer.testing import CliRunner
 
 from msgflow.cli.app import app
 from msgflow.errors import DatabaseError, UsageError
-from msgflow.fleet.compact import compact
 from msgflow.fleet.file_store import Store
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.lake_query import fleet_sql
-from msgflow.fleet.layout import database_path, part_path, run_schema
+from msgflow.fleet.layout import database_path, new_part, part_path, run_schema
 from msgflow.fleet.manifest import read_manifest
+from msgflow.fleet.pack import pack
 from msgflow.fleet.run_database import open_run
 from msgflow.trace import extraction
+from msgflow.version import __version__
 from msgflow_sim import simulate
 
 LARGEST = 2**63 - 1
@@ -39,7 +40,7 @@ def lake(night: Lake, tmp_path: Path) -> Lake:
 def put_row(lake: Lake, **values: Any) -> str:
     """Write a row of the table `run` and return the address of its file."""
     row: dict[str, Any] = dict.fromkeys(run_schema().names)
-    row |= {"run": "feed", "generation": 1, "is_removed": False, "committed_ns": 1} | values
+    row |= {"run": "feed", "committed_ns": 1} | values
     lake.put_table("run/feed.parquet", "run", pa.Table.from_pylist([row], run_schema()), "0001")
     return lake.store.url_of("run/feed.parquet")
 
@@ -72,27 +73,24 @@ def test_no_module_of_the_current_folder_is_imported(
     assert found.table["name"].to_pylist() == ["my_pkg:frame_done"]
 
 
-def test_compaction_deletes_nothing_behind_a_link(lake: Lake, tmp_path: Path) -> None:
-    victim = tmp_path / "victim"
-    (victim / "part=zz").mkdir(parents=True)
-    kept = [victim / "data.parquet", victim / "part=zz" / "data.parquet", victim / "precious"]
-    root = Path(lake.store.url)
-    mine = root / "flow" / "part=gone" / "notes.txt"
-    unused = root / "flow" / "part=gone" / "data.parquet"
-    left = root / "flow" / "part=gone" / ".data.parquet.x.part"
-    mine.parent.mkdir()
-    for file in (*kept, mine, unused, left):
+def test_packing_deletes_nothing_behind_a_link(lake: Lake, tmp_path: Path) -> None:
+    part = new_part("f" * 20)
+    victim, root = tmp_path / "victim", Path(lake.store.url)
+    victim.mkdir()
+    kept = [victim / f"{part}.parquet", victim / "precious", root / "flow" / "notes.parquet"]
+    unused = [root / "flow" / f"{part}.parquet", root / "view" / "topic" / f"{part}.parquet"]
+    left = [root / "flow" / f".{part}.parquet.x.part", root / "run" / ".feed.parquet.x.part"]
+    for file in (*kept, *unused, *left):
         file.write_text("x")
-        os.utime(file, (1, 1))
-    (root / "flow" / "part=zy").symlink_to(victim)
+    (root / "flow" / "more").symlink_to(victim)
     (root / "view" / "more").symlink_to(victim)
-    (root / "flow" / "part=zx").mkdir()
-    (root / "flow" / "part=zx" / "data.parquet").symlink_to(victim / "precious")
-    compact(lake)
-    assert all(file.exists() for file in (*kept, mine))
-    assert not unused.exists()
-    assert not left.exists()
-    assert (root / "flow" / "part=zy").is_symlink()
+    linked = root / "callbacks" / f"{part}.parquet"
+    linked.symlink_to(victim / "precious")
+    pack(lake)
+    assert all(file.exists() for file in kept)
+    assert not any(file.exists() for file in (*unused, *left))
+    assert (root / "flow" / "more").is_symlink()
+    assert linked.is_symlink()
 
 
 def test_files_behind_links_are_errors(lake: Lake, tmp_path: Path) -> None:
@@ -124,7 +122,21 @@ def test_a_part_cannot_lead_out_of_the_lake(lake: Lake) -> None:
         lake.runs()
 
 
-@pytest.mark.parametrize("column", ["run", "generation", "is_removed", "committed_ns"])
+def test_a_run_cannot_lead_out_of_the_lake(lake: Lake) -> None:
+    lake.put_runs("pack-0000000000000000-1", [{"run": "../victim", "committed_ns": 1}])
+    with pytest.raises(DatabaseError, match="a run that is no name"):
+        lake.remove(["../victim"])
+
+
+def test_a_run_is_in_its_own_file(lake: Lake) -> None:
+    """A copy of it under another name could not be replaced or removed."""
+    file = Path(lake.store.url) / "run" / f"{lake.runs()['run'][0]}.parquet"
+    shutil.copy(file, file.with_name("copy.parquet"))
+    with pytest.raises(DatabaseError, match=r"another name than its run — .*copy\.parquet"):
+        lake.runs()
+
+
+@pytest.mark.parametrize("column", ["run", "committed_ns"])
 def test_a_row_without_what_counts_names_its_file(lake: Lake, column: str) -> None:
     url = put_row(lake, **{column: None})
     with pytest.raises(DatabaseError, match=f"a row without {column} — {url}"):
@@ -135,8 +147,8 @@ def test_a_row_without_what_counts_names_its_file(lake: Lake, column: str) -> No
     "values",
     [
         {"part": None},
-        {"part": "p", "generation": LARGEST},
-        {"part": "p", "generation": LARGEST, "committed_ns": 5, "view_part": None},
+        {"part": "p", "committed_ns": LARGEST},
+        {"part": "pack-0000000000000000-1", "view_part": None},
     ],
 )
 def test_a_strange_run_can_be_removed(lake: Lake, values: dict[str, Any]) -> None:
@@ -144,7 +156,7 @@ def test_a_strange_run_can_be_removed(lake: Lake, values: dict[str, Any]) -> Non
     assert "feed" in lake.runs()["run"].to_pylist()
     assert lake.remove(["feed"]) == 1
     assert "feed" not in Lake.open(lake.store.url).runs()["run"].to_pylist()
-    compact(lake, older_than=0)
+    pack(lake)
 
 
 @pytest.mark.parametrize(
@@ -157,15 +169,16 @@ def test_a_strange_run_can_be_removed(lake: Lake, values: dict[str, Any]) -> Non
     ],
 )
 def test_a_file_that_is_none_of_ours_is_named(lake: Lake, content: bytes) -> None:
-    put_row(lake, part="strange")
+    revision = lake.runs()["schema_revision"][0].as_py()
+    put_row(lake, part="strange", msgflow_version=__version__, schema_revision=revision)
     path = part_path("flow", "strange")
     lake.store.put(path, content)
     with pytest.raises(DatabaseError, match="cannot be used") as raised:
-        compact(lake, older_than=0)
+        pack(lake)
     assert lake.store.url_of(path) in raised.value.message
     assert "fleet remove feed " in (raised.value.hint or "")
     lake.remove(["feed"])
-    compact(lake, older_than=0)
+    pack(lake)
 
 
 DEEP = "[" * 200_000
@@ -259,22 +272,22 @@ def test_passwords_in_endpoints_are_not_printed(url: str, monkeypatch: pytest.Mo
 
 
 @pytest.mark.parametrize("is_linked", [True, False])
-def test_compaction_loses_no_answers_that_are_elsewhere(lake: Lake, is_linked: bool) -> None:
+def test_packing_loses_no_answers_that_are_elsewhere(lake: Lake, is_linked: bool) -> None:
     row = lake.runs().to_pylist()[0]
     file = Path(lake.store.url) / part_path("flow", row["part"])
-    moved = file.replace(file.parents[3] / "moved.parquet")
+    moved = file.replace(file.parents[2] / "moved.parquet")
     if is_linked:
         file.symlink_to(moved)
     with pytest.raises(DatabaseError, match=rf"(missing|symbolic link).* — {file}"):
-        compact(lake, older_than=0)
+        pack(lake)
     file.unlink(missing_ok=True)
     moved.rename(file)
-    compact(lake, older_than=0)
+    pack(lake)
     assert len(lake.runs()) == 3
 
 
 def test_commands_are_quoted(lake: Lake) -> None:
-    put_row(lake, run="x; touch PWN", part=None, name="$(touch PWN)")
+    lake.put_runs("x; touch PWN", [{"run": "x; touch PWN", "committed_ns": 1, "name": "$(PWN)"}])
     listed = CliRunner().invoke(app, ["fleet", "open", "no such", "--lake", f"{lake.store.url}/."])
     assert listed.exit_code == 2
     with pytest.raises(UsageError) as raised:

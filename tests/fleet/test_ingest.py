@@ -23,10 +23,11 @@ from msgflow import Database
 from msgflow.cli.app import app
 from msgflow.errors import DatabaseError, UsageError
 from msgflow.fleet import child_process, task_process
-from msgflow.fleet.compact import compact
 from msgflow.fleet.failure import read_failures
 from msgflow.fleet.ingest import Options, fleet_ingest
 from msgflow.fleet.lake import Lake
+from msgflow.fleet.layout import database_path, part_of, part_path
+from msgflow.fleet.pack import pack
 from msgflow.fleet.task import PASSING, Outcome, Task, needs, without_secrets
 from msgflow.fleet.workers import OneProcess
 from msgflow.sql.failure import out_of_memory
@@ -113,7 +114,7 @@ def test_a_run_is_what_its_recording_gives_alone(
     lake = Lake.open(filled.lake)
     for run_row in lake.runs().to_pylist():
         alone = databases[0]
-        database = lake.store.read(f"database/part={run_row['database_part']}/msgflow.duckdb.zst")
+        database = lake.store.read(database_path(run_row["database_part"]))
         assert database is not None
         back = tmp_path / "back.duckdb"
         with pa.CompressedInputStream(pa.BufferReader(database), "zstd") as stream:
@@ -135,14 +136,10 @@ def test_a_run_is_what_its_recording_gives_alone(
             con.execute("DETACH back")
         part = run_row["part"]
         with Database(alone) as opened:
-            for query, path in (
-                ("callbacks", f"callbacks/part={part}"),
-                ("topics-delivery", f"topics_delivery/part={part}"),
-            ):
+            for query in ("callbacks", "topics-delivery"):
+                path = part_path(query.replace("-", "_"), part)
                 expected = opened.query(query, internal=True).to_arrow().to_pylist()
-                found = duckdb.sql(
-                    f"FROM read_parquet('{filled.lake}/{path}/data.parquet')"
-                ).to_arrow_table()
+                found = duckdb.sql(f"FROM read_parquet('{filled.lake}/{path}')").to_arrow_table()
                 assert [
                     {k: v for k, v in row.items() if k not in ("run", "part")}
                     for row in found.to_pylist()
@@ -203,15 +200,13 @@ def test_what_was_mended_is_tried_again(
     (second,) = (r for r in Lake.open(lake).runs().to_pylist() if r["name"] == "broken")
     assert first["run"] != second["run"]
     assert len(Lake.open(lake).runs()) == 2
-    # Compaction and removal leave nothing that is not needed.
+    # Removal and packing leave nothing that is not needed.
     Lake.open(lake).remove([second["run"]])
-    compact(Lake.open(lake), older_than=0)
+    pack(Lake.open(lake))
     store = Lake.open(lake).store
     kept = {row["part"] for row in Lake.open(lake).runs().to_pylist()}
     assert len(kept) == 1
-    assert {path.split("/")[1] for path in (entry.path for entry in store.entries("flow"))} == {
-        f"part={part}" for part in kept
-    }
+    assert {part_of(entry.path) for entry in store.entries("flow")} == kept
     assert not any(second["run"] in entry.path for entry in store.entries())
     assert len(Lake.open(lake).runs()) == 1
 
@@ -281,12 +276,12 @@ def test_a_disk_that_fills_is_said(
     def fill(*_: object, **__: object) -> None:
         raise duckdb.IOException("Could not write file: No space left on device")
 
-    before = Lake.open(task.lake).rows()
+    before = Lake.open(task.lake).runs()
     monkeypatch.setattr(Database, "ingest", fill)
     full = child_process.do(task, tmp_path)
     assert (full.reason, full.stage, full.values) == ("no_space", "ingesting", None)
     assert full.reason in PASSING
-    assert Lake.open(task.lake).rows().equals(before)
+    assert Lake.open(task.lake).runs().equals(before)
 
 
 class Fake(OneProcess):

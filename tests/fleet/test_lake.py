@@ -8,21 +8,22 @@ from pathlib import Path
 from typing import Any
 
 import duckdb
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
 from msgflow import Database
 from msgflow.errors import DatabaseError, UsageError
 from msgflow.fleet.answers import answers
-from msgflow.fleet.compact import compact
 from msgflow.fleet.file_store import Store
 from msgflow.fleet.lake import Lake
-from msgflow.fleet.layout import run_schema, view_path
-from msgflow.fleet.part import Content, Part, part_name, write_part
+from msgflow.fleet.layout import part_of, part_path, run_path, run_schema, view_path
+from msgflow.fleet.pack import pack
+from msgflow.fleet.part import Content, write_part
 
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "fleet.md"
 PAGE = DOCS.read_text(encoding="utf-8")
-_ANSWERS = Content(views=False, database=False)
+Row = dict[str, Any]
 CREATE_RUN, EXAMPLE = (
     text
     for block in re.findall(r"```sql\n(.*?)```", PAGE, re.DOTALL)
@@ -30,15 +31,11 @@ CREATE_RUN, EXAMPLE = (
 )
 
 
-def write(lake: Lake, database: Path, scratch: Path, **more: Any) -> Part:
-    """Write the files of a database into a lake, without a commit."""
-    given: dict[str, Any] = {"source": "here", "options": {}, "content": _ANSWERS}
+def write(lake: Lake, database: Path, scratch: Path) -> Row:
+    """Write the answers of a database into a lake, without a commit."""
+    content = Content(views=False, database=False)
     with Database(database) as opened:
-        return write_part(opened.connection, database, lake.store, scratch, **given | more)
-
-
-def row(part: Part, generation: int = 1, **more: Any) -> dict[str, Any]:
-    return {**part.values, "generation": generation, **more}
+        return write_part(opened.connection, database, lake.store, scratch, content)
 
 
 def read(lake: Lake, sql: str) -> list[tuple[Any, ...]]:
@@ -51,8 +48,8 @@ def read(lake: Lake, sql: str) -> list[tuple[Any, ...]]:
 def rows_of(lake: Lake, table: str) -> list[tuple[Any, ...]]:
     return read(
         lake,
-        f"SELECT t.* EXCLUDE part FROM read_parquet('LAKE/{table}/*/*.parquet', "
-        "hive_partitioning = true) AS t JOIN run USING (run, part) ORDER BY ALL",
+        f"SELECT t.* EXCLUDE part FROM read_parquet('LAKE/{table}/*.parquet') AS t "
+        "JOIN run USING (run, part) ORDER BY ALL",
     )
 
 
@@ -62,30 +59,30 @@ def lake(tmp_path: Path) -> Lake:
 
 
 @pytest.fixture
-def holding(written: tuple[Path, Part, Part], tmp_path: Path) -> tuple[Lake, Part, Part]:
+def holding(written: tuple[Path, Row, Row], tmp_path: Path) -> tuple[Lake, Row, Row]:
     """A copy of it, to change it."""
     shutil.copytree(written[0], tmp_path / "holding")
     return Lake.open(tmp_path / "holding"), *written[1:]
 
 
-def test_a_run_is_there_when_its_row_is(holding: tuple[Lake, Part, Part]) -> None:
+def test_a_run_is_there_when_its_row_is(holding: tuple[Lake, Row, Row]) -> None:
     lake, part, _ = holding
     assert lake.runs().num_rows == 0
     labels = {"robot": 'the "first"', "site": "a\nb, 'c'"}
-    lake.commit([row(part, labels=labels)])
+    lake.commit([{**part, "labels": labels}])
     (run,) = lake.runs().to_pylist()
     assert dict(run["labels"]) == labels
-    assert run["run"] == part.values["run"]
-    assert (run["event_count"], run["name"]) == (part.values["event_count"], "first")
+    assert run["run"] == part["run"]
+    assert (run["event_count"], run["name"]) == (part["event_count"], "first")
     assert read(lake, "SELECT labels['site'] FROM run") == [("a\nb, 'c'",)]
     assert rows_of(lake, "flow")
 
 
 def test_answers_are_those_of_the_database(
-    holding: tuple[Lake, Part, Part], databases: tuple[Path, Path]
+    holding: tuple[Lake, Row, Row], databases: tuple[Path, Path]
 ) -> None:
     lake, part, _ = holding
-    lake.commit([row(part)])
+    lake.commit([part])
     with Database(databases[0]) as database:
         for name in ("e2e-latency", "callbacks", "topics-delivery"):
             expected = database.query(name, internal=True).to_arrow().drop_columns(["run_id"])
@@ -98,9 +95,8 @@ def test_answers_are_those_of_the_database(
             ).to_arrow()
             found = read(
                 lake,
-                f"SELECT * EXCLUDE (run, part) FROM read_parquet('LAKE/view/{view}/*/*.parquet', "
-                "hive_partitioning = true) JOIN (SELECT run, view_part AS part FROM run) "
-                "USING (run, part) ORDER BY ALL",
+                f"SELECT * EXCLUDE (run, part) FROM read_parquet('LAKE/view/{view}/*.parquet') "
+                "JOIN (SELECT run, view_part AS part FROM run) USING (run, part) ORDER BY ALL",
             )
             assert found == [tuple(r.values()) for r in expected_rows.to_pylist()]
         p99 = dict(
@@ -118,19 +114,19 @@ def test_answers_are_those_of_the_database(
     assert len(first) == len(flows)
 
 
-def test_runs_add_up(holding: tuple[Lake, Part, Part]) -> None:
+def test_runs_add_up(holding: tuple[Lake, Row, Row]) -> None:
     """A quantile of several runs, from counts in buckets, is off by less than 1 %."""
     lake, *parts = holding
-    lake.commit(row(part) for part in parts)
+    lake.commit(parts)
     exact = read(
         lake,
         "SELECT quantile_disc(end_ns - start_ns, [0.05, 0.5, 0.9, 0.99, 1])"
-        " FROM read_parquet('LAKE/view/callback_instance/*/*.parquet')",
+        " FROM read_parquet('LAKE/view/callback_instance/*.parquet')",
     )[0][0]
     counted = read(
         lake,
         "WITH b AS (SELECT bucket, sum(count) AS count FROM"
-        " read_parquet('LAKE/distribution/*/*.parquet') WHERE measure = 'callback_duration'"
+        " read_parquet('LAKE/distribution/*.parquet') WHERE measure = 'callback_duration'"
         " GROUP BY bucket), c AS (SELECT bucket, sum(count) OVER (ORDER BY bucket) AS upto,"
         " sum(count) OVER () AS total FROM b), q AS (SELECT unnest([0.05, 0.5, 0.9, 0.99, 1]) AS q)"
         " SELECT q, 2 / 2.02 * pow(1.02, min(bucket) - 1) FROM q, c WHERE upto >= ceil(q * total)"
@@ -139,57 +135,60 @@ def test_runs_add_up(holding: tuple[Lake, Part, Part]) -> None:
     assert [value for _, value in counted] == pytest.approx(exact, rel=0.0101)
 
 
-def test_writing_again_writes_the_same(
-    holding: tuple[Lake, Part, Part], databases: tuple[Path, Path], tmp_path: Path
+def test_writing_again_leaves_what_is_there(
+    holding: tuple[Lake, Row, Row], databases: tuple[Path, Path], tmp_path: Path
 ) -> None:
+    """The rows are the same, in files of their own."""
     lake, first, _ = holding
-    source = "/recordings/first"
     before = {entry.path: lake.store.read(entry.path) for entry in lake.store.entries()}
-    again = write(lake, databases[0], tmp_path, source=source, content=Content())
-    assert again.values == first.values
-    assert {entry.path: lake.store.read(entry.path) for entry in lake.store.entries()} == before
-    # What depends on anything else lies elsewhere.
-    assert first.values["part"] == part_name(first.values["run"], source, {})
-    assert first.values["part"] != part_name(first.values["run"], "there", {})
-    assert first.values["part"] != part_name(first.values["run"], source, {"strict": True})
+    again = write(lake, databases[0], tmp_path)
+    assert first["part"] != again["part"]
+    names = {"part", "view_part", "database_part"}
+    assert {**first, **dict.fromkeys(names)} == {**again, **dict.fromkeys(names)}
+    for answer in answers():
+        one, other = (
+            pq.ParquetFile(lake.store.full(part_path(answer.table, row["part"]))).read()
+            for row in (first, again)
+        )
+        assert one["part"].unique().to_pylist() in ([], [first["part"]])
+        assert one.drop_columns(["part"]).equals(other.drop_columns(["part"]))
+    assert {path: lake.store.read(path) for path in before} == before
 
 
 def test_the_last_row_of_a_run_counts(
-    holding: tuple[Lake, Part, Part], databases: tuple[Path, Path], tmp_path: Path
+    holding: tuple[Lake, Row, Row], databases: tuple[Path, Path], tmp_path: Path
 ) -> None:
     lake, first, other = holding
-    lake.commit([row(first), row(other)])
-    count = len(rows_of(lake, "flow"))
+    lake.commit([first, other])
+    flows = rows_of(lake, "flow")
     # Twice, as by two workers that did the same.
-    lake.commit([row(first)])
-    assert len(rows_of(lake, "flow")) == count
-    replaced = write(lake, databases[0], tmp_path, options={"strict": True})
-    assert len(rows_of(lake, "flow")) == count
-    lake.commit([row(replaced, 2)])
-    assert len(rows_of(lake, "flow")) == count
-    # One that comes late with an earlier generation.
-    lake.commit([row(first, 1)])
-    parts = {run["run"]: run["part"] for run in lake.runs().to_pylist()}
-    assert parts[first.values["run"]] == replaced.values["part"]
-    lake.remove([first.values["run"]])
-    assert [run["run"] for run in lake.runs().to_pylist()] == [other.values["run"]]
-    assert {values[0] for values in rows_of(lake, "flow")} == {other.values["run"]}
+    lake.commit([first])
+    assert rows_of(lake, "flow") == flows
+    replaced = write(lake, databases[0], tmp_path)
+    assert rows_of(lake, "flow") == flows
+    for last in (replaced, first, replaced):
+        lake.commit([last])
+        assert rows_of(lake, "flow") == flows
+        parts = {run["run"]: run["part"] for run in lake.runs().to_pylist()}
+        assert parts[first["run"]] == last["part"]
+    lake.remove([first["run"]])
+    assert [run["run"] for run in lake.runs().to_pylist()] == [other["run"]]
+    assert {values[0] for values in rows_of(lake, "flow")} == {other["run"]}
     with pytest.raises(UsageError, match="no such run"):
-        lake.remove([first.values["run"]])
+        lake.remove([other["run"], first["run"]])
+    assert len(lake.runs()) == 1
 
 
-def test_files_say_what_they_are(holding: tuple[Lake, Part, Part]) -> None:
+def test_files_say_what_they_are(holding: tuple[Lake, Row, Row]) -> None:
     lake, part, _ = holding
-    lake.commit([row(part)])
-    (flow,) = lake.files("flow", lake.runs())
-    (run,) = lake.run_files()
-    (view_part,) = lake.runs()["view_part"].to_pylist()
-    view = view_path("node", view_part)
-    for path, table in ((flow, "flow"), (run, "run"), (view, "node")):
+    lake.commit([part])
+    flow = part_path("flow", part["part"])
+    view = view_path("node", part["view_part"])
+    for path, table in ((flow, "flow"), (run_path(part["run"]), "run"), (view, "node")):
         meta = pq.read_schema(lake.store.full(path)).metadata
         assert meta[b"msgflow.table"] == table.encode()
-        assert meta[b"msgflow.lake_revision"] == b"1"
-        assert meta[b"msgflow.schema_revision"] == part.values["schema_revision"].encode()
+        assert meta[b"msgflow.lake_revision"] == b"2"
+        assert meta[b"msgflow.schema_revision"] == part["schema_revision"].encode()
         assert b"msgflow.version" in meta
 
 
@@ -209,7 +208,8 @@ def test_what_is_no_lake_is_refused(tmp_path: Path) -> None:
         Lake.open_or_create(tmp_path)
     assert sorted(tmp_path.iterdir()) == [tmp_path / "file"]
     for text, words in (
-        ('{"format": "msgflow lake", "revision": 2}', "newer than this msgflow knows"),
+        ('{"format": "msgflow lake", "revision": 3}', "newer than this msgflow knows"),
+        ('{"format": "msgflow lake", "revision": 1}', r"(?s)older than .*ingest .* a new lake"),
         ('{"format": "another"}', "not that of a lake"),
         ("[]", "not that of a lake"),
     ):
@@ -260,40 +260,85 @@ def test_a_file_appears_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     assert store.read("a/b") == b"before"
     assert [entry.path for entry in store.entries()] == ["a/b"]
     store.delete("a/b")
-    assert not (tmp_path / "a").exists()
+    assert store.read("a/b") is None
 
 
-def test_files_of_runs_are_put_together_and_nothing_changes(tmp_path: Path) -> None:
-    lake = Lake.open_or_create(tmp_path / "lake")
-    base = {"generation": 1, "is_removed": False, "schema_revision": "1"}
-    for number in range(9):
-        lake.commit([{**base, "run": f"{number:020}", "part": f"{number}-x"}])
-    lake.remove([f"{3:020}"])
-    before = lake.runs()
-    loose = lake.run_files()
-    assert lake.put_together() == 10
-    assert lake.put_together() == 0
-    # Read by those who know nothing of it, too, and still what counts is read once.
-    assert len(read(lake, "FROM run")) == 8
-    assert lake.runs().equals(before)
-    assert len(lake.rows()) == 10
-    # What the new file stands for is not read any more.
-    lake.store.put(loose[0], b"no parquet")
-    assert Lake.open(tmp_path / "lake").runs().equals(before)
-    lake.commit([{**base, "run": f"{0:020}", "part": "again", "generation": 2}])
-    for number in range(20, 28):
-        lake.commit([{**base, "run": f"{number:020}", "part": f"{number}-x"}])
-    assert lake.runs()["part"][0].as_py() == "again"
-    after = lake.runs()
-    lake.put_together()
-    assert lake.runs().equals(after)
-    kept = set(lake.run_files())
-    assert kept > set(loose)
-    compact(lake, older_than=3600)
-    assert kept < set(lake.run_files())
-    compact(lake, older_than=0)
-    assert len(lake.run_files()) < 3
-    assert lake.runs()["run"].equals(after["run"])
-    lake.store.put(lake.run_files()[0].replace("together-", "together-x"), b"no parquet")
-    with pytest.raises(DatabaseError, match="cannot read the runs"):
-        Lake.open(tmp_path / "lake").runs()
+def content(lake: Lake) -> list[list[tuple[Any, ...]]]:
+    """Return all that somebody without msgflow reads of runs and answers."""
+    runs = read(lake, "SELECT * EXCLUDE (part, committed_ns) FROM run ORDER BY run")
+    return [runs, *(rows_of(lake, answer.table) for answer in answers())]
+
+
+def paths(lake: Lake, *folders: str) -> set[str]:
+    return {entry.path for folder in folders for entry in lake.store.entries(folder)}
+
+
+def test_packing_changes_no_answer(
+    holding: tuple[Lake, Row, Row], databases: tuple[Path, Path], tmp_path: Path
+) -> None:
+    lake, first, other = holding
+    unused = write(lake, databases[0], tmp_path)
+    lake.commit([first, other])
+    before = content(lake)
+    done = pack(lake)
+    assert (done.runs, done.packs) == (2, 1)
+    assert content(lake) == before
+    (part,) = set(lake.runs()["part"].to_pylist())
+    assert paths(lake, "run") == {run_path(part)}
+    assert {part_of(path) for path in paths(lake, *(a.table for a in answers()))} == {part}
+    assert len(paths(lake, "database")) == 2
+    assert pack(lake).deleted == 0
+    # A replaced run has a file of its own again.
+    again = write(lake, databases[0], tmp_path)
+    assert again["part"] != unused["part"]
+    lake.commit([again])
+    assert content(lake)[1:] == before[1:]
+    assert paths(lake, "run") == {run_path(part), run_path(first["run"])}
+    # Neither row is left after a removal.
+    lake.remove([first["run"]])
+    assert lake.run(first["run"], part) is None
+    assert read(lake, "SELECT run FROM run") == [(other["run"],)]
+    assert {row[0] for row in rows_of(lake, "flow")} == {other["run"]}
+    # The pack still has its answers.
+    done = pack(lake)
+    assert (done.runs, done.packs) == (1, 1)
+    (flow,) = paths(lake, "flow")
+    assert set(pq.ParquetFile(lake.store.full(flow)).read()["run"].to_pylist()) == {other["run"]}
+    assert not any(first["run"] in path for path in paths(lake, ""))
+    lake.remove([other["run"]])
+    pack(lake)
+    assert paths(lake, "") == {"lake.json"}
+    assert len(lake.runs()) == 0
+
+
+def test_packs_are_of_one_version_and_not_too_large(
+    holding: tuple[Lake, Row, Row], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lake, first, other = holding
+    keys = [f"{number:020x}" for number in range(5)]
+    for number, key in enumerate(keys):
+        part = f"{key}-0123456789"
+        for answer in answers():
+            table = pq.ParquetFile(lake.store.full(part_path(answer.table, first["part"]))).read()
+            for place, name in enumerate((key, part)):
+                names = pa.array([name] * len(table), pa.string())
+                table = table.set_column(place, ("run", "part")[place], names)
+            lake.put_table(part_path(answer.table, part), answer.table, table, "")
+        lake.commit([{**first, "run": key, "part": part, "start_ns": number}])
+    lake.commit([{**other, "msgflow_version": "0.0.1"}])
+    before = content(lake)
+    monkeypatch.setattr("msgflow.fleet.pack._MOST_RUNS", 2)
+    done = pack(lake)
+    assert (done.runs, done.packs) == (4, 2)
+    parts = {run["run"]: run["part"] for run in lake.runs().to_pylist()}
+    assert parts[keys[0]] == parts[keys[1]] != parts[keys[2]] == parts[keys[3]]
+    assert parts[keys[4]].startswith(keys[4])
+    assert parts[other["run"]] == other["part"]
+    assert content(lake) == before
+    # Full packs stay as they are, until one of their runs is gone.
+    assert pack(lake).packs == 0
+    lake.remove([keys[0]])
+    before = content(lake)
+    done = pack(lake)
+    assert (done.runs, done.packs) == (2, 1)
+    assert content(lake) == before

@@ -16,6 +16,7 @@ from msgflow.fleet.file_store import Store
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.lake_connection import Reading, choose
 from msgflow.fleet.lake_query import fleet_query, fleet_sql, fleet_worst
+from msgflow.fleet.layout import part_path
 from msgflow.fleet.run_database import open_run
 from msgflow.result.query_result import QueryResult
 
@@ -63,7 +64,7 @@ def test_a_label_called_like_a_column_is_not_mistaken(tmp_path: Path) -> None:
     lake = Lake.open_or_create(tmp_path / "lake")
     with pytest.raises(UsageError, match="no run yet"):
         choose(lake)
-    base = {"generation": 1, "is_removed": False, "schema_revision": "1"}
+    base = {"schema_revision": "1"}
     hostile = 'a" || (SELECT 1) || "'
     lake.commit(
         {**base, "run": str(n), "name": f"n{n}", "labels": labels}
@@ -116,7 +117,7 @@ def test_sql_on_a_lake_reads_its_tables_and_changes_no_file(night: Lake, tmp_pat
     # Files of the lake that no table has.
     (lake / "flow" / "other.csv").write_text(f"text\n{SECRET}\n")
     before = content(tmp_path)
-    one = next(path for path in before if path.match("flow/*/*.parquet"))
+    one = next(path for path in before if path.match("flow/*.parquet"))
     files = [one, tmp_path / "other.csv", lake / "flow" / "new.csv"]
     copied = Lake.open(lake)
     runs = fleet_sql(copied, "FROM run").table
@@ -154,11 +155,11 @@ def test_all_tables_are_there_and_rows_of_runs_that_count(night: Lake) -> None:
 
 def test_a_damaged_file_is_said(tmp_path: Path) -> None:
     lake = Lake.open_or_create(tmp_path / "lake")
-    lake.commit([{"run": "1", "generation": 1, "is_removed": False, "part": "1-x"}])
+    lake.commit([{"run": "1", "part": "1-x"}])
     # A table without files is not there.
     with Reading(choose(lake), ["flow"]) as reading, pytest.raises(duckdb.CatalogException):
         reading.connection.execute("FROM flow")
-    lake.store.put("flow/part=1-x/data.parquet", b"no parquet")
+    lake.store.put("flow/1-x.parquet", b"no parquet")
     with pytest.raises(DatabaseError, match="cannot read the lake"):
         Reading(choose(lake), ["flow"])
 
@@ -197,7 +198,7 @@ def test_a_bucket_answers_as_a_folder_does(
         said = str(reading.connection.execute("FROM duckdb_settings()").fetchall())
         assert not any(secret in said for secret in KEYS.values() if "-east-" not in secret)
         with pytest.raises(duckdb.Error):
-            reading.connection.execute("FROM read_parquet('s3://fleet/lake/flow/*/*.parquet')")
+            reading.connection.execute("FROM read_parquet('s3://fleet/lake/flow/*.parquet')")
     target = tmp_path / "back.duckdb"
     assert open_run(lake, "first", target).path == target
     store.refuse_every = 10
@@ -212,7 +213,7 @@ def test_a_bucket_answers_as_a_folder_does(
 def test_a_file_that_is_gone_is_said(in_bucket: tuple[Lake, ObjectStore]) -> None:
     lake, _ = in_bucket
     for number in (2, 0):
-        path = f"flow/part={lake.runs()['part'][number].as_py()}/data.parquet"
+        path = part_path("flow", lake.runs()["part"][number].as_py())
         content = lake.store.read(path)
         assert content is not None
         lake.store.delete(path)
@@ -221,9 +222,7 @@ def test_a_file_that_is_gone_is_said(in_bucket: tuple[Lake, ObjectStore]) -> Non
         lake.store.put(path, content)
     # Of a part that an earlier version wrote, others of it tell that it had the table.
     rows = [row | {"labels": dict(row["labels"] or ())} for row in lake.runs().to_pylist()]
-    lake.commit(
-        row | {"msgflow_version": "0.0.1", "generation": row["generation"] + 1} for row in rows
-    )
-    lake.store.delete(f"flow/part={rows[0]['part']}/data.parquet")
+    lake.commit(row | {"msgflow_version": "0.0.1"} for row in rows)
+    lake.store.delete(part_path("flow", rows[0]["part"]))
     with pytest.raises(DatabaseError, match="a file is gone"):
         fleet_query(lake, "e2e-latency")

@@ -37,34 +37,29 @@ def lake(simulated: Callable[..., Path], tmp_path_factory: pytest.TempPathFactor
     database = simulated("pipeline", 0.01)
     lake = Lake.open_or_create(folder / "lake")
     with Database(database) as opened:
-        part = write_part(
-            opened.connection, database, lake.store, folder, source="here", options={},
-            content=Content(views=False),
-        )  # fmt: skip
+        part = write_part(opened.connection, database, lake.store, folder, Content(views=False))
     tables = {
-        answer.table: pq.ParquetFile(
-            lake.store.full(part_path(answer.table, part.values["part"]))
-        ).read()
+        answer.table: pq.ParquetFile(lake.store.full(part_path(answer.table, part["part"]))).read()
         for answer in answers()
     }
     rows = []
     for number in range(10):
         key = f"{number:020x}"
         for name, table in tables.items():
-            copy = table.set_column(0, "run", pa.array([key] * len(table), pa.string()))
+            keys = pa.array([key] * len(table), pa.string())
+            copy = table.set_column(0, "run", keys).set_column(1, "part", keys)
             if name == "flow" and number == _SLOW:
                 place = copy.column_names.index("latency_ns")
                 copy = copy.set_column(place, "latency_ns", pc.multiply(copy["latency_ns"], 3))
-            lake.put_table(part_path(name, key), name, copy, part.values["schema_revision"])
+            lake.put_table(part_path(name, key), name, copy, part["schema_revision"])
         rows.append(
             {
-                **part.values,
+                **part,
                 "run": key,
                 "part": key,
-                "generation": 1,
                 "name": HOSTILE[number % len(HOSTILE)],
                 "source": HOSTILE[number % len(HOSTILE)],
-                "start_ns": part.values["start_ns"] + number * _DAY,
+                "start_ns": part["start_ns"] + number * _DAY,
                 "labels": {
                     "software_version": "1.0" if number < 5 else "1.1",
                     "robot": HOSTILE[number % len(HOSTILE)],

@@ -1,0 +1,224 @@
+"""Packs: the answers of many runs in few, large files. What no run needs any more is deleted.
+
+It works offline. A pack counts from the moment when the rows of its runs are written; until then
+all runs are as they were, so that an end in between does no harm.
+"""
+
+from __future__ import annotations
+
+import shlex
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from msgflow.errors import DatabaseError
+from msgflow.fleet.answers import answers
+from msgflow.fleet.lake import later_than
+from msgflow.fleet.layout import (
+    DATABASE,
+    FAILURE,
+    RUN,
+    VIEWS,
+    new_pack,
+    packed_runs,
+    part_of,
+    part_path,
+)
+from msgflow.fleet.parquet import read_parquet
+from msgflow.version import __version__
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    import pyarrow as pa
+
+    from msgflow.fleet.file_store import Entry
+    from msgflow.fleet.lake import Lake
+
+# Size of one pack: each of its tables is held in memory, and it is written again when one of its
+# runs is removed.
+_MOST_RUNS = 1_000
+_MOST_BYTES = 50_000_000
+_READ_AT_ONCE = 16
+
+
+@dataclass(frozen=True)
+class Packed:
+    """What was packed.
+
+    Attributes:
+        runs: runs whose answers are in a new part now.
+        packs: new parts.
+        deleted: deleted files.
+        size: their bytes.
+    """
+
+    runs: int
+    packs: int
+    deleted: int
+    size: int
+
+
+def pack(lake: Lake) -> Packed:
+    """Put the answers of many runs together, and delete files that no run needs.
+
+    No other process may use the lake meanwhile.
+    """
+    with lake.writing(alone=True):
+        runs = lake.runs().to_pylist()
+        sizes = Counter[str]()
+        for answer in answers():
+            for entry in lake.store.entries(answer.table):
+                sizes[part_of(entry.path) or ""] += entry.size
+        groups = _groups(runs, sizes)
+        for group in groups:
+            _pack(lake, group)
+        deleted = _clean_up(lake)
+    return Packed(
+        sum(map(len, groups)), len(groups), len(deleted), sum(entry.size for entry in deleted)
+    )
+
+
+def _groups(
+    runs: Sequence[Mapping[str, Any]], sizes: Mapping[str, int]
+) -> list[list[Mapping[str, Any]]]:
+    """Return groups of runs, each of one version, whose answers are to go into one part."""
+    living = Counter(row["part"] for row in runs if row["part"] is not None)
+    full = {
+        part
+        for part in living
+        if living[part] == packed_runs(part)
+        and (living[part] > _MOST_RUNS // 2 or sizes[part] > _MOST_BYTES // 2)
+    }
+    loose = [row for row in runs if row["part"] is not None and row["part"] not in full]
+    loose.sort(key=lambda row: (*_version(row), row["start_ns"] or 0, row["run"]))
+    groups: list[list[Mapping[str, Any]]] = [[]]
+    size = 0.0
+    for row in loose:
+        share = sizes[row["part"]] / living[row["part"]]
+        last = groups[-1]
+        if last and (
+            size + share > _MOST_BYTES
+            or len(last) == _MOST_RUNS
+            or _version(last[-1]) != _version(row)
+        ):
+            groups.append([])
+            size = 0.0
+        groups[-1].append(row)
+        size += share
+    # In several parts, or in one with runs that are gone.
+    return [
+        group
+        for group in groups
+        if len(parts := {row["part"] for row in group}) > 1
+        or any(packed_runs(part) > living[part] for part in parts)
+    ]
+
+
+def _version(row: Mapping[str, Any]) -> tuple[str, str]:
+    return row["schema_revision"] or "", row["msgflow_version"] or ""
+
+
+def _pack(lake: Lake, rows: Sequence[Mapping[str, Any]]) -> None:
+    part = new_pack(len(rows))
+    for answer in answers():
+        table = _together(lake, answer.table, rows, part)
+        if table is not None:
+            lake.put_table(
+                part_path(answer.table, part), answer.table, table, rows[0]["schema_revision"] or ""
+            )
+    lake.put_runs(part, [{**row, "part": part, "committed_ns": later_than(row)} for row in rows])
+
+
+def _together(
+    lake: Lake, table: str, rows: Sequence[Mapping[str, Any]], pack: str
+) -> pa.Table | None:
+    """Return the answers of some runs, run after run; None if no part has the table."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    wanted: dict[str, list[str]] = {}
+    for row in rows:
+        wanted.setdefault(row["part"], []).append(row["run"])
+    with ThreadPoolExecutor(_READ_AT_ONCE) as pool:
+        read = pool.map(lambda part: _read(lake, table, part, wanted[part]), wanted)
+        found = dict(zip(wanted, read, strict=True))
+    there = {part: rows for part, rows in found.items() if rows is not None}
+    # Those of an earlier msgflow may all lack the table.
+    if not there and rows[0]["msgflow_version"] != __version__:
+        return None
+    for part, runs in wanted.items():
+        if part not in there:
+            raise _unusable(lake, table, part, runs, "it is missing")
+        first = next(iter(there))
+        if there[part].schema != there[first].schema:
+            other = lake.store.url_of(part_path(table, first))
+            raise _unusable(lake, table, part, runs, f"it differs from {other}")
+    whole = pa.concat_tables(there.values())
+    names = pa.repeat(pa.scalar(pack), len(whole))
+    whole = whole.set_column(whole.column_names.index("part"), "part", names)
+    # The sort is stable: the rows of a run keep their order.
+    return whole.take(pc.sort_indices(whole["run"]))
+
+
+def _read(lake: Lake, table: str, part: str, runs: Sequence[str]) -> pa.Table | None:
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    content = lake.store.read(part_path(table, part))
+    if content is None:
+        return None
+    with _usable(lake, table, part, runs):
+        read = read_parquet(content)
+        is_wanted = pc.is_in(read["run"], value_set=pa.array(runs, pa.string()))
+        return read.filter(pc.and_(is_wanted, pc.equal(read["part"], part)))
+
+
+@contextmanager
+def _usable(lake: Lake, table: str, part: str, runs: Sequence[str]) -> Iterator[None]:
+    """Turn errors of the content of a file into a DatabaseError that names it."""
+    import pyarrow as pa
+
+    try:
+        yield
+    except (pa.ArrowException, KeyError, OSError) as error:
+        words = (str(error).strip().splitlines() or [type(error).__name__])[0]
+        raise _unusable(lake, table, part, runs, words) from error
+
+
+def _unusable(lake: Lake, table: str, part: str, runs: Sequence[str], why: str) -> DatabaseError:
+    return DatabaseError(
+        f"a file of the lake cannot be used: {why} — {lake.store.url_of(part_path(table, part))}",
+        f"{shlex.join(['msgflow', 'fleet', 'remove', runs[0], '--lake', lake.store.url])};"
+        " ingest it again",
+    )
+
+
+def _clean_up(lake: Lake) -> list[Entry]:
+    """Delete the files of the table `run` of which no row counts, and those that no row names."""
+    runs = lake.runs().to_pylist()
+    counting = {(row["run"], row["part"]) for row in runs}
+    over = {
+        path
+        for path, rows in lake.rows_by_file().items()
+        if counting.isdisjoint(zip(rows["run"].to_pylist(), rows["part"].to_pylist(), strict=True))
+    }
+    unneeded = [entry for entry in lake.store.entries(RUN) if entry.path in over]
+    needed = {
+        **{answer.table: {row["part"] for row in runs} for answer in answers()},
+        VIEWS: {row["view_part"] for row in runs},
+        DATABASE: {row["database_part"] for row in runs},
+    }
+    for folder, parts in needed.items():
+        unneeded += [
+            entry
+            for entry in lake.store.entries(folder)
+            if (part := part_of(entry.path)) is not None and part not in parts
+        ]
+    for folder in (RUN, FAILURE):
+        unneeded += [entry for entry in lake.store.entries(folder) if part_of(entry.path) == ""]
+    for entry in unneeded:
+        lake.store.delete(entry.path)
+    return unneeded
