@@ -4,15 +4,11 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-import pyarrow as pa
-import pyarrow.compute as pc
-import pyarrow.parquet as pq
 import pytest
+from lakes import copied
 
 from msgflow import Database
-from msgflow.fleet.answers import answers
 from msgflow.fleet.lake import Lake
-from msgflow.fleet.layout import new_part, part_path
 from msgflow.fleet.part import Content, write_part
 from msgflow.ingest import ingest
 from msgflow_sim import simulate
@@ -63,26 +59,9 @@ def night(
         {**part, "labels": given, "source": f"/recordings/{part['name']}"}
         for part, given in zip(parts, labels, strict=True)
     ]
-    first = rows[0]
-    copy = {
-        **first,
-        "run": COPY,
-        "part": new_part(COPY),
-        "view_part": None,
-        "database_part": None,
+    copy = copied(lake, rows[0], COPY, slower=2) | {
         "name": "copy",
         "labels": {"robot": "r1", "software_version": "1.1"},
     }
-    for answer in answers():
-        table = pq.ParquetFile(lake.store.full(part_path(answer.table, first["part"]))).read()
-        for place, name in enumerate(("run", "part")):
-            names = pa.array([copy[name]] * len(table), pa.string())
-            table = table.set_column(place, name, names)
-        if answer.table == "flow":
-            place = table.column_names.index("latency_ns")
-            table = table.set_column(place, "latency_ns", pc.multiply(table["latency_ns"], 2))
-        lake.put_table(
-            part_path(answer.table, copy["part"]), answer.table, table, first["schema_revision"]
-        )
     lake.commit([*rows, copy])
     return lake

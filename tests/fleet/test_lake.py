@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import re
 import shutil
 from pathlib import Path
 from typing import Any
 
-import duckdb
-import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from lakes import EXAMPLE, PAGE, content, copied, paths, read, rows_of
 
 from msgflow import Database
 from msgflow.errors import DatabaseError, UsageError
@@ -21,14 +19,7 @@ from msgflow.fleet.layout import part_of, part_path, run_path, run_schema, view_
 from msgflow.fleet.pack import pack
 from msgflow.fleet.part import Content, write_part
 
-DOCS = Path(__file__).resolve().parents[2] / "docs" / "fleet.md"
-PAGE = DOCS.read_text(encoding="utf-8")
 Row = dict[str, Any]
-CREATE_RUN, EXAMPLE = (
-    text
-    for block in re.findall(r"```sql\n(.*?)```", PAGE, re.DOTALL)
-    for text in block.split("\n\n")
-)
 
 
 def write(lake: Lake, database: Path, scratch: Path) -> Row:
@@ -36,21 +27,6 @@ def write(lake: Lake, database: Path, scratch: Path) -> Row:
     content = Content(views=False, database=False)
     with Database(database) as opened:
         return write_part(opened.connection, database, lake.store, scratch, content)
-
-
-def read(lake: Lake, sql: str) -> list[tuple[Any, ...]]:
-    """Return what SQL of the docs returns, of somebody who has no msgflow."""
-    with duckdb.connect() as con:
-        con.execute(CREATE_RUN.replace("LAKE", lake.store.url))
-        return con.execute(sql.replace("LAKE", lake.store.url)).fetchall()
-
-
-def rows_of(lake: Lake, table: str) -> list[tuple[Any, ...]]:
-    return read(
-        lake,
-        f"SELECT t.* EXCLUDE part FROM read_parquet('LAKE/{table}/*.parquet') AS t "
-        "JOIN run USING (run, part) ORDER BY ALL",
-    )
 
 
 @pytest.fixture
@@ -263,21 +239,11 @@ def test_a_file_appears_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     assert store.read("a/b") is None
 
 
-def content(lake: Lake) -> list[list[tuple[Any, ...]]]:
-    """Return all that somebody without msgflow reads of runs and answers."""
-    runs = read(lake, "SELECT * EXCLUDE (part, committed_ns) FROM run ORDER BY run")
-    return [runs, *(rows_of(lake, answer.table) for answer in answers())]
-
-
-def paths(lake: Lake, *folders: str) -> set[str]:
-    return {entry.path for folder in folders for entry in lake.store.entries(folder)}
-
-
 def test_packing_changes_no_answer(
     holding: tuple[Lake, Row, Row], databases: tuple[Path, Path], tmp_path: Path
 ) -> None:
     lake, first, other = holding
-    unused = write(lake, databases[0], tmp_path)
+    copied(lake, first, first["run"])
     lake.commit([first, other])
     before = content(lake)
     done = pack(lake)
@@ -290,7 +256,6 @@ def test_packing_changes_no_answer(
     assert pack(lake).deleted == 0
     # A replaced run has a file of its own again.
     again = write(lake, databases[0], tmp_path)
-    assert again["part"] != unused["part"]
     lake.commit([again])
     assert content(lake)[1:] == before[1:]
     assert paths(lake, "run") == {run_path(part), run_path(first["run"])}
@@ -317,14 +282,7 @@ def test_packs_are_of_one_version_and_not_too_large(
     lake, first, other = holding
     keys = [f"{number:020x}" for number in range(5)]
     for number, key in enumerate(keys):
-        part = f"{key}-0123456789"
-        for answer in answers():
-            table = pq.ParquetFile(lake.store.full(part_path(answer.table, first["part"]))).read()
-            for place, name in enumerate((key, part)):
-                names = pa.array([name] * len(table), pa.string())
-                table = table.set_column(place, ("run", "part")[place], names)
-            lake.put_table(part_path(answer.table, part), answer.table, table, "")
-        lake.commit([{**first, "run": key, "part": part, "start_ns": number}])
+        lake.commit([{**copied(lake, first, key), "start_ns": number}])
     lake.commit([{**other, "msgflow_version": "0.0.1"}])
     before = content(lake)
     monkeypatch.setattr("msgflow.fleet.pack._MOST_RUNS", 2)

@@ -4,23 +4,18 @@ from __future__ import annotations
 
 import re
 import shutil
-from pathlib import Path
 from typing import Any
 
-import duckdb
 import pytest
+from lakes import PAGE, read
 
 from msgflow.fleet.lake import Lake
 
 pytest.importorskip("pyspark", reason="pyspark is not installed")
 pytestmark = pytest.mark.skipif(shutil.which("java") is None, reason="there is no Java")
 
-PAGE = (Path(__file__).resolve().parents[2] / "docs" / "fleet.md").read_text(encoding="utf-8")
 (LINES,) = (
     block for block in re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL) if "spark.read" in block
-)
-CREATE_RUN, _ = next(
-    block.split("\n\n") for block in re.findall(r"```sql\n(.*?)```", PAGE, re.DOTALL)
 )
 
 
@@ -29,7 +24,7 @@ def test_spark_finds_what_duckdb_finds(night: Lake) -> None:
 
     # One that no longer counts.
     (first, *_) = night.runs().to_pylist()
-    night.commit([{**first, "generation": 0, "part": "gone"}])
+    night.put_runs("pack-0000000000000000-1", [{**first, "committed_ns": 0, "part": "gone"}])
     spark = (
         SparkSession.builder.master("local[1]")
         .config("spark.ui.enabled", "false")
@@ -43,12 +38,10 @@ def test_spark_finds_what_duckdb_finds(night: Lake) -> None:
         labels = given["run"].selectExpr("labels['robot'] AS robot").orderBy("robot").collect()
     finally:
         spark.stop()
-    with duckdb.connect() as con:
-        con.execute(CREATE_RUN.replace("LAKE", night.store.url))
-        expected = con.execute(
-            "SELECT path, count(*) FROM"
-            f" read_parquet('{night.store.url}/flow/*/*.parquet', hive_partitioning = true)"
-            " JOIN run USING (run, part) GROUP BY path ORDER BY path"
-        ).fetchall()
+    expected = read(
+        night,
+        "SELECT path, count(*) FROM read_parquet('LAKE/flow/*.parquet')"
+        " JOIN run USING (run, part) GROUP BY path ORDER BY path",
+    )
     assert [tuple(row) for row in rows] == expected
     assert len(labels) == 3

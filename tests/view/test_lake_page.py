@@ -6,23 +6,19 @@ import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-import pyarrow as pa
-import pyarrow.compute as pc
-import pyarrow.parquet as pq
 import pytest
 from hostile import HOSTILE
+from lakes import copied
 from served import Page, shown
 from typer.testing import CliRunner
 
 from msgflow import Database
 from msgflow.cli.app import app
 from msgflow.errors import UsageError
-from msgflow.fleet.answers import answers
 from msgflow.fleet.failure import write_failure
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.lake_page import lake_page, write_lake_page
 from msgflow.fleet.lake_query import fleet_query
-from msgflow.fleet.layout import part_path
 from msgflow.fleet.part import Content, write_part
 from msgflow.view.server import listening, single_application
 
@@ -38,35 +34,21 @@ def lake(simulated: Callable[..., Path], tmp_path_factory: pytest.TempPathFactor
     lake = Lake.open_or_create(folder / "lake")
     with Database(database) as opened:
         part = write_part(opened.connection, database, lake.store, folder, Content(views=False))
-    tables = {
-        answer.table: pq.ParquetFile(lake.store.full(part_path(answer.table, part["part"]))).read()
-        for answer in answers()
-    }
-    rows = []
-    for number in range(10):
-        key = f"{number:020x}"
-        for name, table in tables.items():
-            keys = pa.array([key] * len(table), pa.string())
-            copy = table.set_column(0, "run", keys).set_column(1, "part", keys)
-            if name == "flow" and number == _SLOW:
-                place = copy.column_names.index("latency_ns")
-                copy = copy.set_column(place, "latency_ns", pc.multiply(copy["latency_ns"], 3))
-            lake.put_table(part_path(name, key), name, copy, part["schema_revision"])
-        rows.append(
-            {
-                **part,
-                "run": key,
-                "part": key,
-                "name": HOSTILE[number % len(HOSTILE)],
-                "source": HOSTILE[number % len(HOSTILE)],
-                "start_ns": part["start_ns"] + number * _DAY,
-                "labels": {
-                    "software_version": "1.0" if number < 5 else "1.1",
-                    "robot": HOSTILE[number % len(HOSTILE)],
-                    HOSTILE[0]: HOSTILE[1],
-                },
-            }
-        )
+    rows = [
+        {
+            **copied(lake, part, f"{number:020x}", slower=3 if number == _SLOW else 1),
+            "database_part": part["part"],
+            "name": HOSTILE[number % len(HOSTILE)],
+            "source": HOSTILE[number % len(HOSTILE)],
+            "start_ns": part["start_ns"] + number * _DAY,
+            "labels": {
+                "software_version": "1.0" if number < 5 else "1.1",
+                "robot": HOSTILE[number % len(HOSTILE)],
+                HOSTILE[0]: HOSTILE[1],
+            },
+        }
+        for number in range(10)
+    ]
     lake.commit(rows)
     for text in HOSTILE:
         write_failure(
