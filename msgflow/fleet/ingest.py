@@ -274,8 +274,7 @@ class _Ingest:
 
     def _as_it_is_now(self, key: str) -> Mapping[str, Any] | None:
         """Read a run again, as another process may have written, replaced or removed it."""
-        known = self._runs.get(key)
-        row = self._lake.run(key, known and known["part"])
+        row = self._lake.run(key)
         self._know(key, row)
         return row
 

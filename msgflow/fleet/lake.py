@@ -2,7 +2,7 @@
 
 The file `run/KEY.parquet` makes a run visible, and takes the place of an earlier one at once. The
 part that it names is complete before, and no file of a part ever changes. `pack` puts the rows of
-many runs into one file; of several rows of a run the last one counts.
+all runs into one file; a run that is replaced afterwards has its own file again, which counts.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from msgflow.fleet.file_store import Store
 from msgflow.fleet.layout import (
     ABOUT,
     LAKE_REVISION,
+    PACKED,
     RUN,
     about,
     metadata,
-    packed_runs,
     require_readable,
     run_path,
     run_schema,
@@ -96,7 +96,14 @@ class Lake:
         if con is None:
             with open_memory() as con:
                 return self.runs(con)
-        tables = list(self.rows_by_file().values())
+        names = [
+            entry.path.removeprefix(f"{RUN}/").removesuffix(".parquet")
+            for entry in self.store.entries(RUN, recursive=False)
+            if entry.path.endswith(".parquet")
+        ]
+        with ThreadPoolExecutor(_READ_AT_ONCE) as pool:
+            # One that is gone by now was removed meanwhile.
+            tables = [rows for rows in pool.map(self._rows, names) if rows is not None]
         # Only if needed: making an empty table imports pandas if that is installed.
         rows = pa.concat_tables(tables) if tables else run_schema().empty_table()
         # SQL, as importing pyarrow.compute takes longer.
@@ -105,40 +112,21 @@ class Lake:
         con.unregister("known")
         return pa.Table.from_arrays(found.columns, schema=rows.schema)
 
-    def rows_by_file(self) -> dict[str, pa.Table]:
-        """Return the rows of the table `run` by file, also those that no longer count."""
-        paths = self._run_files()
-        with ThreadPoolExecutor(_READ_AT_ONCE) as pool:
-            tables = list(pool.map(self._rows, paths))
-        return {path: rows for path, rows in zip(paths, tables, strict=True) if rows is not None}
-
-    def run(self, key: str, part: str | None) -> dict[str, Any] | None:
-        """Return the row of a run as it is now, None if the lake has no such run.
-
-        Args:
-            key: of the run.
-            part: the one that it had before, in which it may be packed.
-        """
-        for name in (key, *([part] if part is not None and packed_runs(part) else ())):
-            rows = self._rows(run_path(name))
+    def run(self, key: str) -> dict[str, Any] | None:
+        """Return the row of a run as it is now, None if the lake has no such run."""
+        for name in (key, PACKED):
+            rows = self._rows(name)
             for row in rows.to_pylist() if rows is not None else ():
                 if row["run"] == key:
                     return dict(row)
         return None
 
-    def _run_files(self) -> list[str]:
-        return [
-            entry.path
-            for entry in self.store.entries(RUN, recursive=False)
-            if entry.path.endswith(".parquet")
-        ]
-
-    def _rows(self, path: str) -> pa.Table | None:
-        """Return the rows of a file of the table `run`, None if it is gone."""
+    def _rows(self, name: str) -> pa.Table | None:
+        """Return the rows of a file of the table `run`, None if there is no such file."""
         import pyarrow as pa
 
-        url = self.store.url_of(path)
-        content = self.store.read(path)
+        url = self.store.url_of(run_path(name))
+        content = self.store.read(run_path(name))
         if content is None:
             return None
         try:
@@ -149,7 +137,7 @@ class Lake:
                 f"cannot read the runs of the lake: {line} — {url}",
                 "check that nobody else than msgflow has written there",
             ) from error
-        _require_sound(rows, _name(path), url)
+        _require_sound(rows, name, url)
         return rows
 
     def commit(self, rows: Iterable[Mapping[str, Any]]) -> None:
@@ -159,12 +147,15 @@ class Lake:
         the row before.
         """
         for row in rows:
-            # Even if the clocks of machines differ.
-            moment = max(time.time_ns(), later_than(row))
-            self.put_runs(row["run"], [{**row, "committed_ns": moment}])
+            # Later than the row before, even if the clocks of machines differ.
+            moment = max(time.time_ns(), (row.get("committed_ns") or 0) + 1)
+            self._put_runs(row["run"], [{**row, "committed_ns": min(moment, _MOST)}])
 
-    def put_runs(self, name: str, rows: Sequence[Mapping[str, Any]]) -> None:
-        """Write a file of the table `run`: of one run by its key, or of those of a pack."""
+    def pack_runs(self, rows: Sequence[Mapping[str, Any]]) -> None:
+        """Write all rows of the table `run` into one file, in place of all others."""
+        self._put_runs(PACKED, rows)
+
+    def _put_runs(self, name: str, rows: Sequence[Mapping[str, Any]]) -> None:
         import pyarrow as pa
 
         whole = [
@@ -172,7 +163,7 @@ class Lake:
             for row in rows
         ]
         table = pa.Table.from_pylist(whole, schema=run_schema())
-        revision = max(row["schema_revision"] or "" for row in whole)
+        revision = max((row["schema_revision"] or "" for row in whole), default="")
         self.put_table(run_path(name), RUN, table, revision)
 
     def remove(self, keys: Iterable[str]) -> int:
@@ -181,28 +172,24 @@ class Lake:
         Returns:
             Their number, without keys that are given twice.
         """
-        wanted = set(keys)
-        # Of two that take runs out of one pack, the second would bring the first one's back.
+        wanted = dict.fromkeys(keys)
+        # Of two at the same time, the second would write again what the first one took out.
         with self._locked(RUN, fcntl.LOCK_EX):
-            found = {
-                path: rows.to_pylist()
-                # A pack first: its row of a run counts if the run's own file is gone.
-                for path in reversed(self._run_files())
-                if (_name(path) in wanted or packed_runs(_name(path)))
-                and (rows := self._rows(path)) is not None
-            }
-            unknown = wanted - {row["run"] for rows in found.values() for row in rows}
-            if unknown:
-                raise UsageError(
-                    f"the lake has no such run — {min(unknown)}",
-                    f"msgflow fleet runs --lake {shlex.quote(self.store.url)}",
-                )
-            for path, rows in found.items():
-                kept = [row for row in rows if row["run"] not in wanted]
-                if not kept:
-                    self.store.delete(path)
-                elif len(kept) < len(rows):
-                    self.put_runs(_name(path), kept)
+            rows = self._rows(PACKED)
+            packed = rows.to_pylist() if rows is not None else []
+            kept = [row for row in packed if row["run"] not in wanted]
+            here = {row["run"] for row in packed}
+            for key in wanted:
+                if key not in here and self._rows(key) is None:
+                    raise UsageError(
+                        f"the lake has no such run — {key}",
+                        f"msgflow fleet runs --lake {shlex.quote(self.store.url)}",
+                    )
+            # This first: else the earlier row would count, once the own file of the run is gone.
+            if len(kept) < len(packed):
+                self.pack_runs(kept)
+            for key in wanted:
+                self.store.delete(run_path(key))
         return len(wanted)
 
     def put_table(self, path: str, table_name: str, table: pa.Table, revision: str) -> None:
@@ -255,11 +242,6 @@ class Lake:
             os.close(descriptor)
 
 
-def later_than(row: Mapping[str, Any]) -> int:
-    """Return a moment for a row that is to count in place of another one of its run [epoch ns]."""
-    return min((row.get("committed_ns") or 0) + 1, _MOST)
-
-
 def _require_sound(rows: pa.Table, name: str, url: str) -> None:
     """Raise unless rows of the table `run` have what their order and their files depend on."""
     lacking = [column for column in ("run", "committed_ns") if rows[column].null_count]
@@ -269,7 +251,7 @@ def _require_sound(rows: pa.Table, name: str, url: str) -> None:
         what = f"a row without {lacking[0]}"
     elif unfit:
         what = f"a {unfit[0]} that is no name"
-    elif not packed_runs(name) and names["run"] != [name]:
+    elif name != PACKED and names["run"] != [name]:
         what = "a file with another name than its run"
     else:
         return
@@ -277,7 +259,3 @@ def _require_sound(rows: pa.Table, name: str, url: str) -> None:
         f"cannot read the runs of the lake: {what} — {url}",
         "delete this file; the recordings of its runs have to be ingested again",
     )
-
-
-def _name(path: str) -> str:
-    return path.rpartition("/")[2].removesuffix(".parquet")

@@ -8,7 +8,6 @@ from __future__ import annotations
 import json
 import re
 import secrets
-import time
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -21,11 +20,12 @@ if TYPE_CHECKING:
 LAKE_REVISION = 2
 ABOUT = "lake.json"
 RUN = "run"
+PACKED = "packed"
 FAILURE = "fleet_failure"
 VIEWS = "view"
 DATABASE = "database"
 _FORMAT = "msgflow lake"
-_PACK = re.compile(r"pack-[0-9a-f]{16}-(\d{1,9})")
+_PACK = re.compile(r"pack-[0-9a-f]{10}-(\d{1,9})")
 # A name without a part is one of a killed writer: it has a dot before it and .part behind.
 _FILE = re.compile(
     rf"(?:.+/)?(?:(?P<part>[0-9a-f]{{20}}-[0-9a-f]{{10}}|{_PACK.pattern})\.(?:parquet|duckdb\.zst)"
@@ -67,8 +67,8 @@ def new_part(run: str) -> str:
 
 
 def new_pack(runs: int) -> str:
-    """Return the name of a new part with the answers of many runs; later ones sort behind."""
-    return f"pack-{time.time_ns():016x}-{runs}"
+    """Return the name of a new part with the answers of many runs, and their number."""
+    return f"pack-{secrets.token_hex(5)}-{runs}"
 
 
 def packed_runs(part: str) -> int:
@@ -78,7 +78,7 @@ def packed_runs(part: str) -> int:
 
 
 def run_path(name: str) -> str:
-    """Return the path of a row of the table `run`, by its key, or of the rows of a pack."""
+    """Return the path of the row of a run, by its key, or of all that were `PACKED`."""
     return f"{RUN}/{name}.parquet"
 
 

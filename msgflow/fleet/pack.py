@@ -1,7 +1,7 @@
 """Packs: the answers of many runs in few, large files. What no run needs any more is deleted.
 
-It works offline. A pack counts from the moment when the rows of its runs are written; until then
-all runs are as they were, so that an end in between does no harm.
+It works offline. All packs count from the moment when the file with the rows of all runs is there;
+until then all runs are as they were, so that an end in between does no harm.
 """
 
 from __future__ import annotations
@@ -15,22 +15,21 @@ from typing import TYPE_CHECKING, Any
 
 from msgflow.errors import DatabaseError
 from msgflow.fleet.answers import answers
-from msgflow.fleet.lake import later_than
 from msgflow.fleet.layout import (
     DATABASE,
-    FAILURE,
     RUN,
     VIEWS,
     new_pack,
     packed_runs,
     part_of,
     part_path,
+    run_path,
 )
 from msgflow.fleet.parquet import read_parquet
 from msgflow.version import __version__
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     import pyarrow as pa
 
@@ -73,9 +72,14 @@ def pack(lake: Lake) -> Packed:
             for entry in lake.store.entries(answer.table):
                 sizes[part_of(entry.path) or ""] += entry.size
         groups = _groups(runs, sizes)
+        packed = {row["run"]: row for row in runs}
         for group in groups:
-            _pack(lake, group)
-        deleted = _clean_up(lake)
+            part = _pack(lake, group)
+            packed |= {row["run"]: {**row, "part": part} for row in group}
+        own = {run_path(key) for key in packed}
+        if groups or own.intersection(entry.path for entry in lake.store.entries(RUN)):
+            lake.pack_runs(list(packed.values()))
+        deleted = _clean_up(lake, own, packed.values())
     return Packed(
         sum(map(len, groups)), len(groups), len(deleted), sum(entry.size for entry in deleted)
     )
@@ -121,7 +125,8 @@ def _version(row: Mapping[str, Any]) -> tuple[str, str]:
     return row["schema_revision"] or "", row["msgflow_version"] or ""
 
 
-def _pack(lake: Lake, rows: Sequence[Mapping[str, Any]]) -> None:
+def _pack(lake: Lake, rows: Sequence[Mapping[str, Any]]) -> str:
+    """Write the answers of some runs into a new part."""
     part = new_pack(len(rows))
     for answer in answers():
         table = _together(lake, answer.table, rows, part)
@@ -129,7 +134,7 @@ def _pack(lake: Lake, rows: Sequence[Mapping[str, Any]]) -> None:
             lake.put_table(
                 part_path(answer.table, part), answer.table, table, rows[0]["schema_revision"] or ""
             )
-    lake.put_runs(part, [{**row, "part": part, "committed_ns": later_than(row)} for row in rows])
+    return part
 
 
 def _together(
@@ -196,16 +201,11 @@ def _unusable(lake: Lake, table: str, part: str, runs: Sequence[str], why: str) 
     )
 
 
-def _clean_up(lake: Lake) -> list[Entry]:
-    """Delete the files of the table `run` of which no row counts, and those that no row names."""
-    runs = lake.runs().to_pylist()
-    counting = {(row["run"], row["part"]) for row in runs}
-    over = {
-        path
-        for path, rows in lake.rows_by_file().items()
-        if counting.isdisjoint(zip(rows["run"].to_pylist(), rows["part"].to_pylist(), strict=True))
-    }
-    unneeded = [entry for entry in lake.store.entries(RUN) if entry.path in over]
+def _clean_up(lake: Lake, own: set[str], runs: Iterable[Mapping[str, Any]]) -> list[Entry]:
+    """Delete the runs' own files of the table `run`, then the files of parts that no run names."""
+    unneeded = [
+        entry for entry in lake.store.entries(RUN) if entry.path in own or part_of(entry.path) == ""
+    ]
     needed = {
         **{answer.table: {row["part"] for row in runs} for answer in answers()},
         VIEWS: {row["view_part"] for row in runs},
@@ -217,8 +217,6 @@ def _clean_up(lake: Lake) -> list[Entry]:
             for entry in lake.store.entries(folder)
             if (part := part_of(entry.path)) is not None and part not in parts
         ]
-    for folder in (RUN, FAILURE):
-        unneeded += [entry for entry in lake.store.entries(folder) if part_of(entry.path) == ""]
     for entry in unneeded:
         lake.store.delete(entry.path)
     return unneeded

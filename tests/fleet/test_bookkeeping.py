@@ -165,7 +165,7 @@ def test_labels_are_those_of_the_part_that_counts(place: Path) -> None:
 
     def replace(progress: FleetProgress) -> None:
         lake = Lake.open("lake")
-        row = lake.run("second", None)
+        row = lake.run("second")
         if row is not None and row["part"] != "other":
             lake.commit([row | {"part": "other", "labels": {}}])
 

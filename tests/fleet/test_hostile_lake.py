@@ -123,7 +123,7 @@ def test_a_part_cannot_lead_out_of_the_lake(lake: Lake) -> None:
 
 
 def test_a_run_cannot_lead_out_of_the_lake(lake: Lake) -> None:
-    lake.put_runs("pack-0000000000000000-1", [{"run": "../victim", "committed_ns": 1}])
+    lake.pack_runs([{"run": "../victim", "committed_ns": 1}])
     with pytest.raises(DatabaseError, match="a run that is no name"):
         lake.remove(["../victim"])
 
@@ -148,7 +148,7 @@ def test_a_row_without_what_counts_names_its_file(lake: Lake, column: str) -> No
     [
         {"part": None},
         {"part": "p", "committed_ns": LARGEST},
-        {"part": "pack-0000000000000000-1", "view_part": None},
+        {"part": "pack-0000000000-1", "view_part": None},
     ],
 )
 def test_a_strange_run_can_be_removed(lake: Lake, values: dict[str, Any]) -> None:
@@ -287,7 +287,7 @@ def test_packing_loses_no_answers_that_are_elsewhere(lake: Lake, is_linked: bool
 
 
 def test_commands_are_quoted(lake: Lake) -> None:
-    lake.put_runs("x; touch PWN", [{"run": "x; touch PWN", "committed_ns": 1, "name": "$(PWN)"}])
+    lake.commit([{"run": "x; touch PWN", "name": "$(touch PWN)"}])
     listed = CliRunner().invoke(app, ["fleet", "open", "no such", "--lake", f"{lake.store.url}/."])
     assert listed.exit_code == 2
     with pytest.raises(UsageError) as raised:

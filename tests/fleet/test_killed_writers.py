@@ -16,7 +16,7 @@ from lakes import content, copied, paths, read, rows_of
 
 from msgflow.fleet.answers import answers
 from msgflow.fleet.lake import Lake
-from msgflow.fleet.layout import part_of, run_path
+from msgflow.fleet.layout import PACKED, part_of, run_path
 from msgflow.fleet.pack import pack
 
 Row = dict[str, Any]
@@ -100,9 +100,9 @@ def test_a_pack_that_is_killed_changes_no_answer(
     pack(lake)
     assert content(lake) == before
     (part,) = set(lake.runs()["part"].to_pylist())
-    assert paths(lake, "run") == {run_path(part)}
-    tables = {path for path in paths(lake, "") if path.count("/") == 1}
-    assert {part_of(path) for path in tables if not path.startswith("database/")} == {part}
+    assert paths(lake, "run") == {run_path(PACKED)}
+    tables = paths(lake, *(answer.table for answer in answers()))
+    assert {part_of(path) for path in tables} == {part}
 
 
 @pytest.mark.parametrize("steps", [pytest.param(5, marks=pytest.mark.thorough), _TABLES])
@@ -148,4 +148,4 @@ def test_of_two_writers_one_counts_whole(holding: tuple[Lake, Row, Row]) -> None
     assert rows_of(lake, "flow") == flows[lake.runs()["part"][0].as_py()]
     pack(lake)
     assert rows_of(lake, "flow") in flows.values()
-    assert paths(lake, "run") == {run_path(first["run"])}
+    assert paths(lake, "run") == {run_path(PACKED)}

@@ -15,7 +15,7 @@ from msgflow.errors import DatabaseError, UsageError
 from msgflow.fleet.answers import answers
 from msgflow.fleet.file_store import Store
 from msgflow.fleet.lake import Lake
-from msgflow.fleet.layout import part_of, part_path, run_path, run_schema, view_path
+from msgflow.fleet.layout import PACKED, part_of, part_path, run_path, run_schema, view_path
 from msgflow.fleet.pack import pack
 from msgflow.fleet.part import Content, write_part
 
@@ -250,7 +250,7 @@ def test_packing_changes_no_answer(
     assert (done.runs, done.packs) == (2, 1)
     assert content(lake) == before
     (part,) = set(lake.runs()["part"].to_pylist())
-    assert paths(lake, "run") == {run_path(part)}
+    assert paths(lake, "run") == {run_path(PACKED)}
     assert {part_of(path) for path in paths(lake, *(a.table for a in answers()))} == {part}
     assert len(paths(lake, "database")) == 2
     assert pack(lake).deleted == 0
@@ -258,10 +258,10 @@ def test_packing_changes_no_answer(
     again = write(lake, databases[0], tmp_path)
     lake.commit([again])
     assert content(lake)[1:] == before[1:]
-    assert paths(lake, "run") == {run_path(part), run_path(first["run"])}
+    assert paths(lake, "run") == {run_path(PACKED), run_path(first["run"])}
     # Neither row is left after a removal.
     lake.remove([first["run"]])
-    assert lake.run(first["run"], part) is None
+    assert lake.run(first["run"]) is None
     assert read(lake, "SELECT run FROM run") == [(other["run"],)]
     assert {row[0] for row in rows_of(lake, "flow")} == {other["run"]}
     # The pack still has its answers.

@@ -24,7 +24,7 @@ def test_spark_finds_what_duckdb_finds(night: Lake) -> None:
 
     # One that no longer counts.
     (first, *_) = night.runs().to_pylist()
-    night.put_runs("pack-0000000000000000-1", [{**first, "committed_ns": 0, "part": "gone"}])
+    night.pack_runs([{**first, "committed_ns": 0, "part": "gone"}])
     spark = (
         SparkSession.builder.master("local[1]")
         .config("spark.ui.enabled", "false")
