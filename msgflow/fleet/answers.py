@@ -42,25 +42,20 @@ class Answer:
     Attributes:
         table: its name.
         read: returns the rows of a run, in a fixed order and with a column `run_id`.
-        meaning: one line for the documentation.
     """
 
     table: str
     read: Callable[[duckdb.DuckDBPyConnection, int], pa.Table]
-    meaning: str
 
 
 def answers() -> tuple[Answer, ...]:
     """Return the answers of a lake in the order of their computation."""
     return (
-        Answer(FLOW, _statement("fleet_flow"), "one row per flow of every path"),
-        Answer(
-            DISTRIBUTION,
-            _statement("fleet_distribution"),
-            "durations, periods, waits and latencies of transport in buckets that can be added up",
-        ),
-        Answer(FINDING, _findings, "the view finding: what is worth knowing, with cause and cure"),
-        *(Answer(name.replace("-", "_"), _query(name), f"the query {name}") for name in QUERIES),
+        Answer(FLOW, _statement("fleet_flow")),
+        # Durations, periods, waits and latencies of transport in buckets that can be added up.
+        Answer(DISTRIBUTION, _statement("fleet_distribution")),
+        Answer(FINDING, _findings),
+        *(Answer(name.replace("-", "_"), _query(name)) for name in QUERIES),
     )
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 import shlex
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -29,7 +28,7 @@ from msgflow.fleet.parquet import read_parquet
 from msgflow.version import __version__
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     import pyarrow as pa
 
@@ -175,19 +174,10 @@ def _read(lake: Lake, table: str, part: str, runs: Sequence[str]) -> pa.Table | 
     content = lake.store.read(part_path(table, part))
     if content is None:
         return None
-    with _usable(lake, table, part, runs):
+    try:
         read = read_parquet(content)
         is_wanted = pc.is_in(read["run"], value_set=pa.array(runs, pa.string()))
         return read.filter(pc.and_(is_wanted, pc.equal(read["part"], part)))
-
-
-@contextmanager
-def _usable(lake: Lake, table: str, part: str, runs: Sequence[str]) -> Iterator[None]:
-    """Turn errors of the content of a file into a DatabaseError that names it."""
-    import pyarrow as pa
-
-    try:
-        yield
     except (pa.ArrowException, KeyError, OSError) as error:
         words = (str(error).strip().splitlines() or [type(error).__name__])[0]
         raise _unusable(lake, table, part, runs, words) from error

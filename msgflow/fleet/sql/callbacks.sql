@@ -28,16 +28,15 @@ WITH merged AS (
         c.node,
         c.callback,
         count(DISTINCT c.run) AS runs,
-        count(*) AS callbacks,
         sum(c.count)::BIGINT AS count,
         sum(c.open)::BIGINT AS open,
         min(c.period_min_ns) AS period_min_ns,
-        any_value(c.period_median_ns) AS period_median_ns,
+        CASE WHEN count(*) = 1 THEN any_value(c.period_median_ns) END AS period_median_ns,
         max(c.period_max_ns) AS period_max_ns,
         min(c.min_ns) AS min_ns,
-        any_value(c.median_ns) AS median_ns,
-        any_value(c.p95_ns) AS p95_ns,
-        any_value(c.p99_ns) AS p99_ns,
+        CASE WHEN count(*) = 1 THEN any_value(c.median_ns) END AS median_ns,
+        CASE WHEN count(*) = 1 THEN any_value(c.p95_ns) END AS p95_ns,
+        CASE WHEN count(*) = 1 THEN any_value(c.p99_ns) END AS p99_ns,
         max(c.max_ns) AS max_ns,
         sum(c.total_ns)::BIGINT AS total_ns,
         string_agg(DISTINCT c.symbol, ', ' ORDER BY c.symbol) AS symbol,
@@ -54,25 +53,15 @@ SELECT
     m.count,
     m.open,
     m.period_min_ns,
-    CASE
-        WHEN m.callbacks = 1 THEN m.period_median_ns
-        ELSE greatest(m.period_min_ns, least(m.period_max_ns, p.median_ns))
-    END AS period_median_ns,
+    coalesce(
+        m.period_median_ns, greatest(m.period_min_ns, least(m.period_max_ns, p.median_ns))
+    ) AS period_median_ns,
     m.period_max_ns,
     m.min_ns,
-    CASE
-        WHEN m.callbacks = 1 THEN m.median_ns
-        ELSE greatest(m.min_ns, least(m.max_ns, d.median_ns))
-    END AS median_ns,
+    coalesce(m.median_ns, greatest(m.min_ns, least(m.max_ns, d.median_ns))) AS median_ns,
     round(m.total_ns / nullif(m.count - m.open, 0))::BIGINT AS mean_ns,
-    CASE
-        WHEN m.callbacks = 1 THEN m.p95_ns
-        ELSE greatest(m.min_ns, least(m.max_ns, d.p95_ns))
-    END AS p95_ns,
-    CASE
-        WHEN m.callbacks = 1 THEN m.p99_ns
-        ELSE greatest(m.min_ns, least(m.max_ns, d.p99_ns))
-    END AS p99_ns,
+    coalesce(m.p95_ns, greatest(m.min_ns, least(m.max_ns, d.p95_ns))) AS p95_ns,
+    coalesce(m.p99_ns, greatest(m.min_ns, least(m.max_ns, d.p99_ns))) AS p99_ns,
     m.max_ns,
     m.total_ns,
     m.symbol,

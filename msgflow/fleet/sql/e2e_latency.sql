@@ -54,14 +54,7 @@ completeness AS (
         label_group,
         path,
         count(*) AS roots,
-        count(*) FILTER (WHERE status = 'reached') AS reached,
-        count(*) FILTER (WHERE status = 'superseded') AS superseded,
-        count(*) FILTER (WHERE status = 'dropped') AS dropped,
-        count(*) FILTER (WHERE status = 'lost') AS lost,
-        count(*) FILTER (WHERE status = 'no_output') AS no_output,
-        count(*) FILTER (WHERE status = 'not_connected') AS not_connected,
-        count(*) FILTER (WHERE status = 'unknown') AS unknown,
-        count(*) FILTER (WHERE status = 'cut_by_recording') AS cut_by_recording
+        histogram(status)::MAP(VARCHAR, BIGINT) AS number
     FROM arrival
     WHERE is_first
     GROUP BY label_group, path
@@ -118,14 +111,14 @@ SELECT
     k.label_group,
     k.runs,
     coalesce(c.roots, 0) AS roots,
-    coalesce(c.reached, 0) AS reached,
-    coalesce(c.superseded, 0) AS superseded,
-    coalesce(c.dropped, 0) AS dropped,
-    coalesce(c.lost, 0) AS lost,
-    coalesce(c.no_output, 0) AS no_output,
-    coalesce(c.not_connected, 0) AS not_connected,
-    coalesce(c.unknown, 0) AS unknown,
-    coalesce(c.cut_by_recording, 0) AS cut_by_recording,
+    coalesce(c.number['reached'], 0) AS reached,
+    coalesce(c.number['superseded'], 0) AS superseded,
+    coalesce(c.number['dropped'], 0) AS dropped,
+    coalesce(c.number['lost'], 0) AS lost,
+    coalesce(c.number['no_output'], 0) AS no_output,
+    coalesce(c.number['not_connected'], 0) AS not_connected,
+    coalesce(c.number['unknown'], 0) AS unknown,
+    coalesce(c.number['cut_by_recording'], 0) AS cut_by_recording,
     coalesce(a.number, 0) AS loss_affected,
     coalesce(l.pairs, 0) AS pairs,
     coalesce(l.stored, 0) AS stored,

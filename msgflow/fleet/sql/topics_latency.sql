@@ -27,16 +27,15 @@ WITH merged AS (
         t.topic_name,
         t.subscriber,
         count(DISTINCT t.run) AS runs,
-        count(*) AS subscriptions,
         sum(t.takes)::BIGINT AS takes,
         sum(t.linked)::BIGINT AS linked,
         sum(t.ambiguous)::BIGINT AS ambiguous,
         sum(t.negative)::BIGINT AS negative,
         min(t.min_ns) AS min_ns,
-        any_value(t.median_ns) AS median_ns,
+        CASE WHEN count(*) = 1 THEN any_value(t.median_ns) END AS median_ns,
         round(sum(t.mean_ns * t.linked) / nullif(sum(t.linked), 0))::BIGINT AS mean_ns,
-        any_value(t.p95_ns) AS p95_ns,
-        any_value(t.p99_ns) AS p99_ns,
+        CASE WHEN count(*) = 1 THEN any_value(t.p95_ns) END AS p95_ns,
+        CASE WHEN count(*) = 1 THEN any_value(t.p99_ns) END AS p99_ns,
         max(t.max_ns) AS max_ns,
         bool_and(t.is_internal) AS is_internal
     FROM topics_latency AS t
@@ -53,19 +52,10 @@ SELECT
     m.ambiguous,
     m.negative,
     m.min_ns,
-    CASE
-        WHEN m.subscriptions = 1 THEN m.median_ns
-        ELSE greatest(m.min_ns, least(m.max_ns, d.median_ns))
-    END AS median_ns,
+    coalesce(m.median_ns, greatest(m.min_ns, least(m.max_ns, d.median_ns))) AS median_ns,
     m.mean_ns,
-    CASE
-        WHEN m.subscriptions = 1 THEN m.p95_ns
-        ELSE greatest(m.min_ns, least(m.max_ns, d.p95_ns))
-    END AS p95_ns,
-    CASE
-        WHEN m.subscriptions = 1 THEN m.p99_ns
-        ELSE greatest(m.min_ns, least(m.max_ns, d.p99_ns))
-    END AS p99_ns,
+    coalesce(m.p95_ns, greatest(m.min_ns, least(m.max_ns, d.p95_ns))) AS p95_ns,
+    coalesce(m.p99_ns, greatest(m.min_ns, least(m.max_ns, d.p99_ns))) AS p99_ns,
     m.max_ns,
     m.is_internal
 FROM merged AS m

@@ -29,11 +29,10 @@ WITH merged AS (
         w.node,
         w.callback,
         count(DISTINCT w.run) AS runs,
-        count(*) AS callbacks,
         sum(w.count)::BIGINT AS count,
         sum(w.delayed_min)::BIGINT AS delayed_min,
         sum(w.delayed_max)::BIGINT AS delayed_max,
-        any_value(w.wait_median_ns) AS wait_median_ns,
+        CASE WHEN count(*) = 1 THEN any_value(w.wait_median_ns) END AS wait_median_ns,
         max(w.wait_max_ns) AS wait_max_ns,
         max(w.busy_worst_ns) AS busy_worst_ns,
         sum(w.busy_total_min_ns)::BIGINT AS busy_total_min_ns,
@@ -55,10 +54,7 @@ SELECT
     m.count,
     m.delayed_min,
     m.delayed_max,
-    CASE
-        WHEN m.callbacks = 1 THEN m.wait_median_ns
-        ELSE least(m.wait_max_ns, d.median_ns)
-    END AS wait_median_ns,
+    coalesce(m.wait_median_ns, least(m.wait_max_ns, d.median_ns)) AS wait_median_ns,
     m.wait_max_ns,
     m.busy_worst_ns,
     m.busy_total_min_ns,
