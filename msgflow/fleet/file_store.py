@@ -15,6 +15,7 @@ import shutil
 import time
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 from urllib.parse import urlsplit
@@ -84,6 +85,10 @@ class Store:
         self._root = self.url if self.is_local else self.url.removeprefix(S3)
         self._system: Any = None
 
+    @cached_property
+    def _real_root(self) -> str:
+        return os.path.realpath(self._root)
+
     @property
     def filesystem(self) -> Any:
         """Return the `pyarrow.fs.FileSystem`; `full` gives its paths."""
@@ -110,8 +115,8 @@ class Store:
     def _is_elsewhere(self, path: str) -> bool:
         if self._follows_links or not self.is_local:
             return False
-        root = os.path.realpath(self._root)
-        return os.path.realpath(self.full(path)) != os.path.normpath(os.path.join(root, path))
+        real = os.path.join(self._real_root, os.path.normpath(path)) if path else self._real_root
+        return os.path.realpath(real) != real
 
     def _reading(self, path: str) -> Any:
         if self.is_local:

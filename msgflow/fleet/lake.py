@@ -101,11 +101,12 @@ class Lake:
             for entry in self.store.entries(RUN, recursive=False)
             if entry.path.endswith(".parquet")
         ]
-        with ThreadPoolExecutor(_READ_AT_ONCE) as pool:
+        # Only a bucket makes one wait.
+        with ThreadPoolExecutor(1 if self.store.is_local else _READ_AT_ONCE) as pool:
             # One that is gone by now was removed meanwhile.
             tables = [rows for rows in pool.map(self._rows, names) if rows is not None]
         # Only if needed: making an empty table imports pandas if that is installed.
-        rows = pa.concat_tables(tables) if tables else run_schema().empty_table()
+        rows = pa.concat_tables(tables).combine_chunks() if tables else run_schema().empty_table()
         # SQL, as importing pyarrow.compute takes longer.
         con.register("known", rows)
         found = con.sql(_LAST).to_arrow_table()
@@ -200,8 +201,14 @@ class Lake:
         # The schema has the descriptions of columns, which the table may lack.
         schema = table.schema.with_metadata(metadata(table_name, revision))
         sink = pa.BufferOutputStream()
+        # Thousands of files have one row: to unpack it would take longer than to read it.
+        is_small = len(table) <= 1
         pyarrow.parquet.write_table(
-            table.cast(schema), sink, compression="zstd", row_group_size=_ROW_GROUP
+            table.cast(schema),
+            sink,
+            compression="none" if is_small else "zstd",
+            use_dictionary=not is_small,
+            row_group_size=_ROW_GROUP,
         )
         self.store.put(path, sink.getvalue().to_pybytes())
 
