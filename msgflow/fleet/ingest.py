@@ -167,6 +167,8 @@ class _Ingest:
         self._begin = time.monotonic()
         self._progress = FleetProgress(len(recordings))
         self._runs = {row["run"]: row for row in lake.runs().to_pylist()}
+        own = set(lake.names())
+        self._packed = {key: row for key, row in self._runs.items() if key not in own}
         # Of two runs of a source, which a killed writer left, the earlier one is to go.
         latest_first = sorted(self._runs.values(), key=lambda row: -row["committed_ns"])
         self._sources = {row["source"]: row["run"] for row in latest_first}
@@ -274,7 +276,7 @@ class _Ingest:
 
     def _as_it_is_now(self, key: str) -> Mapping[str, Any] | None:
         """Read a run again, as another process may have written, replaced or removed it."""
-        row = self._lake.run(key)
+        row = self._lake.run(key) or self._packed.get(key)
         self._know(key, row)
         return row
 
@@ -367,6 +369,7 @@ class _Ingest:
             self._commit({**before, **own})
             return
         self._know(before["run"], None)
+        self._packed.pop(before["run"], None)
         with contextlib.suppress(UsageError):  # another process has removed it
             self._lake.remove([before["run"]])
 

@@ -96,15 +96,10 @@ class Lake:
         if con is None:
             with open_memory() as con:
                 return self.runs(con)
-        names = [
-            entry.path.removeprefix(f"{RUN}/").removesuffix(".parquet")
-            for entry in self.store.entries(RUN, recursive=False)
-            if entry.path.endswith(".parquet")
-        ]
         # Only a bucket makes one wait.
         with ThreadPoolExecutor(1 if self.store.is_local else _READ_AT_ONCE) as pool:
             # One that is gone by now was removed meanwhile.
-            tables = [rows for rows in pool.map(self._rows, names) if rows is not None]
+            tables = [rows for rows in pool.map(self._rows, self.names()) if rows is not None]
         # Only if needed: making an empty table imports pandas if that is installed.
         rows = pa.concat_tables(tables).combine_chunks() if tables else run_schema().empty_table()
         # SQL, as importing pyarrow.compute takes longer.
@@ -113,14 +108,18 @@ class Lake:
         con.unregister("known")
         return pa.Table.from_arrays(found.columns, schema=rows.schema)
 
+    def names(self) -> list[str]:
+        """Return the names of the files of the table `run`: keys of runs, and `PACKED`."""
+        return [
+            entry.path.removeprefix(f"{RUN}/").removesuffix(".parquet")
+            for entry in self.store.entries(RUN, recursive=False)
+            if entry.path.endswith(".parquet")
+        ]
+
     def run(self, key: str) -> dict[str, Any] | None:
-        """Return the row of a run as it is now, None if the lake has no such run."""
-        for name in (key, PACKED):
-            rows = self._rows(name)
-            for row in rows.to_pylist() if rows is not None else ():
-                if row["run"] == key:
-                    return dict(row)
-        return None
+        """Return the row in a run's own file as it is now, None if there is no such file."""
+        rows = self._rows(key)
+        return None if rows is None else dict(rows.to_pylist()[0])
 
     def _rows(self, name: str) -> pa.Table | None:
         """Return the rows of a file of the table `run`, None if there is no such file."""

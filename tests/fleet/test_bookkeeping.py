@@ -235,10 +235,17 @@ def test_what_others_write_is_read_once(place: Path, monkeypatch: pytest.MonkeyP
 
 
 def test_packing_keeps_what_counts(place: Path) -> None:
-    ingest(record("a", "first"), labels={"robot": "A"})
+    ingest(record("a", "first"), record("b", "second"), labels={"robot": "A"})
     pack(Lake.open("lake"))
-    ingest("a", labels={"robot": "B"})
+    assert ingest("a", "b", labels={"robot": "B"}).there == 2
     assert labels_of("first") == {"robot": "B"}
+    pack(Lake.open("lake"))
+    # A source with other packets, and one with those of a run that is packed.
+    record("a", "third")
+    record("c", "second")
+    done = ingest("a", "c")
+    assert (done.replaced, done.same) == (1, 1)
+    assert runs() == {"second": "b", "third": "a"}
 
 
 def test_of_two_runs_of_a_source_the_earlier_one_goes(

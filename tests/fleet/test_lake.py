@@ -262,6 +262,7 @@ def test_packing_changes_no_answer(
     # Neither row is left after a removal.
     lake.remove([first["run"]])
     assert lake.run(first["run"]) is None
+    assert first["run"] not in lake.runs()["run"].to_pylist()
     assert read(lake, "SELECT run FROM run") == [(other["run"],)]
     assert {row[0] for row in rows_of(lake, "flow")} == {other["run"]}
     # The pack still has its answers.
