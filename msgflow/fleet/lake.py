@@ -231,18 +231,17 @@ class Lake:
     @contextmanager
     def _locked(self, path: str, operation: int) -> Iterator[None]:
         """Hold the lock of a folder of the lake, where there are such."""
-        try:
-            descriptor = os.open(self.store.full(path), os.O_RDONLY)
-        except OSError:  # a bucket, or no such folder
+        folder = self.store.full(path)
+        if not self.store.is_local or not os.path.isdir(folder):
             yield
             return
+        descriptor = os.open(folder, os.O_RDONLY)
         try:
             try:
                 fcntl.flock(descriptor, operation)
-            except BlockingIOError:
-                raise
-            except OSError:  # a network file system without locks
-                pass
+            except OSError as error:  # a network file system may have no locks
+                if isinstance(error, BlockingIOError):
+                    raise
             yield
         finally:
             os.close(descriptor)
