@@ -123,12 +123,15 @@ def row_counts(lake: Lake, run: str, part: str) -> dict[str, int]:
 
 
 def read_part(lake: Lake, table: str, part: str, run: str) -> pa.Table | None:
-    """Return the rows of an answer that a run has in a part; None: there is no such file."""
+    """Return the rows of an answer that a run has in a part; None: there is no such file.
+
+    The column `part` is left out: what is written twice has two.
+    """
     content = lake.store.read(part_path(table, part))
     if content is None:
         return None
     read = pq.ParquetFile(pa.BufferReader(content)).read()
-    return read.filter(pc.equal(read["run"], run))
+    return read.filter(pc.equal(read["run"], run)).drop_columns(["part"])
 
 
 def children(scratch: Path) -> dict[int, str]:
