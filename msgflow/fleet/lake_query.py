@@ -26,7 +26,7 @@ from msgflow.fleet.lake_connection import (
     what_there_is,
 )
 from msgflow.fleet.layout import VIEWS
-from msgflow.query.catalogue import choose_query, load_query
+from msgflow.query.catalogue import choose_query, load_query, queries_meant
 from msgflow.query.runner import bind, shown_rows
 from msgflow.query.selection import make_selection, selected
 from msgflow.result.query_result import QueryResult
@@ -79,11 +79,12 @@ def header_of(name: str, given: Mapping[str, Value] | None = None) -> Header:
     try:
         query = choose_query(name, given)
     except UsageError:
-        known = _words()
-        raise UsageError(
-            f"there is no such query — {name}",
-            did_you_mean(name, known, f"a lake answers {', '.join(known)}"),
-        ) from None
+        known, meant = _words(), queries_meant(name)
+        there = [f"msgflow fleet query {each.words}" for each in meant if each.name in names()]
+        hint = did_you_mean(name, known, f"a lake answers {', '.join(known)}")
+        if meant:
+            hint = " or ".join(there) or f"msgflow fleet open RUN, then {meant[0].command}"
+        raise UsageError(f"there is no such query — {name}", hint) from None
     variant = query.variant
     if variant is not None and variant.name in given:
         chosen = {variant.name: given[variant.name]}

@@ -70,7 +70,10 @@ def test_another_distribution_adds_a_command_and_replaces_none(msgflow: Msgflow)
     assert msgflow("sql", "SELECT 1").exit_code == 4
 
 
-def test_one_that_cannot_be_imported_names_its_distribution(msgflow: Msgflow, other: Path) -> None:
+def test_one_that_cannot_be_imported_names_its_distribution(
+    msgflow: Msgflow, other: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delitem(sys.modules, "other_command", raising=False)
     (other / "other_command.py").write_text("import no_such_module\n")
     result = msgflow("greet", "r1")
     assert result.exit_code == 2

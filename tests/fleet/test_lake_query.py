@@ -233,6 +233,9 @@ def test_what_a_lake_cannot_answer(night: Lake) -> None:
     for name, words in (
         ("flows", r"does not hold what this query needs — flows\n\nhint: it answers action-"),
         ("e2e", "no such query — e2e\n\nhint: did you mean e2e-latency"),
+        ("cpu-usage", "fleet open RUN, then msgflow query scheduling --measure cpu"),
+        ("bottleneck", "fleet open RUN, then msgflow query critical-path"),
+        ("jitter", "msgflow fleet query timers or msgflow fleet query topics --measure rate"),
     ):
         with pytest.raises(UsageError, match=words):
             fleet_query(night, name)
