@@ -258,16 +258,14 @@ CREATE TABLE store.executor_thread (
     thread_id BIGINT NOT NULL  -- The thread {to thread}
 );
 
--- One row per interval between two executor events of a thread
--- view: What executor threads did, as their three events say.
+-- One row per executor event of a thread: a state lasts until the next one
 CREATE TABLE store.executor_state (
     run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
-    executor_id BIGINT,  -- Executor {to executor}
-    thread_id BIGINT NOT NULL,  -- Thread it happened on {to thread}
+    thread_id BIGINT NOT NULL,  -- The thread {to thread}
     state VARCHAR NOT NULL,  -- 'wait', 'process' or 'execute'
     start_ns BIGINT NOT NULL,  -- Executor event that began it [epoch ns] {clock thread_id}
-    end_ns BIGINT,  -- Next executor event of the thread; NULL: not known (the last, or a gap
-        -- follows) [epoch ns] {clock thread_id}
+    is_behind_gap BOOLEAN DEFAULT false NOT NULL,  -- A gap may hide an executor event between the
+        -- one before and this one
     callback_instance_id BIGINT,  -- First callback instance in it {to callback_instance}
     start_event_id BIGINT  -- Executor event that began it [event order] {hidden}
 );

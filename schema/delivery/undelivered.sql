@@ -144,7 +144,7 @@ one_thread AS (
 long_wait AS (
     SELECT s.subscription_id, w.start_ns, w.end_ns
     FROM life AS s
-    JOIN store.executor_state AS w ON s.only_thread_id = w.thread_id
+    JOIN derive.executor_interval AS w ON s.only_thread_id = w.thread_id
     LEFT JOIN pace AS p ON s.subscription_id = p.subscription_id
     WHERE w.run_id = only_run
         AND w.state = 'wait'

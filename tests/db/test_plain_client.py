@@ -18,8 +18,8 @@ FILL = (
     "INSERT INTO store.callback_instance BY NAME SELECT n AS callback_instance_id, 1 AS run_id, "
     "1 AS trace_id, n % 30 AS callback_id, 1 AS process_id, n % 20 AS thread_id, n AS start_ns, "
     f"n AS end_ns, n AS take_id, 1 AS depth FROM range({ROWS}) AS r(n)",
-    "INSERT INTO store.executor_state BY NAME SELECT 1 AS run_id, 1 + n % 4 AS executor_id, "
-    f"n % 20 AS thread_id, 'wait' AS state, n AS start_ns, n AS end_ns FROM range({ROWS}) AS r(n)",
+    "INSERT INTO store.executor_state BY NAME SELECT 1 AS run_id, n % 20 AS thread_id, "
+    f"'wait' AS state, n AS start_ns, n AS start_event_id FROM range({ROWS}) AS r(n)",
 )
 
 

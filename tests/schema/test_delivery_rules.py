@@ -38,7 +38,7 @@ CREATE TABLE store.publication (run_id BIGINT DEFAULT 1, publisher_id BIGINT, th
 CREATE TABLE store.callback_instance (take_id BIGINT, is_intra_process BOOLEAN);
 CREATE TABLE derive.empty_take (run_id BIGINT DEFAULT 1, subscription_id BIGINT DEFAULT 1,
     failed_ns BIGINT);
-CREATE TABLE store.executor_state (run_id BIGINT DEFAULT 1, thread_id BIGINT DEFAULT 1,
+CREATE TABLE derive.executor_interval (run_id BIGINT DEFAULT 1, thread_id BIGINT DEFAULT 1,
     state VARCHAR DEFAULT 'wait', start_ns BIGINT, end_ns BIGINT);
 INSERT INTO store.publisher VALUES (1, 0, 1), (2, 0, 1);
 """
@@ -105,7 +105,7 @@ class Delivery:
 
     def waits(self, start: int, end: int) -> None:
         self.con.execute(
-            "INSERT INTO store.executor_state (start_ns, end_ns) VALUES (?, ?)", [start, end]
+            "INSERT INTO derive.executor_interval (start_ns, end_ns) VALUES (?, ?)", [start, end]
         )
 
     def misses(self, start: int, end: int) -> None:
@@ -688,7 +688,7 @@ def fill(con: duckdb.DuckDBPyConnection, chance: random.Random, grid: int, begin
         while start < 2_000 * MS:
             end = start + chance.randrange(4 * MS, 30 * MS)
             con.execute(
-                "INSERT INTO store.executor_state (thread_id, start_ns, end_ns) VALUES (?, ?, ?)",
+                "INSERT INTO derive.executor_interval (thread_id, start_ns, end_ns) VALUES (?, ?, ?)",
                 [number, start, end],
             )
             start = end + chance.randrange(5 * MS)

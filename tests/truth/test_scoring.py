@@ -436,13 +436,13 @@ def test_streams_that_end_early_are_judged(tmp_path, system, layout):
     assert [drop for drop in drops if not drop.undecided and not drop.is_right] == []
     found = {score.kind: score for score in scores}
     assert found["callback_instance"].decided > 100
-    # A state that does not last until the thread is seen again is wrong all the same.
+    # A state that begins later is wrong, and so is the one before, which lasts until then.
     _change(
         database,
-        "UPDATE store.executor_state AS s SET end_ns = s.end_ns + 1 "
-        "WHERE s.start_event_id = (SELECT min(start_event_id) FROM store.executor_state)",
+        "UPDATE store.executor_state SET start_ns = start_ns + 1 WHERE start_event_id = ("
+        " SELECT min(start_event_id) FROM store.executor_state WHERE state = 'process')",
     )
-    assert _scores(simulation, database)["executor_state"].wrong == 1
+    assert _scores(simulation, database)["executor_state"].wrong == 2
 
 
 @pytest.fixture(scope="module")

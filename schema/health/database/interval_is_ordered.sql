@@ -10,7 +10,7 @@ WITH reversed AS (
     UNION ALL
     SELECT run_id, 'callback_instance' FROM store.callback_instance WHERE end_ns < start_ns
     UNION ALL
-    SELECT run_id, 'executor_state' FROM store.executor_state WHERE end_ns < start_ns
+    SELECT run_id, 'executor_state' FROM derive.executor_interval WHERE end_ns < start_ns
 )
 SELECT run_id, subject, count(*) AS count, 'rows that end before they begin' AS detail
 FROM reversed

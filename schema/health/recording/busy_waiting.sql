@@ -14,7 +14,7 @@
 WITH waited AS (
     SELECT
         s.run_id, s.executor_id, count(*) AS number, count(DISTINCT s.thread_id) AS threads
-    FROM store.executor_state AS s
+    FROM derive.executor_interval AS s
     SEMI JOIN (FROM store.executor WHERE kind LIKE 'multi_threaded%') AS e
         ON s.executor_id = e.executor_id
     -- Over within a millisecond: something was ready.

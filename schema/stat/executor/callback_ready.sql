@@ -42,7 +42,8 @@ picked AS (
     ASOF LEFT JOIN (
         SELECT e.thread_id, e.start_ns
         FROM store.executor_state AS e
-        JOIN sized AS z ON e.executor_id = z.executor_id
+        JOIN store.executor_thread AS x ON e.thread_id = x.thread_id
+        JOIN sized AS z ON x.executor_id = z.executor_id
         WHERE e.state = 'process' AND z.thread_count > 1
     ) AS s ON r.thread_id = s.thread_id AND r.start_ns >= s.start_ns
 ),

@@ -13,7 +13,7 @@
 CREATE OR REPLACE MACRO derive.executor_poll(executors) AS TABLE
 WITH wait AS (
     SELECT run_id, executor_id, thread_id, start_ns, end_ns
-    FROM store.executor_state
+    FROM derive.executor_interval
     WHERE state = 'wait'
         AND end_ns IS NOT NULL
         AND executor_id IN (SELECT executor_id FROM query_table(executors))
@@ -28,7 +28,7 @@ spinning AS (
     FROM store.callback_instance AS i
     JOIN (SELECT thread_id, max(start_ns) AS start_ns FROM wait GROUP BY thread_id) AS w
         ON i.thread_id = w.thread_id AND i.start_ns <= w.start_ns
-    ANTI JOIN store.executor_state AS s
+    ANTI JOIN derive.executor_interval AS s
         ON i.callback_instance_id = s.callback_instance_id AND i.end_ns <= s.end_ns
     WHERE i.depth = 1 AND i.end_ns > i.start_ns
 ),

@@ -1,0 +1,22 @@
+-- name: main.executor_state
+-- description: What executor threads did, as their three events say.
+-- grain: one row per interval between two executor events of a thread
+-- column: run_id
+-- column: executor_id BIGINT  Executor
+-- column: thread_id
+-- column: state
+-- column: start_ns
+-- column: end_ns BIGINT [epoch ns]  Next executor event of the thread; NULL: not known (the last,
+--     or a gap follows)
+-- column: callback_instance_id
+SELECT
+    s.run_id,
+    s.executor_id,
+    s.thread_id,
+    s.state,
+    derive.corrected_ns(s.start_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS start_ns,
+    derive.corrected_ns(s.end_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS end_ns,
+    s.callback_instance_id
+FROM derive.executor_interval AS s
+JOIN store.thread AS t ON s.thread_id = t.thread_id
+JOIN derive.process_clock AS c ON t.process_id = c.process_id

@@ -1,0 +1,18 @@
+-- name: derive.executor_interval
+-- kind: view
+-- description: What executor threads did, as their three events say: a state lasts until the next
+--     such event of the thread. The last one of a thread, or before a gap, has no end. Times are
+--     by the clock of the executor.
+-- grain: one row per executor event of a thread
+SELECT
+    s.run_id,
+    x.executor_id,
+    s.thread_id,
+    s.state,
+    s.start_ns,
+    CASE WHEN NOT lead(s.is_behind_gap) OVER of_thread THEN lead(s.start_ns) OVER of_thread END
+        AS end_ns,
+    s.callback_instance_id
+FROM store.executor_state AS s
+LEFT JOIN store.executor_thread AS x ON s.thread_id = x.thread_id
+WINDOW of_thread AS (PARTITION BY s.run_id, s.thread_id ORDER BY s.start_event_id)
