@@ -10,8 +10,7 @@ SELECT
     s.thread_id,
     s.state,
     s.start_ns,
-    CASE WHEN NOT lead(s.is_behind_gap) OVER of_thread THEN lead(s.start_ns) OVER of_thread END
-        AS end_ns,
+    lead(CASE WHEN NOT s.is_behind_gap THEN s.start_ns END) OVER of_thread AS end_ns,
     s.callback_instance_id
 FROM store.executor_state AS s
 LEFT JOIN store.executor_thread AS x ON s.thread_id = x.thread_id
