@@ -42,9 +42,10 @@ INSERT INTO store.annotation (annotation_id, run_id, kind, source, process_id)
 VALUES (1, 1, 'periodic_async', 'trace', 1);
 INSERT INTO store.annotation_input (run_id, annotation_id, subscription_id) VALUES (1, 1, 2);
 INSERT INTO store.annotation_output (run_id, annotation_id, publisher_id) VALUES (1, 1, 3);
-INSERT INTO store.executor_state
-    (run_id, executor_id, thread_id, state, start_ns, end_ns, start_event_id)
-SELECT 1, 10 + each, each, 'wait', 0, 10000000 * each, 0 FROM range(1, 7) AS r(each);
+INSERT INTO store.executor_state (run_id, thread_id, state, start_ns, start_event_id)
+SELECT 1, each, 'wait', 0, 0 FROM range(1, 7) AS r(each)
+UNION ALL
+SELECT 1, each, 'process', 10000000 * each, 10000000 * each FROM range(1, 7) AS r(each);
 
 -- One row per period. a, b, c: start and end of a publication.
 CREATE TEMP TABLE period AS

@@ -46,9 +46,9 @@ INSERT INTO store.executor (executor_id, run_id, process_id, kind, is_inferred)
 VALUES (1, 1, 1, 'single_threaded', false), (2, 1, 2, 'multi_threaded', true);
 INSERT INTO store.executor_thread (run_id, executor_id, thread_id) VALUES (1, 1, 1), (1, 2, 2);
 INSERT INTO store.executor_state
-    (run_id, executor_id, thread_id, state, start_ns, end_ns, callback_instance_id, start_event_id)
-VALUES (1, 1, 1, 'wait', 100, 1240, NULL, 1), (1, 1, 1, 'process', 1240, 1290, NULL, 2),
-    (1, 1, 1, 'execute', 1290, 1510, 20, 4), (1, 1, 1, 'wait', 1510, NULL, NULL, 9);
+    (run_id, thread_id, state, start_ns, callback_instance_id, start_event_id)
+VALUES (1, 1, 'wait', 100, NULL, 1), (1, 1, 'process', 1240, NULL, 2),
+    (1, 1, 'execute', 1290, 20, 4), (1, 1, 'wait', 1510, NULL, 9);
 INSERT INTO store.publication
     (publication_id, run_id, trace_id, publisher_id, process_id, thread_id, start_ns, end_ns,
      is_loss_affected, start_event_id, end_event_id)
