@@ -11,12 +11,22 @@
 --     (until_ns). Waits that began after the latest of these moments are left out, unless all
 --     are NULL
 CREATE OR REPLACE MACRO derive.executor_poll(executors) AS TABLE
-WITH wait AS (
-    SELECT run_id, executor_id, thread_id, start_ns, end_ns
+WITH interval AS MATERIALIZED (
+    SELECT run_id, executor_id, thread_id, state, start_ns, end_ns, callback_instance_id
     FROM derive.executor_interval
+    WHERE end_ns IS NOT NULL
+        AND (state = 'wait' OR callback_instance_id IS NOT NULL)
+        -- By thread, not by executor: DuckDB leaves other threads out before it orders the rows.
+        AND thread_id IN (
+            SELECT thread_id
+            FROM store.executor_thread
+            WHERE executor_id IN (SELECT executor_id FROM query_table(executors))
+        )
+),
+wait AS (
+    SELECT run_id, executor_id, thread_id, start_ns, end_ns
+    FROM interval
     WHERE state = 'wait'
-        AND end_ns IS NOT NULL
-        AND executor_id IN (SELECT executor_id FROM query_table(executors))
         AND start_ns <= (
             SELECT coalesce(max(until_ns), 9223372036854775807) FROM query_table(executors)
         )
@@ -28,7 +38,7 @@ spinning AS (
     FROM store.callback_instance AS i
     JOIN (SELECT thread_id, max(start_ns) AS start_ns FROM wait GROUP BY thread_id) AS w
         ON i.thread_id = w.thread_id AND i.start_ns <= w.start_ns
-    ANTI JOIN derive.executor_interval AS s
+    ANTI JOIN interval AS s
         ON i.callback_instance_id = s.callback_instance_id AND i.end_ns <= s.end_ns
     WHERE i.depth = 1 AND i.end_ns > i.start_ns
 ),
