@@ -95,8 +95,9 @@ CREATE TABLE store.executor_thread (
     run_id BIGINT NOT NULL, executor_id BIGINT NOT NULL, thread_id BIGINT NOT NULL
 );
 CREATE TABLE store.executor_state (
-    run_id BIGINT NOT NULL, executor_id BIGINT, thread_id BIGINT NOT NULL, state VARCHAR NOT NULL,
-    start_ns BIGINT NOT NULL, end_ns BIGINT, callback_instance_id BIGINT, start_event_id BIGINT
+    run_id BIGINT NOT NULL, thread_id BIGINT NOT NULL, state VARCHAR NOT NULL,
+    start_ns BIGINT NOT NULL, is_behind_gap BOOLEAN DEFAULT false NOT NULL,
+    callback_instance_id BIGINT, start_event_id BIGINT
 );
 CREATE TABLE store.flow_call (
     run_id BIGINT NOT NULL, publication_id BIGINT NOT NULL, publisher_id BIGINT,

@@ -688,7 +688,8 @@ def fill(con: duckdb.DuckDBPyConnection, chance: random.Random, grid: int, begin
         while start < 2_000 * MS:
             end = start + chance.randrange(4 * MS, 30 * MS)
             con.execute(
-                "INSERT INTO derive.executor_interval (thread_id, start_ns, end_ns) VALUES (?, ?, ?)",
+                "INSERT INTO derive.executor_interval (thread_id, start_ns, end_ns) "
+                "VALUES (?, ?, ?)",
                 [number, start, end],
             )
             start = end + chance.randrange(5 * MS)
