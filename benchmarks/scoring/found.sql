@@ -42,7 +42,7 @@ instance AS (
     FROM analysed.store.executor_state
     UNION ALL
     SELECT 'state_end', start_event_id, thread_id, end_ns
-    FROM analysed.store.executor_state
+    FROM analysed.derive.executor_interval
     WHERE end_ns IS NOT NULL
     UNION ALL
     SELECT 'request_sent', request_id, sender_thread_id, sent_ns
@@ -80,7 +80,7 @@ link AS (
     UNION ALL
     SELECT 'executor_state', state, 'state_start', start_event_id, 'state_end', start_event_id,
         false
-    FROM analysed.store.executor_state
+    FROM analysed.derive.executor_interval
     WHERE end_ns IS NOT NULL
     UNION ALL
     SELECT

@@ -11,7 +11,8 @@ SELECT
     s.state,
     s.start_ns,
     lead(CASE WHEN NOT s.is_behind_gap THEN s.start_ns END) OVER of_thread AS end_ns,
-    s.callback_instance_id
+    s.callback_instance_id,
+    s.start_event_id
 FROM store.executor_state AS s
 LEFT JOIN store.executor_thread AS x ON s.thread_id = x.thread_id
 WINDOW of_thread AS (PARTITION BY s.run_id, s.thread_id ORDER BY s.start_event_id)
