@@ -440,7 +440,7 @@ def test_streams_that_end_early_are_judged(tmp_path, system, layout):
     _change(
         database,
         "UPDATE store.executor_state SET start_ns = start_ns + 1 WHERE start_event_id = ("
-        " SELECT min(start_event_id) FROM store.executor_state WHERE state = 'process')",
+        " SELECT min(start_event_id) FROM store.executor_state WHERE state = 'execute')",
     )
     assert _scores(simulation, database)["executor_state"].wrong == 2
 
