@@ -16,6 +16,7 @@ from msgflow.errors import DatabaseError
 from msgflow.fleet.answers import answers
 from msgflow.fleet.layout import (
     DATABASE,
+    PACKED,
     RUN,
     VIEWS,
     new_pack,
@@ -78,7 +79,8 @@ def pack(lake: Lake) -> Packed:
         own = {run_path(key) for key in packed}
         if groups or own.intersection(entry.path for entry in lake.store.entries(RUN)):
             lake.pack_runs(list(packed.values()))
-        deleted = _clean_up(lake, own, packed.values())
+        # Without a run, no row is left to keep.
+        deleted = _clean_up(lake, own or {run_path(PACKED)}, packed.values())
     return Packed(
         sum(map(len, groups)), len(groups), len(deleted), sum(entry.size for entry in deleted)
     )

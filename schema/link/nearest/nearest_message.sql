@@ -105,8 +105,9 @@ heard AS (
         m.run_id, m.topic_name, m.source_timestamp_ns, m.only_subscription_id, p.publisher_id,
         p.clock_id
 ),
--- A message that was taken on this clock is of the time in which it was taken; it did not wait while
--- the clock was set. Another one that may be of two times, since the clock was set back, is of none.
+-- A message that was taken on this clock is of the time in which it was taken: it did not wait
+-- while the clock was set. Another one may be of two times where the clock was set back. Then it is
+-- of neither.
 message AS MATERIALIZED (
     SELECT *, segment IS NULL AND clock_id IN (SELECT clock_id FROM step) AS is_set
     FROM (

@@ -7,7 +7,7 @@ of its file. Comments, views and macros need no revision: an upgrade writes them
 
 from alembic import op
 
-revision = "0001_tables"
+revision = "0001_store"
 down_revision = None
 branch_labels = None
 depends_on = None
