@@ -73,6 +73,7 @@ def test_no_module_of_the_current_folder_is_imported(
     assert found.table["name"].to_pylist() == ["my_pkg:frame_done"]
 
 
+@pytest.mark.thorough
 def test_packing_deletes_nothing_behind_a_link(lake: Lake, tmp_path: Path) -> None:
     part = new_part("f" * 20)
     victim, root = tmp_path / "victim", Path(lake.store.url)

@@ -251,7 +251,8 @@ def test_each_statistic_is_worth_what_lies_beyond_it(fresh_database: Path) -> No
             "ELSE 1000 + start_ns // 10_000_000 % 3 // 2 END"
         )
     with msgflow.open_db(fresh_database) as database:
-        worth = {row["statistic"]: row["a_independent"] for row in _rows(database, "after")}
+        rows = _rows(database, "after", resamples=400)
+        worth = {row["statistic"]: row["a_independent"] for row in rows}
     assert worth["p99"] < worth["p95"] < worth["median"], worth
 
 

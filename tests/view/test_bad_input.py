@@ -149,6 +149,7 @@ def test_an_empty_run(way: str, empty_database: Path, tmp_path: Path, page: Page
             assert "has no events" in page.page.locator("main").inner_text()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("way", few(["served", "file"], "file"))
 def test_a_run_without_links(way: str, demo: Path, tmp_path: Path, page: Page) -> None:
     path = tmp_path / "unlinked.duckdb"

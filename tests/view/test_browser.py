@@ -136,6 +136,7 @@ def test_the_critical_path_is_that_of_the_query(
     require_critical_path_of_the_query(page, systems, run)
 
 
+@pytest.mark.thorough
 def test_a_report_has_the_critical_path_of_its_slowest_flows(
     demo: Path, read: Read, report: Report, page: Page
 ) -> None:

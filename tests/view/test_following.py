@@ -102,6 +102,7 @@ def test_a_page_that_is_left_while_the_next_one_comes_hears_no_keys(
     assert "sandwiches" in editor.inner_text()
 
 
+@pytest.mark.thorough
 def test_a_window_is_written_only_if_somebody_asks(followed: Followed, tmp_path: Path) -> None:
     _, windows = followed
     for _ in windows:

@@ -188,6 +188,7 @@ def test_a_level_put_together_says_the_same_as_bins_made_at_once(demo: Path, rea
     assert content.rows == [{**bar, "id": bar["id"]} for bar in direct]
 
 
+@pytest.mark.thorough
 def test_a_flow_is_what_flow_both_says(systems: Path, demo: Path, read: Read) -> None:
     names = ["callback_instance", "publication", "take", "request", "response"]
     for path, run in ((systems, 1), (systems, 3), (demo, 1)):

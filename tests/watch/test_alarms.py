@@ -85,6 +85,7 @@ def test_what_was_never_measured(watched) -> None:
     assert watched(text, "--window", "8s", "--step", "8s").exit_code == 5
 
 
+@pytest.mark.thorough
 def test_a_target_that_falls_silent_is_said_once(tmp_path: Path) -> None:
     """The relay ends after one second, and begins again after 1.2 s."""
     rotations = tuple(SECOND // 20 * number for number in range(17, 27))
@@ -117,6 +118,7 @@ def test_a_target_on_part_of_a_path_names_the_culprit(tmp_path: Path) -> None:
     assert all("/PointsTransformerFront" in (culprit or "") for culprit in culprits)
 
 
+@pytest.mark.thorough
 def test_what_was_kept_before_stays(watched, tmp_path: Path) -> None:
     """The same recording is watched twice: the name of its violation is taken."""
     options = ("--window", "8s", "--step", "8s", "--keep-on-violation", tmp_path / "kept")
