@@ -151,6 +151,18 @@ long_wait AS (
         AND w.end_ns - w.start_ns > coalesce(p.patience_ns, derive.delivery_limit().longest_ns)
         AND s.subscription_id IN (SELECT subscription_id FROM missing)
 ),
+-- While a clock is set, no take shows which message it is of.
+while_set AS MATERIALIZED (
+    SELECT b.publication_id
+    FROM derive.clock_step(only_run) AS z
+    JOIN store.host AS h ON z.clock_id = h.clock_id
+    JOIN store.process AS o ON h.host_id = o.host_id
+    JOIN store.publication AS b
+        ON o.process_id = b.process_id
+        AND b.end_ns >= coalesce(z.start_ns, 0)
+        AND b.end_ns <= coalesce(z.end_ns, 9223372036854775807)
+    WHERE b.run_id = only_run
+),
 known AS (
     SELECT
         m.publication_id, m.publisher_id, m.subscription_id, m.topic_name, m.clock_id,
@@ -339,6 +351,7 @@ SELECT
         WHEN arrival_ns > last_seen_ns AND host_end_ns - first_unseen_ns > longest_ns
             THEN 'subscription_ended'
         WHEN has_unidentified_take THEN 'unknown'
+        WHEN publication_id IN (SELECT publication_id FROM while_set) THEN 'unknown'
         WHEN has_failed_take THEN 'take_failed'
         WHEN is_before_first AND has_earlier_gap THEN 'unknown'
         WHEN is_before_first THEN 'before_discovery'

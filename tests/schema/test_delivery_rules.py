@@ -34,7 +34,14 @@ CREATE TABLE store.link_transport (run_id BIGINT DEFAULT 1, publication_id BIGIN
 CREATE TABLE store.take (run_id BIGINT DEFAULT 1, take_id BIGINT,
     subscription_id BIGINT DEFAULT 1, taken_ns BIGINT, source_timestamp_ns BIGINT DEFAULT 1,
     method VARCHAR DEFAULT 'rmw');
-CREATE TABLE store.publication (run_id BIGINT DEFAULT 1, publisher_id BIGINT, thread_id BIGINT);
+CREATE TABLE store.publication (run_id BIGINT DEFAULT 1, publication_id BIGINT,
+    publisher_id BIGINT, process_id BIGINT DEFAULT 1, thread_id BIGINT, end_ns BIGINT);
+CREATE TABLE store.process (process_id BIGINT, host_id BIGINT);
+CREATE TABLE store.host (host_id BIGINT, clock_id BIGINT);
+CREATE TABLE step (clock_id BIGINT DEFAULT 1, start_ns BIGINT, end_ns BIGINT);
+CREATE MACRO derive.clock_step(only_run) AS TABLE FROM step;
+INSERT INTO store.process VALUES (1, 1);
+INSERT INTO store.host VALUES (1, 1);
 CREATE TABLE store.callback_instance (take_id BIGINT, is_intra_process BOOLEAN);
 CREATE TABLE derive.empty_take (run_id BIGINT DEFAULT 1, subscription_id BIGINT DEFAULT 1,
     failed_ns BIGINT);
@@ -71,8 +78,9 @@ class Delivery:
             [self._count, publisher, arrival],
         )
         self.con.execute(
-            "INSERT INTO store.publication (publisher_id, thread_id) VALUES (?, ?)",
-            [publisher, thread],
+            "INSERT INTO store.publication (publication_id, publisher_id, thread_id, end_ns) "
+            "VALUES (?, ?, ?, ?)",
+            [self._count, publisher, thread, arrival],
         )
         if taken is not None:
             self.con.execute(
@@ -150,6 +158,31 @@ def test_a_reader_waits_for_longer_than_messages_take(
     end = 300 * MS + patience + more
     delivery.waits(280 * MS, end)
     delivery.publish(end, end + usual)
+    assert delivery.reason(missing) == reason
+
+
+@pytest.mark.parametrize(
+    ("clock", "start", "end", "reason"),
+    [
+        (1, 300, 300, "unknown"),
+        (1, None, 300, "unknown"),
+        (1, 300, None, "unknown"),
+        (1, 301, 400, "not_delivered"),
+        (1, 200, 299, "not_delivered"),
+        (2, 200, 400, "not_delivered"),
+    ],
+)
+def test_while_the_clock_is_set_nothing_is_called_lost(
+    delivery: Delivery, clock: int, start: int | None, end: int | None, reason: str
+) -> None:
+    """Its take is there, but shows no message."""
+    delivery.lives()
+    usually(delivery, 300_000)
+    missing = delivery.publish(300 * MS)
+    delivery.waits(280 * MS, 310 * MS)
+    delivery.publish(310 * MS, 310 * MS + 300_000)
+    bounds = [None if bound is None else bound * MS for bound in (start, end)]
+    delivery.con.execute("INSERT INTO step VALUES (?, ?, ?)", [clock, *bounds])
     assert delivery.reason(missing) == reason
 
 
