@@ -7,7 +7,6 @@ all runs into one file; a run that is replaced afterwards has its own file again
 
 from __future__ import annotations
 
-import fcntl
 import os
 import shlex
 import time
@@ -31,6 +30,11 @@ from msgflow.fleet.layout import (
     run_schema,
 )
 from msgflow.fleet.parquet import read_parquet
+
+try:
+    import fcntl
+except ImportError:  # Windows has no such locks
+    fcntl = None  # type: ignore[assignment]
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -174,7 +178,7 @@ class Lake:
         """
         wanted = dict.fromkeys(keys)
         # Of two at the same time, the second would write again what the first one took out.
-        with self._locked(RUN, fcntl.LOCK_EX):
+        with self._locked(RUN, alone=True, wait=True):
             rows = self._rows(PACKED)
             packed = rows.to_pylist() if rows is not None else []
             kept = [row for row in packed if row["run"] not in wanted]
@@ -217,10 +221,9 @@ class Lake:
 
         A bucket has no locks.
         """
-        kind = fcntl.LOCK_EX if alone else fcntl.LOCK_SH
         with ExitStack() as stack:
             try:
-                stack.enter_context(self._locked("", kind | fcntl.LOCK_NB))
+                stack.enter_context(self._locked("", alone=alone, wait=False))
             except BlockingIOError as error:
                 raise DatabaseError(
                     f"another msgflow writes to the lake — {self.store.url}",
@@ -229,16 +232,17 @@ class Lake:
             yield
 
     @contextmanager
-    def _locked(self, path: str, operation: int) -> Iterator[None]:
+    def _locked(self, path: str, *, alone: bool, wait: bool) -> Iterator[None]:
         """Hold the lock of a folder of the lake, where there are such."""
         folder = self.store.full(path)
-        if not self.store.is_local or not os.path.isdir(folder):
+        if not fcntl or not self.store.is_local or not os.path.isdir(folder):
             yield
             return
         descriptor = os.open(folder, os.O_RDONLY)
         try:
+            kind = fcntl.LOCK_EX if alone else fcntl.LOCK_SH
             try:
-                fcntl.flock(descriptor, operation)
+                fcntl.flock(descriptor, kind | (0 if wait else fcntl.LOCK_NB))
             except OSError as error:  # a network file system may have no locks
                 if isinstance(error, BlockingIOError):
                     raise

@@ -267,7 +267,7 @@ def test_of_two_runs_of_a_source_the_earlier_one_goes(
     assert runs() == {"second": "a"}
 
 
-def test_nobody_packs_while_others_write(place: Path) -> None:
+def test_a_pack_is_refused_while_others_write(place: Path) -> None:
     record("a", "first")
     refused: list[DatabaseError] = []
 

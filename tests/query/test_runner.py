@@ -7,6 +7,7 @@ import pytest
 
 from msgflow.db import objects
 from msgflow.errors import QueryError, UsageError
+from msgflow.query.catalogue import load_query
 from msgflow.query.runner import bind, run_query
 from msgflow.query.selection import make_selection
 from msgflow.query.steps import Steps
@@ -518,6 +519,15 @@ def test_queries_share_their_steps(connection: duckdb.DuckDBPyConnection) -> Non
         assert topics(Slice("first", start=150)) == ["/c"]
         assert topics(Slice("first")) == ["/a", "/c"]
     assert not connection.execute("SELECT * FROM duckdb_tables() WHERE temporary").fetchall()
+
+
+def test_the_queries_of_flows_make_their_tables_alike() -> None:
+    """Else they could not share them."""
+    names = ("critical-path", "e2e-latency", "flows", "path-breakdown")
+    for table in ("path_outcome", "named_path"):
+        steps = [step for name in names for step in load_query(name).steps if step.table == table]
+        assert len(steps) == len(names)
+        assert len({step.sql for step in steps}) == 1
 
 
 def test_a_step_that_fails_leaves_nothing(connection: duckdb.DuckDBPyConnection) -> None:

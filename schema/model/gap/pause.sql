@@ -4,8 +4,8 @@
 --     pause where it can be nothing else: packets of one trace ended before they were full, not at
 --     equal distances, and no snapshot is recorded, whose buffers keep what earlier ones did to
 --     them. Else it is one if the recording is nowhere else silent for as long, within four times
---     that or a second before and after. It is none where the numbers of all streams skip packets
---     meanwhile: those are lost.
+--     that or a second before and after. Where the numbers of all streams skip packets meanwhile,
+--     these packets were lost, and nothing paused.
 -- grain: one row per pause of a recording
 -- when: staging.packet WHERE begin_ns - covered_until_ns >= staging.pause_limit().least_ns
 --     AND begin_ns <= last_begin_ns
