@@ -11,6 +11,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+import duckdb
 import pytest
 from lakes import content, copied, paths, read, rows_of
 
@@ -136,9 +137,13 @@ def test_of_two_writers_one_counts_whole(holding: tuple[Lake, Row, Row]) -> None
     seen, end = set(), time.monotonic() + 60
     try:
         while len(seen) < 2 and time.monotonic() < end:
-            found = rows_of(lake, "flow")
+            try:
+                found = rows_of(lake, "flow")
+                ((part,),) = read(lake, "SELECT part FROM run")
+            except duckdb.Error:
+                # DuckDB opens a file twice; it was replaced in between. docs/fleet.md says so.
+                continue
             assert found in flows.values()
-            ((part,),) = read(lake, "SELECT part FROM run")
             seen.add(part)
     finally:
         for writer in writers:
