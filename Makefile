@@ -28,7 +28,7 @@ help:
 	@echo 'make test    style, types, import contracts, tests: minutes'
 	@echo 'make test-all the same with thorough tests: what others show on one input, on all of them'
 	@echo 'make bench   speed and memory of reading and ingesting, beside Babeltrace 2'
-	@echo 'make truth   precision and recall on systems with known truth, minutes'
+	@echo 'make truth   precision and recall on systems with known truth: a sample of the day'
 	@echo 'make real    the same on real ROS 2: nodes of rclpy, recorded with LTTng'
 	@echo 'make fuzz    damaged traces, archives, databases and files through all of msgflow'
 	@echo 'make mutants changes SQL rules one place at a time, and says what no test notices; hours'

@@ -26,6 +26,8 @@ _TYPES = {
     "VARCHAR": ("const char *", "lttng_ust_field_string({0}, {0})"),
     "UTINYINT[]": ("const uint8_t *", f"lttng_ust_field_array(uint8_t, {{0}}, {{0}}, {_GID})"),
 }
+# Parameters that the function has, and the event has not.
+_NOT_RECORDED = {"rclcpp_publish": ("const void * publisher_handle",)}
 _HEADER = """
 #undef LTTNG_UST_TRACEPOINT_PROVIDER
 #define LTTNG_UST_TRACEPOINT_PROVIDER ros2
@@ -74,6 +76,15 @@ def build_tracetools(directory: Path) -> Path:
     return library
 
 
+def parameters() -> dict[str, list[str]]:
+    """Return the parameters of the functions, type and name, by the tracepoint's name."""
+    return {
+        one["name"]: _parameters(one["name"], one["fields"])
+        for one in _tracepoints()
+        if _is_known(one)
+    }
+
+
 def _tracepoints() -> list[dict[str, Any]]:
     """Return the tracepoints of ROS 2 as this version has them."""
     path = Path(msgflow.__file__).parent / "ingest" / "tracepoints.toml"
@@ -110,13 +121,22 @@ def _event(name: str, fields: list[dict[str, Any]]) -> str:
     )
 
 
-def _functions(name: str, fields: list[dict[str, Any]]) -> str:
+def _parameters(name: str, fields: list[dict[str, Any]]) -> list[str]:
     # The version is not given: it is that of the library.
-    given = [each for each in fields if each["name"] != "version"]
+    recorded = [
+        f"{_TYPES[each['type']][0]} {each['name']}"
+        for each in fields
+        if each["name"] != "version"
+    ]
+    return [*_NOT_RECORDED.get(name, ()), *recorded]
+
+
+def _functions(name: str, fields: list[dict[str, Any]]) -> str:
     version = '"' + ".".join(str(part) for part in VERSION) + '"'
-    parameters = [f"{_TYPES[each['type']][0]} {each['name']}" for each in given]
     return _FUNCTIONS.format(
         name=name,
-        parameters=", ".join(parameters) or "void",
-        values="".join(", " + (each["name"] if each in given else version) for each in fields),
+        parameters=", ".join(_parameters(name, fields)) or "void",
+        values="".join(
+            ", " + (version if each["name"] == "version" else each["name"]) for each in fields
+        ),
     )
