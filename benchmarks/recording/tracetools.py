@@ -124,9 +124,7 @@ def _event(name: str, fields: list[dict[str, Any]]) -> str:
 def _parameters(name: str, fields: list[dict[str, Any]]) -> list[str]:
     # The version is not given: it is that of the library.
     recorded = [
-        f"{_TYPES[each['type']][0]} {each['name']}"
-        for each in fields
-        if each["name"] != "version"
+        f"{_TYPES[each['type']][0]} {each['name']}" for each in fields if each["name"] != "version"
     ]
     return [*_NOT_RECORDED.get(name, ()), *recorded]
 
