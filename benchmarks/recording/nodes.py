@@ -46,24 +46,30 @@ class Witness(Node):
         self._numbers = itertools.count(1)
         self._running = threading.local()
         self._actions = []
+        self.ending = threading.Event()
+        self.turn = None
 
-    def every(self, seconds: float, work, group=None) -> None:
-        """Do some work at a period."""
+    def every(self, seconds: float, work, group=None):
+        """Do some work at a period; return the timer."""
 
         def run() -> None:
             with self._callback("timer", str(seconds), 0):
                 work()
 
-        self.create_timer(seconds, run, callback_group=group)
+        return self.create_timer(seconds, run, callback_group=group)
 
-    def on(self, topic: str, work, group=None) -> None:
-        """Do some work with each message of a topic."""
+    def on(self, topic: str, work, group=None):
+        """Do some work with each message of a topic; return the subscription."""
 
         def run(message: UInt64) -> None:
             with self._callback("sub", topic, message.data):
                 work()
 
-        self.create_subscription(UInt64, topic, run, 10, callback_group=group)
+        return self.create_subscription(UInt64, topic, run, 10, callback_group=group)
+
+    def after_turns(self, seconds: float, work) -> None:
+        """Do some work at a period, between turns of the executor: no callback, no timer."""
+        self.turn = (seconds, work)
 
     def serve(self, service: str, work) -> None:
         """Do some work for each request, and answer."""
@@ -209,6 +215,16 @@ def busy(seconds: float) -> None:
         pass
 
 
+def take_turns(executor, seconds: float, work) -> None:
+    """Let an executor do what is due, and some work at a period, until ROS shuts down."""
+    due = time.monotonic()
+    while rclpy.ok():
+        executor.spin_once(max(0.0, due - time.monotonic()))
+        if time.monotonic() >= due:
+            work()
+            due += seconds
+
+
 def source(truth: Truth) -> list[Node]:
     """Publish /scan with a period of 50 ms."""
     node = Witness("source", truth)
@@ -288,6 +304,59 @@ def asker(truth: Truth) -> list[Node]:
     return [node]
 
 
+def three_nodes(truth: Truth) -> list[Node]:
+    """Three nodes for one executor, which is busy: two answer messages, one has a timer."""
+    timer = Witness("timer", truth)
+    tick = timer.sender("/tick")
+    timer.every(0.02, lambda: (busy(0.004), tick()))
+    answering = relay(truth, "answering", "/tick", "/result")
+    return [timer, *answering, *relay(truth)]
+
+
+def looping(truth: Truth) -> list[Node]:
+    """Hear /scan, and publish /tick by a clock of its own, between two turns of the executor."""
+    node = Witness("looping", truth)
+    node.on("/scan", lambda: busy(0.001))
+    node.after_turns(0.04, node.sender("/tick"))
+    return [node]
+
+
+def deaf(truth: Truth) -> list[Node]:
+    """Hear /filtered, and destroy the subscription when enough has come; /scan goes on."""
+    node = Witness("deaf", truth)
+    left = itertools.count(20, -1)
+
+    def work() -> None:
+        if next(left) == 0:
+            node.destroy_subscription(subscription)
+
+    subscription = node.on("/filtered", work)
+    node.on("/scan", lambda: None)
+    return [node]
+
+
+def hanging(truth: Truth) -> list[Node]:
+    """Hear /filtered; one of the callbacks does not return until the system ends."""
+    node = Witness("hanging", truth)
+    left = itertools.count(20, -1)
+    node.on("/filtered", lambda: node.ending.wait() if next(left) == 0 else None)
+    return [node]
+
+
+def resetting(truth: Truth) -> list[Node]:
+    """Publish /tick after a pause: each message of /scan starts the period of the timer anew.
+
+    Another timer is cancelled, and goes on later.
+    """
+    node = Witness("resetting", truth)
+    watchdog = node.every(0.03, node.sender("/tick"))
+    node.on("/scan", watchdog.reset)
+    paused = node.every(0.025, node.sender("/result"))
+    turns = itertools.count()
+    node.every(0.31, lambda: paused.cancel() if next(turns) % 2 == 0 else paused.reset())
+    return [node]
+
+
 SYSTEMS = {
     "pipeline": {"sink": (sink, SingleThreadedExecutor), "filter": (relay, SingleThreadedExecutor),
                  "source": (source, SingleThreadedExecutor)},
@@ -302,7 +371,29 @@ SYSTEMS = {
     "actions": {"actor": (actor, MultiThreadedExecutor), "asker": (asker, SingleThreadedExecutor)},
     "events": {"sink": (sink, EventsExecutor), "filter": (relay, EventsExecutor),
                "source": (source, EventsExecutor)},
+    "three_nodes": {"sink": (sink, SingleThreadedExecutor),
+                    "three": (three_nodes, SingleThreadedExecutor),
+                    "source": (source, SingleThreadedExecutor)},
+    "looping": {"sink": (sink, SingleThreadedExecutor),
+                "looping": (looping, SingleThreadedExecutor),
+                "source": (source, SingleThreadedExecutor)},
+    "two_domains": {"sink": (sink, SingleThreadedExecutor),
+                    "filter": (relay, SingleThreadedExecutor),
+                    "source": (source, SingleThreadedExecutor),
+                    "other": (sink, SingleThreadedExecutor)},
+    "destroyed": {"deaf": (deaf, SingleThreadedExecutor),
+                  "filter": (relay, SingleThreadedExecutor),
+                  "source": (source, SingleThreadedExecutor)},
+    "hanging": {"hanging": (hanging, SingleThreadedExecutor),
+                "sink": (sink, SingleThreadedExecutor),
+                "filter": (relay, SingleThreadedExecutor),
+                "source": (source, SingleThreadedExecutor)},
+    "resetting": {"sink": (sink, SingleThreadedExecutor),
+                  "resetting": (resetting, SingleThreadedExecutor),
+                  "source": (source, SingleThreadedExecutor)},
 }  # fmt: skip
+# The domains of processes that do not hear the others.
+DOMAINS = {"other": 7}
 
 
 def main() -> None:
@@ -310,17 +401,27 @@ def main() -> None:
     system, process, path = sys.argv[1:]
     make, executor_class = SYSTEMS[system][process]
     truth = Truth()
-    rclpy.init()
+    rclpy.init(domain_id=DOMAINS.get(process))
     executor = executor_class()
-    for node in make(truth):
+    nodes = make(truth)
+    for node in nodes:
         executor.add_node(node)
-    end = threading.Thread(target=lambda: (sys.stdin.read(), rclpy.shutdown()))
+
+    def finish() -> None:
+        sys.stdin.read()
+        for node in nodes:
+            node.ending.set()
+        rclpy.shutdown()
+
+    end = threading.Thread(target=finish)
     end.start()
     print("ready", flush=True)
     try:
         # Its spin() of rclpy 9.1 does nothing but use the CPU.
         while executor_class is EventsExecutor and rclpy.ok():
             executor.spin_once(0.1)
+        for seconds, work in filter(None, (node.turn for node in nodes)):
+            take_turns(executor, seconds, work)
         executor.spin()
     except ExternalShutdownException:
         pass

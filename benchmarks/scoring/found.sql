@@ -192,3 +192,5 @@ JOIN instance AS f ON l.from_kind = f.kind AND l.from_id = f.id
 JOIN place AS fp ON f.thread_id = fp.thread_id
 JOIN instance AS t ON l.to_kind = t.kind AND l.to_id = t.id
 JOIN place AS tp ON t.thread_id = tp.thread_id;
+
+CREATE OR REPLACE TEMP TABLE judged AS SELECT DISTINCT kind FROM truth_link;

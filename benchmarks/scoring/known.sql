@@ -22,3 +22,6 @@ WHERE kind = 'goal_accepted' AND EXISTS (
     FROM found_link AS r
     WHERE r.kind = 'goal_result' AND r.is_guess AND f.from_id = r.from_id
 );
+
+-- A node that answers no message has no true link of these kinds, but may have invented ones.
+INSERT INTO judged VALUES ('direct'), ('take_adjacent');

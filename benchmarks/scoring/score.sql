@@ -130,5 +130,5 @@ FULL JOIN found AS f ON e.kind = f.kind
 LEFT JOIN repeated AS r ON coalesce(e.kind, f.kind) = r.kind
 LEFT JOIN labelled AS s ON coalesce(e.kind, f.kind) = s.kind
 -- Truth that says nothing of a kind does not judge it.
-WHERE e.kind IS NOT NULL
+WHERE coalesce(e.kind, f.kind) IN (FROM judged)
 ORDER BY 1;
