@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from msgflow.db.objects import public_names
 from msgflow.errors import UsageError
 from msgflow.run.window import WHOLE, Window
 from msgflow.text.name_suggestions import did_you_mean
@@ -83,7 +84,7 @@ class Selection:
         self, connection: duckdb.DuckDBPyConnection, view: str, runs: Sequence[Run]
     ) -> pa.RecordBatchReader:
         """Return the rows of a view, sorted by all columns: equal content gives equal rows."""
-        # The name comes from the catalogue of the database, never from the user.
+        # The name is one that msgflow declares.
         text = f'SELECT * FROM main."{view}" WHERE list_contains($runs, run_id)'
         bindings: dict[str, object] = {"runs": [run.run_id for run in runs]}
         condition = self._condition(view)
@@ -118,13 +119,16 @@ def select_views(
 
     Args:
         connection: to the database.
-        views: names of views; all when empty.
+        views: names of views that msgflow declares; all of these when empty.
         part: runs and times to export.
 
     Raises:
         UsageError: a view, run or time that does not exist, or no run at all.
     """
-    columns = dict(connection.execute(_VIEWS).fetchall())
+    # A database of somebody else may have views of any name, which would become names of files.
+    declared = set(public_names())
+    found = connection.execute(_VIEWS).fetchall()
+    columns = {view: names for view, names in found if view in declared}
     for view in views:
         if view not in columns:
             hint = did_you_mean(view, list(columns), "msgflow db schema")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
@@ -12,7 +13,6 @@ from msgflow.files.temporary_owner import is_abandoned, mark
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
-    from pathlib import Path
 
 _PARTITION = "run_id="
 _ASIDE = ".export."
@@ -26,7 +26,14 @@ def replacing_entries(
     """Yield a directory to write `names` to; they take their places at the end.
 
     An error or an interrupt before that leaves `directory` as it was. Other entries stay.
+
+    Raises:
+        ValueError: a name that is a path, and might lead out of the directory.
+        UsageError: an entry that is there already, or a directory that cannot be written.
     """
+    for name in names:
+        if Path(name).name != name:
+            raise ValueError(f"not the name of an entry: {name!r}")
     _clean_up(directory)
     _refuse_existing(directory, names, force)
     aside = directory / f"{_ASIDE}{mark()}{_SUFFIX}"

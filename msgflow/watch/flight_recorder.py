@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import stat
 import time
 from concurrent.futures import ThreadPoolExecutor
 from itertools import count
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
     from msgflow.watch.kept_traces import KeptTraces
 
 _DATABASE = "msgflow.duckdb"
+# A directory is ours, and may be removed, if this file is in it. It holds the end of the violation.
+_MARK = ".msgflow-violation"
 
 
 class FlightRecorder:
@@ -87,22 +90,27 @@ class FlightRecorder:
         # Several at once would take the memory of the system that is watched.
         self._finish()
         moment = time.strftime("%Y%m%d-%H%M%S", time.gmtime(end_ns // 1_000_000_000))
-        names = (f"violation-{moment}" + (f"-{n}" if n > 1 else "") for n in count(1))
-        target = next(path for path in map(self._directory.joinpath, names) if not path.exists())
+        target = self._directory / f"violation-{moment}"
+        is_ours = False
         # Whatever fails must not end the view.
         try:
             # A directory of a session has `archives`, and is below that of its host.
             common = os.path.commonpath([chunk.parents[2] for chunk in chunks])
-            target.mkdir(parents=True)
+            target = _made(target)
+            is_ours = True
+            (target / _MARK).write_text(f"{end_ns}\n", encoding="utf-8")
             for chunk in chunks:
                 if chunk.is_dir():
                     session = chunk.parents[1].relative_to(common)
-                    shutil.copytree(chunk, target / "archives" / session / chunk.name)
+                    copy = target / "archives" / session / chunk.name
+                    shutil.copytree(chunk, copy, ignore=_no_files)
             if learned is not None:
                 (target / LEARNED_FILE).write_text(learned, encoding="utf-8")
             self._writing = self._beside.submit(self._write, target, traces, links)
         except Exception as error:
-            self._give_up(target, error)
+            if is_ours:
+                shutil.rmtree(target, ignore_errors=True)
+            self._note_failure(target, error)
 
     def close(self) -> None:
         """Wait for the last database."""
@@ -126,17 +134,49 @@ class FlightRecorder:
                 traces=traces,
             )
         except Exception as error:
-            self._give_up(target, error)
+            shutil.rmtree(target, ignore_errors=True)
+            self._note_failure(target, error)
             return
-        others = sorted(set(self._directory.glob("violation-*")) - {target})
-        for oldest in others[: max(len(others) + 1 - self._most, 0)]:
+        kept = {path: _end_ns(path) for path in self._directory.glob("violation-*")}
+        # A violation that another watcher keeps just now may be older.
+        others = sorted(
+            (end_ns, path) for path, end_ns in kept.items() if end_ns is not None and path != target
+        )
+        for _, oldest in others[: max(len(others) + 1 - self._most, 0)]:
             shutil.rmtree(oldest, ignore_errors=True)
         self._note(f"kept: msgflow why --db {target / _DATABASE}")
 
-    def _give_up(self, target: Path, error: Exception) -> None:
-        """Remove what was kept, and say why."""
-        shutil.rmtree(target, ignore_errors=True)
+    def _note_failure(self, target: Path, error: Exception) -> None:
         self._note(f"the violation is not kept in {target}: {_reason(error)}")
+
+
+def _made(path: Path) -> Path:
+    """Make a directory with this name, or with the first free number behind it."""
+    for number in count(1):
+        made = path if number == 1 else path.with_name(f"{path.name}-{number}")
+        try:
+            made.mkdir(parents=True)
+        except FileExistsError:
+            continue
+        return made
+    raise AssertionError("numbers do not end")
+
+
+def _no_files(directory: str, names: list[str]) -> list[str]:
+    """Return what is not to be copied: links may lead anywhere, and pipes never end."""
+    modes = {name: os.lstat(os.path.join(directory, name)).st_mode for name in names}
+    return [name for name, mode in modes.items() if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))]
+
+
+def _end_ns(directory: Path) -> int | None:
+    """Return the end of the violation that is kept in a directory, None if it is not ours."""
+    try:
+        mark = os.lstat(directory / _MARK)
+        if directory.is_symlink() or not stat.S_ISREG(mark.st_mode):
+            return None
+        return int((directory / _MARK).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
 
 
 def _reason(error: Exception) -> str:

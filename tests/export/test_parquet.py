@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -304,3 +304,28 @@ def test_equal_results_are_equal_in_csv(recorded: Database, tmp_path: Path) -> N
     with (tmp_path / "sql.csv").open("wb") as stream:
         write_result(result, Format.CSV, stream)
     assert (tmp_path / "out" / "take.csv").read_bytes() == (tmp_path / "sql.csv").read_bytes()
+
+
+@pytest.mark.parametrize("write", [Database.export_parquet, Database.export_csv])
+def test_a_view_of_somebody_else_becomes_no_file(
+    small_database: Path, tmp_path: Path, write: Callable[..., object]
+) -> None:
+    """Its name might be a path: this one is that of a file that matters."""
+    path, out = tmp_path / "foreign.duckdb", tmp_path / "out"
+    shutil.copyfile(small_database, path)
+    victim = tmp_path / "victim"
+    victim.mkdir()
+    (victim / "letter.csv").write_text("matters")
+    names = ["../victim/letter", f"{victim}/letter", "own"]
+    with duckdb.connect(str(path)) as connection:
+        for name in names:
+            connection.execute(f'CREATE VIEW main."{name}" AS SELECT run_id FROM store.run')
+    with Database(path) as database:
+        write(database, out, force=True)
+        for name in names:
+            with pytest.raises(UsageError, match="there is no such view"):
+                write(database, out, [name], force=True)
+    assert [file.name for file in victim.iterdir()] == ["letter.csv"]
+    assert (victim / "letter.csv").read_text() == "matters"
+    assert not [entry for entry in out.iterdir() if entry.name.startswith("own")]
+    assert (out / "node" / "run_id=1").exists() or (out / "node.csv").exists()

@@ -55,17 +55,22 @@ def watched(shared_traces: Path, tmp_path: Path):
 def test_a_violation_names_the_culprit_and_is_kept(watched, tmp_path: Path) -> None:
     """A window of three seconds: in the other ones nothing took so long."""
     kept = tmp_path / "kept"
-    result = watched(
-        TARGETS, "--window", "3s", "--step", "3s", "--json", "--keep-on-violation", kept
-    )
+    others_own = [kept / "violation-19700101-000000" / "msgflow.duckdb", kept / "violation-report"]
+    for file in others_own:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text("matters")
+    options = ("--window", "3s", "--step", "3s", "--json", "--keep-most", 1)
+    result = watched(TARGETS, *options, "--keep-on-violation", kept)
     assert result.exit_code == 1
+    # What this program did not write stays.
+    assert all(file.read_text() == "matters" for file in others_own)
     first, *others = map(json.loads, result.stdout.splitlines())
     (violation,) = first["violations"]
     assert violation["subject"] == "/scan → /filtered"
     assert violation["worst_ns"] == 99_343_279
     assert "/filter ran 48.084 ms" in violation["culprit"]
     assert not any(window["violations"] for window in others)
-    (directory,) = kept.iterdir()
+    (directory,) = kept.glob("violation-2*")
     assert len(list(directory.glob("archives/*/*"))) > 2
     with Database(directory / "msgflow.duckdb") as database:
         rows = database.query("e2e-latency").to_arrow().to_pylist()
@@ -188,7 +193,10 @@ def test_a_full_disk_ends_no_view(watched, tmp_path: Path, kilobytes: int) -> No
 
 
 def test_sessions_of_one_name_on_two_hosts_are_kept(tmp_path: Path) -> None:
-    """lttng-relayd has a directory for each host; their chunks may have equal names."""
+    """lttng-relayd has a directory for each host; their chunks may have equal names.
+
+    Links and pipes in them are not followed.
+    """
     directory = tmp_path / "trace"
     rotations = (SECOND // 2,)
     simulate("two_hosts", directory, factor=0.1, recording=Recording(rotations=rotations))
@@ -200,6 +208,11 @@ def test_sessions_of_one_name_on_two_hosts_are_kept(tmp_path: Path) -> None:
         chunks.append(Chunk(0, moved, first.rename(first.with_name("chunk-0"))))
     read = [read_chunk(chunk, Continuation()) for chunk in chunks]
     notes: list[str] = []
+    secret = tmp_path / "secret"
+    secret.write_text("matters")
+    (chunks[0].path / "link").symlink_to(secret)
+    (chunks[0].path / "loop").symlink_to(chunks[0].path)
+    os.mkfifo(chunks[0].path / "pipe")
     recorder = FlightRecorder(
         tmp_path / "kept", most=1, window_ns=SECOND, earlier_ns=0, clock_sync="none",
         note=notes.append,
@@ -208,7 +221,9 @@ def test_sessions_of_one_name_on_two_hosts_are_kept(tmp_path: Path) -> None:
     recorder.keep(SECOND, traces, [chunk.path for chunk in chunks], None, None)
     recorder.close()
     assert notes[0].startswith("kept: ")
-    assert len(list((tmp_path / "kept").glob("*/archives/*/drive/chunk-0"))) == 2
+    kept = list((tmp_path / "kept").glob("*/archives/*/drive/chunk-0"))
+    assert len(kept) == 2
+    assert not {"link", "loop", "pipe"} & {path.name for one in kept for path in one.iterdir()}
 
 
 def test_an_error_of_the_targets_is_told_as_it_is(watched, monkeypatch) -> None:
@@ -302,3 +317,22 @@ def test_paths_of_one_target_are_told_apart(monkeypatch) -> None:
     assert told(monkeypatch, [first], [first, second], [first, second]) == [
         ["drive"], ["drive"], [],
     ]  # fmt: skip
+
+
+def test_of_violations_the_oldest_goes_first(tmp_path: Path) -> None:
+    """Not by name: a name that became free is taken again."""
+    recorder = FlightRecorder(
+        tmp_path, most=2, window_ns=1, earlier_ns=0, clock_sync="none", note=lambda _: None
+    )
+    simulate(
+        "quiet", tmp_path / "trace", factor=0.05, recording=Recording(rotations=(SECOND // 50,))
+    )
+    (chunk,) = list(tmp_path.glob("trace/**/archives/*"))[:1]
+    read = read_chunk(Chunk(0, chunk.parents[1], chunk), Continuation())
+    assert read is not None
+    ends = [SECOND + number for number in range(5)]
+    for end_ns in ends:
+        recorder.keep(end_ns, KeptTraces([], [read]), [chunk], None, None)
+    recorder.close()
+    marks = [path.read_text() for path in tmp_path.glob("violation-*/.msgflow-violation")]
+    assert sorted(map(int, marks)) == ends[-2:]
