@@ -85,10 +85,7 @@ def require_ingestable(path: Path) -> None:
 
 
 def upgrade(path: Path) -> Upgrade:
-    """Bring a database to the schema and views, then to the links, of this msgflow.
-
-    Either is one transaction.
-    """
+    """Bring a database to the schema, views and links of this msgflow, in one transaction."""
     if not path.exists():
         raise DatabaseError(f"no database — {path}", "msgflow ingest TRACE")
     with database_errors(path):
@@ -96,14 +93,12 @@ def upgrade(path: Path) -> Upgrade:
             before = None if is_empty(con) else require_known(con, path)
             if before is not None:
                 views_changed = not _has_our_views(con, path)
-                _bring_to_head(con, path)
+                rederived = _bring_to_head(con, path)
         if before is None:
             # A file of our own: the format of this one depends on the program that made it.
             _replace_by_new(path)
             return Upgrade(None, objects.head_revision(), True, ())
-        # DuckDB renders definitions that it has just written in another way than those of a file.
-        with contextlib.closing(connect(path, read_only=False)) as con:
-            return Upgrade(before, objects.head_revision(), views_changed, _rederive(con))
+        return Upgrade(before, objects.head_revision(), views_changed, rederived)
 
 
 def _has_our_views(con: duckdb.DuckDBPyConnection, path: Path) -> bool:
@@ -116,7 +111,8 @@ def _has_our_views(con: duckdb.DuckDBPyConnection, path: Path) -> bool:
     return True
 
 
-def _bring_to_head(con: duckdb.DuckDBPyConnection, path: Path) -> None:
+def _bring_to_head(con: duckdb.DuckDBPyConnection, path: Path) -> tuple[str, ...]:
+    """Return the names of the runs whose links were derived again."""
     revision = recorded_revision(con)
     is_older = revision != objects.head_revision()
     # Migrations and views need their tables. Before the first release, others had revisions of the
@@ -124,6 +120,7 @@ def _bring_to_head(con: duckdb.DuckDBPyConnection, path: Path) -> None:
     require_tables(con, path, _definitions_of(revision) if revision and is_older else None)
     with migrated(con) if is_older else transaction(con) as changing:
         objects.apply(changing)
+        return _rederive(changing)
 
 
 def _definitions_of(revision: str) -> Mapping[str, str]:
@@ -142,10 +139,8 @@ def _rederive(con: duckdb.DuckDBPyConnection) -> tuple[str, ...]:
     from msgflow.db.derivation import derive, stale_runs
 
     stale = stale_runs(con)
-    if stale:
-        with transaction(con):
-            for run_id, _ in stale:
-                derive(con, run_id)
+    for run_id, _ in stale:
+        derive(con, run_id)
     return tuple(name for _, name in stale)
 
 

@@ -9,6 +9,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from unittest.mock import Mock
 
 import duckdb
 import pytest
@@ -295,6 +296,7 @@ def test_a_new_database_needs_neither_alembic_nor_sqlalchemy(tmp_path: Path) -> 
     program = """
 import sys
 from pathlib import Path
+from unittest.mock import Mock
 from msgflow.db import migration
 migration.create(Path(sys.argv[1]))
 assert migration.upgrade(Path(sys.argv[1])).before is not None
@@ -320,6 +322,7 @@ def test_the_hash_of_definitions_is_of_all_files_that_make_them(tmp_path: Path) 
     program = """
 import sys
 from pathlib import Path
+from unittest.mock import Mock
 from msgflow.db.objects import definition_hash
 print(definition_hash())
 for path in map(Path, sys.argv[1:]):
@@ -474,3 +477,25 @@ def test_a_failing_view_leaves_the_old_ones(
     assert (
         con.execute("SELECT view_name, sql FROM duckdb_views() ORDER BY ALL").fetchall() == before
     )
+
+
+def test_an_upgrade_that_ends_early_changes_nothing(
+    database: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not even the views, if the links of a run cannot be derived."""
+    with duckdb.connect(str(database)) as con:
+        con.execute(
+            "INSERT INTO store.run (run_id, name, created_at, msgflow_version, derivation_hash) "
+            "VALUES (1, 'stale', now(), '0', 'old')"
+        )
+        con.execute("CREATE OR REPLACE VIEW main.run AS SELECT 1 AS one")
+    monkeypatch.setattr(derivation, "derive", Mock(side_effect=KeyboardInterrupt))
+    with pytest.raises(KeyboardInterrupt):
+        migration.upgrade(database)
+    with duckdb.connect(str(database)) as con:
+        assert con.execute("FROM main.run").fetchall() == [(1,)]
+        assert con.execute("SELECT derivation_hash FROM store.run").fetchall() == [("old",)]
+    monkeypatch.undo()
+    done = migration.upgrade(database)
+    assert done.views_changed
+    assert done.rederived_runs == ("stale",)
