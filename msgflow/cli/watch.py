@@ -8,6 +8,7 @@ import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, closing, contextmanager
+from itertools import chain, count
 from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING, Annotated, Any
@@ -283,6 +284,13 @@ def _alarm(targets: Path, paths: Path) -> Alarm:
     return Alarm(file, places, print_note)
 
 
+def _free(name: str) -> Path:
+    """Return a path where nothing is, also no link that leads nowhere."""
+    path = Path(name)
+    numbered = (path.with_stem(f"{path.stem}-{number}") for number in count(2))
+    return next(one for one in chain([path], numbered) if not os.path.lexists(one))
+
+
 def _record(
     words: list[str],
     directory: Path | None,
@@ -301,7 +309,7 @@ def _record(
 
     name = f"watch-{time.strftime('%Y%m%d-%H%M%S')}-{os.getpid()}"
     # A file, since the program would stop if it wrote to a full pipe.
-    log = Path(f"{directory or name}.log") if on_screen and sys.stderr.isatty() else None
+    log = _free(f"{directory or name}.log") if on_screen and sys.stderr.isatty() else None
     ended = Event()
     with (
         temporary_directory() as temporary,

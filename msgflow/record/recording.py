@@ -97,7 +97,7 @@ def record(
         name: of the LTTng session.
         channel: which events, in which buffers.
         program: to start once all is ready, and to end afterwards; with its arguments.
-        log: file that gets what the program prints, if it prints anything; None: our stderr.
+        log: new file that gets what the program prints, if it prints anything; None: our stderr.
         seconds: how long to record; None: without a limit.
         kernel: also record what the scheduler does.
         snapshot: a snapshot session that has the initialisation of nodes that run already; what it
@@ -163,7 +163,8 @@ def record(
 def _written(log: Path) -> Iterator[IO[bytes]]:
     """Yield the file while a program may write to it; an empty one does not stay."""
     try:
-        stream = log.open("wb")
+        # Nothing that is there is touched, also not what a link leads to.
+        stream = log.open("xb")
     except OSError as error:
         raise RecordingError(
             f"cannot write {log}: {(error.strerror or str(error)).lower()}", "another place: -o DIR"

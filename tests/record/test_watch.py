@@ -125,12 +125,18 @@ def test_what_a_program_prints_does_not_tear_the_screen(tmp_path: Path) -> None:
     assert f"sh ended with exit code 3: {log.name} has what it printed" in said
 
 
-@pytest.mark.thorough
 def test_a_recording_with_a_name_has_what_the_program_printed_beside_it(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "msgflow", "watch", "-o", "drive", "--", *SPEAKS]
+    """In a new file: not in one that is there, nor where a link leads to."""
+    (tmp_path / "drive.log").write_text("matters")
+    (tmp_path / "drive-2.log").symlink_to(tmp_path / "elsewhere")
+    speaks = ["sh", "-c", "echo spoken; sleep 1"]
+    command = [sys.executable, "-m", "msgflow", "watch", "-o", "drive", "--", *speaks]
     with Terminal(command, tmp_path) as terminal:
         terminal.wait()
-    assert {path.name for path in tmp_path.iterdir()} == {"drive", "drive.log"}
+    names = {path.name for path in tmp_path.iterdir()}
+    assert names == {"drive", "drive.log", "drive-2.log", "drive-3.log"}
+    assert (tmp_path / "drive.log").read_text() == "matters"
+    assert (tmp_path / "drive-3.log").read_text() == "spoken\n"
 
 
 @pytest.mark.thorough
