@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import re
+import sys
 from dataclasses import dataclass
+from io import StringIO
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from msgflow.errors import UsageError
@@ -140,9 +142,21 @@ def is_null(node: Any) -> bool:
 
 def quoted(text: str) -> str:
     """Return a text as YAML writes it: in quotes, unless it is plainly a name."""
-    if _PLAIN.fullmatch(text) and text.lower() not in _WORDS:
-        return text
-    return json.dumps(text, ensure_ascii=False)
+    return text if _PLAIN.fullmatch(text) and text.lower() not in _WORDS else in_quotes(text)
+
+
+def in_quotes(text: str) -> str:
+    """Return a text in quotes, on one line, which YAML reads as the same text."""
+    if text.isprintable():
+        return json.dumps(text, ensure_ascii=False)
+    # JSON leaves characters as they are that end a line of YAML, or that YAML forbids.
+    from ruamel.yaml import YAML
+
+    yaml, stream = YAML(typ="safe", pure=True), StringIO()
+    yaml.default_style = '"'
+    yaml.width = sys.maxsize
+    yaml.dump(text, stream)
+    return stream.getvalue().rstrip("\n")
 
 
 def list_lines(key: str, items: Sequence[str], width: int = _WIDTH) -> list[str]:

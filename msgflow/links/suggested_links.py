@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from msgflow.files.yaml_file import list_lines, quoted
+from msgflow.text.values import printable
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -81,7 +82,7 @@ class LinkSuggestions:
             lines += _indented(
                 _comment(f"Without a name: {row['message_count']:,} messages {' '.join(ends)}.")
             )
-            lines += _indented([f"# - {{name: /NAME, {row['entry']}}}"])
+            lines += _indented([f"# - {{name: /NAME, {printable(row['entry'])}}}"])
         return lines
 
 
@@ -101,4 +102,5 @@ def _indented(lines: Sequence[str]) -> list[str]:
 
 
 def _comment(text: str) -> list[str]:
-    return [f"# {line}" for line in textwrap.wrap(text, _WIDTH, break_on_hyphens=False)]
+    words = printable(" ".join(text.split()))
+    return [f"# {line}" for line in textwrap.wrap(words, _WIDTH, break_on_hyphens=False)]

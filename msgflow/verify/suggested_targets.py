@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import json
 import math
 from typing import TYPE_CHECKING, Any
 
+from msgflow.files.yaml_file import in_quotes
 from msgflow.verify.condition import UNITS, Dimension
 from msgflow.verify.metrics import SUBJECTS
 
@@ -51,7 +51,7 @@ def suggest_targets(run: Run, results: Mapping[str, Sequence[Row]], margin: floa
         *_processes(results["scheduling-wakeup"], margin),
     ]
     lines = [
-        f"# What run {json.dumps(run.name)} met, and {100 * margin:.4g} % more: review it, keep"
+        f"# What run {in_quotes(run.name)} met, and {100 * margin:.4g} % more: review it, keep"
         " what matters.",
         *_undelivered(results["topics-delivery"]),
         "targets:" if entries else "targets: []",
@@ -69,7 +69,7 @@ def _undelivered(rows: Sequence[Row]) -> Iterator[str]:
     for row in rows:
         share = row["delivered_percent"]
         if share is not None and share < _DELIVERED_PERCENT:
-            way = json.dumps(f"{row['topic_name']} → {row['subscriber']}", ensure_ascii=False)
+            way = in_quotes(f"{row['topic_name']} → {row['subscriber']}")
             yield (
                 f"# {way}: only {share:.3g} % of the messages were delivered"
                 f" ({row['dropped']} dropped, {row['lost']} lost). Is this a good run?"
@@ -95,7 +95,7 @@ def _paths(rows: Sequence[Row], margin: float) -> Iterator[Entry]:
         least = math.floor(100 * share * (1 - margin / 10))
         yield (
             "path",
-            json.dumps(ends, ensure_ascii=False),
+            f"[{', '.join(map(in_quotes, ends))}]",
             {"latency": f"p99 < {_time(slow, margin)}", "completeness": f">= {least} %"},
         )
 
@@ -113,8 +113,8 @@ def _timers(rows: Sequence[Row], margin: float) -> Iterator[Entry]:
             late = max(_LEAST_LATENESS_NS, *(row["lateness_p99_ns"] for row in known))
             requirements["lateness"] = f"p99 < {_time(late, margin)}"
         if requirements:
-            name = json.dumps(_literal(node), ensure_ascii=False)
-            label = json.dumps(_literal(callback), ensure_ascii=False)
+            name = in_quotes(_literal(node))
+            label = in_quotes(_literal(callback))
             yield "timer", f"{name}\n    callback: {label}", requirements
 
 
@@ -126,8 +126,8 @@ def _callbacks(rows: Sequence[Row], margin: float) -> Iterator[Entry]:
             continue
         slow = max(row["running_p99_ns"] for row in group)
         lost = max((row["preempted_ns"] / row["total_ns"] for row in known), default=0)
-        label = json.dumps(_literal(callback), ensure_ascii=False)
-        name = json.dumps(_literal(node), ensure_ascii=False)
+        label = in_quotes(_literal(callback))
+        name = in_quotes(_literal(node))
         requirements = {"cpu": f"p99 < {_time(slow, margin)}"}
         most = math.floor(100 * lost * (1 + margin)) + 1
         if most < 100:
@@ -142,7 +142,7 @@ def _processes(rows: Sequence[Row], margin: float) -> Iterator[Entry]:
         called = nodes if nodes.startswith("/") else process
         if called and any(row["count"] >= LEAST_VALUES for row in group):
             slow = max(row["p99_ns"] for row in group)
-            name = json.dumps(_literal(called), ensure_ascii=False)
+            name = in_quotes(_literal(called))
             yield "process", name, {"wakeup": f"p99 < {_time(slow, margin)}"}
 
 
@@ -154,8 +154,8 @@ def _topics(rows: Sequence[Row]) -> Iterator[Entry]:
         if row["count"] < LEAST_VALUES or row["period_deviation_ns"] is None:
             continue
         if row["period_deviation_ns"] * row["rate_hz"] <= _STEADY * 1e9:
-            name = json.dumps(_literal(topic), ensure_ascii=False)
-            publisher = json.dumps(_literal(node), ensure_ascii=False)
+            name = in_quotes(_literal(topic))
+            publisher = in_quotes(_literal(node))
             yield "topic", f"{name}\n    node: {publisher}", {"rate": _around([row["rate_hz"]])}
 
 
@@ -171,7 +171,7 @@ def _calls(
         if any(row[samples] < LEAST_VALUES for row in group):
             continue
         slow = max(row[f"{column}_p99_ns"] for row in group)
-        name = json.dumps(_literal(called), ensure_ascii=False)
+        name = in_quotes(_literal(called))
         yield kind, name, {metric: f"p99 < {_time(slow, margin)}"}
 
 
