@@ -7,17 +7,21 @@ from typing import TYPE_CHECKING, Any
 
 from msgflow.confined.process import ConfinedProcess
 from msgflow.database import Database
-from msgflow.db.memory import bound_process
+from msgflow.db.memory import bound_process, default_limit
 from msgflow.result.query_result import QueryResult
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
+    import pyarrow as pa
+
     Write = Callable[[Any], int]
 
 _SIZE = 8
 _ROWS_AT_ONCE = 100_000
+# The server holds an answer as a whole, and so does the browser.
+MOST_BYTES = 100_000_000
 
 
 def answer(
@@ -26,16 +30,31 @@ def answer(
     """Write the result of `Database.sql`, in the child: notes as JSON, then rows."""
     import pyarrow as pa
 
-    with Database(path, memory_limit=memory_limit) as database:
+    with Database(path, memory_limit=memory_limit or default_limit()) as database:
         bound_process(database.connection)
         result = database.sql(text, limit=limit)
-        notes = json.dumps(result.notes).encode()
+        table = _cut(result.table)
+        said = list(result.notes)
+        if len(table) < len(result):
+            said.append(
+                f"the first {len(table)} of {len(result)} rows: all take"
+                f" {result.table.nbytes / 1e6:,.0f} MB, and a page shows {MOST_BYTES / 1e6:.0f} MB"
+            )
+        notes = json.dumps(said).encode()
         write(len(notes).to_bytes(_SIZE) + notes)
         with (
             pa.PythonFile(_Stream(write), "w") as stream,
-            pa.ipc.new_stream(stream, result.table.schema) as writer,
+            pa.ipc.new_stream(stream, table.schema) as writer,
         ):
-            writer.write_table(result.table, max_chunksize=_ROWS_AT_ONCE)
+            writer.write_table(table, max_chunksize=_ROWS_AT_ONCE)
+
+
+def _cut(table: pa.Table) -> pa.Table:
+    """Return the first rows, of which a page can show all bytes."""
+    while len(table) and table.nbytes > MOST_BYTES:
+        # Rows differ in size: the first may take more than their share.
+        table = table.slice(0, len(table) * MOST_BYTES // table.nbytes)
+    return table
 
 
 class WarmSql:
@@ -43,8 +62,8 @@ class WarmSql:
 
     Args:
         path: the database; every query opens it anew.
-        memory_limit: most memory that DuckDB takes; its default when None. The process takes a
-            quarter more at most, but may take 256 MiB.
+        memory_limit: most memory that DuckDB takes; that of `default_limit` when None. The process
+            takes a quarter more at most, but may take 256 MiB.
         seconds: how long a query may take.
     """
 

@@ -8,6 +8,7 @@
     -- param: from VARCHAR = NULL     Topic where flows start; every source when NULL
     -- param: case VARCHAR {first|last} = 'first'     Which rows count
     -- param: depth BIGINT {1..} = 32     How deep; at least 1
+    -- param: bins BIGINT {1..2000} = 80     How many; at most 2000
     -- column: median_ns BIGINT [ns]  Half of the flows took no longer
     -- brief: path, median_ns
     -- answer: lost
@@ -82,7 +83,7 @@ _COMMENT = re.compile(r"--[^\n]*")
 _OBJECT = re.compile(r"\b(?:raw|staging|store|derive|main)\.[a-z_0-9]+\b")
 _RELATION = re.compile(r"\b(?:FROM|JOIN) ([a-z_0-9]+)\b(?![.(])")
 _NEXT_SOURCE = re.compile(r", (?=[a-z]+\.)")
-_MINIMUM = re.compile(r"(-?\d+)\.\.")
+_RANGE = re.compile(r"(-?\d+)\.\.(-?\d+)?")
 _REPEATABLE = ("param", "column")
 _SINGLE = (
     "name", "title", "description", "cause", "cure", "grain", "kind", "severity", "note", "when",
@@ -108,6 +109,7 @@ class Param:
         description: one sentence.
         choices: the only values allowed, or empty for any.
         minimum: the least integer allowed, or None for any.
+        maximum: the greatest one, likewise; only what strangers ask for has one.
     """
 
     name: str
@@ -117,6 +119,7 @@ class Param:
     description: str
     choices: tuple[str, ...] = ()
     minimum: int | None = None
+    maximum: int | None = None
 
 
 @dataclass(frozen=True)
@@ -388,15 +391,18 @@ def _param(field: _Field, path: Path) -> Param:
             path,
             field.line,
             "expected '-- param: name TYPE {choice|choice} = default  description' (choices, or"
-            " {minimum..} of an integer, and default may be left out, two spaces end the default),"
+            " {least..} or {least..most} of an integer, and default may be left out, two spaces end"
+            " the default),"
             f" not {field.value!r}",
         )
     choices = tuple(part.strip() for part in (match["choices"] or "").split("|") if part.strip())
     minimum: int | None = None
-    if least := _MINIMUM.fullmatch("|".join(choices)):
+    maximum: int | None = None
+    if limits := _RANGE.fullmatch("|".join(choices)):
         if not is_integer(match["type"]):
             raise _error(path, field.line, f"only an integer has a minimum, not {match['type']}")
-        minimum, choices = int(least[1]), ()
+        minimum, choices = int(limits[1]), ()
+        maximum = int(limits[2]) if limits[2] else None
     default: Value = None
     if match["default"] is not None:
         try:
@@ -407,6 +413,8 @@ def _param(field: _Field, path: Path) -> Param:
             raise _error(path, field.line, f"the default {default!r} is not among the choices")
         if minimum is not None and isinstance(default, int) and default < minimum:
             raise _error(path, field.line, f"the default {default!r} is less than {minimum}")
+        if maximum is not None and isinstance(default, int) and default > maximum:
+            raise _error(path, field.line, f"the default {default!r} is more than {maximum}")
     return Param(
         name=match["name"],
         type=match["type"],
@@ -415,6 +423,7 @@ def _param(field: _Field, path: Path) -> Param:
         description=" ".join(match["description"].split()),
         choices=choices,
         minimum=minimum,
+        maximum=maximum,
     )
 
 

@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 
     from msgflow.result.query_result import QueryResult
     from msgflow.run.choice import Run
+    from msgflow.sql.header import Param
 
 Params = dict[str, Any]
 
@@ -447,9 +448,18 @@ def _own(name: str, params: Params, given: Mapping[str, Any]) -> Params:
     own: Params = {}
     for param in page_query(name).params:
         if param.name in params and param.name not in given:
-            value = params[param.name]
-            own[param.name] = _whole(params, param.name) if param.type == "BIGINT" else str(value)
+            own[param.name] = _value(param, params)
     return own
+
+
+def _value(param: Param, params: Params) -> int | str:
+    if param.type != "BIGINT":
+        return str(params[param.name])
+    number = _whole(params, param.name)
+    least, most = param.minimum, param.maximum
+    if (least is not None and number < least) or (most is not None and number > most):
+        raise UsageError(f"{param.name} is from {least} to {most} — {number}")
+    return number
 
 
 def _whole(params: Params, name: str, default: int | None = None) -> int:

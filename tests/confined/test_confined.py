@@ -17,7 +17,8 @@ import pytest
 from processes import children_of, has_ended
 
 from msgflow.confined.process import ConfinedProcess, LateError
-from msgflow.confined.query import WarmSql
+from msgflow.confined.query import MOST_BYTES, WarmSql
+from msgflow.db.memory import default_limit
 from msgflow.errors import DatabaseError, QueryError, UsageError
 
 SLOW = "SELECT levenshtein(repeat('a', 400000), repeat('b', 400000))"
@@ -55,6 +56,23 @@ def test_a_missing_database(tmp_path: Path) -> None:
         pytest.raises(DatabaseError, match="no database"),
     ):
         sql("SELECT 1", 1)
+
+
+def test_an_answer_is_cut_by_bytes(sql: WarmSql) -> None:
+    """Of 300 rows of 1 MB each; the first row alone is of half that size."""
+    text = "SELECT repeat('x', if(i = 0, 500_000, 1_000_000)) AS x FROM range(300) t(i) ORDER BY i"
+    found = sql(text, 1000)
+    assert 90_000_000 < found.table.nbytes <= MOST_BYTES
+    (note,) = found.notes
+    assert note == f"the first {len(found)} of 300 rows: all take 300 MB, and a page shows 100 MB"
+
+
+def test_without_a_limit_it_is_that_of_a_server(sql: WarmSql) -> None:
+    found = sql("SELECT current_setting('memory_limit') AS said", 1).table.to_pylist()
+    with duckdb.connect() as con:
+        con.execute("SET memory_limit = ?", [default_limit()])
+        expected = con.execute("SELECT current_setting('memory_limit')").fetchall()
+    assert [(row["said"],) for row in found] == expected
 
 
 def test_functions_of_duckdb_keep_to_the_memory(small_database: Path) -> None:

@@ -97,9 +97,10 @@ def test_an_object_does_not_need_itself() -> None:
     assert parse(text, PATH).needs == ("main.b",)
 
 
-def test_an_integer_may_have_a_minimum() -> None:
-    (param,) = parse_with("-- param: depth BIGINT {1..} = 32  How deep").params
-    assert param == Param("depth", "BIGINT", 32, True, "How deep", minimum=1)
+@pytest.mark.parametrize(("limits", "maximum"), [("1..", None), ("1..64", 64)])
+def test_an_integer_may_have_a_minimum(limits: str, maximum: int | None) -> None:
+    (param,) = parse_with(f"-- param: depth BIGINT {{{limits}}} = 32  How deep").params
+    assert param == Param("depth", "BIGINT", 32, True, "How deep", minimum=1, maximum=maximum)
 
 
 def test_a_note_is_kept() -> None:
@@ -132,6 +133,7 @@ def test_a_macro_keeps_its_whole_statement() -> None:
         ("-- param: a BIGINT = one  Default", "'one' is not NULL, TRUE, FALSE, a number"),
         ("-- param: a VARCHAR {b|c} = 'd'  x", "the default 'd' is not among the choices"),
         ("-- param: a BIGINT {1..} = 0  x", "the default 0 is less than 1"),
+        ("-- param: a BIGINT {1..9} = 10  x", "the default 10 is more than 9"),
         ("-- param: a VARCHAR {1..}  x", "only an integer has a minimum"),
         ("-- note: moon", "note 'moon' is not one of clocks"),
         ("-- param: a BIGINT  x\n-- param: a BIGINT  y", "'a' stands twice"),

@@ -48,6 +48,14 @@ def test_headers_say_what_a_page_query_has(name: str, demo: Path, read: Read) ->
     assert table.column_names == [column.name for column in header.columns]
 
 
+def test_numbers_of_rows_and_pieces_have_bounds() -> None:
+    """A page may ask for any: a large one would take all memory, a negative one is an error."""
+    params = [(name, param) for name in NAMES for param in page_query(name).params]
+    sizes = [(name, param) for name, param in params if param.name in ("bins", "limit", "steps")]
+    assert len(sizes) > 10
+    assert [name for name, param in sizes if param.minimum != 1 or param.maximum is None] == []
+
+
 def test_bars_are_the_instances_of_the_views(demo: Path, read: Read) -> None:
     connection = read(demo)
     pages = Pages()

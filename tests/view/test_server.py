@@ -166,6 +166,10 @@ def test_every_answer_is_strict(demo: Path, serve: Serve) -> None:
         ("area?part=callbacks&of=%5B%5D", "sums are of a list"),
         ("area?part=other&of=%5B1%5D", "there are no such sums"),
         ("path_point?path=x", "path is a whole number"),
+        ("executor_share?bins=1000000000", "bins is from 1 to 2000"),
+        ("rate?bins=0", "bins is from 1 to 2000"),
+        ("gap?limit=-5", "limit is from 1 to 50000"),
+        ("path_slowest?limit=50001", "limit is from 1 to 50000"),
     ],
 )
 def test_what_cannot_be_asked_is_refused(demo: Path, serve: Serve, place: str, said: str) -> None:

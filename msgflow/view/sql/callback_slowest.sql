@@ -7,7 +7,7 @@
 -- param: start_ns BIGINT  Begin of the window, epoch ns
 -- param: end_ns BIGINT  Its end, epoch ns, exclusive
 -- param: callback BIGINT  The callback
--- param: limit BIGINT = 10  Most rows
+-- param: limit BIGINT {1..50000} = 10  Most rows
 -- column: start_at BIGINT [ns since origin]  When it began
 -- column: duration BIGINT [ns]  How long it ran
 -- column: callback_instance_id BIGINT  Identity of the instance

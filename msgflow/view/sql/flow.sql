@@ -7,8 +7,8 @@
 -- param: kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or 'response'
 -- param: id BIGINT  Its identity
 -- param: direction VARCHAR = 'both'  'forward' (effects), 'backward' (causes) or 'both'
--- param: steps BIGINT = NULL  Most steps each way, three per message; any number when NULL
--- param: limit BIGINT = 20000  Most vertices, those nearest in time
+-- param: steps BIGINT {1..50000} = NULL  Most steps each way, three per message; any number when NULL
+-- param: limit BIGINT {1..50000} = 20000  Most vertices, those nearest in time
 -- column: kind UTINYINT  As in bar.sql
 -- column: id BIGINT  Identity of the vertex
 -- column: row_key BIGINT  Row of the timeline

@@ -4,7 +4,7 @@
 -- grain: one row per gap of a trace
 -- param: run BIGINT  Run
 -- param: origin_ns BIGINT  What times count from, epoch ns
--- param: limit BIGINT = 20000  Most gaps, the longest
+-- param: limit BIGINT {1..50000} = 20000  Most gaps, the longest
 -- column: host VARCHAR  Machine or container
 -- column: kind VARCHAR  'loss', 'packets' or 'pause'
 -- column: start_at BIGINT [ns since origin]  Begin

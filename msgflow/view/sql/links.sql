@@ -13,7 +13,7 @@
 -- param: first_publication BIGINT  As in window_ids.sql
 -- param: last_publication BIGINT  As in window_ids.sql
 -- param: last_instance BIGINT  As in window_ids.sql
--- param: limit BIGINT = 50000  Most links
+-- param: limit BIGINT {1..50000} = 50000  Most links
 -- column: link_kind UTINYINT  0 transport, 1 direct, 2 periodic_async, 3 partial_sync,
 --     4 take_adjacent, 5 polled, 6 approximate_sync
 -- column: from_row BIGINT  Row of the timeline where the arrow begins

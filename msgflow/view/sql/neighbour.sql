@@ -7,7 +7,7 @@
 -- param: row BIGINT  Row of the timeline
 -- param: kind BIGINT  Kind of the bar
 -- param: id BIGINT  Identity of the thing
--- param: step BIGINT  1: next, -1: previous
+-- param: step BIGINT {-1..1}  1: next, -1: previous
 -- column: kind UTINYINT  Kind of the bar
 -- column: id BIGINT  Identity of the thing
 -- column: start_at BIGINT [ns since origin]  Begin

@@ -4,7 +4,7 @@
 -- grain: one row per bin with flows
 -- param: run BIGINT  Run
 -- param: path BIGINT  Number of the path
--- param: bins BIGINT = 60  Number of bins
+-- param: bins BIGINT {1..2000} = 60  Number of bins
 -- param: begin_at BIGINT = NULL  Only flows that began at this time or later, ns since origin
 -- param: end_at BIGINT = NULL  Only flows that began before this time, ns since origin
 -- column: bin BIGINT  Position of the bin, from 0

@@ -5,7 +5,7 @@
 -- grain: one row per flow, or per piece of time with flows
 -- param: run BIGINT  Run
 -- param: path BIGINT  Number of the path
--- param: limit BIGINT = 2000  Most rows
+-- param: limit BIGINT {1..50000} = 2000  Most rows
 -- param: begin_at BIGINT = NULL  Only flows that began at this time or later, ns since origin
 -- param: end_at BIGINT = NULL  Only flows that began before this time, ns since origin
 -- column: root_at BIGINT [ns since origin]  Start of the root

@@ -5,7 +5,7 @@
 -- grain: one row per share
 -- param: run BIGINT  Run
 -- param: path BIGINT  Number of the path
--- param: steps BIGINT = 200  Number of shares
+-- param: steps BIGINT {1..2000} = 200  Number of shares
 -- param: begin_at BIGINT = NULL  Only flows that began at this time or later, ns since origin
 -- param: end_at BIGINT = NULL  Only flows that began before this time, ns since origin
 -- column: share DOUBLE  Share of the flows, 0 to 1

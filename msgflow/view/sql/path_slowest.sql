@@ -4,7 +4,7 @@
 -- grain: one row per flow
 -- param: run BIGINT  Run
 -- param: path BIGINT = NULL  Number of the path; every one when NULL
--- param: limit BIGINT = 10  Most flows of a path
+-- param: limit BIGINT {1..50000} = 10  Most flows of a path
 -- param: begin_at BIGINT = NULL  Only flows that began at this time or later, ns since origin
 -- param: end_at BIGINT = NULL  Only flows that began before this time, ns since origin
 -- column: path_id BIGINT  Number of the path

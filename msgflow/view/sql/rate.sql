@@ -7,7 +7,7 @@
 -- param: origin_ns BIGINT  What times count from, epoch ns
 -- param: start_ns BIGINT  Begin of the window, epoch ns
 -- param: end_ns BIGINT  Its end, epoch ns, exclusive
--- param: bins BIGINT = 300  Number of pieces
+-- param: bins BIGINT {1..2000} = 300  Number of pieces
 -- column: start_at BIGINT [ns since origin]  Begin of the piece
 -- column: length BIGINT [ns]  Length of the piece
 -- column: count BIGINT  What began in it

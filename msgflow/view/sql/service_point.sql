@@ -7,7 +7,7 @@
 -- param: start_ns BIGINT  Begin of the window, epoch ns
 -- param: end_ns BIGINT  Its end, epoch ns, exclusive
 -- param: client BIGINT = NULL  Client that called; NULL: not known
--- param: bins BIGINT = 80  Number of pieces
+-- param: bins BIGINT {1..2000} = 80  Number of pieces
 -- column: start_at BIGINT [ns since origin]  Begin of the piece
 -- column: length BIGINT [ns]  Length of the piece
 -- column: count BIGINT  Calls that began in it

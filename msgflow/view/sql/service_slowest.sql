@@ -7,7 +7,7 @@
 -- param: start_ns BIGINT  Begin of the window, epoch ns
 -- param: end_ns BIGINT  Its end, epoch ns, exclusive
 -- param: client BIGINT = NULL  Client that called; NULL: not known
--- param: limit BIGINT = 10  Most rows
+-- param: limit BIGINT {1..50000} = 10  Most rows
 -- column: start_at BIGINT [ns since origin]  When the request was sent
 -- column: duration BIGINT [ns]  Round trip
 -- column: request_id BIGINT  Identity of the request

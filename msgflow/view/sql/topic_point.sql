@@ -8,7 +8,7 @@
 -- param: start_ns BIGINT  Begin of the window, epoch ns
 -- param: end_ns BIGINT  Its end, epoch ns, exclusive
 -- param: topic VARCHAR = NULL  Topic; NULL: that without a known name
--- param: bins BIGINT = 80  Number of pieces
+-- param: bins BIGINT {1..2000} = 80  Number of pieces
 -- column: start_at BIGINT [ns since origin]  Begin of the piece
 -- column: length BIGINT [ns]  Length of the piece
 -- column: published BIGINT  Publications in it

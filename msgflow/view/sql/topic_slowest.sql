@@ -7,7 +7,7 @@
 -- param: start_ns BIGINT  Begin of the window, epoch ns
 -- param: end_ns BIGINT  Its end, epoch ns, exclusive
 -- param: topic VARCHAR = NULL  Topic; NULL: that without a known name
--- param: limit BIGINT = 10  Most rows
+-- param: limit BIGINT {1..50000} = 10  Most rows
 -- column: taken_at BIGINT [ns since origin]  When it was taken
 -- column: subscriber VARCHAR  Node that took it
 -- column: latency BIGINT [ns]  From the end of the publication to the take
