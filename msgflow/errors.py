@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 from enum import IntEnum
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 
 class ExitCode(IntEnum):
@@ -70,3 +74,15 @@ class DatabaseError(MsgflowError):
 
 class DatabaseInUseError(DatabaseError):
     """Another process has the database open."""
+
+
+def require_utf8(name: str | Path, kind: type[MsgflowError] = UsageError) -> None:
+    """Raise an error of this kind unless a name is UTF-8: databases hold no other ones.
+
+    The system takes any bytes. Python gives one that is not UTF-8 as half of a surrogate pair.
+    """
+    try:
+        str(name).encode()
+    except UnicodeEncodeError:
+        shown = str(name).encode(errors="surrogateescape").decode(errors="backslashreplace")
+        raise kind(f"not UTF-8 — {shown}", "give it a name in UTF-8 first") from None

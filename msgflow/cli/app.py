@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 from importlib import import_module
+from itertools import takewhile
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -17,7 +18,7 @@ from msgflow.cli.completion import is_completing
 from msgflow.cli.errors import print_exception
 from msgflow.cli.output import discard_stdout, print_error
 from msgflow.cli.signals import HANDLER
-from msgflow.errors import ExitCode, UsageError
+from msgflow.errors import ExitCode, UsageError, require_utf8
 from msgflow.sql.interrupt import Terminated
 from msgflow.version import __version__
 
@@ -83,6 +84,9 @@ class RootGroup(TyperGroup):
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Return the name, the imported command, and the words behind it."""
+        # Behind `--` stands a program of the user.
+        for word in takewhile(lambda word: word != "--", args):
+            require_utf8(word)
         if args[0] not in COMMANDS and args[0] not in self.list_commands(ctx):
             from msgflow.query.catalogue import queries_meant
 

@@ -19,7 +19,7 @@ import duckdb
 from msgflow.db.lock_holder import lock_holder
 from msgflow.db.memory import limit_threads, set_memory_limit
 from msgflow.db.workspace import remove_abandoned_workspaces
-from msgflow.errors import DatabaseError, DatabaseInUseError
+from msgflow.errors import DatabaseError, DatabaseInUseError, require_utf8
 from msgflow.files.temporary_owner import is_abandoned, mark
 from msgflow.sql.failure import in_words
 
@@ -128,6 +128,7 @@ def _prefix(database: Path) -> str:
 
 def require_file(path: Path) -> None:
     """Raise unless a path is a file, or nothing yet."""
+    require_utf8(path.absolute(), DatabaseError)
     # DuckDB would wait for a pipe, and read a device to its end.
     if path.exists() and not path.is_file():
         what = "a directory" if path.is_dir() else "a pipe, socket or device"

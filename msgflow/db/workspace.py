@@ -9,7 +9,7 @@ import uuid
 from typing import TYPE_CHECKING
 
 from msgflow.db.lock_holder import lock_holder
-from msgflow.errors import DatabaseError
+from msgflow.errors import DatabaseError, require_utf8
 
 try:
     import fcntl
@@ -32,6 +32,7 @@ def workspace(beside: Path) -> Iterator[Path]:
     without such locks these stay.
     """
     parent = beside.absolute().parent
+    require_utf8(parent, DatabaseError)
     remove_abandoned_workspaces(parent)
     directory = parent / f"{_PREFIX}{uuid.uuid4().hex}"
     with contextlib.ExitStack() as stack:

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 from urllib.parse import urlsplit
 
-from msgflow.errors import DatabaseError, UsageError
+from msgflow.errors import DatabaseError, UsageError, require_utf8
 from msgflow.files.temporary_owner import mark
 from msgflow.trace.regular_file import open_regular
 
@@ -281,7 +281,9 @@ def normal_url(url: str | Path) -> str:
             "give them in the environment: AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY",
         )
     if is_local:
-        return os.path.abspath(rest if separator else text)
+        path = os.path.abspath(rest if separator else text)
+        require_utf8(path)
+        return path
     if scheme != "s3":
         raise UsageError(
             f"neither a folder nor a bucket — {text}", "give a path, or s3://BUCKET/PREFIX"

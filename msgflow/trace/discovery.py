@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from msgflow.errors import TraceError
+from msgflow.errors import TraceError, require_utf8
 from msgflow.trace import metadata_frame
 from msgflow.trace.archive import is_archive
 from msgflow.trace.model import TraceLocation
@@ -173,6 +173,8 @@ def _locate(directory: Path) -> TraceLocation:
         size = sum(file.stat().st_size for file in files)
     except OSError as error:
         raise unreadable_error(error, directory) from error
+    for path in (directory, *files):
+        require_utf8(path, TraceError)
     for path in files:
         if not os.access(path, os.R_OK):
             raise TraceError(
