@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 import subprocess
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ _NO_DAEMON = "No session daemon is available"
 # Seconds.
 _LONGEST = 60.0
 _HIGHEST_BIT = 2**63
+_NOT_XML = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +64,12 @@ def lttng(*arguments: str) -> ElementTree.Element:
     try:
         # Ctrl-C of the terminal must not end it: what it began would stay.
         run = subprocess.run(
-            command, capture_output=True, text=True, start_new_session=True, timeout=_LONGEST
+            command,
+            capture_output=True,
+            text=True,
+            errors="replace",
+            start_new_session=True,
+            timeout=_LONGEST,
         )
     except subprocess.TimeoutExpired:
         raise RecordingError(
@@ -78,7 +85,14 @@ def lttng(*arguments: str) -> ElementTree.Element:
             f"lttng {arguments[0]} failed: {reason.removeprefix('Error: ').rstrip('.')}",
             shlex.join(["lttng", *arguments]),
         )
-    return ElementTree.fromstring(run.stdout)
+    try:
+        # A process may have any name, and lttng writes it as it is.
+        return ElementTree.fromstring(_NOT_XML.sub("\ufffd", run.stdout))
+    except ElementTree.ParseError as error:
+        raise RecordingError(
+            f"cannot read what lttng {arguments[0]} says: {error}",
+            shlex.join(["lttng", *arguments]),
+        ) from None
 
 
 def is_daemon_running() -> bool:

@@ -196,6 +196,7 @@ class _Watch:
         self._note = note
         self._show = show
         self._expects_nodes = expects_nodes
+        self._has_failed = False
         self._begin = time.monotonic()
         self.status = Status(0.0, 0, 0, shutil.disk_usage(directory).free)
 
@@ -203,14 +204,17 @@ class _Watch:
         """Look, and tell whether the recording has to end."""
         try:
             self._look()
-        except RecordingError:
-            if is_there(self._name):
-                raise
-            self._note(
-                f"the session {self._name} was destroyed by another program, or its daemon ended:"
-                " the recording ends here"
-            )
-            return True
+        except RecordingError as error:
+            if self._is_gone():
+                self._note(
+                    f"the session {self._name} was destroyed by another program, or its daemon"
+                    " ended: the recording ends here"
+                )
+                return True
+            # The recording goes on all the same: LTTng writes it.
+            if not self._has_failed:
+                self._note(f"not everything about the recording is known: {error.message}")
+            self._has_failed = True
         if self.status.free_bytes < _LEAST_FREE_BYTES:
             self._note("the disk is full: the recording ends here; remove files, or use -o DIR")
             return True
@@ -218,15 +222,19 @@ class _Watch:
             return True
         return seconds is not None and self.status.seconds >= seconds
 
+    def _is_gone(self) -> bool:
+        try:
+            return not is_there(self._name)
+        except RecordingError:
+            return False
+
     def _look(self) -> None:
         before = self.status
         passed = time.monotonic() - self._begin
-        self.status = Status(
-            passed,
-            recorded_bytes(self._directory),
-            losses(self._name),
-            shutil.disk_usage(self._directory).free,
-        )
+        free = shutil.disk_usage(self._directory).free
+        written = recorded_bytes(self._directory)
+        self.status = replace(before, seconds=passed, event_bytes=written, free_bytes=free)
+        self.status = replace(self.status, discarded=losses(self._name))
         self._show(self.status)
         if self.status.discarded and not before.discarded:
             self._note(
@@ -274,7 +282,11 @@ def _require_room(directory: Path, note: Callable[[str], None], seconds: float |
 
 
 def _note_running(note: Callable[[str], None]) -> None:
-    running = [provider for provider in providers() if provider.is_ros]
+    try:
+        running = [provider for provider in providers() if provider.is_ros]
+    except RecordingError as error:
+        note(f"it is not known what runs already: {error.message}")
+        return
     if running:
         first = f"{running[0].program} ({running[0].pid})"
         others = f" and {len(running) - 1} more" if len(running) > 1 else ""
