@@ -244,7 +244,7 @@ def _shown(text: str) -> str:
         return text
     from msgflow.text.values import printable
 
-    return printable(text, keep="\n\r\t")
+    return printable(text, keep="\n\t")
 
 
 def _width_of_stderr() -> int:

@@ -315,14 +315,17 @@ def test_parquet_is_not_written_to_a_terminal(small_database: Path) -> None:
 
 @pytest.mark.parametrize("form", few(["table", "csv", "json", "jsonl", "markdown"], "table", "csv"))
 def test_a_terminal_obeys_no_name(small_database: Path, form: str) -> None:
-    """Control characters in names show; a file and a pipe get them as they are."""
-    text = "SELECT 'a' || chr(27) || '[31m' || chr(155) || '2J' || chr(7) || 'é' AS \"na\\me\""
+    """Control characters in names show, also one that goes back to the begin of the line.
+
+    A file and a pipe get them as they are.
+    """
+    text = "SELECT 'a' || chr(27) || '[31m' || chr(155) || '2J' || chr(7) || chr(13) || 'é' AS \"na\\me\""
     shown = on_terminal(command("sql", text, "--db", small_database, "--format", form))
     assert not {character for character in shown.decode() if not character.isprintable()} - {"\n"}
     assert "é" in shown.decode()
     assert "\\x9b" in shown.decode()
     exact = piped("sql", text, "--db", small_database, "--format", "csv")
-    assert "\x1b[31m\x9b2J\x07é".encode() in exact
+    assert "\x1b[31m\x9b2J\x07\ré".encode() in exact
 
 
 def test_messages_obey_no_name(small_database: Path) -> None:
