@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from msgflow.export.otlp_batch import BATCH_AS_JSON
+from msgflow.errors import UsageError
 from msgflow.files.atomic import replacing
 from msgflow.query.names import require_places
 from msgflow.sql.statement import internal_sql
@@ -64,6 +65,11 @@ def write_otlp(
         UsageError: not exactly one run, a time that cannot be read, or a file that cannot be
             written.
     """
+    if str(target).startswith(("http:/", "https:/")):
+        raise UsageError(
+            f"traces of OpenTelemetry are written to a file — {target}",
+            "a collector sends the file on, with its receiver otlpjsonfile: docs/export.md",
+        )
     run = part.one_run(connection, "traces of OpenTelemetry")
     try:
         batches, traces, spans, links = _keep_spans(connection, run, part, choice)

@@ -244,3 +244,9 @@ def test_nothing_is_left_in_the_connection(database: Database, tmp_path: Path) -
     assert not database.connection.sql(
         "SELECT 1 FROM duckdb_tables() WHERE table_name = 'otlp_span'"
     ).fetchall()
+
+
+def test_a_collector_is_no_file(database: Database) -> None:
+    with pytest.raises(UsageError, match="written to a file") as raised:
+        database.export_otlp("http://localhost:4318/v1/traces")
+    assert "otlpjsonfile" in str(raised.value.hint)
