@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from msgflow.export.otlp_batch import BATCH_AS_JSON
 from msgflow.errors import UsageError
+from msgflow.export.otlp_batch import BATCH_AS_JSON
 from msgflow.files.atomic import replacing
 from msgflow.query.names import require_places
 from msgflow.sql.statement import internal_sql

@@ -319,7 +319,8 @@ def test_a_terminal_obeys_no_name(small_database: Path, form: str) -> None:
 
     A file and a pipe get them as they are.
     """
-    text = "SELECT 'a' || chr(27) || '[31m' || chr(155) || '2J' || chr(7) || chr(13) || 'é' AS \"na\\me\""
+    parts = ["'a'", "chr(27)", "'[31m'", "chr(155)", "'2J'", "chr(7)", "chr(13)", "'é'"]
+    text = f'SELECT {" || ".join(parts)} AS "na\\me"'
     shown = on_terminal(command("sql", text, "--db", small_database, "--format", form))
     assert not {character for character in shown.decode() if not character.isprintable()} - {"\n"}
     assert "é" in shown.decode()
