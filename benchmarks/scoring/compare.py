@@ -136,7 +136,7 @@ def compare_real(database: Path, truth: Path) -> list[Score]:
             f"CREATE TEMP VIEW real AS FROM read_json('{truth}', "
             f"format = 'newline_delimited', columns = {_REAL_COLUMNS})"
         )
-        return _score(connection, "real")
+        return [*_score(connection, "real"), _lost(connection)]
 
 
 def _open(database: Path) -> duckdb.DuckDBPyConnection:
@@ -155,6 +155,16 @@ def _excused(connection: duckdb.DuckDBPyConnection, excused: int) -> Score:
         "excused", pairs or 0, 0, excused, wrong, 0, 0, 0, 0, 0, precision, 1.0,
         f"at most {allowed}",
     )  # fmt: skip
+
+
+def _lost(connection: duckdb.DuckDBPyConnection) -> Score:
+    """Messages that are called lost; those that were not are wrong."""
+    connection.execute((_SQL / "lost.sql").read_text())
+    ((found, wrong),) = connection.execute(
+        "SELECT count(*), count(*) FILTER (NOT is_lost) FROM lost"
+    ).fetchall()
+    precision = 1 - wrong / found if found else 1.0
+    return Score("lost", found - wrong, 0, found, wrong, 0, 0, 0, 0, 0, precision, 1.0, "")
 
 
 def _score(connection: duckdb.DuckDBPyConnection, source: str) -> list[Score]:
