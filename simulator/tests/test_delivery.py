@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 
+import pytest
+
 from msgflow_sim import Host, Node, Process, Publisher, Scenario, Subscription, Timer, simulate
 
 
@@ -73,6 +75,7 @@ def test_an_address_is_used_again(recordings):
     assert again == [(1,)]
 
 
+@pytest.mark.thorough
 def test_a_subscription_is_there_once_the_middleware_has_it(tmp_path, read):
     """What is sent before the rest of it is created comes before discovery."""
     recording = read(simulate("host_chain", tmp_path, layout="humble-cyclonedds", factor=0.1))

@@ -96,7 +96,7 @@ def perfect(bt2, made):
     return _events(bt2, made("perfect"))
 
 
-@pytest.mark.parametrize("name", few(FAULTS, "late", "brim", "packets", "stopped", "last_snapshot"))
+@pytest.mark.parametrize("name", few(FAULTS, "brim", "last_snapshot"))
 def test_the_truth_names_exactly_what_is_missing(bt2, made, perfect, name):
     simulation = made(name)
     events, discarded, packets = _events(bt2, simulation)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections import defaultdict
 from itertools import pairwise
 
+import pytest
+
 
 def _overlaps(intervals):
     ordered = sorted(intervals)
@@ -49,6 +51,7 @@ def test_one_thread_of_an_executor_waits_at_a_time(recordings):
     assert _overlaps((start, end) for start, end, _ in waits) == 0
 
 
+@pytest.mark.thorough
 def test_executors_of_a_process_have_threads_of_their_own(recordings):
     recording = recordings["executors"]
     threads = defaultdict(set)

@@ -278,6 +278,7 @@ def test_clock_offset_shifts_one_host_and_nothing_else(tmp_path, recordings):
     assert moved == {("alpha", 0), ("beta", _SECOND)}
 
 
+@pytest.mark.thorough
 def test_messages_of_one_publisher_stay_in_order(tmp_path, burst, read):
     recording = read(simulate(burst, tmp_path / "out"))
     taken = recording.truth(

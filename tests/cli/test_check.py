@@ -126,6 +126,7 @@ def test_a_run_that_does_not_exist(msgflow: Msgflow, database: Path) -> None:
     assert msgflow("check", "--run", "nothing", "--db", database).exit_code == 2
 
 
+@pytest.mark.thorough
 def test_findings_of_several_runs_say_which(msgflow: Msgflow, database: Path) -> None:
     add(database, "run", {"run_id": "2", "name": "other"})
     add(database, "gap", pause())
@@ -136,6 +137,7 @@ def test_findings_of_several_runs_say_which(msgflow: Msgflow, database: Path) ->
     assert "   run other (2): everything — nothing was published" in every
 
 
+@pytest.mark.thorough
 def test_runs_of_a_label_are_several_runs(msgflow: Msgflow, database: Path) -> None:
     labels = {"labels": "['site=berlin']"}
     add(database, "run", *({"run_id": n, "name": f"other {n}"} | labels for n in ("2", "3")))
@@ -166,6 +168,7 @@ def test_a_database_without_runs(msgflow: Msgflow, fresh_database: Path) -> None
     assert next_steps == f"msgflow ingest TRACE --db {fresh_database}\n"
 
 
+@pytest.mark.thorough
 def test_broken_rules_of_the_database_are_shown_alike(
     msgflow: Msgflow, fresh_database: Path
 ) -> None:

@@ -167,6 +167,7 @@ def test_what_is_not_there_is_named(
     assert arguments[-1] in result.stderr
 
 
+@pytest.mark.thorough
 def test_containers_share_a_clock_and_have_equal_pids(msgflow: Msgflow, tmp_path: Path) -> None:
     """Two containers on one machine: two hosts of one clock, whose processes have the same id."""
     system = scenarios()["two_hosts"]

@@ -216,6 +216,7 @@ def test_db_schema_lists_the_views_or_the_columns_of_one(
     assert "did you mean take" in unknown.stderr
 
 
+@pytest.mark.thorough
 def test_db_upgrade_of_a_current_database(msgflow: Msgflow, small_database: Path) -> None:
     with duckdb.connect(str(small_database)) as connection:
         connection.execute("UPDATE store.run SET derivation_hash = 'old'")

@@ -56,6 +56,7 @@ def test_the_exit_code_tells_whether_a_condition_holds(msgflow: Msgflow, databas
     ]
 
 
+@pytest.mark.thorough
 def test_every_kind_of_thing(msgflow: Msgflow, database: Path) -> None:
     topics = msgflow("compare", 1, 2, "--what", "topics", "--format", "csv", "--db", database)
     assert '"/image → /viewer"' in topics.stdout

@@ -96,6 +96,7 @@ def test_errors(msgflow: Msgflow, trace: Path) -> None:
     assert (empty.exit_code, empty.stdout, empty.stderr) == (0, "", "note: no events\n")
 
 
+@pytest.mark.thorough
 def test_an_archive_is_ingested_under_its_name(
     msgflow: Msgflow, trace: Path, tmp_path: Path
 ) -> None:
@@ -115,6 +116,7 @@ def command(*arguments: object) -> list[str]:
     return [sys.executable, "-m", "msgflow", "events", *map(str, arguments)]
 
 
+@pytest.mark.thorough
 def test_a_reader_that_goes_away_is_no_error(trace: Path) -> None:
     process = subprocess.Popen(command(trace), stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     assert process.stdout is not None

@@ -24,6 +24,7 @@ def test_traces_are_counted(msgflow: Msgflow, demo: Path) -> None:
     assert len(Path("msgflow-traces.json").read_text().splitlines()) == 1
 
 
+@pytest.mark.thorough
 def test_several_places_may_be_given(msgflow: Msgflow, demo: Path) -> None:
     both = ("--from", "/imu/data", "--from", "/camera/image")
     result = msgflow("export", "otlp", *both, "--db", demo)

@@ -43,7 +43,7 @@ def section(text: str, title: str) -> str:
     return text.partition(f"{title}\n")[2].partition("\n\n")[0]
 
 
-@pytest.mark.parametrize("name", ["real_py_mixed", "real_overload"])
+@pytest.mark.parametrize("name", few(["real_py_mixed", "real_overload"], "real_overload"))
 def test_the_way_of_a_message_is_the_work_of_no_node(ask: Msgflow, name: str) -> None:
     """All commands say so of the time in which the reader was not busy."""
     found = json.loads(ask(name, "why", "--format", "json").stdout)
@@ -66,9 +66,7 @@ def test_the_way_of_a_message_is_the_work_of_no_node(ask: Msgflow, name: str) ->
     ("name", "columns"),
     few(
         product(("real_py_mixed", "real_overload", "real_reference", "real_container"), (80, 100)),
-        ("real_py_mixed", 80),
         ("real_overload", 80),
-        ("real_overload", 100),
     ),
 )
 def test_why_keeps_its_columns(ask: Msgflow, name: str, columns: int) -> None:
@@ -127,6 +125,7 @@ def test_why_says_that_messages_end_at_a_node(ask: Msgflow) -> None:
     assert "suggest links" not in said
 
 
+@pytest.mark.thorough
 def test_why_asks_for_nothing_without_a_name(ask: Msgflow) -> None:
     said = ask("real_late", "why").stderr.splitlines()
     steps = [line.partition(" --db ")[0] for line in said if line.startswith("next: ")]
@@ -164,6 +163,7 @@ def test_the_column_that_a_user_sorts_by_is_shown(header: Header, ask: Msgflow) 
         assert name.removesuffix("_ns") in re.split(r"[ \n]+", shown), shown[:300]
 
 
+@pytest.mark.thorough
 def test_rows_of_zero_are_counted_not_shown(ask: Msgflow) -> None:
     result = ask("real_reference", "query", "path-breakdown", columns=100)
     rows = json.loads(ask("real_reference", "query", "path-breakdown", "--format", "json").stdout)
@@ -188,7 +188,9 @@ def test_check_says_what_to_do_next(ask: Msgflow, name: str, steps: list[str]) -
     assert found == [f"next: msgflow {step}" for step in steps]
 
 
-@pytest.mark.parametrize("name", ["real_overload", "real_reference", "real_tiny"])
+@pytest.mark.parametrize(
+    "name", few(["real_overload", "real_reference", "real_tiny"], "real_overload")
+)
 def test_messages_are_all_that_were_published(real: Callable[[str], Path], name: str) -> None:
     with duckdb.connect(str(real(name)), read_only=True) as connection:
         ((messages, publications, takes, rows),) = connection.execute(
@@ -211,6 +213,7 @@ def test_messages_are_all_that_were_published(real: Callable[[str], Path], name:
     assert unnamed == 0
 
 
+@pytest.mark.thorough
 def test_an_export_says_where_to_start(ask: Msgflow) -> None:
     said = " ".join(ask("real_tiny", "export", "csv", "-o", "csv").stderr.split())
     assert "note: start with callback_run, message: they have the names inside" in said

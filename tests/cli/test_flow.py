@@ -27,6 +27,7 @@ def test_the_tree_goes_to_stdout_and_words_to_stderr(
     assert result.stderr == "run: noon (2)\n"
 
 
+@pytest.mark.thorough
 def test_every_start_and_direction(msgflow: Msgflow, small_database: Path) -> None:
     for direction in ("forward", "backward", "both"):
         arguments = ("flow", "--publication", 1, "--direction", direction, "--absolute")
@@ -83,6 +84,7 @@ def test_mistakes_have_code_2(
     assert "\n\nhint: " in result.stderr
 
 
+@pytest.mark.thorough
 def test_the_slowest_flows_are_those_of_the_query(
     msgflow: Msgflow, simulated: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -163,6 +165,7 @@ def test_why_is_the_critical_path_of_the_flow(
     assert sum(by_instance["duration_ns"].to_pylist()) == by_instance["latency_ns"][0].as_py()
 
 
+@pytest.mark.thorough
 def test_a_node_means_what_it_did_first(msgflow: Msgflow, simulated: Callable[..., Path]) -> None:
     demo = simulated("demo", 0.1)
     with Database(demo) as database:

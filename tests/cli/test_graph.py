@@ -47,6 +47,7 @@ def test_mistakes_have_code_2(msgflow: Msgflow, small_database: Path, tmp_path: 
     assert not list(tmp_path.glob("a.*"))
 
 
+@pytest.mark.thorough
 def test_it_has_rows_as_a_query(msgflow: Msgflow, small_database: Path, tmp_path: Path) -> None:
     with Database(small_database) as database:
         rows = database.query("graph", sort="name").to_arrow().to_pylist()

@@ -94,6 +94,7 @@ def test_the_option_of_other_commands_for_a_file_names_that_for_the_database(
     assert "fleet ingest --help" in msgflow("fleet", "ingest", "trace", option, "lake").stderr
 
 
+@pytest.mark.thorough
 def test_events_of_ones_own_are_loaded_on_request(msgflow: Msgflow, tmp_path: Path) -> None:
     trace = simulate("own_events", tmp_path / "robot", factor=0.03).directory
     mistyped = msgflow("ingest", trace, "--events", "my_pgk:*")

@@ -117,6 +117,7 @@ def test_suggestions_are_written_and_applied_in_one_go(msgflow: Msgflow) -> None
     assert text.count("- kind:") == Path("again.yaml").read_text().count("- kind:")
 
 
+@pytest.mark.thorough
 def test_topics_without_a_name_are_named(msgflow: Msgflow, tmp_path: Path) -> None:
     late = Recording(start_ns=300_000_000)
     trace = simulate("pipeline", tmp_path / "trace", factor=0.1, recording=late).directory

@@ -85,6 +85,7 @@ def test_remove_leaves_the_others_as_they_were(
     assert names(msgflow, database) == ["after", "before"]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("answer", "options", "code", "left"),
     [
@@ -212,6 +213,7 @@ def test_a_label_without_a_value_is_kept(msgflow: Msgflow, database: Path) -> No
     assert labels(msgflow, database)[0] == ["plain=", "robot=r1"]
 
 
+@pytest.mark.thorough
 def test_a_label_chooses_runs(msgflow: Msgflow, database: Path) -> None:
     for run in ("before", "after"):
         assert (
@@ -232,12 +234,12 @@ def test_a_label_chooses_runs(msgflow: Msgflow, database: Path) -> None:
     ("words", "message"),
     [
         (("x=1", "no label"), "a label is KEY=VALUE — no label"),
-        (("x=1", "=2"), "no key of a label — ''"),
-        (("x=1", "1x=2"), "no key of a label — '1x'"),
-        (("x=1", "a b=2"), "no key of a label — 'a b'"),
-        (("x=1", "\x1b[31m=2"), "no key of a label — '\\x1b[31m'"),
-        (("x=1", "x=2"), "a run has one label of a key — x"),
-        (("x=1", f"y={'z' * 1001}"), "no value of a label — y"),
+        thorough(("x=1", "=2"), "no key of a label — ''"),
+        thorough(("x=1", "1x=2"), "no key of a label — '1x'"),
+        thorough(("x=1", "a b=2"), "no key of a label — 'a b'"),
+        thorough(("x=1", "\x1b[31m=2"), "no key of a label — '\\x1b[31m'"),
+        thorough(("x=1", "x=2"), "a run has one label of a key — x"),
+        thorough(("x=1", f"y={'z' * 1001}"), "no value of a label — y"),
         (("x=1", "y="), "run 1 has no label of this key — y"),
     ],
 )

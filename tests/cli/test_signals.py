@@ -262,7 +262,7 @@ _DEAF = """import time
     interruptible(Mock(), work, only_reads={1})"""
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", few([signal.SIGINT, signal.SIGTERM], signal.SIGINT))
 def test_a_statement_that_notices_no_interrupt_ends_with_the_process(
     number: signal.Signals,
 ) -> None:
@@ -270,6 +270,7 @@ def test_a_statement_that_notices_no_interrupt_ends_with_the_process(
     assert failing(number, _DEAF.replace("{1}", "True")) == _ENDINGS[number]
 
 
+@pytest.mark.thorough
 def test_what_a_statement_writes_is_waited_for() -> None:
     said = "time.sleep(2)\n        print('done', file=sys.stderr)"
     body = _DEAF.replace("{1}", "False").replace("time.sleep(50)", said)

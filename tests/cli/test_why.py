@@ -100,6 +100,7 @@ def _duration(row: dict[str, Any]) -> int:
     return duration
 
 
+@pytest.mark.thorough
 def test_losses_on_topics_without_a_name_are_told(empty_database: Path, tmp_path: Path) -> None:
     path = Path(shutil.copy(empty_database, tmp_path / "run.duckdb"))
     case = Path(__file__).parents[1] / "query/cases/e2e-latency/lost_and_edge.case"
@@ -174,6 +175,7 @@ def test_callbacks_that_were_not_traced_are_not_asked_for(
     assert "/source" not in result.stdout.partition("ITS SLOWEST FLOW")[2]
 
 
+@pytest.mark.thorough
 def test_formats(msgflow: Msgflow, demo: Path) -> None:
     result = msgflow("why", "-o", "why.json")
     assert result.stdout == ""
@@ -184,6 +186,7 @@ def test_formats(msgflow: Msgflow, demo: Path) -> None:
     assert msgflow("why", "--format", "markdown").stdout.startswith("## Paths\n\n|")
 
 
+@pytest.mark.thorough
 def test_a_place_where_flows_only_begin_or_pass(msgflow: Msgflow, untraced: Path) -> None:
     refused = msgflow("why", "/sour*")
     assert refused.exit_code == 2

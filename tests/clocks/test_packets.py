@@ -155,6 +155,7 @@ def test_a_kernel_trace_of_an_older_tracer_lies_anywhere(
     assert rows(database, "SELECT hostname FROM host ORDER BY 1") == [("alpha",), ("beta",)]
 
 
+@pytest.mark.thorough
 def test_a_number_that_comes_round_again_is_told_by_time(make: Make, ingest: Ingest) -> None:
     """Identifications repeat every three seconds, and once after a tenth of one."""
     network = make(clock_offset_ns=5 * SECOND)
@@ -196,6 +197,7 @@ def test_clocks_are_told_by_numbers_that_all_come_again(make: Make, ingest: Inge
     assert all(abs(way + 300 * SECOND - 60_000) < 2_000_000 for way in ways)
 
 
+@pytest.mark.thorough
 def test_numbers_that_come_again_regularly_tell_nothing(make: Make, ingest: Ingest) -> None:
     network = make()
     for number in range(200):
@@ -240,6 +242,7 @@ def test_headers_of_all_kinds(make: Make, ingest: Ingest) -> None:
     assert "1 whose other end was not seen or is not certain" in unused
 
 
+@pytest.mark.thorough
 def test_one_host_is_said(make: Make, ingest: Ingest) -> None:
     network = make()
     traffic(network, 0.5)
@@ -250,6 +253,7 @@ def test_one_host_is_said(make: Make, ingest: Ingest) -> None:
     assert beta(database)["method"] == "messages"
 
 
+@pytest.mark.thorough
 def test_a_kernel_trace_without_packets_is_said(make: Make, ingest: Ingest) -> None:
     network = make()
     network.write(with_network=False)

@@ -11,6 +11,7 @@ from thorough import few
 from msgflow import open_db
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", few(["pingpong", "services"], "services"))
 def test_clocks_come_together(shared_traces: Path, tmp_path: Path, name: str) -> None:
     meta = json.loads((shared_traces / name / "meta.json").read_text())

@@ -19,6 +19,7 @@ def test_truth_lies_within_the_bound_that_messages_allow(kind: str, tmp_path: Pa
     assert outcome.is_good, outcome
 
 
+@pytest.mark.thorough
 def test_three_hosts_in_a_chain(tmp_path: Path) -> None:
     """The third is brought to the first through the second; the bounds of both steps add up."""
     done = simulate("host_chain", tmp_path / "traces", factor=0.5)

@@ -122,6 +122,7 @@ def test_another_thread_ends_a_query_and_the_next_one_works(small_database: Path
         assert len(sql("SELECT 1", 10)) == 1
 
 
+@pytest.mark.thorough
 def test_a_child_killed_before_it_begins_fails_no_call(small_database: Path) -> None:
     asked = {"path": str(small_database), "memory_limit": None, "limit": None}
     before = set(children_of(os.getpid()))
@@ -156,6 +157,7 @@ def test_a_mistake_in_the_child_is_no_error_of_the_user() -> None:
         process.call("nothing", {})
 
 
+@pytest.mark.thorough
 def test_a_child_that_ends_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "ending.py").write_text(
         "import os\ndef end(write): os._exit(3)\ndef stop(write): os.abort()\n"

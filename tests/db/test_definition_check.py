@@ -60,9 +60,7 @@ def writers(trace: Path) -> tuple[Callable[[Path], object], ...]:
     )
 
 
-@pytest.mark.parametrize(
-    "name", few(CHANGES, "view main.run", "macro derive.corrected_ns", "macro main.sum")
-)
+@pytest.mark.parametrize("name", few(CHANGES, "view main.run"))
 def test_a_changed_database_is_not_written(
     small_database: Path, trace: Path, tmp_path: Path, name: str
 ) -> None:

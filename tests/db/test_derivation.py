@@ -7,6 +7,7 @@ from pathlib import Path
 import duckdb
 import golden
 import pytest
+from thorough import thorough
 
 from msgflow.db import derivation, objects
 from msgflow.db.sandbox import open_file
@@ -127,7 +128,7 @@ ELSEWHERE = {
     ("system", "layout", "lost", "names"),
     [
         ("pipeline", "humble", 0.3, SOMETIMES_EMPTY.keys() - set().union(*ELSEWHERE.values())),
-        *((*system, 0.0, names) for system, names in ELSEWHERE.items()),
+        *(thorough(*system, 0.0, names) for system, names in ELSEWHERE.items()),
     ],
 )
 def test_tables_have_no_row_without_those_of_their_when(

@@ -235,6 +235,7 @@ def test_an_older_file_keeps_its_runs(small_database: Path, tmp_path: Path, befo
     assert dict(found) == {1: "none", 2: "file"}
 
 
+@pytest.mark.thorough
 def test_a_failing_view_leaves_the_tables_of_an_older_file(
     small_database: Path, monkeypatch: pytest.MonkeyPatch, before: str
 ) -> None:
@@ -249,6 +250,7 @@ def test_a_failing_view_leaves_the_tables_of_an_older_file(
     assert rows_by_count(small_database) == rows
 
 
+@pytest.mark.thorough
 def test_other_tables_without_another_revision_are_refused(database: Path) -> None:
     """As databases of between two releases have them."""
     with duckdb.connect(str(database)) as con:
@@ -280,6 +282,7 @@ def test_a_new_database_is_the_same_with_and_without_a_cache(
         assert kept.read_bytes().partition(b"\n")[2] == again.read_bytes() != made.read_bytes()
 
 
+@pytest.mark.thorough
 def test_the_cache_keeps_few_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     (tmp_path / "msgflow").mkdir()
@@ -292,6 +295,7 @@ def test_the_cache_keeps_few_files(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert kept > {f"database-{n}" for n in range(11, 20)}
 
 
+@pytest.mark.thorough
 def test_a_new_database_needs_neither_alembic_nor_sqlalchemy(tmp_path: Path) -> None:
     program = """
 import sys

@@ -52,6 +52,7 @@ def test_a_chain_goes_straight_down_and_what_was_asked_for_is_marked(robot: Data
     ]
 
 
+@pytest.mark.thorough
 def test_a_publication_may_take_until_its_thread_goes_on(
     empty_database: Path, tmp_path: Path
 ) -> None:
@@ -91,6 +92,7 @@ def test_a_flow_that_ends_at_a_node_which_publishes_says_so(
         assert "ends here" not in str(database.flow("/tracks"))
 
 
+@pytest.mark.thorough
 def test_what_a_busy_executor_added_is_said(empty_database: Path, tmp_path: Path) -> None:
     """The numbers are worked out by hand in the golden cases of waits."""
     path = tmp_path / "busy.duckdb"
@@ -118,6 +120,7 @@ def test_what_a_busy_executor_added_is_said(empty_database: Path, tmp_path: Path
     }
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("reason", ["receiver_gap", "unknown"])
 def test_what_may_have_been_taken_is_not_called_untaken(
     reason: str, empty_database: Path, tmp_path: Path
@@ -164,6 +167,7 @@ def test_branches_are_indented_and_nothing_is_drawn_twice(robot: Database) -> No
     ]
 
 
+@pytest.mark.thorough
 def test_what_follows_from_a_request_without_a_callback_names_its_node(
     empty_database: Path, tmp_path: Path
 ) -> None:
@@ -187,6 +191,7 @@ def test_what_follows_from_a_request_without_a_callback_names_its_node(
     assert lines[3].endswith("  thread thread 1  ◀")
 
 
+@pytest.mark.thorough
 def test_calls_of_services(empty_database: Path, tmp_path: Path) -> None:
     with database_of("services_forward", empty_database, tmp_path) as database:
         flow = database.flow(callback_instance_id=5)
@@ -238,6 +243,7 @@ def test_backward_ends_at_one_cause_twice(robot: Database) -> None:
     assert lines[-1].endswith("see [1]  publishes /image")
 
 
+@pytest.mark.thorough
 def test_a_ring_is_drawn_once(empty_database: Path, tmp_path: Path) -> None:
     with database_of("ring", empty_database, tmp_path) as database:
         for direction in ("forward", "backward", "both"):
@@ -274,6 +280,7 @@ def test_points_in_time_and_widths(robot: Database) -> None:
     assert "\x1b[" in tree_text(flow, color=True)
 
 
+@pytest.mark.thorough
 def test_limits_are_said(robot: Database) -> None:
     flow = robot.flow("/image", direction="forward", depth=1)
     assert flow.is_cut
@@ -309,6 +316,7 @@ def test_json_has_each_node_once_and_all_edges(robot: Database) -> None:
     }
 
 
+@pytest.mark.thorough
 def test_the_message_is_the_first_at_or_after_a_time(small_database: Path) -> None:
     with Database(small_database) as database:
         assert database.flow("/chatter").start.id == 2
@@ -355,6 +363,7 @@ def test_a_topic_without_publications_says_so(small_database: Path) -> None:
         database.flow("/unused")
 
 
+@pytest.mark.thorough
 def test_a_long_chain_is_read_as_far_as_the_limits_say(
     empty_database: Path, tmp_path: Path
 ) -> None:
@@ -401,6 +410,7 @@ INSERT INTO store.link_causal BY NAME
 """
 
 
+@pytest.mark.thorough
 def test_a_stored_message_waits_from_when_its_subscription_existed(
     empty_database: Path, tmp_path: Path
 ) -> None:

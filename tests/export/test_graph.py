@@ -111,6 +111,7 @@ def test_services_are_drawn_differently(empty_database: Path, tmp_path: Path) ->
     assert graph.to_mermaid().count(" ==> ") == 4
 
 
+@pytest.mark.thorough
 def test_actions_are_drawn_differently(empty_database: Path, tmp_path: Path) -> None:
     with database_of("actions", empty_database, tmp_path, GRAPHS) as database:
         graph = database.graph()
@@ -130,6 +131,7 @@ def test_actions_are_drawn_differently(empty_database: Path, tmp_path: Path) -> 
     assert str(graph).endswith("2 topics, 0 services, 1 actions")
 
 
+@pytest.mark.thorough
 def test_loops_and_nothing_at_all_are_drawn(empty_database: Path, tmp_path: Path) -> None:
     with database_of("every_part", empty_database, tmp_path) as database:
         with duckdb.connect(str(database.path)) as connection:
@@ -155,11 +157,13 @@ def test_hostile_names_are_inert_in_dot(hostile: Database) -> None:
         subprocess.run([program, "-Tsvg"], input=text.encode(), check=True, capture_output=True)
 
 
+@pytest.mark.thorough
 def test_hostile_names_are_inert_in_mermaid(hostile: Database) -> None:
     text = hostile.graph().to_mermaid()
     assert all(MERMAID_LINE.fullmatch(line) for line in text.splitlines())
 
 
+@pytest.mark.thorough
 def test_a_notebook_draws_it(hostile: Database) -> None:
     graph = hostile.graph()
     assert graph._repr_mimebundle_() == {

@@ -10,6 +10,7 @@ from typing import Any
 import duckdb
 import pytest
 from golden import fill_case
+from thorough import thorough
 
 from msgflow import Database, UsageError
 
@@ -55,13 +56,13 @@ def database(simulated: Callable[..., Path]) -> Iterator[Database]:
             "SELECT root_ns, latency_ns FROM end_to_end([1], NULL, NULL, 'callback_start',"
             " 'callback_end', $start, 9223372036854775807) WHERE status = 'reached' AND is_first",
         ),
-        (
+        thorough(
             "callback", "duration_ms",
             "SELECT start_ns, end_ns - start_ns FROM callback_instance"
             " JOIN callback_label USING (callback_id)"
             " WHERE end_ns IS NOT NULL AND NOT is_internal AND start_ns >= $start",
         ),
-        (
+        thorough(
             "topic", "latency_ms",
             "SELECT taken_ns, latency_ns FROM link_transport JOIN take USING (take_id)"
             " JOIN subscription USING (subscription_id)"
@@ -79,6 +80,7 @@ def test_every_value_stands_once_in_its_topic(
     assert len(rows) > 10
 
 
+@pytest.mark.thorough
 def test_age_and_waits_have_topics(database: Database, tmp_path: Path) -> None:
     written = database.export_mcap(tmp_path / "run.mcap")
     topics = read(tmp_path / "run.mcap")
@@ -106,6 +108,7 @@ def test_names_are_those_of_topics_of_ros(database: Database, tmp_path: Path) ->
     assert all(name.replace("/", "").replace("_", "").isalnum() for name in names)
 
 
+@pytest.mark.thorough
 def test_what_was_lost_is_a_warning(fresh_database: Path, tmp_path: Path) -> None:
     with duckdb.connect(str(fresh_database)) as connection:
         fill_case(connection, SYSTEMS / "every_delivery.case")

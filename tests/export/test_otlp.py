@@ -179,6 +179,7 @@ def test_further_causes_are_links(simulated: Callable[..., Path], tmp_path: Path
         assert span["trace"] != cause["trace"]
 
 
+@pytest.mark.thorough
 def test_a_chosen_flow_is_one_trace_through_a_cache(
     simulated: Callable[..., Path], tmp_path: Path
 ) -> None:
@@ -199,6 +200,7 @@ def test_a_chosen_flow_is_one_trace_through_a_cache(
     assert max(span["end"] for span in spans) == slowest["sink_ns"]
 
 
+@pytest.mark.thorough
 def test_flows_are_chosen_by_their_paths(simulated: Callable[..., Path], tmp_path: Path) -> None:
     named = tmp_path / "paths.yaml"
     named.write_text("paths: [{name: drive, from: /camera/image, to: /base/motors}]")

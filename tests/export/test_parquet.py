@@ -138,6 +138,7 @@ def test_a_run_can_be_chosen(small_database: Path, tmp_path: Path) -> None:
     assert pq.read_table(tmp_path / "run")["name"].to_pylist() == ["morning"]
 
 
+@pytest.mark.thorough
 def test_a_window_cuts_what_happened(recorded: Database, tmp_path: Path) -> None:
     """Links belong to the time of their cause; objects stay."""
     recorded.export_parquet(tmp_path, start=110, end=270)

@@ -272,6 +272,7 @@ def test_counters_have_rates_and_queues(exported: Exported) -> None:
             assert [value for time, value in values if time == at][-1] == there
 
 
+@pytest.mark.thorough
 def test_a_window_has_what_begins_in_it(simulated: Callable[..., Path], tmp_path: Path) -> None:
     pytest.importorskip("perfetto.trace_builder.proto_builder")
     with open_db(simulated("pipeline", 0.1)) as database:
@@ -286,6 +287,7 @@ def test_a_window_has_what_begins_in_it(simulated: Callable[..., Path], tmp_path
     assert 0 < len(decoded.arrows) < len(whole.arrows)
 
 
+@pytest.mark.thorough
 def test_gaps_are_slices_of_their_host(simulated: Callable[..., Path], tmp_path: Path) -> None:
     pytest.importorskip("perfetto.trace_builder.proto_builder")
     path = Path(shutil.copy(simulated("pipeline", 0.1), tmp_path / "run.duckdb"))

@@ -133,6 +133,7 @@ def test_a_few_bad_runs_change_nothing(tmp_path: Path) -> None:
     assert abs(row["change_percent"]) < 2
 
 
+@pytest.mark.thorough
 def test_runs_of_a_robot_may_count_as_one(slower: Lake) -> None:
     """Each robot made two runs of a version: half as many tell less."""
     alone, robots = rows_of(slower)["median"], rows_of(slower, unit="robot")["median"]
@@ -202,6 +203,7 @@ def test_what_makes_no_sense_is_a_usage_error(
     assert not result.stdout
 
 
+@pytest.mark.thorough
 def test_the_other_of_two_values_need_not_be_named(slower: Lake) -> None:
     given = ("--by", "version", "--format", "json")
     both = run(slower, "2.10", "2.9", *given)
@@ -229,6 +231,7 @@ def test_the_command_is_a_gate(slower: Lake) -> None:
     assert failed.stderr.rstrip().endswith(PATH)
 
 
+@pytest.mark.thorough
 def test_a_run_is_chosen_by_its_labels(slower: Lake) -> None:
     result = run(slower, "--by", "version", "--where", "robot < 'r13'", "--format", "csv")
     assert "A is version=2.9: 10 runs" in result.stderr, result.stderr

@@ -84,7 +84,7 @@ def dies(program: str, lake: Lake, steps: int, *more: Path) -> None:
     [
         pytest.param(3, marks=pytest.mark.thorough),
         # The rows of the pack are not there yet.
-        _TABLES,
+        pytest.param(_TABLES, marks=pytest.mark.thorough),
         # Both the rows of the pack and files of runs are there.
         _TABLES + 2,
         pytest.param(_TABLES + 10, marks=pytest.mark.thorough),
@@ -106,6 +106,7 @@ def test_a_pack_that_is_killed_changes_no_answer(
     assert {part_of(path) for path in tables} == {part}
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("steps", [pytest.param(5, marks=pytest.mark.thorough), _TABLES])
 def test_a_replacement_that_is_killed_leaves_the_old_run(
     holding: tuple[Lake, Row, Row], databases: tuple[Path, Path], tmp_path: Path, steps: int

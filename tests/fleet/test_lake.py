@@ -111,6 +111,7 @@ def test_runs_add_up(holding: tuple[Lake, Row, Row]) -> None:
     assert [value for _, value in counted] == pytest.approx(exact, rel=0.0101)
 
 
+@pytest.mark.thorough
 def test_writing_again_leaves_what_is_there(
     holding: tuple[Lake, Row, Row], databases: tuple[Path, Path], tmp_path: Path
 ) -> None:
@@ -277,6 +278,7 @@ def test_packing_changes_no_answer(
     assert len(lake.runs()) == 0
 
 
+@pytest.mark.thorough
 def test_packs_are_of_one_version_and_not_too_large(
     holding: tuple[Lake, Row, Row], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -159,6 +159,7 @@ def test_a_store_that_is_not_there(bucket: ObjectStore, monkeypatch: pytest.Monk
         Store("s3://fleet/lake").read("lake.json")
 
 
+@pytest.mark.thorough
 def test_a_store_that_refuses_now_and_then(bucket: ObjectStore) -> None:
     bucket.refuse_every = 8
     refused = bucket.refused

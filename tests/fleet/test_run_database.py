@@ -37,6 +37,7 @@ def test_a_run_comes_back(night: Lake, databases: tuple[Path, Path], tmp_path: P
     assert target.read_bytes() == content
 
 
+@pytest.mark.thorough
 def test_the_file_is_named_by_the_key(
     night: Lake, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -57,6 +58,7 @@ def test_runs_that_cannot_be_opened(night: Lake, tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.thorough
 def test_what_is_not_the_database_of_the_run_is_refused(night: Lake, tmp_path: Path) -> None:
     lake = Lake.open_or_create(tmp_path / "lake")
     rows = {row["name"]: row for row in night.runs().to_pylist()}

@@ -345,6 +345,7 @@ def paths(analysis: Analysis, limits: str = "") -> list[tuple[str, bool]]:
     ]
 
 
+@pytest.mark.thorough
 def test_a_loop_visits_no_subscription_twice(analysis: Analysis) -> None:
     """Ping and pong for ever: the path ends where it would come back."""
     system = RosSystem()
@@ -387,6 +388,7 @@ def test_fan_in_and_fan_out(analysis: Analysis) -> None:
     ]
 
 
+@pytest.mark.thorough
 def test_limits_cut_and_say_so(analysis: Analysis) -> None:
     system = RosSystem()
     graph(
@@ -416,6 +418,7 @@ def test_limits_cut_and_say_so(analysis: Analysis) -> None:
     assert crowded[0][1]
 
 
+@pytest.mark.thorough
 def test_roots_without_a_callback_are_publications(analysis: Analysis) -> None:
     """A main loop that publishes; a publication inside a service's callback begins with that."""
     chain = Chain()
@@ -433,6 +436,7 @@ def test_roots_without_a_callback_are_publications(analysis: Analysis) -> None:
     ]
 
 
+@pytest.mark.thorough
 def test_the_flow_at_a_quantile(fresh_database: Path) -> None:
     with duckdb.connect(str(fresh_database)) as connection:
         fill(connection)

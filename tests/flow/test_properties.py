@@ -5,6 +5,7 @@ from __future__ import annotations
 from random import Random
 from typing import Any
 
+import pytest
 from analysis import Analysis
 from fates import FATES
 from hypothesis import HealthCheck, given, settings
@@ -100,6 +101,7 @@ def test_shifting_all_times_shifts_all_outputs(analysis: Analysis, seed: int, sh
         ]
 
 
+@pytest.mark.thorough
 @FEW
 @given(seed=SEEDS)
 def test_the_values_of_handles_do_not_matter(analysis: Analysis, seed: int) -> None:
@@ -200,6 +202,7 @@ def test_edges_are_what_the_walker_walks(analysis: Analysis, seed: int) -> None:
     assert analysis.value("SELECT count(*) FROM flow_edge") > 0
 
 
+@pytest.mark.thorough
 def test_random_systems_are_worth_it(analysis: Analysis) -> None:
     """They have flows of several steps, losses, and callbacks that never ended."""
     depths, statuses, open_callbacks = set(), set(), 0

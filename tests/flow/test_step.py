@@ -45,6 +45,7 @@ def test_the_picture_is_that_of_the_walkers(analysis: Analysis, seed: int, every
             assert {row for row in rows if row[0] is not None} == links
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("every", [7, thorough(1)])
 def test_what_was_not_taken_is_what_no_link_shows(analysis: Analysis, every: int) -> None:
     analysis.build(random_system(1, actions=60))

@@ -68,6 +68,7 @@ def test_stamps(trace: Path, tmp_path: Path, database: Path, stamp: int) -> None
     assert left.count(latest) == stamps.count(max(stamps))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("wrong", "right"),
     few(
@@ -91,6 +92,7 @@ def test_counters_of_lost_events(
     assert "discarded_events" in found
 
 
+@pytest.mark.thorough
 def test_a_stream_copied_beside_itself_and_a_pipe(
     trace: Path, tmp_path: Path, database: Path, new_database: Path
 ) -> None:
@@ -137,6 +139,7 @@ def test_a_stream_that_is_missing(trace: Path, tmp_path: Path, new_database: Pat
     assert f"the stream {path.name} is missing, only its index is there" in detail
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("length", few([1025, 1_000_000], 1025))
 def test_names_that_are_too_long(tmp_path: Path, new_database: Path, length: int) -> None:
     """Each message is joined with the name of its topic, so that one took gigabytes."""

@@ -6,10 +6,13 @@ import os
 import shutil
 from pathlib import Path
 
+import pytest
+
 from msgflow.db.connection import connect
 from msgflow.ingest import ingest
 
 
+@pytest.mark.thorough
 def test_a_cut_packet_is_not_blamed_on_buffers(
     trace: Path, tmp_path: Path, new_database: Path
 ) -> None:

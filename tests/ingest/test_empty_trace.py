@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+import pytest
 from ingested import contents
 
 from msgflow.db.connection import connect
@@ -17,6 +18,7 @@ def empty_traces(database: Path) -> list[str]:
         return [f.subject for f in read_findings(connection, [1]) if f.name == "empty_trace"]
 
 
+@pytest.mark.thorough
 def test_metadata_alone_and_a_copy(
     trace: Path, tmp_path: Path, new_database: Path, database: Path
 ) -> None:

@@ -68,7 +68,7 @@ def interrupted_at(
     return process.returncode, errors
 
 
-@pytest.mark.parametrize("stage", few(STAGES, "reading the traces", "linking messages"))
+@pytest.mark.parametrize("stage", few(STAGES, "linking messages"))
 def test_an_interrupt_leaves_nothing(trace: Path, new_database: Path, stage: str) -> None:
     assert interrupted_at(stage, trace, new_database) == (
         ExitCode.INTERRUPTED,
@@ -78,7 +78,7 @@ def test_an_interrupt_leaves_nothing(trace: Path, new_database: Path, stage: str
 
 
 @pytest.mark.parametrize("stage", few(STAGES, "building the model"))
-@pytest.mark.parametrize("ignored", [False, True])
+@pytest.mark.parametrize("ignored", few([False, True], True))
 def test_a_termination_leaves_nothing(
     trace: Path, new_database: Path, stage: str, ignored: bool
 ) -> None:
@@ -93,6 +93,7 @@ def test_a_termination_leaves_nothing(
     assert os.listdir(new_database.parent) == []
 
 
+@pytest.mark.thorough
 def test_a_termination_that_comes_too_late_is_none(database: Path, other_trace: Path) -> None:
     code, errors = interrupted_at(
         "closing the database", other_trace, database, number=signal.SIGTERM
@@ -101,6 +102,7 @@ def test_a_termination_that_comes_too_late_is_none(database: Path, other_trace: 
     assert "as run pair (2)" in errors
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "stage", few(["reading the traces", "linking messages"], "linking messages")
 )

@@ -269,6 +269,7 @@ def test_findings_of_which_nothing_tells_are_not_planned(
     assert "'kernel_trace_not_joined'" not in planned["staging.finding"]
 
 
+@pytest.mark.thorough
 def test_an_object_without_a_row_has_its_columns_all_the_same(planned: dict[str, Any]) -> None:
     with duckdb.connect() as con:
         con.execute("ATTACH ':memory:' AS staging")

@@ -78,6 +78,7 @@ def test_a_trace_says_whether_it_would_show_requests(
     assert rows(new_database, "SELECT has_request_events FROM trace") == [(has_both,)]
 
 
+@pytest.mark.thorough
 def test_what_was_ignored_is_told(make_trace: Make, new_database: Path) -> None:
     """And what is ignored in vain, as a mistyped name is."""
     report = ingest(

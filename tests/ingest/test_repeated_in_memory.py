@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import duckdb
+import pytest
 
 from msgflow import trace
 from msgflow.clocks import read_clock_sync
@@ -51,6 +52,7 @@ def test_a_run_leaves_nothing_to_the_next(tmp_path: Path) -> None:
     assert second["publication"]
 
 
+@pytest.mark.thorough
 def test_tables_that_stay_empty_are_not_made_again(tmp_path: Path) -> None:
     path = simulate("pipeline", tmp_path / "trace", factor=0.1).directory
     with database_in_memory() as con:

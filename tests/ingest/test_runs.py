@@ -62,6 +62,7 @@ def test_a_second_run_has_the_ids_of_the_first_continued(
     assert rows(both, "SELECT max(publication_id) = count(*) FROM publication") == [(True,)]
 
 
+@pytest.mark.thorough
 def test_the_same_trace_gives_the_same_rows_in_another_database(
     database: Path, new_database: Path, trace: Path
 ) -> None:
@@ -102,6 +103,7 @@ def test_a_replacement_keeps_other_runs(both: Path, trace: Path) -> None:
     assert not any(of_run(both, 1).values())
 
 
+@pytest.mark.thorough
 def test_one_ingest_may_replace_several_runs(both: Path, trace: Path, other_trace: Path) -> None:
     ingest([trace, other_trace], both, replace=True, name="both")
     assert rows(both, RUNS) == [(3, "both")]
@@ -120,6 +122,7 @@ def test_names_given_must_be_free(database: Path, trace: Path, other_trace: Path
     assert rows(database, "SELECT count(*) FROM trace") == [(2,)]
 
 
+@pytest.mark.thorough
 def test_names_not_given_are_made_free(database: Path, other_trace: Path, tmp_path: Path) -> None:
     shutil.copytree(other_trace, tmp_path / "robot")
     assert ingest([tmp_path / "robot"], database).run_name == "robot-2"

@@ -52,7 +52,7 @@ FAILURES = {
 }
 
 
-@pytest.mark.parametrize("where", few(FAILURES, "reading", "storing"))
+@pytest.mark.parametrize("where", few(FAILURES, "storing"))
 def test_a_failure_leaves_the_database_as_it_was(
     database: Path, other_trace: Path, monkeypatch: pytest.MonkeyPatch, where: str
 ) -> None:
@@ -135,6 +135,7 @@ def test_a_killed_ingest_is_forgotten(
         assert os.listdir(path.parent) == [path.name]
 
 
+@pytest.mark.thorough
 def test_the_workspace_of_a_running_ingest_is_left_alone(database: Path, other_trace: Path) -> None:
     """One whose lock nobody holds goes, whatever is in it."""
     with workspace(database) as running:
@@ -149,6 +150,7 @@ def test_the_workspace_of_a_running_ingest_is_left_alone(database: Path, other_t
     assert os.listdir(database.parent) == [database.name]
 
 
+@pytest.mark.thorough
 def test_without_file_locks_everything_works_but_cleaning(
     new_database: Path, trace: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -76,6 +76,7 @@ def test_events_that_match_a_pattern_are_loaded(
         assert opened.check() == []
 
 
+@pytest.mark.thorough
 def test_none_is_loaded_unless_asked_for(make_trace: Make, new_database: Path) -> None:
     report = ingest([make_trace(FIELDS, EVENTS)], new_database)
     assert rows(new_database, LOADED) == []
@@ -101,6 +102,7 @@ def test_patterns_that_load_nothing_are_told(make_trace: Make, new_database: Pat
     ]
 
 
+@pytest.mark.thorough
 def test_all_that_msgflow_does_not_read_is_loaded_by_a_star(
     make_trace: Make, new_database: Path
 ) -> None:
@@ -114,6 +116,7 @@ def test_all_that_msgflow_does_not_read_is_loaded_by_a_star(
     assert rows(new_database, "SELECT count(*) FROM callback_instance") == [(1,)]
 
 
+@pytest.mark.thorough
 def test_nothing_else_to_load_is_told(make_trace: Make, new_database: Path) -> None:
     report = ingest([make_trace(ROS, EVENTS[:1])], new_database, events=["my_pkg:*"])
     ((_, _, detail),) = findings(report, "user_event_not_loaded")
@@ -128,6 +131,7 @@ def test_what_is_ignored_is_not_loaded(make_trace: Make, new_database: Path) -> 
     assert findings(report, "user_event_not_loaded") == []
 
 
+@pytest.mark.thorough
 def test_the_ingest_names_a_pattern_whose_events_are_ignored(
     make_trace: Make, new_database: Path
 ) -> None:
@@ -225,6 +229,7 @@ LABELLED = {
 }
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("reader", few(READERS, "msgflow"))
 def test_an_enumeration_is_its_label(make_trace: Make, new_database: Path, reader: str) -> None:
     """The number where no label or several belong to it, and inside an array."""
@@ -250,6 +255,7 @@ def test_an_enumeration_is_its_label(make_trace: Make, new_database: Path, reade
     assert [fields["each"] for fields in found] == [[0, 1]] * len(made)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("reader", few(READERS, "msgflow"))
 def test_labels_of_several_programs_count_together(
     make_trace: Make, new_database: Path, reader: str
@@ -273,6 +279,7 @@ def test_labels_of_several_programs_count_together(
     )
 
 
+@pytest.mark.thorough
 def test_both_readers_give_the_same(tmp_path: Path) -> None:
     trace = simulate("own_events", tmp_path / "trace", factor=0.05).directory
     tables = []
@@ -284,6 +291,7 @@ def test_both_readers_give_the_same(tmp_path: Path) -> None:
     assert tables[0] == tables[1] != []
 
 
+@pytest.mark.thorough
 def test_all_other_tables_stay_as_they_are(tmp_path: Path) -> None:
     """But that threads are there which no event of ROS 2 was of, and were seen longer."""
     trace = simulate("own_events", tmp_path / "trace", factor=0.05).directory

@@ -89,6 +89,7 @@ def test_patterns(database: Path) -> None:
         assert rows(database, DECLARED) == [("periodic_async", "file", ["/a", "/b"], ["/c", "/d"])]
 
 
+@pytest.mark.thorough
 def test_equal_entries_are_one(database: Path) -> None:
     entry = BOTH.partition("links:\n")[2]
     other = entry.replace("[/a, /b]", "[/b, /a, '/[ab]']")
@@ -189,6 +190,7 @@ BACK: tuple[tuple[list[tuple[str, str, str]], int, str], ...] = (
 )
 
 
+@pytest.mark.thorough
 @each(BACK)
 def test_links_that_lead_back_change_nothing(
     back: tuple[list[tuple[str, str, str]], int, str], database: Path, untouched: Contents
@@ -221,6 +223,7 @@ def test_what_the_trace_declares_itself_is_not_declared_again(
     assert rows(path, "SELECT source, count(*) FROM annotation GROUP BY source") == [("trace", 1)]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "name", few(["partial_sync", "periodic_async_jazzy24"], "periodic_async_jazzy24")
 )
@@ -295,6 +298,7 @@ def slam(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "listener",
     few(
@@ -308,6 +312,7 @@ def test_messages_that_another_node_of_the_process_keeps(slam: Path, listener: s
     assert rows(slam, KEPT) == [("/transform_listener_impl_5566a1b0", "/mapGraph")]
 
 
+@pytest.mark.thorough
 @each(["/transform_listener_impl_55d01c40", "/rtabmap"])
 def test_it_is_of_the_same_process(listener: str, slam: Path) -> None:
     before = contents(slam)
@@ -361,6 +366,7 @@ def test_a_file_settles_what_is_doubtful(answering: Path) -> None:
     assert rows(answering, COUNTED) == [direct, doubtful]
 
 
+@pytest.mark.thorough
 def test_a_file_forbids_what_callbacks_published(answering: Path) -> None:
     text = ANSWERS.replace("direct", "independent").replace("/filter", "/relay")
     with Database(answering) as opened:
@@ -368,6 +374,7 @@ def test_a_file_forbids_what_callbacks_published(answering: Path) -> None:
     assert rows(answering, COUNTED) == [("take_adjacent", 2, 12)]
 
 
+@pytest.mark.thorough
 def test_independent_counts_where_both_are_declared(answering: Path) -> None:
     both = ANSWERS.replace("]", f", {ANSWERS[8:-1].replace('direct', 'independent')}]")
     with Database(answering) as opened:
@@ -379,6 +386,7 @@ def test_independent_counts_where_both_are_declared(answering: Path) -> None:
     assert rows(answering, COUNTED) == [("direct", 1, 9)]
 
 
+@pytest.mark.thorough
 def test_links_that_are_none_may_go_round(database: Path) -> None:
     """And name a topic on both sides."""
     text = """
@@ -393,6 +401,7 @@ links:
     assert rows(database, "SELECT count(*) FROM annotation_firing") == [(0,)]
 
 
+@pytest.mark.thorough
 def test_what_follows_from_responses_stays(empty_database: Path, tmp_path: Path) -> None:
     """Whatever is declared of callbacks: what these publish, the thread does not by itself."""
     system = RosSystem()

@@ -88,6 +88,7 @@ def test_a_named_topic_can_be_asked_for(database: Path) -> None:
     ) == [(0,)], "the file and the stamp decide, not the trace"
 
 
+@pytest.mark.thorough
 def test_a_file_names_topics_while_ingesting(trace: Path, database: Path, tmp_path: Path) -> None:
     file = file_of(database, ["/first"])
     again = tmp_path / "again.duckdb"
@@ -97,6 +98,7 @@ def test_a_file_names_topics_while_ingesting(trace: Path, database: Path, tmp_pa
     assert rows(again, "SELECT count(*) FROM publisher WHERE is_topic_declared") == [(1,)]
 
 
+@pytest.mark.thorough
 def test_another_file_takes_the_names_back(database: Path) -> None:
     before = entries(database)
     with Database(database) as opened:
@@ -128,6 +130,7 @@ def test_suggestions_keep_names_and_offer_the_others(database: Path) -> None:
     assert ("/first",) in rows(database, TOPICS.format("publisher"))
 
 
+@pytest.mark.thorough
 def test_one_topic_has_one_name(database: Path) -> None:
     """A publisher and the subscription that takes its messages are on one topic."""
     (publisher, subscription) = rows(
@@ -169,6 +172,7 @@ def test_mistakes_have_their_line(case: tuple[str, str], ingested: Path) -> None
     assert f"links.yaml, line 2: {message}" in refused.value.message
 
 
+@pytest.mark.thorough
 def test_a_handle_that_two_processes_have(database: Path) -> None:
     """The line that the finding shows says which; a name that messages tell cannot be changed."""
     import duckdb

@@ -16,7 +16,7 @@ import duckdb
 import pytest
 from mcp import Client
 from mcp.client.stdio import StdioServerParameters
-from thorough import few
+from thorough import few, thorough
 
 from msgflow.mcp import server as mcp_server
 
@@ -111,18 +111,20 @@ def test_answers_are_capped_and_say_so(small_database: Path) -> None:
     ("call", "words"),
     [
         (("sql", {"query": "COPY run TO 'x.csv'"}), ["not a statement that only reads", "hint: "]),
-        (("sql", {"query": "FROM read_csv('/etc/passwd')"}), ["SQL reaches no other files"]),
-        (("sql", {"query": "FROM '/etc/passwd'"}), ["/etc/passwd does not exist"]),
-        (("sql", {"query": "FROM nothing"}), ["nothing"]),
+        thorough(
+            ("sql", {"query": "FROM read_csv('/etc/passwd')"}), ["SQL reaches no other files"]
+        ),
+        thorough(("sql", {"query": "FROM '/etc/passwd'"}), ["/etc/passwd does not exist"]),
+        thorough(("sql", {"query": "FROM nothing"}), ["nothing"]),
         (("run_query", {"name": "latency"}), ["no such query", "hint: ", "e2e-latency"]),
-        (("run_query", {"name": "info", "run": "x"}), ["no such run — x", "morning (1)"]),
+        thorough(("run_query", {"name": "info", "run": "x"}), ["no such run — x", "morning (1)"]),
         (
             ("run_query", {"name": "e2e-latency", "parameters": {"paths": "/etc/passwd"}}),
             ["e2e-latency has no such parameter — paths"],
         ),
-        (("schema", {"view": "x"}), ["there is no such view — x"]),
-        (("flow", {"topic": "/nothing"}), ["/nothing"]),
-        (("check", {"run": "x"}), ["no such run — x"]),
+        thorough(("schema", {"view": "x"}), ["there is no such view — x"]),
+        thorough(("flow", {"topic": "/nothing"}), ["/nothing"]),
+        thorough(("check", {"run": "x"}), ["no such run — x"]),
     ],
 )
 def test_errors_have_hints(small_database: Path, call: Call, words: list[str]) -> None:
@@ -173,6 +175,7 @@ def test_the_schemas_say_that_nothing_else_is_taken(small_database: Path) -> Non
     assert all(tool.input_schema["additionalProperties"] is False for tool in tools)
 
 
+@pytest.mark.thorough
 def test_without_a_database_a_call_says_so(tmp_path: Path) -> None:
     ((failed, text),) = ask(tmp_path / "none.duckdb", ("info", {}))
     assert failed
@@ -195,6 +198,7 @@ def test_a_call_that_takes_too_long_is_stopped(small_database: Path) -> None:
     assert not after.is_error
 
 
+@pytest.mark.thorough
 def test_a_waiting_agent_keeps_nobody_from_writing(small_database: Path) -> None:
     async def talk() -> None:
         async with Client(mcp_server.make_server(small_database)) as client:

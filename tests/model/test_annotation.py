@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from analysis import Analyse, Analysis
 from ros_system import RosSystem
 from staged_events import Thread
@@ -98,6 +99,7 @@ def test_objects_that_were_never_initialised(system: RosSystem, analyse: Analyse
     ) == [(published, "periodic_async", 1)]
 
 
+@pytest.mark.thorough
 def test_annotations_without_anything_known(system: RosSystem, analyse: Analyse) -> None:
     """They are rows, and two that name different handles are two."""
     system.annotate(MAIN, "partial_sync", [0x11], [0x21])

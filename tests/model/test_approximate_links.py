@@ -84,7 +84,7 @@ def found(analysis: Analysis, system: RosSystem) -> dict[int, tuple[list[int], i
 
 
 @pytest.mark.parametrize("inputs", [2, 3, 4])
-@pytest.mark.parametrize("seed", few(range(12), 0, 1, 2))
+@pytest.mark.parametrize("seed", few(range(12), 0))
 def test_sets_are_those_of_the_filter(analysis: Analysis, inputs: int, seed: int) -> None:
     system, sets = record(messages(Random(100 * inputs + seed), inputs))
     links = found(analysis, system)
@@ -107,7 +107,7 @@ def test_sets_are_seldom_in_doubt(analysis: Analysis) -> None:
     assert analysis.value("SELECT count(*) FROM link_causal WHERE kind = 'direct'") == 0
 
 
-@pytest.mark.parametrize("inputs", [2, 3])
+@pytest.mark.parametrize("inputs", few([2, 3], 3))
 @pytest.mark.parametrize("seed", few(range(12), 0))
 def test_a_filter_whose_sets_are_not_all_published(
     analysis: Analysis, inputs: int, seed: int

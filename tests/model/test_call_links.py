@@ -6,6 +6,7 @@ import pytest
 from analysis import Analyse
 from ros_system import RosSystem
 from staged_events import Thread
+from thorough import thorough
 
 CLIENT = Thread(100)
 SERVER = Thread(200, trace=1)
@@ -63,6 +64,7 @@ def test_until_the_executor_goes_on(calls: RosSystem, analyse: Analyse) -> None:
     ]
 
 
+@pytest.mark.thorough
 def test_until_anything_else_is_taken_or_called(calls: RosSystem, analyse: Analyse) -> None:
     """And what is published in a callback has that as its cause."""
     calls.subscription(CLIENT, 0x30, "/a")
@@ -95,6 +97,7 @@ def test_not_across_a_gap(calls: RosSystem, analyse: Analyse) -> None:
     assert analyse(calls).rows(LINKS) == []
 
 
+@pytest.mark.thorough
 def test_not_where_a_gap_hides_what_was_taken_last(calls: RosSystem, analyse: Analyse) -> None:
     """It ends behind the take, and another one lies in it."""
     respond(calls, 1)
@@ -107,7 +110,8 @@ def test_not_where_a_gap_hides_what_was_taken_last(calls: RosSystem, analyse: An
 
 
 @pytest.mark.parametrize(
-    ("from_taken", "until_taken", "count"), [(-50, 0, 1), (-50, 1, 0), (0, 0, 0), (0, 5, 0)]
+    ("from_taken", "until_taken", "count"),
+    [(-50, 0, 1), (-50, 1, 0), thorough(0, 0, 0), thorough(0, 5, 0)],
 )
 def test_a_gap_that_touches_the_take(
     calls: RosSystem, analyse: Analyse, from_taken: int, until_taken: int, count: int
@@ -120,6 +124,7 @@ def test_a_gap_that_touches_the_take(
     assert len(analyse(calls).rows(LINKS)) == count
 
 
+@pytest.mark.thorough
 def test_a_gap_behind_what_was_sent(calls: RosSystem, analyse: Analyse) -> None:
     taken = respond(calls)
     requested = calls.send_request(CLIENT, 0x12, 1)
@@ -137,6 +142,7 @@ def test_gaps_of_other_hosts_hide_nothing(calls: RosSystem, analyse: Analyse) ->
     assert analyse(calls).rows(LINKS) == [(1, taken, True, 1)]
 
 
+@pytest.mark.thorough
 def test_gaps_of_the_kernel_trace_hide_nothing(calls: RosSystem, analyse: Analyse) -> None:
     respond(calls)
     calls.lose()
@@ -161,6 +167,7 @@ def test_each_thread_has_turns_of_its_own(calls: RosSystem, analyse: Analyse) ->
     assert analyse(calls).rows(LINKS) == [(1, first, True, 2), (3, second, True, 1)]
 
 
+@pytest.mark.thorough
 def test_no_turns_without_an_executor(calls: RosSystem, analyse: Analyse) -> None:
     """In rclpy a timer may have published."""
     python = Thread(300, None, "python3")
@@ -180,6 +187,7 @@ def test_another_process_may_have_sent_it(calls: RosSystem, analyse: Analyse) ->
     assert analyse(calls).rows(LINKS) == [(1, taken, True, 2)]
 
 
+@pytest.mark.thorough
 def test_what_is_also_sent_otherwise_is_doubtful(calls: RosSystem, analyse: Analyse) -> None:
     """A loop that spins once and then publishes; what it published before it spun tells nothing."""
     calls.publish(CLIENT, 0x11, 1)
@@ -192,6 +200,7 @@ def test_what_is_also_sent_otherwise_is_doubtful(calls: RosSystem, analyse: Anal
     assert analyse(calls).rows(LINKS) == [(2, taken, True, 2), (requested, taken, True, 2)]
 
 
+@pytest.mark.thorough
 def test_what_was_sent_before_spinning_tells_nothing(system: RosSystem, analyse: Analyse) -> None:
     system.client(CLIENT, 0x10, "/add", gid=7)
     system.publisher(CLIENT, 0x11, "/result")
@@ -202,6 +211,7 @@ def test_what_was_sent_before_spinning_tells_nothing(system: RosSystem, analyse:
     assert analyse(system).rows(LINKS) == [(2, taken, True, 1)]
 
 
+@pytest.mark.thorough
 def test_behind_a_gap_nothing_is_sent_otherwise(calls: RosSystem, analyse: Analyse) -> None:
     """What was taken before it may be lost."""
     calls.lose()
@@ -259,6 +269,7 @@ def test_a_request_with_a_callback(calls: RosSystem, analyse: Analyse) -> None:
     assert analyse(calls).rows(LINKS) == []
 
 
+@pytest.mark.thorough
 def test_a_response_that_waited_for_another(calls: RosSystem, analyse: Analyse) -> None:
     """It is sent in no callback, though one began with its request: before, and on a thread."""
     calls.service(SERVER, 0x23, "/sum", callback=0xC2)
@@ -335,6 +346,7 @@ def test_flows_and_paths_go_on_from_a_response(system: RosSystem, analyse: Analy
     assert analysis.rows("SELECT sum(duration_ns) FROM end_to_end_part([1])") == [(ended - begun,)]
 
 
+@pytest.mark.thorough
 def test_a_path_through_a_service_that_is_not_traced(system: RosSystem, analyse: Analyse) -> None:
     """A message leads to a call of which only the client shows."""
     source, sink = Thread(50), Thread(300)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from analysis import Analyse
 from ros_system import RosSystem
 from staged_events import Thread
@@ -57,6 +58,7 @@ def test_what_the_executor_said_in_between_stands_beside_a_loss_elsewhere(
     ]
 
 
+@pytest.mark.thorough
 def test_initialisation_between_them_does_not_matter(system: RosSystem, analyse: Analyse) -> None:
     """Nor do events of providers that say nothing about the call."""
     system.subscription(MAIN, 0x10, "/chatter", callback=0xCB)
@@ -82,6 +84,7 @@ def test_a_take_is_not_for_the_callback_of_another_subscription(
     ]
 
 
+@pytest.mark.thorough
 def test_a_take_is_not_for_a_timer(system: RosSystem, analyse: Analyse) -> None:
     system.subscription(MAIN, 0x10, "/chatter", callback=0xCB)
     system.timer(MAIN, 0x20, 0xDD)
@@ -153,6 +156,7 @@ def test_a_callback_never_initialised_learns_its_subscription(
     assert model.value("SELECT count(*) FROM callback_instance WHERE take_id IS NOT NULL") == 4
 
 
+@pytest.mark.thorough
 def test_everything_is_unknown_in_a_trace_that_starts_late(
     system: RosSystem, analyse: Analyse
 ) -> None:
@@ -167,6 +171,7 @@ def test_everything_is_unknown_in_a_trace_that_starts_late(
     ) == [("subscription", True)]
 
 
+@pytest.mark.thorough
 def test_an_address_is_that_of_the_callback_added_last(system: RosSystem, analyse: Analyse) -> None:
     system.timer(MAIN, 0x20, 0xCB)
     system.start(MAIN, 0xCB)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from analysis import Analyse
 from ros_system import RosSystem
 from staged_events import Thread
@@ -33,6 +34,7 @@ def test_nested_callbacks(system: RosSystem, analyse: Analyse) -> None:
     ]
 
 
+@pytest.mark.thorough
 def test_recursion_of_one_callback(system: RosSystem, analyse: Analyse) -> None:
     """Six levels deep, with a second call on the way out."""
     starts = [system.start(MAIN, 0xC1) for _ in range(6)]
@@ -44,6 +46,7 @@ def test_recursion_of_one_callback(system: RosSystem, analyse: Analyse) -> None:
     assert analyse(system).rows(RUNS) == [*expected, (again, again_end, 4, 3)]
 
 
+@pytest.mark.thorough
 def test_recursion_through_another_callback(system: RosSystem, analyse: Analyse) -> None:
     starts = [system.start(MAIN, callback) for callback in (0xC1, 0xC2, 0xC1, 0xC2)]
     ends = [system.end(MAIN, callback) for callback in (0xC2, 0xC1, 0xC2, 0xC1)]

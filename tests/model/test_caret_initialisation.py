@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from analysis import Analyse
 from ros_system import RMW, RosSystem
 from staged_events import Thread
@@ -49,6 +50,7 @@ def test_what_was_recorded_when_it_happened_is_not_doubled(
     assert model.value("SELECT count(*) FROM process") == 1
 
 
+@pytest.mark.thorough
 def test_reported_twice_is_one_object(system: RosSystem, analyse: Analyse) -> None:
     report(system)
     report(system)

@@ -78,6 +78,7 @@ def test_what_was_taken_has_no_reason(pair: Pair, analyse: Analyse) -> None:
     assert analyse(pair).rows(REASONS) == [(1, "delivered", None)]
 
 
+@pytest.mark.thorough
 def test_before_the_subscription_there_was(pair: Pair, analyse: Analyse) -> None:
     pair.publisher(TALKER, 0x10, "/a")
     pair.send(1)
@@ -89,6 +90,7 @@ def test_before_the_subscription_there_was(pair: Pair, analyse: Analyse) -> None
     ]
 
 
+@pytest.mark.thorough
 def test_before_discovery_nothing_arrives(pair: Pair, analyse: Analyse) -> None:
     pair.create()
     pair.send(1, 2)
@@ -100,6 +102,7 @@ def test_before_discovery_nothing_arrives(pair: Pair, analyse: Analyse) -> None:
     }
 
 
+@pytest.mark.thorough
 def test_a_process_that_is_seen_no_more_has_ended(pair: Pair, analyse: Analyse) -> None:
     """Others go on for much longer than a message ever took."""
     pair.create()
@@ -121,6 +124,7 @@ def test_at_the_end_of_the_trace_messages_are_pending(pair: Pair, analyse: Analy
     assert reasons(analyse(pair)) == {1: None, 2: "pending_at_end"}
 
 
+@pytest.mark.thorough
 def test_a_subscription_ends_where_its_handle_is_used_again(pair: Pair, analyse: Analyse) -> None:
     pair.create()
     pair.send_and_hear(1)
@@ -163,6 +167,7 @@ def test_an_attempt_that_took_nothing(pair: Pair, analyse: Analyse) -> None:
     assert model.value("SELECT count(*) FROM failed_take") == 1
 
 
+@pytest.mark.thorough
 def test_a_callback_that_looks_for_a_message_and_finds_none(pair: Pair, analyse: Analyse) -> None:
     """It was told of none: the two were not connected yet."""
     pair.create()
@@ -174,6 +179,7 @@ def test_a_callback_that_looks_for_a_message_and_finds_none(pair: Pair, analyse:
     assert reasons(analyse(pair)) == {1: "before_discovery", 2: None}
 
 
+@pytest.mark.thorough
 def test_where_nothing_was_ever_taken_nothing_was_overwritten(pair: Pair, analyse: Analyse) -> None:
     pair.create(depth=2)
     pair.send(1, 2, 3, 4)
@@ -214,6 +220,7 @@ def test_without_a_depth_nobody_can_tell(pair: Pair, analyse: Analyse) -> None:
     assert analyse(pair).rows(REASONS)[1] == (2, "unknown", "unknown")
 
 
+@pytest.mark.thorough
 def test_a_reader_that_waits_has_nothing_in_its_queue(pair: Pair, analyse: Analyse) -> None:
     """It waited for longer than messages take: the message did not come, whatever the depth."""
     pair.create(depth=1)
@@ -225,6 +232,7 @@ def test_a_reader_that_waits_has_nothing_in_its_queue(pair: Pair, analyse: Analy
     assert reasons(analyse(pair)) == {1: None, 2: "not_delivered", 3: None}
 
 
+@pytest.mark.thorough
 def test_a_reader_that_is_busy_tells_nothing(pair: Pair, analyse: Analyse) -> None:
     pair.create(depth=1)
     pair.send_and_hear(1)
@@ -285,12 +293,14 @@ def stamped(system: Pair) -> int:
     return stamp
 
 
+@pytest.mark.thorough
 def test_a_stamp_of_before_the_trace(pair: Pair, analyse: Analyse) -> None:
     pair.create()
     pair.hear(5)
     assert analyse(pair).rows(ORPHANS) == [(5, "before_tracing")]
 
 
+@pytest.mark.thorough
 def test_a_stamp_in_a_gap_of_the_publisher(pair: Pair, analyse: Analyse) -> None:
     pair.create()
     stamped(pair)
@@ -302,6 +312,7 @@ def test_a_stamp_in_a_gap_of_the_publisher(pair: Pair, analyse: Analyse) -> None
     assert (stamp, "publisher_gap") in analyse(pair).rows(ORPHANS)
 
 
+@pytest.mark.thorough
 def test_a_stamp_after_the_last_event_of_every_publisher(pair: Pair, analyse: Analyse) -> None:
     pair.create()
     stamped(pair)
@@ -365,6 +376,7 @@ def test_a_gap_goes_before_the_end_of_a_process(pair: Pair, analyse: Analyse) ->
     }
 
 
+@pytest.mark.thorough
 def test_a_gap_goes_before_a_failed_take(pair: Pair, analyse: Analyse) -> None:
     pair.create()
     pair.send_and_hear(1)
@@ -376,6 +388,7 @@ def test_a_gap_goes_before_a_failed_take(pair: Pair, analyse: Analyse) -> None:
     assert reasons(analyse(pair)) == {1: None, 2: "receiver_gap", 3: None}
 
 
+@pytest.mark.thorough
 def test_what_cannot_be_identified_goes_before_a_failed_take(pair: Pair, analyse: Analyse) -> None:
     """Either may have been for the message."""
     pair.create()
@@ -408,6 +421,7 @@ def test_discovery_goes_before_waiting(pair: Pair, analyse: Analyse) -> None:
     assert reasons(analyse(pair)) == {1: "before_discovery", 2: None}
 
 
+@pytest.mark.thorough
 def test_a_gap_may_hide_that_the_two_knew_each_other(pair: Pair, analyse: Analyse) -> None:
     pair.create()
     pair.send(1)
@@ -420,6 +434,7 @@ def test_a_gap_may_hide_that_the_two_knew_each_other(pair: Pair, analyse: Analys
     assert reasons(analyse(pair)) == {1: "receiver_gap", 2: "unknown", 3: None}
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("late_ns", "reason"), [(300, "not_delivered"), (310, "overwritten")])
 def test_a_reader_that_gets_no_cpu_seems_to_wait(
     pair: Pair, analyse: Analyse, late_ns: int, reason: str
@@ -450,6 +465,7 @@ class Dual(Pair):
         self.wait(MS)
 
 
+@pytest.mark.thorough
 def test_before_the_receiver_is_recorded(analyse: Analyse) -> None:
     """The second session reaches the talker first: that the message was taken does not show."""
     dual = Dual()
@@ -459,6 +475,7 @@ def test_before_the_receiver_is_recorded(analyse: Analyse) -> None:
     assert reasons(analyse(dual)) == {1: "receiver_gap", 2: None}
 
 
+@pytest.mark.thorough
 def test_before_the_sender_is_recorded(analyse: Analyse) -> None:
     """The other way round: what was on its way then was stamped before the tracing of its sender.
 
@@ -480,6 +497,7 @@ def paused(pair: Pair, begin: int, end: int) -> None:
     pair.add_packet(end, pair.now)
 
 
+@pytest.mark.thorough
 def test_processes_leave_one_after_the_other_before_a_pause(pair: Pair, analyse: Analyse) -> None:
     """The talker was told to stop first: what it sent then is not in the trace."""
     pair.create()
@@ -501,6 +519,7 @@ def test_processes_leave_one_after_the_other_before_a_pause(pair: Pair, analyse:
     assert analyse(pair).rows(ORPHANS) == [(stamp, "publisher_gap"), (later, "publisher_gap")]
 
 
+@pytest.mark.thorough
 def test_a_publisher_without_a_topic_may_be_the_sender(pair: Pair, analyse: Analyse) -> None:
     """Its initialisation was lost, and what it published in the gap as well."""
     pair.create()
@@ -517,6 +536,7 @@ def test_a_publisher_without_a_topic_may_be_the_sender(pair: Pair, analyse: Anal
     assert (stamp, "publisher_gap") in analyse(pair).rows(ORPHANS)
 
 
+@pytest.mark.thorough
 def test_a_publisher_without_a_topic_that_was_recorded_is_not(pair: Pair, analyse: Analyse) -> None:
     pair.create()
     pair.publish(OTHER, 0x77, 3)
@@ -530,6 +550,7 @@ def test_a_publisher_without_a_topic_that_was_recorded_is_not(pair: Pair, analys
     assert analyse(pair).rows(ORPHANS) == [(stamp, "publisher_not_traced")]
 
 
+@pytest.mark.thorough
 def test_a_publisher_that_was_created_later_is_not(pair: Pair, analyse: Analyse) -> None:
     """Of those that there were, all had ended."""
     pair.create()

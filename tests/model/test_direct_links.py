@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from analysis import Analyse
 from ros_system import RosSystem
 from staged_events import Thread
@@ -52,6 +53,7 @@ def test_the_innermost_run_counts(system: RosSystem, analyse: Analyse) -> None:
     assert runs == [(1, outer), (2, first), (3, outer), (4, inner), (5, second), (6, outer)]
 
 
+@pytest.mark.thorough
 def test_in_a_run_that_never_ended(system: RosSystem, analyse: Analyse) -> None:
     """It links its publications until something comes that cannot be inside."""
     start = system.start(MAIN, 0xC1)

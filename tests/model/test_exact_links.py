@@ -57,6 +57,7 @@ def test_zero_is_no_stamp(pair: RosSystem, analyse: Analyse) -> None:
     assert analyse(pair).rows(LINKS) == []
 
 
+@pytest.mark.thorough
 def test_one_process_may_stamp_two_topics_alike(pair: RosSystem, analyse: Analyse) -> None:
     pair.publisher(TALKER, 0x11, "/b")
     pair.subscription(LISTENER, 0x21, "/b")
@@ -84,6 +85,7 @@ def test_every_subscription_has_its_own_take(pair: RosSystem, analyse: Analyse) 
     assert analyse(pair).rows(LINKS) == [(1, n, "exact", 1) for n in (1, 2, 3)]
 
 
+@pytest.mark.thorough
 def test_equal_topic_and_stamp_pair_in_order(pair: RosSystem, analyse: Analyse) -> None:
     """The k-th publication belongs to the k-th take of each subscription; it is a guess."""
     pair.subscription(LISTENER, 0x21, "/a")
@@ -109,6 +111,7 @@ def test_more_takes_than_publications_are_a_guess(pair: RosSystem, analyse: Anal
     assert analyse(pair).rows(LINKS) == [(1, 1, "exact", 2), (2, 3, "exact", 1)]
 
 
+@pytest.mark.thorough
 def test_a_topic_unknown_where_it_was_published(system: RosSystem, analyse: Analyse) -> None:
     """The stamp alone is unique; the link teaches the publisher its topic."""
     system.subscription(LISTENER, 0x20, "/a")
@@ -128,6 +131,7 @@ def test_a_topic_unknown_where_it_was_taken(system: RosSystem, analyse: Analyse)
     assert model.rows("SELECT topic_name, is_inferred FROM subscription") == [("/a", True)]
 
 
+@pytest.mark.thorough
 def test_both_topics_unknown(system: RosSystem, analyse: Analyse) -> None:
     system.publish(TALKER, 0x10, 1)
     system.take(LISTENER, 0x20, 1)
@@ -160,6 +164,7 @@ def test_one_publication_is_not_on_two_topics(system: RosSystem, analyse: Analys
     assert len(analyse(system).rows(LINKS)) <= 1
 
 
+@pytest.mark.thorough
 def test_clocks_apart_make_a_negative_latency(system: RosSystem, analyse: Analyse) -> None:
     """Equal stamps need no clocks."""
     talker, listener = Thread(100, trace=1), Thread(100, trace=0)

@@ -119,6 +119,7 @@ def test_the_first_of_several_callbacks_names_a_state(system: RosSystem, analyse
     assert [row[3] for row in analyse(system).rows(STATES)] == [1, None]
 
 
+@pytest.mark.thorough
 def test_an_executor_that_waits_only_afterwards_was_not_idle(
     system: RosSystem, analyse: Analyse
 ) -> None:

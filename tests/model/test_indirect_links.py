@@ -88,7 +88,7 @@ INDIRECT = (
 
 
 # The last of the few: only there a run ends between the cut of a publication and its reading.
-@pytest.mark.parametrize("seed", few(range(30), 0, 1, 18))
+@pytest.mark.parametrize("seed", few(range(30), 18))
 def test_links_are_those_of_the_definition(analysis: Analysis, seed: int) -> None:
     system, history = make_history(seed)
     assert analysis.build(system).rows(INDIRECT) == reference(history)

@@ -106,6 +106,7 @@ def test_a_packet_that_takes_no_time_may_have_no_other_place_for_a_loss(
     assert analyse(system).rows(GAPS) == [("loss", 0, 100, 100, 7)]
 
 
+@pytest.mark.thorough
 def test_lost_packets_lie_between_those_around_them(system: RosSystem, analyse: Analyse) -> None:
     system.add_packet(0, 100)
     system.add_packet(400, 500, lost_packets=3)
@@ -340,6 +341,7 @@ def test_a_rotation_ends_packets_too(system: RosSystem, analyse: Analyse) -> Non
     assert analyse(system).rows(GAPS) == []
 
 
+@pytest.mark.thorough
 def test_what_opens_a_chunk_shows_that_nothing_was_stopped(
     system: RosSystem, analyse: Analyse
 ) -> None:
@@ -470,6 +472,7 @@ def test_a_silence_between_chunks_without_numbers(system: RosSystem, analyse: An
     assert analyse(system).rows(GAPS) == [("pause", None, 200 * MS + 1, 500 * MS, None)]
 
 
+@pytest.mark.thorough
 def test_a_gap_of_a_chunk_holds_for_the_recording(system: RosSystem, analyse: Analyse) -> None:
     """The thread is seen again in the next one only."""
     for chunk in (0, 1):
@@ -564,6 +567,7 @@ def test_a_take_whose_callback_is_in_the_gap(system: RosSystem, analyse: Analyse
     assert model.column("SELECT count(*) FROM callback_instance") == [0]
 
 
+@pytest.mark.thorough
 def test_a_callback_whose_take_is_in_the_gap(system: RosSystem, analyse: Analyse) -> None:
     system.subscription(Thread(100), 0x30, "/a", callback=0xC1)
     system.add("ros2:rmw_take", Thread(100), message=0xB)
@@ -578,6 +582,7 @@ def test_a_callback_whose_take_is_in_the_gap(system: RosSystem, analyse: Analyse
     assert model.column("SELECT is_loss_affected FROM callback_instance") == [True]
 
 
+@pytest.mark.thorough
 def test_a_callback_with_the_rest_of_its_take(system: RosSystem, analyse: Analyse) -> None:
     """The layers with the stamp are in the gap, the last one is not; then a call without any.
 
@@ -633,6 +638,7 @@ def test_a_thread_that_began_behind_a_gap(system: RosSystem, analyse: Analyse) -
     assert analyse(system).column("SELECT is_loss_affected FROM take") == [False]
 
 
+@pytest.mark.thorough
 def test_links_of_a_run_that_meets_a_gap_are_marked(system: RosSystem, analyse: Analyse) -> None:
     thread = Thread(100)
     system.publisher(thread, 0x10, "/a")
@@ -671,6 +677,7 @@ def test_a_gap_at_the_end_marks_what_never_ended(system: RosSystem, analyse: Ana
     ]
 
 
+@pytest.mark.thorough
 def test_a_guess_over_a_gap_is_marked(system: RosSystem, analyse: Analyse) -> None:
     """Two publications with one stamp: a third may be in the gap between them and the take."""
     thread = Thread(100)

@@ -118,6 +118,7 @@ def test_what_is_not_in_the_trace_has_no_link(unstamped: Unstamped, analyse: Ana
     assert analyse(unstamped.system).rows(LINKS) == expected(unstamped.truth)
 
 
+@pytest.mark.thorough
 def test_the_messages_of_an_untraced_publisher_have_no_link(
     unstamped: Unstamped, analyse: Analyse
 ) -> None:
@@ -127,6 +128,7 @@ def test_the_messages_of_an_untraced_publisher_have_no_link(
     assert analyse(unstamped.system).rows(LINKS) == expected(unstamped.truth)
 
 
+@pytest.mark.thorough
 def test_a_long_write_is_no_obstacle(unstamped: Unstamped, analyse: Analyse) -> None:
     """Ten megabytes are stamped milliseconds after the write began."""
     for n in range(40):
@@ -134,6 +136,7 @@ def test_a_long_write_is_no_obstacle(unstamped: Unstamped, analyse: Analyse) -> 
     assert analyse(unstamped.system).rows(LINKS) == expected(unstamped.truth)
 
 
+@pytest.mark.thorough
 def test_a_process_that_stamps_lost_an_event(unstamped: Unstamped, analyse: Analyse) -> None:
     """Its other publications say what their messages look like: nothing is matched by time."""
     for n in range(10):
@@ -142,6 +145,7 @@ def test_a_process_that_stamps_lost_an_event(unstamped: Unstamped, analyse: Anal
     assert analyse(unstamped.system).rows(LINKS) == []
 
 
+@pytest.mark.thorough
 def test_a_stamp_that_some_publication_has_is_no_message_of_another(
     unstamped: Unstamped, analyse: Analyse
 ) -> None:
@@ -197,6 +201,7 @@ def test_a_clock_that_drifts_and_jumps_is_followed(system: RosSystem, analyse: A
     assert len(links) >= 0.85 * len(slewed.truth)
 
 
+@pytest.mark.thorough
 def test_a_gap_after_the_publication_makes_the_link_doubtful(
     unstamped: Unstamped, analyse: Analyse
 ) -> None:
@@ -229,6 +234,7 @@ class Coarse(Unstamped):
         return -(time % 4_000_000)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("kind", "share", "reason"), [(Jumping, 0.4, "clock_set"), (Coarse, 0.0, "ambiguous")]
 )
@@ -273,7 +279,7 @@ class Remote(Unstamped):
 
 
 @pytest.mark.parametrize(
-    "offset", few([300_000, -200_000, 7_000_000, -10_000_000, 40_000_000], -200_000, 40_000_000)
+    "offset", few([300_000, -200_000, 7_000_000, -10_000_000, 40_000_000], 40_000_000)
 )
 @pytest.mark.parametrize("count", few([100, 800], 100))
 def test_a_clock_is_told_from_others_a_period_away(
@@ -286,6 +292,7 @@ def test_a_clock_is_told_from_others_a_period_away(
     assert analyse(system).rows(LINKS) == expected(remote.truth)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("offset", few([0, 4_000_000, 13_000_000], 4_000_000))
 def test_a_timer_that_is_never_late_does_not_tell_its_periods_apart(
     system: RosSystem, analyse: Analyse, offset: int
@@ -297,6 +304,7 @@ def test_a_timer_that_is_never_late_does_not_tell_its_periods_apart(
     assert links == (set(remote.truth) if offset == 0 else set())
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("jump", few([-10_000_000, 10_000_000], 10_000_000))
 def test_a_jump_by_a_period_is_followed(system: RosSystem, analyse: Analyse, jump: int) -> None:
     remote = Remote(system, jump=jump)

@@ -44,6 +44,7 @@ def test_what_ran_nested_is_used_by_what_it_ran_in(merge: RosSystem, analyse: An
     assert analyse(merge).rows(LINKS) == [(11, 12, 1), (21, 22, 1), (31, 32, 1)]
 
 
+@pytest.mark.thorough
 def test_and_by_no_later_firing(merge: RosSystem, analyse: Analyse) -> None:
     """What is published before the other input came has no message of it."""
     for n in (10, 20):
@@ -70,6 +71,7 @@ def test_what_came_after_the_last_publication_is_kept(merge: RosSystem, analyse:
     assert analyse(merge).rows(LINKS) == [(11, 12, 1), (13, 22, 1)]
 
 
+@pytest.mark.thorough
 def test_what_a_firing_runs_in_has_not_ended(merge: RosSystem, analyse: Analyse) -> None:
     """Also if there is another callback between the two."""
     merge.timer(NODE, 0x31, callback=0xCC)
@@ -86,6 +88,7 @@ def test_what_a_firing_runs_in_has_not_ended(merge: RosSystem, analyse: Analyse)
     assert analyse(merge).rows(LINKS) == []
 
 
+@pytest.mark.thorough
 def test_nested_deeper(merge: RosSystem, analyse: Analyse) -> None:
     merge.timer(NODE, 0x31, callback=0xCC)
     for n in (10, 20):
@@ -100,6 +103,7 @@ def test_nested_deeper(merge: RosSystem, analyse: Analyse) -> None:
     assert analyse(merge).rows(LINKS) == [(11, 13, 1), (21, 23, 1)]
 
 
+@pytest.mark.thorough
 def test_a_message_that_was_there_before_may_be_the_one(merge: RosSystem, analyse: Analyse) -> None:
     begin(merge, B, 9)
     merge.end(NODE, B)
@@ -111,6 +115,7 @@ def test_a_message_that_was_there_before_may_be_the_one(merge: RosSystem, analys
     assert analyse(merge).rows(LINKS) == [(11, 12, 2)]
 
 
+@pytest.mark.thorough
 def test_other_firings_may_have_used_what_a_firing_did_not(
     merge: RosSystem, analyse: Analyse
 ) -> None:
@@ -130,6 +135,7 @@ def test_other_firings_may_have_used_what_a_firing_did_not(
     assert analyse(merge).rows(LINKS) == [(11, 12, 1), (13, 22, 2)]
 
 
+@pytest.mark.thorough
 def test_used_by_one_annotation(merge: RosSystem, analyse: Analyse) -> None:
     """It may be there for the other. And a timer uses nothing."""
     other = Thread(100, 101)
@@ -157,6 +163,7 @@ def test_used_by_one_annotation(merge: RosSystem, analyse: Analyse) -> None:
     assert analyse(merge).rows(LINKS) == [(11, 12, 1), (11, 22, 2), (33, 32, 3)]
 
 
+@pytest.mark.thorough
 def test_nested_in_what_is_no_input(merge: RosSystem, analyse: Analyse) -> None:
     """The message came meanwhile on another thread: that has ended."""
     other = Thread(100, 101)
@@ -172,6 +179,7 @@ def test_nested_in_what_is_no_input(merge: RosSystem, analyse: Analyse) -> None:
     assert analyse(merge).rows(LINKS) == [(20, 12, 2)]
 
 
+@pytest.mark.thorough
 def test_what_another_instance_ran_in_has_ended(merge: RosSystem, analyse: Analyse) -> None:
     other = Thread(100, 101)
     begin(merge, B, 11)

@@ -153,6 +153,7 @@ def test_sessions_one_after_the_other_are_no_copies(system: RosSystem, analyse: 
     assert model.rows(FOUND) == []
 
 
+@pytest.mark.thorough
 def test_a_trace_per_process_holds_no_copies(system: RosSystem, analyse: Analyse) -> None:
     sessions(system, "alpha", "alpha")
     threads = session(0, 100), session(1, 200)
@@ -165,6 +166,7 @@ def test_a_trace_per_process_holds_no_copies(system: RosSystem, analyse: Analyse
     assert model.rows(FOUND) == []
 
 
+@pytest.mark.thorough
 def test_other_hosts_hold_no_copies(system: RosSystem, analyse: Analyse) -> None:
     sessions(system, "alpha", "beta")
     threads = session(0), session(1)
@@ -176,6 +178,7 @@ def test_other_hosts_hold_no_copies(system: RosSystem, analyse: Analyse) -> None
     assert model.rows(FOUND) == []
 
 
+@pytest.mark.thorough
 def test_three_sessions(system: RosSystem, analyse: Analyse) -> None:
     sessions(system, "alpha", "alpha", "alpha")
     threads = session(0), session(1), session(2)
@@ -222,6 +225,7 @@ def test_namespaces_of_process_ids_that_one_session_lacks(
     assert model.column("SELECT DISTINCT is_inferred FROM publisher") == [False]
 
 
+@pytest.mark.thorough
 def test_copies_are_found_where_only_one_session_has_namespaces(
     system: RosSystem, analyse: Analyse
 ) -> None:
@@ -270,6 +274,7 @@ def test_containers_with_one_hostname_are_no_copies(system: RosSystem, analyse: 
     assert failed_checks(model) == []
 
 
+@pytest.mark.thorough
 def test_most_events_have_a_twin_where_sessions_record_one_thread(
     system: RosSystem, analyse: Analyse
 ) -> None:
@@ -284,6 +289,7 @@ def test_most_events_have_a_twin_where_sessions_record_one_thread(
     assert counts(model)[2] >= 10
 
 
+@pytest.mark.thorough
 def test_what_only_one_session_recorded_has_no_twin(system: RosSystem, analyse: Analyse) -> None:
     """One goes on for a moment when the next one has started."""
     threads = session(0), session(1)
@@ -296,6 +302,7 @@ def test_what_only_one_session_recorded_has_no_twin(system: RosSystem, analyse: 
     assert counts(model) == (20, 20, 20, 20)
 
 
+@pytest.mark.thorough
 def test_few_events_have_one_by_chance(system: RosSystem, analyse: Analyse) -> None:
     threads = session(0), session(1)
     sessions(system, "alpha", "alpha")
@@ -314,6 +321,7 @@ def test_few_events_have_one_by_chance(system: RosSystem, analyse: Analyse) -> N
     assert counts(model)[:3] == (14, 14, 14)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("late_ns", "is_same"), [(10_000, True), (10_001, False), (-10_000, True), (-10_001, False)]
 )
@@ -334,6 +342,7 @@ def test_a_twin_follows_at_once(
     assert namespaces(model) == ([None] if is_same else [None, -2])
 
 
+@pytest.mark.thorough
 def test_a_twin_is_on_the_same_cpu(system: RosSystem, analyse: Analyse) -> None:
     """Two processes do the same on two CPUs, at one moment."""
     threads = session(0), session(1, cpu=1)
@@ -362,6 +371,7 @@ def test_two_sessions_of_the_second_container(system: RosSystem, analyse: Analys
     assert namespaces(model) == [None, -2]
 
 
+@pytest.mark.thorough
 def test_two_sessions_of_the_first_container(system: RosSystem, analyse: Analyse) -> None:
     """That the second one differs from one of them does not make a container of the other."""
     one, other, twin = session(0), session(1), session(2)
@@ -377,6 +387,7 @@ def test_two_sessions_of_the_first_container(system: RosSystem, analyse: Analyse
     assert namespaces(model) == [None, -2]
 
 
+@pytest.mark.thorough
 def test_a_namespace_is_not_that_of_another_container(system: RosSystem, analyse: Analyse) -> None:
     containers(system, session(0, pid_ns=7), session(1))
     model = analyse(system)
@@ -384,6 +395,7 @@ def test_a_namespace_is_not_that_of_another_container(system: RosSystem, analyse
     assert counts(model) == (8, 8, 8, 8)
 
 
+@pytest.mark.thorough
 def test_nor_is_one_of_the_second_container_that_of_the_first(
     system: RosSystem, analyse: Analyse
 ) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import pytest
 from analysis import Analyse, Analysis
 from kernel_schedule import BLOCKED, HOG, MAIN, Kernel, call, recorded
 from ros_system import RosSystem
@@ -75,6 +76,7 @@ def test_an_idle_cpu_takes_nothing_where_a_switch_to_another_thread_is_missing(
     assert model.rows("SELECT runnable_ns, sleeping_ns FROM callback_schedule") == [(200, 100)]
 
 
+@pytest.mark.thorough
 def test_a_callback_counts_only_its_own_part(system: RosSystem, analyse: Analyse) -> None:
     """The thread was preempted before the callback began, and woken when it had not yet ended."""
     recorded(system)
@@ -82,6 +84,7 @@ def test_a_callback_counts_only_its_own_part(system: RosSystem, analyse: Analyse
     assert of_callback(model) == [(0, 0, 100), (HOG, 200, 0)]
 
 
+@pytest.mark.thorough
 def test_a_thread_that_migrates_waits_for_another_cpu(system: RosSystem, analyse: Analyse) -> None:
     kernel = Kernel(system)
     kernel.switch(800, 0, OTHER, cpu=1)
@@ -132,6 +135,7 @@ def test_interrupts_are_part_of_the_time_on_a_cpu(system: RosSystem, analyse: An
     ]
 
 
+@pytest.mark.thorough
 def test_interrupts_that_were_not_recorded_are_not_known(
     system: RosSystem, analyse: Analyse
 ) -> None:

@@ -8,6 +8,7 @@ import pytest
 from analysis import Analyse
 from ros_system import RosSystem
 from staged_events import STEP_NS, Thread
+from thorough import thorough
 
 MAIN = Thread(100)
 LIVES = "SELECT pid, life, name, first_seen_ns, last_seen_ns FROM store.process ORDER BY process_id"
@@ -85,6 +86,7 @@ def called(system: RosSystem, *threads: Thread) -> None:
             system.wait(MILLISECOND)
 
 
+@pytest.mark.thorough
 def test_a_name_that_comes_back_is_of_another_process(system: RosSystem, analyse: Analyse) -> None:
     """Two containers share a session daemon. One thread has the name of its process."""
     called(system, Thread(7, name="front"), Thread(7, name="rear"))
@@ -391,6 +393,7 @@ def test_what_another_process_goes_on_with_keeps_no_life_going(
     assert analyse(system).rows(OTHERS) == [("main", 2), ("other", 1)]
 
 
+@pytest.mark.thorough
 @another
 def test_what_another_process_did_before_begins_no_life(
     system: RosSystem, analyse: Analyse, other: Thread
@@ -402,6 +405,7 @@ def test_what_another_process_did_before_begins_no_life(
     assert analyse(system).rows(OTHERS) == [("main", 1), ("other", 1)]
 
 
+@pytest.mark.thorough
 @another
 def test_another_program_begins_a_life_whatever_another_process_does(
     system: RosSystem, analyse: Analyse, other: Thread
@@ -451,7 +455,7 @@ def lose(system: RosSystem, trace: int, *gaps: tuple[int, int]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("lost", "lives"), [("before", 1), ("init", 2), ("use", 1), ("elsewhere", 1)]
+    ("lost", "lives"), [("before", 1), ("init", 2), thorough("use", 1), thorough("elsewhere", 1)]
 )
 def test_an_old_object_used_behind_a_gap_may_have_been_made_again(
     system: RosSystem, analyse: Analyse, lost: str, lives: int
@@ -584,11 +588,11 @@ FRONT = Thread(7, pid_ns=1)
     ("used", "rear"),
     [
         ("publisher", FRONT),
-        ("subscription", FRONT),
-        ("creation", FRONT),
+        thorough("subscription", FRONT),
+        thorough("creation", FRONT),
         ("publisher", replace(FRONT, pid=8)),
-        ("publisher", replace(FRONT, trace=1)),
-        ("publisher", replace(FRONT, pid_ns=2)),
+        thorough("publisher", replace(FRONT, trace=1)),
+        thorough("publisher", replace(FRONT, pid_ns=2)),
     ],
 )
 def test_objects_of_several_processes_are_used_by_turns(
@@ -705,6 +709,7 @@ def test_addresses_are_those_of_one_process(system: RosSystem, analyse: Analyse)
     assert analyse(system).rows(MIXED) == [(100, False), (200, False)]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("lost", "is_mixed"),
     [("before", True), ("between", False), ("behind", True), ("elsewhere", True)],

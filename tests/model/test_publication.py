@@ -68,6 +68,7 @@ def test_calls_that_begin_below_rclcpp(system: RosSystem, analyse: Analyse) -> N
     assert model.column("SELECT publisher_id FROM publication") == [1, 1, 1]
 
 
+@pytest.mark.thorough
 def test_a_layer_with_another_message_is_another_call(system: RosSystem, analyse: Analyse) -> None:
     system.publisher(MAIN, 0x10, "/chatter")
     system.publish(MAIN, 0x10, message=0xA, layers="rclcpp")
@@ -80,6 +81,7 @@ def test_a_layer_with_another_message_is_another_call(system: RosSystem, analyse
     ) == [(True, False, False, None), (False, True, False, None), (False, False, True, 777)]
 
 
+@pytest.mark.thorough
 def test_the_same_message_published_twice_is_two_calls(system: RosSystem, analyse: Analyse) -> None:
     system.publisher(MAIN, 0x10, "/chatter")
     for stamp in (777, 778):
@@ -106,6 +108,7 @@ def test_nothing_between_the_layers_but_the_thread_counts(
     ) == [(1, 100, 4 * STEP_NS, 777), (2, 101, 4 * STEP_NS, 888)]
 
 
+@pytest.mark.thorough
 def test_an_event_of_the_thread_between_two_layers_splits(
     system: RosSystem, analyse: Analyse
 ) -> None:
@@ -178,6 +181,7 @@ def test_intra_and_inter_process_are_one_call(system: RosSystem, analyse: Analys
     assert analyse(system).rows(LAYERS) == [(first, *at(first, 3, 4, 5), None, 777)]
 
 
+@pytest.mark.thorough
 def test_intra_process_alone_is_a_call_even_without_a_reader(
     system: RosSystem, analyse: Analyse
 ) -> None:
@@ -190,6 +194,7 @@ def test_intra_process_alone_is_a_call_even_without_a_reader(
     ]
 
 
+@pytest.mark.thorough
 def test_adjacent_calls_of_two_publishers_stay_two(system: RosSystem, analyse: Analyse) -> None:
     system.publisher(MAIN, 0x10, "/chatter")
     system.publisher(MAIN, 0x11, "/other")
@@ -201,6 +206,7 @@ def test_adjacent_calls_of_two_publishers_stay_two(system: RosSystem, analyse: A
     ) == [(1, False, None), (2, True, 777)]
 
 
+@pytest.mark.thorough
 def test_a_gap_between_intra_and_inter_process_splits(system: RosSystem, analyse: Analyse) -> None:
     """Behind the gap may be the next call of the same publisher."""
     system.publisher(MAIN, 0x10, "/chatter")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from analysis import Analyse
 from ros_system import WRITER, RosSystem
 from staged_events import Thread
@@ -113,6 +114,7 @@ def test_rosout_by_its_rmw_handle(system: RosSystem, analyse: Analyse) -> None:
     assert model.column("SELECT publisher_id FROM publication") == [2]
 
 
+@pytest.mark.thorough
 def test_rosout_by_its_dds_writer(system: RosSystem, analyse: Analyse) -> None:
     system.writer(MAIN, 0x10, "/rosout")
     system.publisher(MAIN, 0x10, "/rosout")

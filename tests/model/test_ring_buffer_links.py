@@ -6,6 +6,7 @@ import pytest
 from analysis import Analyse
 from ros_system import RosSystem
 from staged_events import Thread
+from thorough import thorough
 
 TALKER = Thread(100)
 LISTENER = Thread(100, 101)
@@ -100,6 +101,7 @@ def test_a_gap_may_hide_another_use_of_the_slot(intra: Intra, analyse: Analyse) 
     assert analyse(intra.system).rows(LINKS) == []
 
 
+@pytest.mark.thorough
 def test_a_gap_may_have_begun_before_the_message(intra: Intra, analyse: Analyse) -> None:
     """One that was over by then hides nothing."""
     published = [intra.publish(0)]
@@ -200,6 +202,7 @@ def test_behind_a_gap_what_was_put_in_is_lost(intra: Intra, analyse: Analyse) ->
     assert analyse(intra.system).column(REASONS) == ["publisher_gap", "no_stamp"]
 
 
+@pytest.mark.thorough
 def test_what_is_kept_for_who_comes_late_has_no_publication(intra: Intra, analyse: Analyse) -> None:
     intra.enqueue(0)
     intra.dequeue(0)
@@ -232,6 +235,7 @@ def test_the_copy_by_the_middleware_is_no_delivery(intra: Intra, analyse: Analys
     ) == 1  # fmt: skip
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("is_reader", [True, False])
 def test_a_copy_for_a_reader_that_never_gets_its_turn(
     intra: Intra, analyse: Analyse, *, is_reader: bool
@@ -258,11 +262,11 @@ def test_a_copy_for_a_reader_that_never_gets_its_turn(
         # No callback shows that its subscription reads a buffer.
         (False, False, True, False, False),
         # One message of the publisher came to a callback through the middleware.
-        (True, True, True, False, False),
+        thorough(True, True, True, False, False),
         # Another process passes nothing on in this one.
-        (True, False, False, False, False),
+        thorough(True, False, False, False, False),
         # Where publishers show that they pass messages on, this one would have.
-        (True, False, True, True, False),
+        thorough(True, False, True, True, False),
     ],
 )
 def test_copies_before_publishers_said_that_they_pass_messages_on(

@@ -73,6 +73,7 @@ def test_both_ends_of_calls(system: RosSystem, analyse: Analyse) -> None:
     ) == [("/add", "/add", True)]
 
 
+@pytest.mark.thorough
 def test_the_event_of_sending_may_come_last(system: RosSystem, analyse: Analyse) -> None:
     """The middleware may know the number only after writing."""
     hosts(system)
@@ -130,6 +131,7 @@ def test_clients_are_told_apart(system: RosSystem, analyse: Analyse) -> None:
     assert rows == [(1, first, later, None), (1, second, late, None)]
 
 
+@pytest.mark.thorough
 def test_a_client_that_came_again(system: RosSystem, analyse: Analyse) -> None:
     """The same GID and numbers: the responses tell, although the first request is not answered."""
     hosts(system)
@@ -165,6 +167,7 @@ def test_handles_that_are_used_again(system: RosSystem, analyse: Analyse) -> Non
     ]
 
 
+@pytest.mark.thorough
 def test_equal_requests_without_response_go_by_order(system: RosSystem, analyse: Analyse) -> None:
     hosts(system)
     sent = [system.send_request(CLIENT, 0x10, 1) for _ in range(2)]
@@ -186,6 +189,7 @@ def test_what_cannot_be_told_is_not_guessed(system: RosSystem, analyse: Analyse)
     ]
 
 
+@pytest.mark.thorough
 def test_two_services_of_one_name(system: RosSystem, analyse: Analyse) -> None:
     """Both take the request and answer."""
     second = Thread(201, trace=1)
@@ -239,6 +243,7 @@ def test_a_service_learns_its_name(system: RosSystem, analyse: Analyse) -> None:
     ]
 
 
+@pytest.mark.thorough
 def test_a_callback_behind_something_else_is_not_of_the_request(
     system: RosSystem, analyse: Analyse
 ) -> None:
@@ -304,6 +309,7 @@ def test_what_sent_a_request(system: RosSystem, analyse: Analyse) -> None:
     ]
 
 
+@pytest.mark.thorough
 def test_a_run_begins_where_one_that_never_ended_is_over(
     system: RosSystem, analyse: Analyse
 ) -> None:
@@ -422,6 +428,7 @@ def test_services_of_a_managed_node_that_were_lost(
     ]
 
 
+@pytest.mark.thorough
 def test_services_of_managed_nodes_that_begin_together(system: RosSystem, analyse: Analyse) -> None:
     """Two processes with equal addresses, a thread that makes services, and a lost callback."""
     hosts(system)
@@ -501,6 +508,7 @@ def test_a_service_callback_that_throws(system: RosSystem, analyse: Analyse) -> 
     assert analyse(system).rows(RUNS)[0][1] is None
 
 
+@pytest.mark.thorough
 def test_a_response_that_comes_later_and_a_gap(system: RosSystem, analyse: Analyse) -> None:
     """What the executor did last may be lost, and so may the end."""
     hosts(system)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from analysis import Analyse
 from ros_system import RosSystem
 from staged_events import Thread
@@ -79,6 +80,7 @@ def test_constructions_on_two_threads_do_not_mix(system: RosSystem, analyse: Ana
     ]
 
 
+@pytest.mark.thorough
 def test_a_buffer_used_again_belongs_to_the_new_subscription(
     system: RosSystem, analyse: Analyse
 ) -> None:

@@ -41,6 +41,7 @@ def test_a_failed_take_is_none(listener: RosSystem, analyse: Analyse) -> None:
     assert analyse(listener).column("SELECT source_timestamp_ns FROM take") == [778]
 
 
+@pytest.mark.thorough
 def test_a_failed_take_does_not_lend_its_stamp(listener: RosSystem, analyse: Analyse) -> None:
     """rclcpp_take comes even where nothing was taken."""
     listener.take(MAIN, 0x10, 777, taken=0, layers="rmw rclcpp")
@@ -71,6 +72,7 @@ def test_rmw_takes_count_where_no_rcl_take_is_traced(system: RosSystem, analyse:
     assert model.rows("SELECT start_ns, take_id FROM callback_instance") == [(start, 1)]
 
 
+@pytest.mark.thorough
 def test_a_layer_with_another_message_is_no_part(listener: RosSystem, analyse: Analyse) -> None:
     """It is a take of its own, and little is known about it."""
     first = listener.take(MAIN, 0x10, 777, message=0xB, layers="rmw")
@@ -91,6 +93,7 @@ def test_the_first_event_of_a_thread_begins_its_take(system: RosSystem, analyse:
     ]
 
 
+@pytest.mark.thorough
 def test_a_take_whose_upper_layers_were_lost_is_still_one(
     listener: RosSystem, analyse: Analyse
 ) -> None:
@@ -129,6 +132,7 @@ def test_handles_never_initialised_are_placeholders(system: RosSystem, analyse: 
     ]
 
 
+@pytest.mark.thorough
 def test_a_handle_is_that_of_the_subscription_initialised_last(
     system: RosSystem, analyse: Analyse
 ) -> None:

@@ -42,6 +42,7 @@ def test_until_the_next_take(relay: RosSystem, analyse: Analyse) -> None:
     ]
 
 
+@pytest.mark.thorough
 def test_a_run_of_a_callback_is_a_better_cause(relay: RosSystem, analyse: Analyse) -> None:
     """And after one has begun, or the executor went on, the message by hand is none."""
     relay.take(SINK, 0x21, 11)
@@ -62,6 +63,7 @@ def test_not_across_a_gap(relay: RosSystem, analyse: Analyse) -> None:
     assert analyse(relay).rows(LINKS) == []
 
 
+@pytest.mark.thorough
 def test_not_across_a_gap_that_began_before(relay: RosSystem, analyse: Analyse) -> None:
     """On a CPU that the thread may have visited."""
     taken = relay.take(PYTHON, 0x20, 11, layers="rmw rcl")
@@ -111,6 +113,7 @@ def test_flows_pass_through(relay: RosSystem, analyse: Analyse) -> None:
     ]
 
 
+@pytest.mark.thorough
 def test_until_the_next_take_of_a_request_or_response(relay: RosSystem, analyse: Analyse) -> None:
     """A service of rclpy shows no callback either; what it publishes is not due to the message."""
     relay.take(PYTHON, 0x20, 11, layers="rmw rcl")
@@ -128,6 +131,7 @@ def test_until_the_next_take_of_a_request_or_response(relay: RosSystem, analyse:
     assert [row[:2] for row in analyse(relay).rows(LINKS)] == [(1, 11), (2, 11), (3, 11), (5, 12)]
 
 
+@pytest.mark.thorough
 def test_the_middleware_answers_nothing(relay: RosSystem, analyse: Analyse) -> None:
     """Discovery publishes without a publisher of rcl, and no event of it was lost."""
     relay.take(PYTHON, 0x20, 11, layers="rmw rcl")

@@ -46,6 +46,7 @@ def divided(model: Analysis, from_ns: int, to_ns: int) -> dict[str, int]:
     )
 
 
+@pytest.mark.thorough
 def test_any_interval_of_a_thread_divides_as_callbacks_do(
     system: RosSystem, analyse: Analyse
 ) -> None:
@@ -117,6 +118,7 @@ def test_a_waker_that_the_next_switch_contradicts_is_not_known(
     ) == [(kind, waker)]
 
 
+@pytest.mark.thorough
 def test_of_two_kernel_traces_of_a_schedule_the_one_that_knows_the_waker_counts(
     system: RosSystem, analyse: Analyse
 ) -> None:
@@ -150,6 +152,7 @@ def test_a_waking_may_come_before_the_switch_that_it_undoes(
     assert schedules(analyse(system)) == [(500, 0, 100, 0, 0, 0)]
 
 
+@pytest.mark.thorough
 def test_a_thread_that_is_woken_twice_waits_from_the_first_time(
     system: RosSystem, analyse: Analyse
 ) -> None:
@@ -184,6 +187,7 @@ def test_each_thread_has_its_own_wakings(system: RosSystem, analyse: Analyse) ->
     assert rows == [(100, 1100, 1300, "sleeping"), (101, 1150, 1200, "runnable")]
 
 
+@pytest.mark.thorough
 def test_without_wakings_a_sleep_lasts_until_the_thread_runs(
     system: RosSystem, analyse: Analyse
 ) -> None:
@@ -208,6 +212,7 @@ def test_what_the_next_switch_contradicts_is_not_known(system: RosSystem, analys
     assert schedules(analyse(system)) == [(300, 0, 0, 0, 0, 300), (100, 0, 0, 0, 0, 0)]
 
 
+@pytest.mark.thorough
 def test_a_callback_beyond_the_kernel_trace_is_not_known(
     system: RosSystem, analyse: Analyse
 ) -> None:
@@ -327,6 +332,7 @@ def test_another_process_that_begins_changes_no_numbers(
     assert analyse(system).rows("SELECT is_joined FROM staging.schedule") == [(False,)]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("source", ["dump", "fork"])
 def test_declared_numbers_hold_where_no_event_tells_them(
     system: RosSystem, analyse: Analyse, source: str
@@ -403,6 +409,7 @@ def test_contexts_hold_for_the_life_of_a_process(system: RosSystem, analyse: Ana
     ]
 
 
+@pytest.mark.thorough
 def test_a_thread_that_nothing_tells_is_said(system: RosSystem, analyse: Analyse) -> None:
     recorded(system)
     call(system, 800, 810, Thread(100, 101))
@@ -425,6 +432,7 @@ def test_without_a_kernel_trace_there_is_nothing(system: RosSystem, analyse: Ana
     assert model.rows("FROM other_thread") == []
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("state", [16, 32])
 def test_a_thread_that_ended_does_not_sleep(
     system: RosSystem, analyse: Analyse, state: int
@@ -552,6 +560,7 @@ def test_the_number_of_a_thread_is_known_on_a_cpu_without_switches_from_idle(
     assert schedules(analyse(system)) == [(100, 0, 0, 0, 0, 0), (100, 0, 0, 0, 0, 0)]
 
 
+@pytest.mark.thorough
 def test_what_wakes_is_known_where_it_is_seen(system: RosSystem, analyse: Analyse) -> None:
     """From a CPU that went idle, and on which a thread is seen only afterwards."""
     other = Thread(100, 101, cpu=1)
@@ -576,6 +585,7 @@ def test_what_wakes_is_known_where_it_is_seen(system: RosSystem, analyse: Analys
     ) == [(1100, None, None, None), (2300, "thread", 101, None), (3100, None, None, None)]
 
 
+@pytest.mark.thorough
 def test_a_wrong_clock_is_found_where_most_of_the_schedule_is_unknown(
     system: RosSystem, analyse: Analyse
 ) -> None:
@@ -595,6 +605,7 @@ def test_a_wrong_clock_is_found_where_most_of_the_schedule_is_unknown(
     ]
 
 
+@pytest.mark.thorough
 def test_two_threads_are_not_one_to_the_kernel(system: RosSystem, analyse: Analyse) -> None:
     """A trace of another boot, in which one thread had the CPU all the time."""
     kernel = Kernel(system, clock="perf", tracer="perf")
@@ -629,6 +640,7 @@ def test_a_few_agreeing_events_among_contradictions_do_not_join(
     ]
 
 
+@pytest.mark.thorough
 def test_a_kernel_trace_that_contradicts_itself_at_all_events_is_not_joined(
     system: RosSystem, analyse: Analyse
 ) -> None:
@@ -732,6 +744,7 @@ def test_the_clock_of_most_events_counts(system: RosSystem, analyse: Analyse) ->
     ) == [(True, 41, 40, "alpha")]
 
 
+@pytest.mark.thorough
 def test_after_a_preemption_it_is_not_known_when_the_thread_goes_on_unseen(
     system: RosSystem, analyse: Analyse
 ) -> None:

@@ -6,6 +6,7 @@ import pytest
 from analysis import Analyse
 from ros_system import RosSystem
 from staged_events import Thread
+from thorough import thorough
 
 TALKER = Thread(100)
 LISTENER = Thread(200)
@@ -27,6 +28,7 @@ def test_one_message_names_the_topic_of_all(system: RosSystem, analyse: Analyse)
     assert model.rows(TOPICS) == [(0x10, "/a"), (0x11, "/b")]
 
 
+@pytest.mark.thorough
 def test_a_name_is_not_needed(system: RosSystem, analyse: Analyse) -> None:
     """Nothing was initialised in the trace at all."""
     for stamp, handles in ((1, (0x10,)), (2, (0x11,)), (3, (0x10, 0x11))):
@@ -69,7 +71,7 @@ def test_contradictions_teach_nothing(system: RosSystem, analyse: Analyse) -> No
 
 
 @pytest.mark.parametrize(
-    ("of_publisher", "of_reader", "topic"), [(10, 11, None), (11, 10, None), (11, 11, "/a")]
+    ("of_publisher", "of_reader", "topic"), [(10, 11, None), thorough(11, 10, None), (11, 11, "/a")]
 )
 def test_less_than_a_tenth_on_both_sides_is_chance(
     system: RosSystem, analyse: Analyse, of_publisher: int, of_reader: int, topic: str | None

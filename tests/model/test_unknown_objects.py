@@ -181,6 +181,7 @@ def test_two_callbacks_of_one_handle(system: RosSystem, analyse: Analyse) -> Non
     assert analysis.rows(TIMERS) == []
 
 
+@pytest.mark.thorough
 def test_two_handles_before_one_callback(system: RosSystem, analyse: Analyse) -> None:
     receive(system, 0x30, 0xC9)
     fire(system, 0x20, 0xC0)
@@ -188,6 +189,7 @@ def test_two_handles_before_one_callback(system: RosSystem, analyse: Analyse) ->
     assert analyse(system).rows(CALLBACKS)[0] == (0xC0, "unknown", None)
 
 
+@pytest.mark.thorough
 def test_something_else_in_between(system: RosSystem, analyse: Analyse) -> None:
     receive(system, 0x30, 0xC9)
     system.execute(MAIN, 0x20)
@@ -213,6 +215,7 @@ def test_a_gap_in_between_tells_nothing(system: RosSystem, analyse: Analyse) -> 
     ]
 
 
+@pytest.mark.thorough
 def test_a_known_subscription_without_a_take(system: RosSystem, analyse: Analyse) -> None:
     """Loaned messages: what has no take in that process may be either."""
     system.subscription(MAIN, 0x30, "/a", callback=0xCB)
@@ -243,6 +246,7 @@ def test_timers_come_first_in_a_round(system: RosSystem, analyse: Analyse) -> No
     assert uncertain(analysis) == [("unknown_owner", 2)]
 
 
+@pytest.mark.thorough
 def test_a_gap_may_hide_the_begin_of_a_round(system: RosSystem, analyse: Analyse) -> None:
     receive(system, 0x30, 0xC9)
     system.lose()
@@ -262,6 +266,7 @@ def test_several_threads_keep_no_such_order(system: RosSystem, analyse: Analyse)
     assert analyse(system).rows(CALLBACKS)[0] == (0xC1, "timer", 1)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("handles", "kind"), [((), "unknown"), ((0x20,), "service"), ((0x20, 0x41), "unknown")]
 )
@@ -339,6 +344,7 @@ def test_a_placeholder_of_a_buffer_is_not_said_to_miss_messages(
     assert broken_rules(analysis.connection) == []
 
 
+@pytest.mark.thorough
 def test_several_callbacks_behind_a_ring_buffer(system: RosSystem, analyse: Analyse) -> None:
     """The address may have been used again: nobody can tell."""
     dequeue(system, 0xB0, 0xC1)
@@ -355,6 +361,7 @@ def test_several_callbacks_behind_a_ring_buffer(system: RosSystem, analyse: Anal
     assert uncertain(analysis) == [("ambiguous_buffer", 3), ("unknown_owner", 3)]
 
 
+@pytest.mark.thorough
 def test_a_ring_buffer_of_a_known_callback(system: RosSystem, analyse: Analyse) -> None:
     """Only which buffer it reads was lost, also for a message that led to nothing."""
     system.subscription(MAIN, 0x30, "/a", callback=0xC1)
@@ -365,6 +372,7 @@ def test_a_ring_buffer_of_a_known_callback(system: RosSystem, analyse: Analyse) 
     assert analysis.rows("SELECT topic_name, is_inferred FROM subscription") == [("/a", False)]
 
 
+@pytest.mark.thorough
 def test_an_intra_process_callback_without_a_buffer(system: RosSystem, analyse: Analyse) -> None:
     """Before Iron nothing else shows of the message; where a gap hid the dequeue it is the same."""
     run(system, 0xC1, intra=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from analysis import Analyse, Analysis
 from ros_system import RosSystem
 from staged_events import Thread
@@ -105,6 +106,7 @@ def test_a_callback_that_is_seen_to_end_is_not_affected_by_a_loss_after_it(
     assert marks(analyse(system)) == [(False,)]
 
 
+@pytest.mark.thorough
 def test_the_time_is_corrected_as_all_others(system: RosSystem, analyse: Analyse) -> None:
     happen(system, ts=2_000)
     model = analyse(system)

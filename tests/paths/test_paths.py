@@ -28,6 +28,7 @@ def database(simulated: Callable[..., Path]) -> Iterator[Database]:
         yield opened
 
 
+@pytest.mark.thorough
 def test_a_name_stands_for_a_path(database: Database, tmp_path: Path) -> None:
     file = tmp_path / "paths.yaml"
     file.write_text(GOOD, encoding="utf-8")

@@ -9,6 +9,7 @@ from typing import Any
 import duckdb
 import pytest
 from golden import BASE, fill_case, insert
+from thorough import thorough
 
 import msgflow
 from msgflow.errors import UsageError
@@ -102,6 +103,7 @@ def _rows(database: msgflow.Database, run_b: str, **options: Any) -> list[dict[s
     return comparison.result.to_arrow().to_pylist()
 
 
+@pytest.mark.thorough
 def test_what_is_equal_is_rarely_called_different(compared: list[dict[str, Any]]) -> None:
     assert len(compared) == 5 * CALLBACKS
     for statistic in ("median", "mean"):
@@ -179,6 +181,7 @@ def test_each_statistic_is_of_the_values_and_in_its_interval(fresh_database: Pat
     assert rows["max"]["low_ns"] is None
 
 
+@pytest.mark.thorough
 def test_five_values_beyond_a_quantile_are_enough(fresh_database: Path) -> None:
     """Each callback has as many values as one statistic needs; then one less in run B."""
     enough = {"/n · Timer(1 ms)": 20, "/n · Timer(2 ms)": 100, "/n · Timer(3 ms)": 500}
@@ -218,6 +221,7 @@ def test_five_values_beyond_a_quantile_are_enough(fresh_database: Path) -> None:
     }
 
 
+@pytest.mark.thorough
 def test_values_that_are_held_count_once(fresh_database: Path) -> None:
     """Of 1280 durations, 64 are independent, whose means differ by more than those of 1280."""
     _fill(fresh_database, shift_ns=0, callbacks=16, values=1_280, held=20)
@@ -267,6 +271,7 @@ def test_what_is_alike_all_along_has_no_interval(fresh_database: Path) -> None:
             assert (row["low_ns"], row["high_ns"]) == (None, None)
 
 
+@pytest.mark.thorough
 def test_too_few_resamples_have_no_interval(fresh_database: Path) -> None:
     _fill(fresh_database, shift_ns=100_000, callbacks=1)
     with msgflow.open_db(fresh_database) as database:
@@ -289,6 +294,7 @@ def test_too_few_resamples_have_no_interval(fresh_database: Path) -> None:
         }
 
 
+@pytest.mark.thorough
 def test_a_seed_gives_the_same_intervals_and_another_one_others(fresh_database: Path) -> None:
     _fill(fresh_database, shift_ns=0, callbacks=4)
     with msgflow.open_db(fresh_database) as database:
@@ -319,8 +325,8 @@ def test_a_verdict_is_of_the_recordings_alone(fresh_database: Path) -> None:
     ("waited", "said"),
     [
         ("preempted_ns", "300.000 µs more waiting for a CPU"),
-        ("running_ns", "300.000 µs more CPU time"),
-        ("sleeping_ns", "300.000 µs more sleeping or blocked"),
+        thorough("running_ns", "300.000 µs more CPU time"),
+        thorough("sleeping_ns", "300.000 µs more sleeping or blocked"),
     ],
 )
 def test_longer_callbacks_computed_or_waited(fresh_database: Path, waited: str, said: str) -> None:
@@ -378,6 +384,7 @@ def test_less_that_arrives_fails(fresh_database: Path) -> None:
     assert len(reverse) == 1
 
 
+@pytest.mark.thorough
 def test_percentages_of_what_is_not_positive(fresh_database: Path) -> None:
     _fill(fresh_database, shift_ns=-7_000, callbacks=1)
     with msgflow.open_db(fresh_database) as database:
@@ -396,6 +403,7 @@ def test_percentages_of_what_is_not_positive(fresh_database: Path) -> None:
     assert "clocks apply" in str(raised.value.hint)
 
 
+@pytest.mark.thorough
 def test_nothing_holds_of_paths_that_were_left_out(fresh_database: Path) -> None:
     with duckdb.connect(str(fresh_database)) as connection:
         fill_case(connection, CASES / "many_paths.case")
@@ -436,6 +444,7 @@ def test_what_exceeds_a_condition_fails(fresh_database: Path) -> None:
         assert all(failure.reason.endswith("ms)") for failure in failures[:4])
 
 
+@pytest.mark.thorough
 def test_what_is_gone_fails(fresh_database: Path) -> None:
     _fill(fresh_database, shift_ns=0, callbacks=4)
     with duckdb.connect(str(fresh_database)) as connection:
@@ -508,6 +517,7 @@ def test_a_database_without_runs_says_so(fresh_database: Path) -> None:
         database.compare(1, 2)
 
 
+@pytest.mark.thorough
 def test_a_start_with_the_longest_values_is_named_and_left_out(fresh_database: Path) -> None:
     _fill(fresh_database, shift_ns=0, callbacks=1)
     with duckdb.connect(str(fresh_database)) as connection:

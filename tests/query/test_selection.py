@@ -9,7 +9,7 @@ from typing import Any
 import duckdb
 import pytest
 from golden import fill_case
-from thorough import few
+from thorough import few, thorough
 
 from msgflow.database import Database
 from msgflow.errors import QueryError, UsageError
@@ -234,6 +234,7 @@ def latencies(database: Database, **given: Any) -> list[int]:
     )  # fmt: skip
 
 
+@pytest.mark.thorough
 def test_the_slowest_flows_piece_by_piece(database: Database) -> None:
     every = latencies(database, to="/base/motors")
     for detail in ("short", "full"):
@@ -247,6 +248,7 @@ def test_the_slowest_flows_piece_by_piece(database: Database) -> None:
         assert {row["rank"] for row in pieces} == {1, 2, 3}
 
 
+@pytest.mark.thorough
 def test_short_pieces_are_one_line_and_layers_one_piece(database: Database) -> None:
     short = rows(database, "critical-path", to="/base/motors")
     full = rows(database, "critical-path", to="/base/motors", detail="full")
@@ -262,6 +264,7 @@ def test_short_pieces_are_one_line_and_layers_one_piece(database: Database) -> N
     assert publish["pieces"] == [row["activity"] for row in full].count("rcl") >= 3
 
 
+@pytest.mark.thorough
 def test_totals_add_up(database: Database) -> None:
     full = rows(database, "critical-path", to="/base/motors", detail="full")
     by_node = rows(database, "critical-path", to="/base/motors", by="node")
@@ -307,7 +310,7 @@ def test_flows_through_and_by_their_end(database: Database) -> None:
             "end_to_end([1], NULL, NULL, 'callback_start', 'callback_end',"
             " -9223372036854775808, 9223372036854775807)",
         ),
-        (
+        thorough(
             "end_to_end_part([1])",
             "end_to_end_part([1], NULL, NULL, 'callback_start', 'callback_end', 0,"
             " 9223372036854775807, 'first')",
@@ -331,13 +334,15 @@ def test_macros_need_no_more_than_the_runs(database: Database, short: str, whole
         ("end_to_end([1], from_event := 'start')", "from_event is one of callback_start, publish"),
         ("end_to_end([1], to_event := NULL)", "to_event is one of take, callback_start"),
         ("comparison('nodes', 1, 1)", "what is one of paths, callbacks, topics, not nodes"),
-        ("comparison(NULL, 1, 1)", "what is one of paths, callbacks, topics, not NULL"),
+        thorough("comparison(NULL, 1, 1)", "what is one of paths, callbacks, topics, not NULL"),
         (
             "comparison('paths', 1, 1, wanted_case := 'fist')",
             "wanted_case is one of first, last, newest, every_pair, not fist",
         ),
-        ("end_to_end_part([1], flow_case := 'fist')", "flow_case is one of first, last, newest"),
-        ("critical_path([1], to_event := 'end')", "not end"),
+        thorough(
+            "end_to_end_part([1], flow_case := 'fist')", "flow_case is one of first, last, newest"
+        ),
+        thorough("critical_path([1], to_event := 'end')", "not end"),
     ],
 )
 def test_words_that_macros_do_not_know_are_errors(
@@ -371,24 +376,24 @@ def test_what_left_nothing_is_said(database: Database) -> None:
             "flows from /boxes end at /fusion (on /boxes), and those to /viewer begin at /tracker:"
             " msgflow suggest links",
         ),
-        (
+        thorough(
             "/boxes",
             "/objects",
             "flows from /boxes end at /fusion (on /boxes), which publishes towards /objects:"
             " msgflow suggest links",
         ),
-        (
+        thorough(
             "/boxes",
             "/path",
             "flows from /boxes end at /fusion (on /boxes), and nothing arrives at /path:"
             " msgflow suggest links",
         ),
-        (
+        thorough(
             "/tracks",
             "/boxes",
             "flows from /tracks end at /viewer (on /tracks), and those to /boxes begin at /camera",
         ),
-        (
+        thorough(
             "/imu",
             "/odom",
             "flows from /imu end at /driver (on /plan), and those to /odom begin at /base:"

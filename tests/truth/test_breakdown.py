@@ -89,7 +89,7 @@ def test_parts_of_simulated_flows_add_up(simulations: Callable[[str], Ingested],
     check_flows(simulations(name))
 
 
-@pytest.mark.parametrize("name", few(RECORDINGS, "services", "real_overload"))
+@pytest.mark.parametrize("name", few(RECORDINGS, "services"))
 def test_the_breakdown_adds_up_by_path(recordings: Callable[[str], Ingested], name: str) -> None:
     """Sums of the query over the parts of a path are those of its flows, from start to end."""
     con = recordings(name).connection
@@ -105,6 +105,7 @@ def test_the_breakdown_adds_up_by_path(recordings: Callable[[str], Ingested], na
     assert totals == dict(expected)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", few(RECORDINGS, "periodic_async_jazzy24"))
 def test_pieces_of_the_critical_path_add_up(
     recordings: Callable[[str], Ingested], name: str
@@ -161,6 +162,7 @@ def test_the_critical_path_and_the_breakdown_agree(
     assert (certain, certain + doubtful) == (busy_min, busy_max)
 
 
+@pytest.mark.thorough
 def test_the_wait_for_a_timer_is_shown_as_such(recordings: Callable[[str], Ingested]) -> None:
     """Periods of 8 ms, inputs every 5 and 12: the longest flow waited for the timer."""
     (row,) = (
@@ -174,6 +176,7 @@ def test_the_wait_for_a_timer_is_shown_as_such(recordings: Callable[[str], Inges
     assert row[0] > 0.5
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "name", few(["sync_1_1", "periodic_async_jazzy24", "partial_sync"], "periodic_async_jazzy24")
 )
@@ -208,6 +211,7 @@ def measured(
     return rows
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("case", few(["first", "last", "newest", "every_pair"], "first"))
 def test_the_slowest_flow_is_one_of_those_that_count(
     recordings: Callable[[str], Ingested], case: str

@@ -39,6 +39,7 @@ def test_no_message_is_taken_for_the_next(tmp_path: Path, system: str, recording
     assert transport.found > (850 if recording == "step" else 1000)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("offset_ns", "slew_ppm", "factor", "least"),
     [
@@ -136,6 +137,7 @@ def test_messages_that_are_written_for_each_subscription_on_its_own(
     assert "exact" in transport.labels
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("system", few(["pipeline", "channels"], "channels"))
 def test_a_clock_that_is_set_back_by_milliseconds_makes_none_wrong(
     tmp_path: Path, system: str
@@ -153,6 +155,7 @@ def test_a_clock_that_is_set_back_by_milliseconds_makes_none_wrong(
     assert transport.recall > (0.6 if system == "pipeline" else 0.7)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("hosts", "steps", "least"),
     [
@@ -188,7 +191,7 @@ def test_a_clock_that_is_set_back_by_seconds_makes_none_wrong(
 @pytest.mark.parametrize(
     ("recording", "factor", "least"),
     [
-        (Recording(lost_event_share=0.3), 0.3, 800),
+        thorough(Recording(lost_event_share=0.3), 0.3, 800),
         # By four periods: all messages fit publications of four periods before as well.
         (Recording(realtime_steps=((13 * SECOND // 10, -40_000_000),)), 0.3, 300),
         thorough(

@@ -34,6 +34,7 @@ def test_processes_with_equal_ids_are_told_apart(tmp_path: Path, name: str) -> N
     assert [finding.severity for finding in report.findings if "ids" in finding.name] == ["info"]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("cpu_count", [4, pytest.param(1, marks=pytest.mark.thorough)])
 def test_links_of_processes_that_cannot_be_told_apart_are_marked(
     tmp_path: Path, cpu_count: int

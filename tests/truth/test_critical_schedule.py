@@ -24,6 +24,7 @@ def traced(
     return ingested
 
 
+@pytest.mark.thorough
 def test_pieces_add_up_to_the_latency(traced: Ingested) -> None:
     assert (
         traced.rows(

@@ -13,6 +13,7 @@ from msgflow_sim import Host, Node, Process, Publisher, Scenario, Subscription, 
 from msgflow_sim.entity import MILLISECOND, SECOND, Work
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("depth", "period", "work", "duration"),
     [

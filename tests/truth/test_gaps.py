@@ -77,6 +77,7 @@ QUIET: dict[str, tuple[Recording, list[int]]] = {
 }
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", few(QUIET, "stopped_between_ticks"))
 def test_a_quiet_system_pauses_where_it_was_stopped(tmp_path: Path, name: str) -> None:
     """Though nothing is lost, and it is as silent everywhere else."""
@@ -96,6 +97,7 @@ def test_a_quiet_system_pauses_where_it_was_stopped(tmp_path: Path, name: str) -
     assert [drop for drop in drops if not drop.is_right and not drop.undecided] == []
 
 
+@pytest.mark.thorough
 def test_a_rotation_is_no_pause_however_silent_the_system_is(tmp_path: Path) -> None:
     """The one long callback runs across the border: it keeps its end, and what it causes."""
     recording = Recording(rotations=(4 * SECOND // 3,))

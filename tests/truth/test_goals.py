@@ -26,6 +26,7 @@ def test_goals_of_a_simulation(tmp_path: Path) -> None:
     assert_right(scores)
 
 
+@pytest.mark.thorough
 def test_goals_of_real_nodes(tmp_path: Path) -> None:
     ingest([REAL / "trace.tar.xz"], tmp_path / "run.duckdb")
     assert_right(compare_real(tmp_path / "run.duckdb", REAL / "truth.jsonl.gz"))
@@ -38,6 +39,7 @@ def assert_right(scores: list[Score]) -> None:
     assert not [score for score in scores if score.wrong or score.missing or score.doubted]
 
 
+@pytest.mark.thorough
 def test_goals_of_real_nodes_that_stand_still_at_times(tmp_path: Path) -> None:
     """A thread rejects a goal of /dock, waits, and publishes the status of the next one.
 
@@ -57,6 +59,7 @@ def test_goals_of_real_nodes_that_stand_still_at_times(tmp_path: Path) -> None:
     assert_right(compare_real(tmp_path / "run.duckdb", STALLED / "truth.jsonl.gz"))
 
 
+@pytest.mark.thorough
 def test_what_is_known_of_goals_before_kilted(tmp_path: Path) -> None:
     simulation = simulate("actions", tmp_path / "trace", factor=0.1, layout="jazzy")
     ingested = ingest_one(simulation.directory, tmp_path / "run.duckdb")

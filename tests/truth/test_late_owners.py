@@ -27,6 +27,7 @@ CASES = {
 }
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("system", "layout"),
     few(CASES, ("intra_process", "galactic"), ("layers", "rolling")),

@@ -78,6 +78,7 @@ def test_instances_and_links(named):
         assert score.missing == 0, score
 
 
+@pytest.mark.thorough
 def test_what_a_layout_cannot_show_is_not_asked_for(named):
     name, simulation, path, _ = named
     layout = layouts()[name]

@@ -34,13 +34,13 @@ EXCEPT ALL
     "recording",
     [
         Recording(),
-        Recording(lost_event_share=0.3),
+        thorough(Recording(lost_event_share=0.3), id="loss"),
         thorough(Recording(pauses=((S // 10, S // 5),)), id="pause"),
         thorough(
             Recording(start_ns=S // 10, is_dual_session=True, clock_error_ns=3_000), id="dual"
         ),
     ],
-    ids=["perfect", "loss", None, None],
+    ids=["perfect", None, None, None],
 )
 def test_each_is_in_the_callback_that_recorded_it(tmp_path: Path, recording: Recording) -> None:
     """Nested ones too, and none in one that was over, with or without what was lost."""

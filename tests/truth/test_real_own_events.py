@@ -72,6 +72,7 @@ def trace(tmp_path: Path) -> Path:
     return tmp_path / "trace"
 
 
+@pytest.mark.thorough
 def test_every_event_is_there_with_its_fields_and_its_callback(trace: Path, tmp_path: Path) -> None:
     ingest([trace], tmp_path / "run.duckdb", events=["my_pkg:*"])
     with duckdb.connect(str(tmp_path / "run.duckdb"), read_only=True) as connection:

@@ -110,9 +110,7 @@ def load_truth(recording: Ingested, path: Path) -> None:
     recording.connection.execute(TRUTH.format(path=path))
 
 
-@pytest.mark.parametrize(
-    "name", few(RECORDINGS, "real_container", "real_py_mixed", "real_services")
-)
+@pytest.mark.parametrize("name", few(RECORDINGS, "real_container"))
 def test_links_are_right(real: Callable[[str], Path], shared_traces: Path, name: str) -> None:
     scores = compare_real(real(name), shared_traces / name / "truth.jsonl.gz")
     assert {one.kind for one in scores if one.found} >= {"transport"}
@@ -147,6 +145,7 @@ def test_latencies_are_those_of_the_nodes(
         ]
 
 
+@pytest.mark.thorough
 def test_a_set_of_messages_closest_in_time(shared_traces: Path, tmp_path: Path) -> None:
     """The filter of /approx wrote down what it made each set of."""
     trace = shared_traces / "real_filters"

@@ -120,7 +120,7 @@ def checker(shared_traces: Path) -> Path:
 
 @pytest.mark.parametrize(
     "name",
-    few(TRUE_TRACES, "sync_1_1", "services", "containers_one_daemon"),
+    few(TRUE_TRACES, "sync_1_1", "services"),
 )
 def test_scores(
     recordings: Callable[[str], Ingested],
@@ -158,6 +158,7 @@ DECIDED = {
 }
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", few(ONCE_WRONG, "untraced_rival"))
 def test_what_was_wrong_is_right(
     recordings: Callable[[str], Ingested], shared_traces: Path, name: str
@@ -183,6 +184,7 @@ def test_what_was_wrong_is_right(
     assert reasons == [(1_698 if name == "clock_step" else 0,)]
 
 
+@pytest.mark.thorough
 def test_answers_of_rclpy_are_right_and_its_timers_are_marked(
     recordings: Callable[[str], Ingested], shared_traces: Path
 ) -> None:
@@ -216,6 +218,7 @@ def test_nothing_is_wrong_where_events_were_lost(
     assert all(float(recall) > 0.94 for _, recall in scores.values())
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("name", "kind", "count"),
     few(

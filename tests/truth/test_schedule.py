@@ -11,7 +11,7 @@ import duckdb
 import pytest
 from ingested import ingest_one
 from scoring import Score, compare_simulated
-from thorough import few
+from thorough import few, thorough
 
 from msgflow_sim import Recording, Simulation, scenarios, simulate
 from msgflow_sim.entity import MILLISECOND, SECOND
@@ -31,7 +31,7 @@ KINDS = {"thread_state", "preemptor", "callback_schedule", "arrival"}
 Traced = tuple[Simulation, Path]
 
 
-@pytest.fixture(scope="module", params=few(SYSTEMS, "real_time", "shared_memory"))
+@pytest.fixture(scope="module", params=few(SYSTEMS, "real_time"))
 def traced(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Traced:
     return ingested(request.param, tmp_path_factory.mktemp(request.param), Recording())
 
@@ -59,6 +59,7 @@ def test_all_is_found_and_nothing_else(traced: Traced) -> None:
         assert score.misguessed < 0.05 * score.found
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("traced", few(SYSTEMS, "shared_memory"), indirect=True, scope="module")
 def test_perf_gives_the_same_answers(traced: Traced, tmp_path: Path) -> None:
     """But it does not tell what it has lost."""
@@ -99,20 +100,24 @@ def test_perf_gives_the_same_answers(traced: Traced, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("kind", "change"),
     [
-        ("thread_state", "UPDATE thread_state SET end_ns = end_ns + 1 WHERE state = 'runnable'"),
+        thorough(
+            "thread_state", "UPDATE thread_state SET end_ns = end_ns + 1 WHERE state = 'runnable'"
+        ),
         ("thread_state", "UPDATE thread_state SET state = 'sleeping' WHERE state = 'preempted'"),
-        (
+        thorough(
             "thread_state",
             "UPDATE thread_state SET waker_kind = 'thread' WHERE waker_kind = 'timer'",
         ),
-        ("thread_state", "UPDATE thread_state SET cpu = cpu + 1"),
-        ("preemptor", "DELETE FROM preemptor WHERE state = 'preempted'"),
+        thorough("thread_state", "UPDATE thread_state SET cpu = cpu + 1"),
+        thorough("preemptor", "DELETE FROM preemptor WHERE state = 'preempted'"),
         ("preemptor", "UPDATE preemptor SET preemptor_priority = preemptor_priority + 1"),
         ("callback_schedule", "UPDATE callback_schedule SET running_ns = running_ns + 1"),
-        ("callback_schedule", "UPDATE callback_schedule SET preemption_count = 0"),
-        ("callback_schedule", "UPDATE callback_schedule SET irq_ns = irq_ns + 1"),
-        ("callback_schedule", "UPDATE callback_schedule SET softirq_ns = 0"),
-        ("arrival", "UPDATE thread_state SET waker_kind = 'timer' WHERE waker_kind = 'softirq'"),
+        thorough("callback_schedule", "UPDATE callback_schedule SET preemption_count = 0"),
+        thorough("callback_schedule", "UPDATE callback_schedule SET irq_ns = irq_ns + 1"),
+        thorough("callback_schedule", "UPDATE callback_schedule SET softirq_ns = 0"),
+        thorough(
+            "arrival", "UPDATE thread_state SET waker_kind = 'timer' WHERE waker_kind = 'softirq'"
+        ),
         ("arrival", "UPDATE thread_state SET end_ns = end_ns - 1 WHERE state = 'sleeping'"),
     ],
 )
@@ -146,6 +151,7 @@ def test_a_cpu_has_one_thread_at_a_time(traced: Traced) -> None:
     ).fetchall() == [(0,)]
 
 
+@pytest.mark.thorough
 def test_a_disk_ends_waits_that_nothing_else_does(tmp_path: Path) -> None:
     simulation, database = ingested("shared_memory", tmp_path, Recording())
     with duckdb.connect(str(database), read_only=True) as connection:
@@ -163,6 +169,7 @@ def test_a_disk_ends_waits_that_nothing_else_does(tmp_path: Path) -> None:
     assert happened > 10
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("system", "depth"),
     few([("shared_map", 1), ("shared_memory", 2)], ("shared_memory", 2)),

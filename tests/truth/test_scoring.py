@@ -491,6 +491,7 @@ def test_an_indirect_link_stored_twice_is_repeated(caches, tmp_path):
     assert _scores(simulation, changed)["partial_sync"].repeated == 5
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "name", few(["sync_1_1", "sync_1_1_jazzy", "pingpong", "services"], "services")
 )

@@ -179,6 +179,7 @@ def test_row_by_row(simulations: Callable[[str], Ingested], name: str, table: st
     assert simulated.differences(*CASES[table]) == ([], [])
 
 
+@pytest.mark.thorough
 def test_a_wrong_indirect_link_is_marked_and_no_input_is_said_to_lack_a_message(
     simulations: Callable[[str], Ingested],
 ) -> None:

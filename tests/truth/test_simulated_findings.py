@@ -29,7 +29,7 @@ EXPECTED = {
 }
 
 
-@pytest.mark.parametrize("name", few(EXPECTED, "polled", "restarts", "services"))
+@pytest.mark.parametrize("name", few(EXPECTED, "polled", "services"))
 def test_findings(simulations: Callable[[str], Ingested], name: str) -> None:
     assert simulations(name).rows(FINDINGS.format(ABOUT_PROCESSES)) == EXPECTED[name]
 
@@ -47,6 +47,7 @@ def test_which_process_fell_silent(simulations: Callable[[str], Ingested]) -> No
     assert count == sent > 0
 
 
+@pytest.mark.thorough
 def test_timers_off_their_grid(simulations: Callable[[str], Ingested]) -> None:
     """Neither the others of the process nor one that another callback delays are marked."""
     with open_db(simulations("timers").path) as database:

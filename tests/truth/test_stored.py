@@ -51,6 +51,7 @@ def test_the_time_up_to_the_subscription_is_a_part_of_its_own(overload: Ingested
     assert parts["network_or_idle"]["max_ns"] < 0.02e9
 
 
+@pytest.mark.thorough
 def test_flows_of_stored_messages_are_the_last_of_the_slowest(overload: Ingested) -> None:
     slowest = rows(overload, "critical-path")
     assert "stored" not in {row["activity"] for row in slowest}

@@ -26,6 +26,7 @@ IN_DOUBT = {
 }
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("system", few(NOT_FOUND, "merges"))
 def test_what_is_suggested_without_a_doubt_is_right(system: str, tmp_path: Path) -> None:
     scenario = merges() if system == "merges" else system

@@ -210,6 +210,7 @@ def test_the_executor_is_busy_with_what_really_ran(
     assert seen == 3
 
 
+@pytest.mark.thorough
 def test_calls_that_the_trace_lost_were_not_missed(
     tmp_path: Path, timers: dict[int, TrueTimer]
 ) -> None:

@@ -210,6 +210,7 @@ def test_lost_messages_are_a_share_of_those_connected(
     assert any(row["value"] < 1 for row in found if row["metric"] == "completeness")
 
 
+@pytest.mark.thorough
 def test_roots_that_a_queue_dropped_are_losses(overwritten: Path, check: Check) -> None:
     """Of ten roots, two were not connected and two cut; two of the others were dropped."""
     text = """
@@ -257,6 +258,7 @@ def test_a_run_meets_what_is_suggested_from_it(
     }[name] <= kinds  # fmt: skip
 
 
+@pytest.mark.thorough
 def test_a_run_with_a_kernel_trace_meets_what_is_suggested_from_it(
     traced: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -357,6 +359,7 @@ def with_paths(system: Path, tmp_path: Path, text: str) -> list[dict[str, Any]]:
         )
 
 
+@pytest.mark.thorough
 def test_a_path_may_have_a_name_of_its_file(system: Path, tmp_path: Path, check: Check) -> None:
     (named,) = with_paths(system, tmp_path, "targets: [{path: there, latency: max < 1 us}]")
     (listed,) = rows(check("targets: [{path: [/a, /b], latency: max < 1 us}]"))

@@ -119,6 +119,7 @@ def test_names_in_the_address_are_only_ever_text(
     page.page.wait_for_url("**#/overview*")
 
 
+@pytest.mark.thorough
 def test_a_database_without_a_run(empty_database: Path, tmp_path: Path, page: Page) -> None:
     path = tmp_path / "none.duckdb"
     shutil.copyfile(empty_database, path)
@@ -224,6 +225,7 @@ def test_long_names_a_long_gap_and_five_hundred_nodes(
         assert "/t499" in labels
 
 
+@pytest.mark.thorough
 def test_a_page_of_a_replaced_database_says_so(
     demo: Path, systems: Path, tmp_path: Path, page: Page
 ) -> None:

@@ -163,6 +163,7 @@ def in_ns(text: str) -> float:
     return float(value.replace(",", "")) * {"s": 1e9, "ms": 1e6, "µs": 1e3, "ns": 1}[unit]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("way", few(["served", "file"], "served"))
 def test_clicking_a_bar_picks_it(
     way: str, recorded: Path, read: Read, serve: Serve, report: Report, page: Page
@@ -312,6 +313,7 @@ def test_a_histogram_has_bins_without_flows_too(
     assert low[-2] <= expected["max_ns"] < low[-1]
 
 
+@pytest.mark.thorough
 def test_a_long_run_opens_where_bars_can_be_read(systems: Path, serve: Serve, page: Page) -> None:
     """Around the longest callback, with a way to the whole."""
     page.open(serve(systems).address)
@@ -344,6 +346,7 @@ def test_a_long_run_opens_where_bars_can_be_read(systems: Path, serve: Serve, pa
     assert page.page.locator("button.whole").count() == 0
 
 
+@pytest.mark.thorough
 def test_a_topic_with_the_name_of_its_node_is_written_once(
     systems: Path, serve: Serve, page: Page
 ) -> None:
@@ -422,6 +425,7 @@ def test_executors_have_a_scale_and_a_legend_above_them(
     assert tops == sorted(tops)
 
 
+@pytest.mark.thorough
 def test_a_table_that_is_wider_says_so_and_is_cards_on_a_phone(
     systems: Path, serve: Serve, page: Page
 ) -> None:
@@ -452,6 +456,7 @@ def test_no_tab_is_out_of_sight_on_a_phone(demo: Path, report: Report, page: Pag
     assert all(box and box["x"] >= 0 and box["x"] + box["width"] <= 390 for box in boxes)
 
 
+@pytest.mark.thorough
 def test_a_screenshot_is_no_blank_page(demo: Path, read: Read, report: Report, page: Page) -> None:
     number = a_publication(read(demo), 1)
     for width, height, scheme in ((1280, 800, "light"), (390, 844, "dark")):

@@ -43,6 +43,7 @@ def test_the_file_has_exactly_the_flow(
     assert 0 < arrows <= len(wanted)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("depth", few([0, 1], 1))
 def test_the_file_ends_where_depth_does(
     depth: int, systems: Path, read: Read, tmp_path: Path, page: Page
@@ -58,6 +59,7 @@ def test_the_file_ends_where_depth_does(
     assert depth < len(flow.nodes) < len(flow_of(read(systems), "publication", number))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("direction", few(["forward", "backward", "both"], "backward"))
 def test_the_limit_is_of_the_direction(
     direction: str, systems: Path, read: Read, tmp_path: Path, page: Page

@@ -62,6 +62,7 @@ def test_threads_and_cores_say_what_took_the_cpu(traced: Path, serve: Serve, pag
         assert f"{said}: 40 ms" in page.page.locator(".tooltip").inner_text()
 
 
+@pytest.mark.thorough
 def test_without_a_kernel_trace_there_is_nothing_of_it(
     dropping: Path, serve: Serve, page: Page
 ) -> None:

@@ -101,6 +101,7 @@ def test_the_page_says_what_the_lake_says(lake: Lake, address: str, page: Page) 
     )
 
 
+@pytest.mark.thorough
 def test_a_click_on_a_point_names_its_run(address: str, page: Page) -> None:
     page.open(address)
     over = page.page.locator(".charts .u-over").first
@@ -128,6 +129,7 @@ def test_labels_are_only_ever_text(address: str, page: Page) -> None:
         )
 
 
+@pytest.mark.thorough
 def test_the_server_shows_the_page_anew(lake: Lake, page: Page) -> None:
     made: list[str] = []
 

@@ -74,6 +74,7 @@ def test_each_name_has_a_row_and_a_click_follows_the_callback(
     assert 0 < len(page.page.evaluate(LANES)) < 5
 
 
+@pytest.mark.thorough
 def test_a_page_of_one_flow_has_its_events(
     own_events: Path, read: Read, tmp_path: Path, page: Page
 ) -> None:

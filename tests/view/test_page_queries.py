@@ -79,6 +79,7 @@ def test_bars_are_the_instances_of_the_views(demo: Path, read: Read) -> None:
         assert connection.execute(f"({drawn}) EXCEPT ALL ({sql})").fetchall() == []
 
 
+@pytest.mark.thorough
 def test_lanes_of_executors_are_what_their_threads_did(
     simulated: Callable[..., Path], read: Read
 ) -> None:
@@ -267,6 +268,7 @@ def test_arrows_are_the_links(systems: Path, read: Read) -> None:
     assert waits == wanted
 
 
+@pytest.mark.thorough
 def test_arrows_of_a_window_are_those_that_overlap_it(demo: Path, read: Read) -> None:
     """On two hosts whose clocks were brought together."""
     connection = read(demo)

@@ -80,6 +80,7 @@ def test_paths(way: str, demo: Path, serve: Serve, report: Report, page: Page, r
     assert (kind, root) in flow
 
 
+@pytest.mark.thorough
 def test_a_point_of_the_latency_leads_to_its_flow(demo: Path, report: Report, page: Page) -> None:
     page.open(report(demo))
     page.go("#/paths")
@@ -139,6 +140,7 @@ def test_services_in_the_graph(systems: Path, serve: Serve, page: Page) -> None:
     assert all(shown(row["round_trip_median_ns"]) in text for row in services if row["answered"])
 
 
+@pytest.mark.thorough
 def test_actions_in_the_graph(simulated: Callable[..., Path], serve: Serve, page: Page) -> None:
     """In place of their services; their topics are topics."""
     path = simulated("actions", 0.2)
@@ -233,6 +235,7 @@ def test_compare(systems: Path, serve: Serve, page: Page) -> None:
     assert f"of {len(subjects)} differ" in said
 
 
+@pytest.mark.thorough
 def test_compare_shows_what_was_measured_before_intervals(
     systems: Path, serve: Serve, page: Page
 ) -> None:

@@ -77,6 +77,7 @@ def test_strangers_get_nothing(demo: Path, serve: Serve) -> None:
     )
 
 
+@pytest.mark.thorough
 def test_a_request_that_does_not_arrive_ends(
     demo: Path, serve: Serve, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -21,6 +21,7 @@ from hostile import HOSTILE, renamed
 from processes import children_of, has_ended
 from served import Page, Served
 from tables import Decoded, decoded
+from thorough import thorough
 
 from msgflow.database import open_db
 from msgflow.sql.header import read as read_header
@@ -109,6 +110,7 @@ def test_the_examples_are_those_of_the_cookbook(demo: Path, read: Read) -> None:
         connection.execute(example["sql"]).fetchall()
 
 
+@pytest.mark.thorough
 def test_a_query_that_takes_too_long_ends(demo: Path, tmp_path: Path) -> None:
     server = Served(Path(shutil.copyfile(demo, tmp_path / "late.duckdb")), seconds=2)
     try:
@@ -137,6 +139,7 @@ def test_a_query_that_nobody_waits_for_ends_and_keeps_no_page_waiting(
     assert time.monotonic() - begin < 15
 
 
+@pytest.mark.thorough
 def test_a_query_of_a_replaced_database_says_so(demo: Path, tmp_path: Path) -> None:
     path = Path(shutil.copyfile(demo, tmp_path / "copy.duckdb"))
     server = Served(path)
@@ -153,6 +156,7 @@ def test_a_query_of_a_replaced_database_says_so(demo: Path, tmp_path: Path) -> N
         server.close()
 
 
+@pytest.mark.thorough
 def test_a_signal_ends_the_server_and_the_query(demo: Path, tmp_path: Path) -> None:
     path = Path(shutil.copyfile(demo, tmp_path / "copy.duckdb"))
     words = [sys.executable, "-m", "msgflow", "ui", "--no-browser", "--port", "0"]
@@ -277,7 +281,11 @@ def test_a_link_carries_query_rows_and_chart(demo: Path, serve: Serve, page: Pag
 
 @pytest.mark.parametrize(
     ("drawing", "across", "upwards"),
-    [("line", "at", "every number"), ("bars", "name", "a_ns"), ("histogram", "b", None)],
+    [
+        ("line", "at", "every number"),
+        thorough("bars", "name", "a_ns"),
+        thorough("histogram", "b", None),
+    ],
 )
 def test_charts(
     demo: Path, serve: Serve, page: Page, drawing: str, across: str, upwards: str | None
@@ -315,6 +323,7 @@ def test_charts(
         assert sum(counts) == 70
 
 
+@pytest.mark.thorough
 def test_charts_of_what_cannot_be_drawn(demo: Path, serve: Serve, page: Page) -> None:
     page.open(serve(demo).address)
     for text in ("SELECT 'a' AS name", "SELECT 1 AS a WHERE false", "SELECT NULL::INT AS a"):
@@ -325,6 +334,7 @@ def test_charts_of_what_cannot_be_drawn(demo: Path, serve: Serve, page: Page) ->
     page.page.locator(".chart canvas").wait_for()
 
 
+@pytest.mark.thorough
 def test_explain(demo: Path, serve: Serve, page: Page) -> None:
     page.open(serve(demo).address)
     page.go(f"#/sql?text={quote('SELECT name FROM run; -- end')}")
@@ -375,13 +385,15 @@ def test_a_query_can_be_stopped(demo: Path, serve: Serve, page: Page) -> None:
 @pytest.mark.parametrize(
     ("text", "wanted"),
     [
-        (
+        thorough(
             "SELECT 'x' AS x, max(callback_instance_id) AS callback_instance_id"
             " FROM callback_instance WHERE run_id = 1",
             "callback_instance",
         ),
-        ("SELECT max(take_id) AS take_id, 1 AS publication_id FROM take WHERE run_id = 2", None),
-        ("SELECT 'take' AS kind, max(take_id) AS id FROM take WHERE run_id = 1", "take"),
+        thorough(
+            "SELECT max(take_id) AS take_id, 1 AS publication_id FROM take WHERE run_id = 2", None
+        ),
+        thorough("SELECT 'take' AS kind, max(take_id) AS id FROM take WHERE run_id = 1", "take"),
         (
             "SELECT 7 AS path, 'publication' AS root_kind, max(publication_id) AS root_id,"
             " 1 AS take_id FROM publication WHERE run_id = 2",
@@ -409,6 +421,7 @@ def test_a_row_leads_to_its_flow_in_its_run(
     assert page.page.evaluate("msgflow.run.run_id") == run
 
 
+@pytest.mark.thorough
 def test_a_time_leads_to_its_moment(demo: Path, serve: Serve, page: Page, read: Read) -> None:
     text = "SELECT start_ns + 1000000000 AS at FROM run UNION ALL SELECT NULL"
     page.open(serve(demo).address)
@@ -423,6 +436,7 @@ def test_a_time_leads_to_its_moment(demo: Path, serve: Serve, page: Page, read: 
     )
 
 
+@pytest.mark.thorough
 def test_rows_without_a_place_on_the_timeline_are_no_buttons(
     demo: Path, serve: Serve, page: Page
 ) -> None:

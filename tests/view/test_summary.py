@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from hostile import HOSTILE, renamed
 from served import Page, shown
+from thorough import few
 from typer.testing import CliRunner
 
 from msgflow.cli.app import app
@@ -42,7 +43,7 @@ def printed(command: str, database: Path) -> list[dict[str, object]]:
     return rows
 
 
-@pytest.mark.parametrize("part", SUMMARY)
+@pytest.mark.parametrize("part", few(SUMMARY, "paths", "drops", "threads"))
 def test_its_numbers_are_those_of_the_command_beside_them(part: str, dropping: Path) -> None:
     found = section(dropping, part)
     rows = [row for command in found.commands for row in printed(command, dropping)]
@@ -58,6 +59,7 @@ def test_its_numbers_are_those_of_the_command_beside_them(part: str, dropping: P
     assert rows
 
 
+@pytest.mark.thorough
 def test_flows_of_the_summary_are_the_slowest(dropping: Path) -> None:
     rows = section(dropping, "blame").result.table.to_pylist()
     with open_db(dropping) as opened:
@@ -112,6 +114,7 @@ def test_markdown_has_verdicts_findings_paths_and_drops(dropping: Path, tmp_path
     assert "the run has no such topic — /nowhere" in text
 
 
+@pytest.mark.thorough
 def test_threads_are_named_by_their_nodes(dropping: Path, tmp_path: Path) -> None:
     """Each process of rclpy is python3."""
     output = tmp_path / "summary.md"
@@ -122,6 +125,7 @@ def test_threads_are_named_by_their_nodes(dropping: Path, tmp_path: Path) -> Non
     assert any(f"`{busiest['nodes'][0]}` | {busiest['tid'][0]}" in line for line in lines)
 
 
+@pytest.mark.thorough
 def test_markdown_of_some_paths_is_about_these(dropping: Path, tmp_path: Path) -> None:
     output = tmp_path / "summary.md"
     with open_db(dropping) as opened:
@@ -160,6 +164,7 @@ def test_another_suffix_is_no_report(dropping: Path, tmp_path: Path) -> None:
     assert ".html or .md" in result.stderr
 
 
+@pytest.mark.thorough
 def test_the_command_of_verdicts_names_the_file_of_paths(dropping: Path, tmp_path: Path) -> None:
     targets, paths, summary = (tmp_path / name for name in ("t.yaml", "p.yaml", "summary.md"))
     targets.write_text(_TARGETS, encoding="utf-8")

@@ -15,7 +15,7 @@ import duckdb
 import pytest
 from served import Page, Served, shown
 from tables import decoded
-from thorough import few
+from thorough import few, thorough
 from typer.testing import CliRunner
 
 from msgflow.cli.app import app
@@ -91,6 +91,7 @@ def test_a_window_is_written_with_all_its_digits(demo: Path, read: Read) -> None
     pages.close()
 
 
+@pytest.mark.thorough
 def test_a_topic_at_a_glance_is_what_its_only_publisher_and_subscription_say(
     demo: Path, systems: Path
 ) -> None:
@@ -215,6 +216,7 @@ def test_nodes(way: str, demo: Path, serve: Serve, report: Report, page: Page) -
     assert ("callback_instance", longest[0]["callback_instance_id"]) in page.flow()
 
 
+@pytest.mark.thorough
 def test_processes_without_callbacks_are_named(
     real: Callable[[str], Path], serve: Serve, page: Page
 ) -> None:
@@ -303,6 +305,7 @@ def test_the_bar_holds_a_window_on_all_pages(
     page.page.wait_for_function("() => !location.hash.includes('start=')")
 
 
+@pytest.mark.thorough
 def test_a_page_that_is_ready_late_keeps_what_is_typed(
     demo: Path, serve: Serve, page: Page
 ) -> None:
@@ -338,6 +341,7 @@ def test_the_bar_finds_names_and_moments(demo: Path, serve: Serve, page: Page) -
     page.page.get_by_text("nothing has this in its name").wait_for()
 
 
+@pytest.mark.thorough
 def test_the_warm_up_that_is_skipped_is_that_of_compare(
     real: Callable[[str], Path], serve: Serve, page: Page
 ) -> None:
@@ -367,7 +371,7 @@ def test_rows_of_ros_itself_are_shown_where_the_bar_says_so(
     assert "/rosout" in [row["topic"] for row in cells(page, "topics")]
 
 
-@pytest.mark.parametrize("place", ["topics?topic=", "paths"])
+@pytest.mark.parametrize("place", few(["topics?topic=", "paths"], "paths"))
 def test_charts_are_downloaded(place: str, demo: Path, serve: Serve, page: Page) -> None:
     with open_db(demo) as opened:
         topic = opened.query("topics-summary").to_arrow().to_pylist()[0]["topic_name"]
@@ -390,7 +394,7 @@ def test_charts_are_downloaded(place: str, demo: Path, serve: Serve, page: Page)
     ("place", "titles"),
     [
         ("timeline", ["begin_ns", "what", "row", "node", "duration_ns", "identity"]),
-        ("graph", ["from", "to", "kind", "indirect", "count", "median_ns"]),
+        thorough("graph", ["from", "to", "kind", "indirect", "count", "median_ns"]),
     ],
 )
 def test_the_timeline_and_the_graph_are_downloaded(

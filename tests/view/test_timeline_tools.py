@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from served import Page, Served, shown
+from thorough import thorough
 from typer.testing import CliRunner
 
 from msgflow.cli.app import app
@@ -47,6 +48,7 @@ def test_crosses_are_the_messages_that_were_not_taken(dropping: Path, timeline: 
     assert any(flags == 16 for _, _, flags in rows)
 
 
+@pytest.mark.thorough
 def test_a_cross_leads_to_its_message(timeline: Page) -> None:
     x, y, number = timeline.page.evaluate("""() => {
         const { renderer } = msgflow.page;
@@ -128,6 +130,7 @@ def test_a_pinned_row_is_the_first(timeline: Page) -> None:
     assert "pin=" in timeline.page.url
 
 
+@pytest.mark.thorough
 def test_the_strip_moves_the_window(timeline: Page) -> None:
     strip = timeline.page.locator("canvas.minimap[data-filled]")
     strip.wait_for(timeout=60_000)
@@ -150,9 +153,12 @@ def test_help_names_every_key(timeline: Page) -> None:
 @pytest.mark.parametrize(
     ("symbol", "said"),
     [
-        ("Talker::on_timer()", "Talker::on_timer"),
-        ("void (Talker::?)(std::shared_ptr<A_<std::allocator<void> > const>)", None),
-        ("sub<A_<std::allocator<void> >, f(In)>(rclcpp::Node*)::{lambda(In)#5}", "sub::{lambda#5}"),
+        thorough("Talker::on_timer()", "Talker::on_timer"),
+        thorough("void (Talker::?)(std::shared_ptr<A_<std::allocator<void> > const>)", None),
+        thorough(
+            "sub<A_<std::allocator<void> >, f(In)>(rclcpp::Node*)::{lambda(In)#5}",
+            "sub::{lambda#5}",
+        ),
         ("std::_Bind<void (Node::*(Node*, std::_Placeholder<1>))(int)>", "bound method of Node"),
     ],
 )
@@ -161,6 +167,7 @@ def test_symbols_are_without_templates(symbol: str, said: str | None, timeline: 
     assert timeline.page.evaluate(source, symbol) == (said or symbol)
 
 
+@pytest.mark.thorough
 def test_a_graph_is_saved_as_svg_and_png(timeline: Page) -> None:
     timeline.go("#/graph")
     for name, begin in (("SVG", b"<svg"), ("PNG", b"\x89PNG")):

@@ -92,6 +92,7 @@ def test_an_ingest_into_a_database_whose_pages_are_idle(dropping: Path, database
         assert (status, len(decoded(content).rows)) == (200, 2)
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("_soon")
 def test_answers_are_kept_while_it_is_closed(
     database: Path, monkeypatch: pytest.MonkeyPatch
@@ -111,6 +112,7 @@ def test_answers_are_kept_while_it_is_closed(
     assert len(asked) == 1
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("_soon")
 def test_it_is_kept_while_a_question_runs(database: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     is_asked, may_end = threading.Event(), threading.Event()
@@ -167,6 +169,7 @@ def test_a_command_that_is_refused_learns_that_the_pages_let_go(
     assert "msgflow ui lets go of it" in str(refused.value.hint)
 
 
+@pytest.mark.thorough
 def test_the_token_is_that_of_the_database(database: Path, tmp_path: Path) -> None:
     with served(database) as first:
         cookie = first.token

@@ -78,6 +78,7 @@ def test_a_violation_names_the_culprit_and_is_kept(watched, tmp_path: Path) -> N
     assert f"kept: msgflow why --db {directory}" in result.stderr
 
 
+@pytest.mark.thorough
 def test_a_target_that_is_met(watched) -> None:
     """The exit code is that of verify."""
     result = watched(TARGETS.replace("80 ms", "1 s"), "--window", "8s", "--step", "8s")
@@ -108,6 +109,7 @@ def test_a_target_that_falls_silent_is_said_once(tmp_path: Path) -> None:
     assert result.exit_code == 0
 
 
+@pytest.mark.thorough
 def test_a_target_on_part_of_a_path_names_the_culprit(tmp_path: Path) -> None:
     """Messages of the last topic go on to further nodes."""
     recording = Recording(rotations=(SECOND // 4,))
@@ -192,6 +194,7 @@ def test_a_full_disk_ends_no_view(watched, tmp_path: Path, kilobytes: int) -> No
     assert said.lower().count("no space left on") == 1
 
 
+@pytest.mark.thorough
 def test_sessions_of_one_name_on_two_hosts_are_kept(tmp_path: Path) -> None:
     """lttng-relayd has a directory for each host; their chunks may have equal names.
 
@@ -226,6 +229,7 @@ def test_sessions_of_one_name_on_two_hosts_are_kept(tmp_path: Path) -> None:
     assert not {"link", "loop", "pipe"} & {path.name for one in kept for path in one.iterdir()}
 
 
+@pytest.mark.thorough
 def test_an_error_of_the_targets_is_told_as_it_is(watched, monkeypatch) -> None:
     def judge(*_: object) -> None:
         raise UsageError("no such thing", "choose another")

@@ -75,6 +75,7 @@ def test_keys_sort_and_pick_a_path(terminal: Terminal) -> None:
     assert termios.tcgetattr(terminal.side) == terminal.before
 
 
+@pytest.mark.thorough
 def test_a_terminal_that_controls_no_session_has_no_keys(shared_traces: Path) -> None:
     side, other = pty.openpty()
     directory = str(shared_traces / "real_rotate")

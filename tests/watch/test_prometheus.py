@@ -99,6 +99,7 @@ def metrics(exporter: Exporter, family: str) -> dict[tuple[str, ...], float]:
     return {tuple(sample.labels.values()): sample.value for sample in found.samples}
 
 
+@pytest.mark.thorough
 def test_the_sum_of_latencies_does_not_fall_and_losses_have_reasons(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 from unittest.mock import Mock
 
 import pytest
-from thorough import few
+from thorough import few, thorough
 
 from msgflow.cli.show.window_line import window_line
 from msgflow.clocks import read_clock_sync
@@ -159,6 +159,7 @@ def test_a_damaged_and_a_missing_chunk_are_said(simulated: Path, tmp_path: Path)
     assert sum(row["roots"] for report in found for row in report.paths) > 0
 
 
+@pytest.mark.thorough
 def test_a_chunk_without_any_file_is_no_damage(simulated: Path, tmp_path: Path) -> None:
     directory = tmp_path / "trace"
     shutil.copytree(simulated, directory)
@@ -194,6 +195,7 @@ def test_a_clock_that_is_set_is_said_and_is_no_lag(
     assert "by -3600" in said
 
 
+@pytest.mark.thorough
 def test_links_and_clocks_of_what_is_not_there_are_said(simulated: Path, tmp_path: Path) -> None:
     """It may start later: the view goes on, with the other links."""
     clocks = tmp_path / "clocks.yaml"
@@ -234,6 +236,7 @@ def test_what_was_learned_may_not_fit_a_window(
     assert "/later" in said
 
 
+@pytest.mark.thorough
 def test_a_recording_that_ended_long_ago_is_no_lag(simulated: Path) -> None:
     notes: list[str] = []
     watcher = watching(notes, 0.5, 0.5)
@@ -273,6 +276,7 @@ def fed(
     return is_over
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("sync", few(["none", "messages"], "messages"))
 def test_a_clock_that_errs_is_said_and_its_host_left_out(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, sync: str
@@ -307,6 +311,7 @@ def test_a_clock_that_errs_is_said_and_its_host_left_out(
     assert all(any(row["callbacks"] for row in report.executors) for report in found[-3:])
 
 
+@pytest.mark.thorough
 def test_the_only_host_that_vanishes_and_a_clock_apart_are_said_once(
     simulated: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -451,7 +456,8 @@ def test_windows_and_alarms_wait_for_nothing_that_takes_longer(hang: Path) -> No
 
 
 @pytest.mark.parametrize(
-    ("late", "is_late"), [(0.6, False), (0.1, True)], ids=["within_late", "later"]
+    ("late", "is_late"),
+    [thorough(0.6, False, id="within_late"), pytest.param(0.1, True, id="later")],
 )
 def test_a_chunk_that_comes_after_those_of_another_host(
     simulated: Path, late: float, is_late: bool
@@ -492,6 +498,7 @@ def test_a_chunk_that_comes_after_those_of_another_host(
         assert (numbers, missed, notes) == (0, 0, [])
 
 
+@pytest.mark.thorough
 def test_of_a_finished_recording_no_chunk_is_late(simulated: Path) -> None:
     """Even where chunks are longer than a window and what it waits for."""
     notes: list[str] = []
@@ -520,6 +527,7 @@ def test_a_source_that_stops_holds_up_no_window(simulated: Path) -> None:
     assert not any(report.late_events for report in found)
 
 
+@pytest.mark.thorough
 def test_of_a_finished_recording_windows_wait_for_a_host_that_begins_empty(
     simulated: Path, tmp_path: Path
 ) -> None:
