@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections import defaultdict
 
 import pytest
+from thorough import few
 
 MILLISECOND = 1_000_000
 
 
-@pytest.fixture(params=["restarts", "container_restarts"])
+@pytest.fixture(params=few(["restarts", "container_restarts"], "restarts"))
 def restarted(request, recordings):
     """Processes that begin again, with other ids of threads and with the same ones."""
     return recordings[request.param]

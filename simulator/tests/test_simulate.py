@@ -87,6 +87,7 @@ def test_many_rows_are_written_in_groups(tmp_path):
     assert pq.read_metadata(simulation.truth["executor_state"]).num_row_groups > 1
 
 
+@pytest.mark.thorough
 def test_the_demonstration_is_worth_looking_at(recordings):
     paths = {
         tuple(path): (count, fastest, slowest)

@@ -244,6 +244,7 @@ def test_queues_of_plain_scenarios_never_overflow(basic):
     }
 
 
+@pytest.mark.thorough
 def test_full_queues_lose_the_oldest_if_so_asked(tmp_path, overloaded, read):
     recording = read(simulate(overloaded, tmp_path / "out"))
     lost = recording.truth(

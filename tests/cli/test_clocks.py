@@ -126,6 +126,7 @@ def test_a_database_is_corrected_and_restored(
         assert "be compared; cure: msgflow clocks apply messages\n" in said
 
 
+@pytest.mark.thorough
 def test_a_file_with_offsets(
     msgflow: Msgflow, drifting: Simulation, direct: Path, tmp_path: Path
 ) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import duckdb
 import pyarrow.parquet as pq
 import pytest
+from thorough import few
 from typer.testing import Result
 
 from msgflow.db.objects import public_names
@@ -175,6 +176,7 @@ def test_info_as_one_json_object(msgflow: Msgflow, small_database: Path) -> None
     assert result["findings"][0]["count"] == 7
 
 
+@pytest.mark.thorough
 def test_info_as_markdown(msgflow: Msgflow, small_database: Path) -> None:
     text = msgflow("info", "--db", small_database, "--format", "markdown", "--run", "1").stdout
     assert "## Topics\n\n| run_id | topic_name |" in text
@@ -238,7 +240,7 @@ def test_db_upgrade_of_old_views(msgflow: Msgflow, small_database: Path) -> None
     assert msgflow("info", "--db", small_database).exit_code == 0
 
 
-@pytest.mark.parametrize("command", ["info", "info --section runs", "db upgrade"])
+@pytest.mark.parametrize("command", few(["info", "info --section runs", "db upgrade"], "info"))
 def test_a_database_from_before_the_first_release(
     msgflow: Msgflow, small_database: Path, command: str
 ) -> None:

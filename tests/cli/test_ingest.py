@@ -48,6 +48,7 @@ def test_two_commands_lead_to_the_answer_and_a_trace_is_ingested_once(
     assert "first" in msgflow("info").stdout
 
 
+@pytest.mark.thorough
 def test_an_archive_beside_the_traces_is_named_and_read_as_the_note_says(
     msgflow: Msgflow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -20,6 +20,7 @@ from msgflow_sim import Recording, simulate
 Msgflow = Callable[..., Result]
 
 
+@pytest.mark.thorough
 def test_from_a_suggestion_to_links(msgflow: Msgflow, shared_traces: Path, tmp_path: Path) -> None:
     assert msgflow("ingest", shared_traces / "sync_1_1").exit_code == 0
     result = msgflow("suggest", "links")

@@ -271,6 +271,7 @@ def test_no_line_is_wider_than_the_terminal(
     assert [line for line in shown.splitlines() if len(line) > width] == []
 
 
+@pytest.mark.thorough
 def test_notes_fit_the_terminal_also_where_the_answer_goes_elsewhere(
     two_hosts_far_apart: Path,
 ) -> None:

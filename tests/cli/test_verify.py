@@ -23,6 +23,7 @@ def demo(msgflow: Msgflow, simulated: Callable[..., Path]) -> Msgflow:
     return msgflow
 
 
+@pytest.mark.thorough
 def test_from_a_suggestion_to_verdicts(demo: Msgflow, tmp_path: Path) -> None:
     file = tmp_path / "targets.yaml"
     assert demo("suggest", "targets", "--run", "trace", "-o", file).exit_code == 0

@@ -117,6 +117,7 @@ def test_losses_on_topics_without_a_name_are_told(empty_database: Path, tmp_path
     assert losses[0] == losses[1] != []
 
 
+@pytest.mark.thorough
 def test_without_a_place_it_is_the_path_of_the_slowest_flow(demo: Path) -> None:
     with Database(demo) as database:
         longest = max(row["max_ns"] or 0 for row in database.query("e2e-latency").table.to_pylist())
@@ -156,6 +157,7 @@ def untraced(empty_database: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPat
     return path
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("taken_ns", "steps"),
     [

@@ -174,6 +174,7 @@ def test_a_number_that_comes_round_again_is_told_by_time(make: Make, ingest: Ing
     assert "4 that were repeated" in unused
 
 
+@pytest.mark.thorough
 def test_clocks_are_told_by_numbers_that_all_come_again(make: Make, ingest: Ingest) -> None:
     """No number is there only once, and the hosts did not record at the same time."""
     network = make(clock_offset_ns=-300 * SECOND)

@@ -8,6 +8,7 @@ from pathlib import Path
 import duckdb
 import pytest
 from sql_attack import ALLOWED, SECRET, STATEMENTS, answered, attack, content
+from thorough import few
 
 import msgflow
 from msgflow.db.connection import connect
@@ -124,7 +125,7 @@ FORGED = (
 )
 
 
-@pytest.mark.parametrize("forged", FORGED)
+@pytest.mark.parametrize("forged", few(FORGED, FORGED[0], FORGED[2]))
 def test_a_forged_view_or_macro_reaches_no_other_file(place: Path, forged: str) -> None:
     """It can give wrong answers, as forged rows can."""
     with duckdb.connect(str(place)) as con:

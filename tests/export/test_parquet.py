@@ -14,6 +14,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from golden import fill_case
+from thorough import few
 
 from msgflow import Database, UsageError, __version__
 from msgflow.db.connection import recorded_revision
@@ -77,7 +78,9 @@ def test_every_public_view_can_be_partitioned(small_database: Path) -> None:
     assert with_run == {row["view"] for row in described}
 
 
-@pytest.mark.parametrize("view", ["publication", "publisher", "callback_instance", "run"])
+@pytest.mark.parametrize(
+    "view", few(["publication", "publisher", "callback_instance", "run"], "callback_instance")
+)
 def test_duckdb_reads_back_what_the_view_has(recorded: Database, tmp_path: Path, view: str) -> None:
     recorded.export_parquet(tmp_path / "out", [view])
     described = f"SELECT column_name, column_type FROM (DESCRIBE {view}) ORDER BY column_name"

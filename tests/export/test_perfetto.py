@@ -116,7 +116,7 @@ def decode(path: Path) -> Decoded:
     return decoded
 
 
-@pytest.fixture(scope="module", params=few(SYSTEMS, "demo", "services", "multi_threaded"))
+@pytest.fixture(scope="module", params=few(SYSTEMS, "demo"))
 def exported(
     request: pytest.FixtureRequest,
     simulated: Callable[..., Path],

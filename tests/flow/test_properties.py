@@ -218,6 +218,7 @@ def test_random_systems_are_worth_it(analysis: Analysis) -> None:
     assert open_callbacks
 
 
+@pytest.mark.thorough
 def test_the_same_events_give_the_same_rows(analysis: Analysis) -> None:
     analysis.build(random_system(1))
     before = outputs(analysis)

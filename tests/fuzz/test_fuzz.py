@@ -119,6 +119,7 @@ def test_the_campaign_finds_what_is_planted() -> None:
     assert len(found) == 7
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("count", "recordings"), [(3, 1), thorough(26, 3)])
 def test_a_slice_of_the_campaign(count: int, recordings: int) -> None:
     found = run(CAMPAIGN, count, SEED, recordings)

@@ -153,6 +153,7 @@ def test_the_alias_of_8_0_0() -> None:
     assert schema.field("message").metadata is None
 
 
+@pytest.mark.thorough
 def test_every_recorded_event_is_listed_whole(shared_traces: Path) -> None:
     """Every event and every field that the recorded traces declare."""
     known = catalogue.load().tracepoints

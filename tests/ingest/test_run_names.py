@@ -56,6 +56,7 @@ def test_no_path_is_not_the_current_directory(new_database: Path) -> None:
         ingest([""], new_database)
 
 
+@pytest.mark.thorough
 def test_a_link_that_leads_nowhere_yet_leads_to_the_new_database(
     trace: Path, new_database: Path, tmp_path: Path
 ) -> None:

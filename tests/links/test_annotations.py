@@ -99,15 +99,17 @@ def test_equal_entries_are_one(database: Path) -> None:
     assert len(rows(database, DECLARED)) == 1
 
 
-def test_a_name_that_occurs_twice_with_its_process(database: Path) -> None:
+PLACES = ("process: right", "process: 400", "process: '400'\n    host: alpha")
+
+
+@pytest.mark.parametrize("place", few(PLACES, PLACES[-1]))
+def test_a_name_that_occurs_twice_with_its_process(database: Path, place: str) -> None:
     text = BOTH.replace("/fusion", "/ns/twin").replace("[/a, /b]", "/x").replace("[/c, /d]", "/y")
-    for place in ("process: right", "process: 400", "{process: '400', host: alpha}"):
-        extra = place.strip("{}").replace(", ", "\n    ")
-        with Database(database) as opened:
-            opened.apply_links(write(database, f"{text}    {extra}\n"))
-        assert rows(
-            database, "SELECT p.name FROM annotation JOIN process AS p USING (process_id)"
-        ) == [("right",)]
+    with Database(database) as opened:
+        opened.apply_links(write(database, f"{text}    {place}\n"))
+    assert rows(database, "SELECT p.name FROM annotation JOIN process AS p USING (process_id)") == [
+        ("right",)
+    ]
 
 
 WRONG = (

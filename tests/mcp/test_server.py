@@ -184,6 +184,7 @@ def test_without_a_database_a_call_says_so(tmp_path: Path) -> None:
     assert not (tmp_path / "none.duckdb").exists()
 
 
+@pytest.mark.thorough
 def test_a_call_that_takes_too_long_is_stopped(small_database: Path) -> None:
     async def talk() -> Any:
         async with Client(mcp_server.make_server(small_database, seconds=3)) as client:

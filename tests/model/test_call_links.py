@@ -292,6 +292,7 @@ def test_a_response_that_waited_for_another(calls: RosSystem, analyse: Analyse) 
     ]
 
 
+@pytest.mark.thorough
 def test_flows_and_paths_go_on_from_a_response(system: RosSystem, analyse: Analyse) -> None:
     """A timer calls, the response leads to another call, and the response to that to a message."""
     system.node(CLIENT, 0x1, "asking")

@@ -356,6 +356,7 @@ def test_a_twin_is_on_the_same_cpu(system: RosSystem, analyse: Analyse) -> None:
     assert counts(model)[:3] == (8, 8, 8)
 
 
+@pytest.mark.thorough
 def test_two_sessions_of_the_second_container(system: RosSystem, analyse: Analyse) -> None:
     """They are copies of each other, and both are of one container."""
     first, *others = session(0), session(1), session(2)
@@ -405,6 +406,7 @@ def test_nor_is_one_of_the_second_container_that_of_the_first(
     assert counts(model) == (8, 8, 8, 8)
 
 
+@pytest.mark.thorough
 def test_a_thread_with_a_namespace_that_renames_itself_is_one(
     system: RosSystem, analyse: Analyse
 ) -> None:

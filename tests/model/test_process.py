@@ -363,9 +363,9 @@ def test_a_callback_behind_a_gap_keeps_no_life_going(
 another = pytest.mark.parametrize(
     "other",
     [
-        pytest.param(Thread(100, 101, "other", trace=1, pid_ns=1), id="on_another_host"),
+        thorough(Thread(100, 101, "other", trace=1, pid_ns=1), id="on_another_host"),
         pytest.param(Thread(100, 101, "other", pid_ns=2), id="in_another_namespace"),
-        pytest.param(Thread(200, 201, "other", pid_ns=1), id="with_another_id"),
+        thorough(Thread(200, 201, "other", pid_ns=1), id="with_another_id"),
     ],
 )
 OTHERS = "SELECT name, max(life) FROM store.process GROUP BY name ORDER BY name"

@@ -6,6 +6,7 @@ import pytest
 from analysis import Analyse
 from ros_system import WRITER, RosSystem
 from staged_events import STEP_NS, Thread
+from thorough import thorough
 
 MAIN = Thread(100)
 LAYERS = (
@@ -252,7 +253,7 @@ def test_layers_of_caret(system: RosSystem, analyse: Analyse) -> None:
 @pytest.mark.parametrize(
     ("hook", "fields", "stamp"),
     [
-        ("ros2_caret:dds_write", {"message": 0xA}, None),
+        thorough("ros2_caret:dds_write", {"message": 0xA}, None),
         ("ros2_caret:dds_bind_addr_to_stamp", {"source_stamp": 777}, 777),
     ],
 )

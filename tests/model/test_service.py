@@ -6,6 +6,7 @@ import pytest
 from analysis import Analyse, Analysis
 from ros_system import RosSystem
 from staged_events import Thread
+from thorough import thorough
 
 CLIENT = Thread(100)
 SERVER = Thread(200, trace=1)
@@ -414,7 +415,7 @@ def test_services_of_managed_nodes(system: RosSystem, analyse: Analyse) -> None:
     assert analysis.rows("SELECT count(*) FROM service WHERE is_inferred") == [(0,)]
 
 
-@pytest.mark.parametrize(("services", "callbacks"), [(1, 1), (1, 0), (0, 1)])
+@pytest.mark.parametrize(("services", "callbacks"), [thorough(1, 1), (1, 0), thorough(0, 1)])
 def test_services_of_a_managed_node_that_were_lost(
     system: RosSystem, analyse: Analyse, services: int, callbacks: int
 ) -> None:

@@ -73,6 +73,7 @@ def test_not_across_a_gap_that_began_before(relay: RosSystem, analyse: Analyse) 
     assert analyse(relay).rows(LINKS) == []
 
 
+@pytest.mark.thorough
 def test_flows_pass_through(relay: RosSystem, analyse: Analyse) -> None:
     relay.publish(SOURCE, 0x10, 11)
     relay.take(PYTHON, 0x20, 11, layers="rmw rcl")

@@ -9,6 +9,7 @@ from analysis import Analyse, Analysis
 from kernel_schedule import BLOCKED, HOG, KERNEL, MAIN, TIMER, Kernel, call, recorded
 from ros_system import RosSystem
 from staged_events import Thread
+from thorough import few
 
 STATES = "SELECT start_ns, end_ns, state, cpu FROM thread_state ORDER BY thread_id, start_ns"
 
@@ -136,7 +137,7 @@ def test_of_two_kernel_traces_of_a_schedule_the_one_that_knows_the_waker_counts(
     ]
 
 
-@pytest.mark.parametrize("traces", [1, 2])
+@pytest.mark.parametrize("traces", few([1, 2], 2))
 def test_a_waking_may_come_before_the_switch_that_it_undoes(
     system: RosSystem, analyse: Analyse, traces: int
 ) -> None:

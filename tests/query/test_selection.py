@@ -315,7 +315,7 @@ def test_flows_through_and_by_their_end(database: Database) -> None:
             "end_to_end_part([1], NULL, NULL, 'callback_start', 'callback_end', 0,"
             " 9223372036854775807, 'first')",
         ),
-        (
+        thorough(
             "critical_path([1])",
             "critical_path([1], NULL, NULL, 'callback_start', 'callback_end', 0,"
             " 9223372036854775807, most_flows := 1)",
@@ -399,7 +399,7 @@ def test_what_left_nothing_is_said(database: Database) -> None:
             "flows from /imu end at /driver (on /plan), and those to /odom begin at /base:"
             " a link may be missing (msgflow links apply FILE)",
         ),
-        ("/result", "/path", "no message of /result was received"),
+        thorough("/result", "/path", "no message of /result was received"),
     ],
 )
 def test_why_no_path_leads_from_one_place_to_another_is_said(

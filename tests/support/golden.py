@@ -5,6 +5,7 @@
         == system NAME       what several cases have in common, in tests/support/systems: the tables
                              of NAME.case, each unless the case has it too; or SQL, NAME.sql, that
                              fills the store beside the rows of BASE
+        == thorough          only `make test-all` runs it: another case shows the same on other rows
         == derive            if this section is there, links are derived before; without it only
                              what the graph of flows makes of the links given
         == params            parameters of the query, and run, start, end, internal; or
@@ -98,6 +99,7 @@ class Case:
 
     Attributes:
         system: name of the system it is about, if any.
+        is_thorough: whether only `make test-all` runs it.
         derives: whether links are derived.
         parameters: None where it gives none.
         tables: CSV of the rows of each table.
@@ -107,6 +109,7 @@ class Case:
     """
 
     system: str | None = None
+    is_thorough: bool = False
     derives: bool = False
     parameters: dict[str, Any] | None = None
     tables: dict[str, str] = field(default_factory=dict)
@@ -123,6 +126,8 @@ def read_case(path: Path) -> Case:
         match kind:
             case "system":
                 case.system = name
+            case "thorough":
+                case.is_thorough = True
             case "derive":
                 case.derives = True
             case "params":
@@ -175,7 +180,10 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 class GoldenFile(pytest.File):
     def collect(self) -> Iterator[pytest.Item]:
-        yield GoldenCase.from_parent(self, name=f"{self.path.parent.name}/{self.path.stem}")
+        item = GoldenCase.from_parent(self, name=f"{self.path.parent.name}/{self.path.stem}")
+        if read_case(self.path).is_thorough:
+            item.add_marker("thorough")
+        yield item
 
 
 class GoldenCase(pytest.Item):

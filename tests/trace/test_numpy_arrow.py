@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -127,6 +128,7 @@ def test_a_batch_without_rows() -> None:
     assert empty_batch(schema).equals(pa.RecordBatch.from_pylist([], schema=schema))
 
 
+@pytest.mark.thorough
 def test_an_ingest_and_a_query_import_nothing_that_takes_long(tmp_path: Path) -> None:
     """pandas, where it is installed, takes longer than reading a small trace."""
     simulate("pipeline", tmp_path / "trace", factor=0.02)

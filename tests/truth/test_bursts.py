@@ -188,6 +188,7 @@ def test_a_clock_that_is_set_back_by_seconds_makes_none_wrong(
     assert score["transport"].found > least
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("recording", "factor", "least"),
     [

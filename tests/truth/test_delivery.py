@@ -51,7 +51,7 @@ TRUE = """
 DECIDED = ("pipeline", "fan_out", "two_hosts", "demo")
 
 
-@pytest.fixture(params=few(DECIDED, "two_hosts", "demo"))
+@pytest.fixture(params=few(DECIDED, "demo"))
 def decided(request: pytest.FixtureRequest, simulations: Callable[[str], Ingested]) -> Ingested:
     return simulations(request.param)
 

@@ -45,7 +45,7 @@ OBJECTS = {
 }
 
 
-@pytest.fixture(scope="module", params=few(layouts(), "foxy", "humble"))
+@pytest.fixture(scope="module", params=few(layouts(), "humble"))
 def named(request, tmp_path_factory):
     """The pipeline in each layout: its name, truth, database file and the database."""
     directory: Path = tmp_path_factory.mktemp("layout")

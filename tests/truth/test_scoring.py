@@ -208,6 +208,7 @@ def test_what_is_wrong_in_a_run_with_a_doubtful_wrong_end_is_a_guess(
     assert (score.wrong, score.misguessed) == (wrong, 1 - wrong)
 
 
+@pytest.mark.thorough
 def test_a_row_at_another_time_is_wrong(simulation, database):
     _change(
         database,

@@ -159,6 +159,7 @@ def served(make: object) -> Iterator[tuple[str, None]]:
             thread.join(20)
 
 
+@pytest.mark.thorough
 def test_what_does_not_go_with_a_lake(lake: Lake, tmp_path: Path) -> None:
     target = tmp_path / "x.html"
     for arguments, words in (

@@ -8,7 +8,8 @@ from pathlib import Path
 import duckdb
 import pytest
 from ingested import made_once
-from served import Page
+from served import Page, Served
+from thorough import few
 
 from msgflow.database import open_db
 from msgflow.ingest import ingest
@@ -53,11 +54,17 @@ def own_events(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return made_once(tmp_path_factory, "own_events", make)
 
 
+@pytest.mark.parametrize("way", few(["served", "file"], "served"))
 def test_each_name_has_a_row_and_a_click_follows_the_callback(
-    own_events: Path, read: Read, report: Callable[..., str], page: Page
+    way: str,
+    own_events: Path,
+    read: Read,
+    serve: Callable[[Path], Served],
+    report: Callable[..., str],
+    page: Page,
 ) -> None:
     ((instance, at, _),) = read(own_events).execute(AN_EVENT).fetchall()
-    page.open(report(own_events))
+    page.open(serve(own_events).address if way == "served" else report(own_events))
     page.go(f"#/timeline?from={at - 20_000}&to={at + 20_000}")
     lanes = page.page.evaluate(LANES)
     # Of the three nodes with such events in callbacks, and of two processes outside of all.

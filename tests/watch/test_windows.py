@@ -508,6 +508,7 @@ def test_of_a_finished_recording_no_chunk_is_late(simulated: Path) -> None:
     assert notes == []
 
 
+@pytest.mark.thorough
 def test_a_source_that_stops_holds_up_no_window(simulated: Path) -> None:
     """It is neither waited for nor late."""
     chunks = finished_chunks(simulated)
