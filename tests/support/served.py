@@ -55,6 +55,7 @@ class Served:
     def close(self) -> None:
         self.server.should_exit = True
         self._thread.join(20)
+        assert not self._thread.is_alive(), "the server does not end"
         self._running.__exit__(None, None, None)
         self._sql.close()
 
