@@ -165,7 +165,7 @@ def recorded_jazzy() -> Path:
     return path
 
 
-@pytest.fixture(params=BASIC)
+@pytest.fixture(params=few(BASIC, "demo"))
 def basic(request: pytest.FixtureRequest, recordings: dict[str, Recording]) -> Recording:
     """Each scenario of plain executors, typed messages and queues that never are full."""
     return recordings[request.param]

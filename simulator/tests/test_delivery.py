@@ -57,6 +57,7 @@ def test_expired_messages_make_takes_fail(recordings):
     assert late[0][0] < 3_020_000
 
 
+@pytest.mark.thorough
 def test_nothing_is_taken_outside_the_life_of_a_subscription(recordings):
     for name in ("losses", "restarts"):
         ((outside,),) = recordings[name].truth(

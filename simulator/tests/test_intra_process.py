@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections import deque
 
 import pytest
+from thorough import few
 
 from msgflow_sim import simulate
 
 INTRA = ("intra_process", "mixed_intra_process")
 
 
-@pytest.fixture(params=INTRA)
+@pytest.fixture(params=few(INTRA, "intra_process"))
 def intra(request, recordings):
     """Each scenario with messages that stay in their process."""
     return recordings[request.param]

@@ -157,6 +157,7 @@ def test_an_ingest_reaches_other_files_only_while_it_opens_its_own(
     assert list((tmp_path / "deep" / "staging").glob("*.parquet"))
 
 
+@pytest.mark.thorough
 def test_a_database_of_this_msgflow_is_written_and_read(
     small_database: Path, tmp_path: Path
 ) -> None:

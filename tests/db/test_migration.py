@@ -13,6 +13,7 @@ from unittest.mock import Mock
 
 import duckdb
 import pytest
+from thorough import thorough
 
 from msgflow.db import derivation, migration, objects
 from msgflow.db.connection import connect, recorded_revision
@@ -176,7 +177,7 @@ def test_a_file_of_each_revision_becomes_what_a_new_one_is(
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ("ALTER TABLE store.take ADD COLUMN more BIGINT", r"another table store\.take"),
+        thorough("ALTER TABLE store.take ADD COLUMN more BIGINT", r"another table store\.take"),
         # A migration reads it.
         ("ALTER TABLE store.finding RENAME TO diagnostic", r"a foreign table store\.diagnostic"),
     ],
@@ -208,6 +209,7 @@ def older(path: Path) -> None:
         )
 
 
+@pytest.mark.thorough
 def test_an_older_file_keeps_its_runs(small_database: Path, tmp_path: Path, before: str) -> None:
     """And the migration tells from clocks how clocks were brought together."""
     older(small_database)
@@ -371,6 +373,7 @@ def test_a_new_database_has_every_view_with_comments(database: Path) -> None:
             assert by_column[column.name].startswith(column.description)
 
 
+@pytest.mark.thorough
 def test_upgrade_applies_changed_views(database: Path) -> None:
     con = open_file(database, read_only=False)
     con.execute("UPDATE store.definition SET hash = 'old'")

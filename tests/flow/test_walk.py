@@ -11,6 +11,7 @@ import pytest
 from analysis import Analysis
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from thorough import examples
 
 from msgflow.db import objects
 
@@ -186,7 +187,7 @@ def walk(con: duckdb.DuckDBPyConnection, macro: str, name: str, number: int) -> 
     return set(con.execute(f"SELECT kind, id FROM {macro}(?, ?)", [name, number]).fetchall())
 
 
-@settings(EXAMPLES, max_examples=4)
+@settings(EXAMPLES, max_examples=examples(2, 4))
 @given(links=LINKS)
 def test_directions_agree(analysis: Analysis, links: dict[str, list[Any]]) -> None:
     """Forward from a reaches b exactly when backward from b reaches a."""

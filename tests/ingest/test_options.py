@@ -39,7 +39,7 @@ EVENTS = [
 
 
 @pytest.mark.parametrize(
-    ("ignore", "stamp", "is_layer"), [((), 777, True), (("dds:*",), None, False)]
+    ("ignore", "stamp", "is_layer"), [thorough((), 777, True), (("dds:*",), None, False)]
 )
 def test_events_may_be_ignored(
     make_trace: Make, new_database: Path, ignore: tuple[str, ...], stamp: int | None, is_layer: bool
@@ -59,7 +59,7 @@ def test_events_may_be_ignored(
 @pytest.mark.parametrize(
     ("calls", "ignore", "has_both"),
     [
-        (("send_request", "take_request"), (), True),
+        thorough(("send_request", "take_request"), (), True),
         (("send_request",), (), False),
         thorough(("take_request",), (), False),
         thorough(("send_request", "take_request"), ("*:rmw_send_request",), False),

@@ -36,6 +36,7 @@ def twice(trace: Path, tmp_path: Path) -> Path:
     return directory
 
 
+@pytest.mark.thorough
 def test_nothing_is_counted_twice(database: Path, twice: Path, tmp_path: Path) -> None:
     report = ingest([twice], tmp_path / "twice.duckdb")
     both = contents(tmp_path / "twice.duckdb")

@@ -314,6 +314,7 @@ def test_all_other_tables_stay_as_they_are(tmp_path: Path) -> None:
     assert contents[0] == contents[1]
 
 
+@pytest.mark.thorough
 def test_an_event_that_two_sessions_recorded_is_loaded_once(tmp_path: Path) -> None:
     """Each name for itself: what only one of the sessions has enabled is not lost."""
     trace = simulate("own_events", tmp_path / "once" / "first", factor=0.05).directory

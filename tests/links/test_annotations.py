@@ -152,6 +152,7 @@ def test_what_does_not_exist_changes_nothing(
     assert contents(database) == untouched
 
 
+@pytest.mark.thorough
 def test_contradictory_entries_are_named(database: Path) -> None:
     """Both are in force; the finding goes with the file."""
     found = "SELECT count, detail FROM finding WHERE name = 'contradictory_annotations'"

@@ -114,6 +114,7 @@ def suggested(database: Path) -> str:
         return opened.suggest_links().text("msgflow links apply FILE")
 
 
+@pytest.mark.thorough
 def test_suggestions_keep_names_and_offer_the_others(database: Path) -> None:
     offered = [line.replace("- ", "# - ", 1) for line in entries(database)]
     text = suggested(database)

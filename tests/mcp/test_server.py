@@ -251,6 +251,7 @@ def test_what_takes_too_much_memory_says_so(
     assert "more memory than 20MB\nhint: " in answer.content[0].text
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("number", few([signal.SIGINT, signal.SIGTERM], signal.SIGTERM))
 def test_a_signal_ends_it_while_it_waits(small_database: Path, number: int) -> None:
     with subprocess.Popen(

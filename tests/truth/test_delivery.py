@@ -98,6 +98,7 @@ def test_simulated_systems_keep_every_rule(simulated: Ingested) -> None:
     assert broken_rules(simulated.connection) == []
 
 
+@pytest.mark.thorough
 def test_the_trace_of_trace_compass(recordings: Callable[[str], Ingested]) -> None:
     """The buffers of the process in the middle end 0.2 s before the others."""
     trace = recordings("tracecompass-ros2")

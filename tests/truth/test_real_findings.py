@@ -97,17 +97,13 @@ EXPECTED: dict[str, list[tuple[str, str | None, int]]] = {
 }
 
 
-@pytest.mark.parametrize(
-    "name", few(EXPECTED, "real_container", "real_late", "real_overload", "real_py_mixed")
-)
+@pytest.mark.parametrize("name", few(EXPECTED, "real_container", "real_overload"))
 def test_findings(recordings: Callable[[str], Ingested], name: str) -> None:
     found = recordings(name).rows(FINDINGS)
     assert [row[:3] for row in found] == EXPECTED[name], found
 
 
-@pytest.mark.parametrize(
-    "name", few(EXPECTED, "real_container", "real_late", "real_overload", "real_py_mixed")
-)
+@pytest.mark.parametrize("name", few(EXPECTED, "real_container", "real_overload"))
 def test_recordings_keep_every_rule(recordings: Callable[[str], Ingested], name: str) -> None:
     assert broken_rules(recordings(name).connection) == []
 

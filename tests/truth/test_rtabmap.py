@@ -43,6 +43,7 @@ def slam(simulations: Callable[[str], Ingested]) -> Ingested:
     return simulations("rtabmap")
 
 
+@pytest.mark.thorough
 def test_a_map_leads_back_to_one_image_on_the_other_host(slam: Ingested) -> None:
     maps = slam.rows(
         "SELECT take_id FROM take JOIN subscription USING (subscription_id) "
@@ -64,6 +65,7 @@ def test_a_map_leads_back_to_one_image_on_the_other_host(slam: Ingested) -> None
         assert published[:-2] in [[("/camera/color/image_raw", "scout", n)] for n in (1, 2)]
 
 
+@pytest.mark.thorough
 def test_transforms_reach_three_listeners_and_go_nowhere_by_themselves(slam: Ingested) -> None:
     heard = [
         ("/transform_listener_impl_5566a1b0", 3),
@@ -74,6 +76,7 @@ def test_transforms_reach_three_listeners_and_go_nowhere_by_themselves(slam: Ing
     assert slam.rows("SELECT count(*) FROM link_causal WHERE kind = 'take_adjacent'") == [(0,)]
 
 
+@pytest.mark.thorough
 def test_chains_are_those_that_happened(slam: Ingested) -> None:
     found = slam.rows(PAIRS)
     assert found == slam.rows(TRUTH)

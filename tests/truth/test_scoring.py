@@ -218,6 +218,7 @@ def test_a_row_at_another_time_is_wrong(simulation, database):
     assert (score.wrong, score.missing) == (1, 1)
 
 
+@pytest.mark.thorough
 def test_a_row_twice_is_repeated(simulation, database):
     _change(
         database,

@@ -78,6 +78,7 @@ def test_the_limit_is_of_the_direction(
     assert f"3 of {count} vertices" in page.page.locator(".said").inner_text()
 
 
+@pytest.mark.thorough
 def test_hostile_names_are_inert(systems: Path, tmp_path: Path, page: Page) -> None:
     path = renamed(systems, tmp_path / "hostile.duckdb", HOSTILE)
     target = tmp_path / "flow.html"

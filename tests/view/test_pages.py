@@ -128,6 +128,7 @@ def test_graph(way: str, systems: Path, serve: Serve, report: Report, page: Page
     assert f"q={first.replace('/', '%2F')}" in page.page.url
 
 
+@pytest.mark.thorough
 def test_services_in_the_graph(systems: Path, serve: Serve, page: Page) -> None:
     with open_db(systems) as opened:
         services = opened.query("service-latency", run=1).to_arrow().to_pylist()

@@ -484,6 +484,7 @@ def test_a_named_query_is_saved(
     assert page.page.evaluate("document.activeElement.validity.valid") is False
 
 
+@pytest.mark.thorough
 def test_names_are_only_ever_text_on_the_sql_page(
     systems: Path, tmp_path: Path, page: Page
 ) -> None:

@@ -192,6 +192,7 @@ def test_topics(way: str, demo: Path, serve: Serve, report: Report, page: Page, 
     assert ("take", take) in page.flow()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("way", few(["served", "file"], "served"))
 def test_nodes(way: str, demo: Path, serve: Serve, report: Report, page: Page) -> None:
     with open_db(demo) as opened:

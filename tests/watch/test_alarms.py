@@ -86,6 +86,7 @@ def test_a_target_that_is_met(watched) -> None:
     assert "violation" not in result.stdout
 
 
+@pytest.mark.thorough
 def test_what_was_never_measured(watched) -> None:
     text = TARGETS.replace("/scan", "/no_such_topic")
     assert watched(text, "--window", "8s", "--step", "8s").exit_code == 5

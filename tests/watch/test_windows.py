@@ -222,6 +222,7 @@ def test_links_and_clocks_of_what_is_not_there_are_said(simulated: Path, tmp_pat
     assert "later" in of_clocks
 
 
+@pytest.mark.thorough
 def test_what_was_learned_may_not_fit_a_window(
     simulated: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
