@@ -146,6 +146,7 @@ def test_runs_of_a_label_are_several_runs(msgflow: Msgflow, database: Path) -> N
     assert "   run other 3 (3): everything — nothing was published" in result.stdout
 
 
+@pytest.mark.thorough
 def test_the_next_step_is_about_one_run(msgflow: Msgflow, database: Path) -> None:
     def steps(*run: str) -> list[str]:
         lines = msgflow("check", *run, "--db", database).stderr.splitlines()

@@ -8,7 +8,7 @@ from pathlib import Path
 import duckdb
 import pyarrow.parquet as pq
 import pytest
-from thorough import few
+from thorough import few, thorough
 from typer.testing import Result
 
 from msgflow.db.objects import public_names
@@ -51,15 +51,15 @@ def test_every_command_has_help(msgflow: Msgflow, command: str) -> None:
     [
         "query callbacks --each",
         "sql 'SELECT 1'",
-        "check",
-        "report -o page.html",
-        "flow /chatter",
-        "compare 1 2",
+        thorough("check"),
+        thorough("report -o page.html"),
+        thorough("flow /chatter"),
+        thorough("compare 1 2"),
         "export parquet -o views",
-        "export perfetto -o trace.pftrace",
-        "export otlp -o traces.json",
-        "export mcap -o run.mcap",
-        "export csv -o rows",
+        thorough("export perfetto -o trace.pftrace"),
+        thorough("export otlp -o traces.json"),
+        thorough("export mcap -o run.mcap"),
+        thorough("export csv -o rows"),
         "ui --no-browser",
     ],
 )

@@ -257,6 +257,7 @@ eval "printf '%s\\n' ${{COMPREPLY[*]}}"
     assert not (tmp_path / "hacked").exists()
 
 
+@pytest.mark.thorough
 def test_the_script_can_be_shown_and_installed(tmp_path: Path) -> None:
     # Typer does not look for the process of the shell then.
     environment = os.environ | {

@@ -128,6 +128,7 @@ def test_a_reader_that_goes_away_is_no_error(trace: Path) -> None:
     assert (process.wait(timeout=30), errors) == (0, b"")
 
 
+@pytest.mark.thorough
 def test_an_interrupt_removes_what_was_unpacked(trace: Path, tmp_path: Path) -> None:
     archive = shutil.make_archive(str(tmp_path / "packed"), "tar", trace.parent, trace.name)
     temporary = tmp_path / "temporary"

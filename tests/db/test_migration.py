@@ -13,7 +13,7 @@ from unittest.mock import Mock
 
 import duckdb
 import pytest
-from thorough import thorough
+from thorough import examples, thorough
 
 from msgflow.db import derivation, migration, objects
 from msgflow.db.connection import connect, recorded_revision
@@ -276,7 +276,8 @@ def test_a_new_database_is_the_same_with_and_without_a_cache(
     # A file that is made anew differs, as each has an identifier.
     write_empty(tmp_path / "copied.duckdb")
     assert (tmp_path / "copied.duckdb").read_bytes() == made.read_bytes()
-    for n, damage in enumerate((b"", whole[:-1], whole[:5000] + b"x" + whole[5001:])):
+    damages = (whole[:5000] + b"x" + whole[5001:], b"", whole[:-1])
+    for n, damage in enumerate(damages[: examples(1, 3)]):
         kept.write_bytes(damage)
         again = tmp_path / f"again{n}.duckdb"
         write_empty(again)

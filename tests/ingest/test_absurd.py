@@ -126,6 +126,7 @@ def test_damage_is_the_reason_where_nothing_is_left(
     assert not new_database.exists()
 
 
+@pytest.mark.thorough
 def test_a_stream_that_is_missing(trace: Path, tmp_path: Path, new_database: Path) -> None:
     changed = copied(trace, tmp_path)
     path = streams(directories(changed)[0])[0]

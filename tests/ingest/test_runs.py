@@ -110,6 +110,7 @@ def test_one_ingest_may_replace_several_runs(both: Path, trace: Path, other_trac
     assert rows(both, "SELECT count(*) FROM trace") == [(3,)]
 
 
+@pytest.mark.thorough
 def test_names_given_must_be_free(database: Path, trace: Path, other_trace: Path) -> None:
     """Unless the run of that name is to be replaced."""
     before = contents(database)

@@ -74,6 +74,7 @@ def test_a_failure_leaves_no_new_database(
     assert os.listdir(new_database.parent) == []
 
 
+@pytest.mark.thorough
 def test_a_failing_replacement_keeps_the_run(
     database: Path, trace: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

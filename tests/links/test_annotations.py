@@ -206,6 +206,7 @@ def test_links_that_lead_back_change_nothing(
     assert contents(database) == untouched
 
 
+@pytest.mark.thorough
 def test_what_the_trace_declares_itself_is_not_declared_again(
     shared_traces: Path, tmp_path: Path
 ) -> None:

@@ -160,6 +160,7 @@ def test_a_stamp_that_some_publication_has_is_no_message_of_another(
     )
 
 
+@pytest.mark.thorough
 def test_two_publishers_at_once_are_ambiguous(unstamped: Unstamped, analyse: Analyse) -> None:
     """Two processes write at the same moment, and one message arrives: it may be of either."""
     other = Thread(300)

@@ -53,7 +53,8 @@ def test_what_is_changed() -> None:
     ("file", "options", "tests", "changes", "survived"),
     [
         thorough(LIMIT, numbers_of(LIMIT, "'least_row'"), QUEUES, 2, 0),
-        (LIMIT, numbers_of(LIMIT, "'least_row'"), "tests/sql/test_value.py", 2, 2),
+        thorough(LIMIT, numbers_of(LIMIT, "'least_row'"), "tests/sql/test_value.py", 2, 2),
+        (LIMIT, ["--replace", "'least_row'", "'most_row'"], "tests/sql/test_value.py", 1, 1),
         (ENDS, DROPPED, "tests/schema/cases/finding.stream_ends_early", 1, 0),
     ],
 )

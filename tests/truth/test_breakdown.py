@@ -89,6 +89,7 @@ def test_parts_of_simulated_flows_add_up(simulations: Callable[[str], Ingested],
     check_flows(simulations(name))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", few(RECORDINGS, "services"))
 def test_the_breakdown_adds_up_by_path(recordings: Callable[[str], Ingested], name: str) -> None:
     """Sums of the query over the parts of a path are those of its flows, from start to end."""

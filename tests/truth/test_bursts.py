@@ -21,6 +21,7 @@ RECORDINGS = {
 }
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("recording", few(RECORDINGS, "step"))
 @pytest.mark.parametrize("system", few(["bursts", "bursts_two_hosts"], "bursts_two_hosts"))
 def test_no_message_is_taken_for_the_next(tmp_path: Path, system: str, recording: str) -> None:

@@ -11,7 +11,7 @@ from scoring import compare_simulated
 from thorough import few
 
 from msgflow.db.finding import broken_rules
-from msgflow_sim import Recording, simulate
+from msgflow_sim import Recording, scenarios, simulate
 
 TRACES = (
     "partial_sync",
@@ -93,6 +93,7 @@ def test_reasons_add_up(recordings: Callable[[str], Ingested], name: str) -> Non
     assert broken_rules(recordings(name).connection) == []
 
 
+@pytest.mark.parametrize("simulated", few(scenarios(), "demo", "services"), indirect=True)
 def test_simulated_systems_keep_every_rule(simulated: Ingested) -> None:
     """That reasons add up is one; none complains about what a sound system does."""
     assert broken_rules(simulated.connection) == []

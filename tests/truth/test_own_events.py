@@ -30,6 +30,7 @@ EXCEPT ALL
 """
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "recording",
     [

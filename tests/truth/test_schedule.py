@@ -110,7 +110,7 @@ def test_perf_gives_the_same_answers(traced: Traced, tmp_path: Path) -> None:
         ),
         thorough("thread_state", "UPDATE thread_state SET cpu = cpu + 1"),
         thorough("preemptor", "DELETE FROM preemptor WHERE state = 'preempted'"),
-        ("preemptor", "UPDATE preemptor SET preemptor_priority = preemptor_priority + 1"),
+        thorough("preemptor", "UPDATE preemptor SET preemptor_priority = preemptor_priority + 1"),
         ("callback_schedule", "UPDATE callback_schedule SET running_ns = running_ns + 1"),
         thorough("callback_schedule", "UPDATE callback_schedule SET preemption_count = 0"),
         thorough("callback_schedule", "UPDATE callback_schedule SET irq_ns = irq_ns + 1"),
@@ -118,7 +118,7 @@ def test_perf_gives_the_same_answers(traced: Traced, tmp_path: Path) -> None:
         thorough(
             "arrival", "UPDATE thread_state SET waker_kind = 'timer' WHERE waker_kind = 'softirq'"
         ),
-        ("arrival", "UPDATE thread_state SET end_ns = end_ns - 1 WHERE state = 'sleeping'"),
+        thorough("arrival", "UPDATE thread_state SET end_ns = end_ns - 1 WHERE state = 'sleeping'"),
     ],
 )
 def test_what_is_wrong_is_noticed(traced: Traced, tmp_path: Path, kind: str, change: str) -> None:

@@ -358,6 +358,7 @@ def test_the_warm_up_that_is_skipped_is_that_of_compare(
     page.page.get_by_text(f"--start {skipped / SECOND:g}s").first.wait_for()
 
 
+@pytest.mark.thorough
 def test_rows_of_ros_itself_are_shown_where_the_bar_says_so(
     demo: Path, serve: Serve, page: Page
 ) -> None:
@@ -372,6 +373,7 @@ def test_rows_of_ros_itself_are_shown_where_the_bar_says_so(
     assert "/rosout" in [row["topic"] for row in cells(page, "topics")]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("place", few(["topics?topic=", "paths"], "paths"))
 def test_charts_are_downloaded(place: str, demo: Path, serve: Serve, page: Page) -> None:
     with open_db(demo) as opened:

@@ -170,6 +170,7 @@ def test_what_came_before_is_kept_of_violations_only(watched) -> None:
     assert "--keep-on-violation DIR --keep-before 2s" in result.stderr
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("kilobytes", few([100, 2_000], 2_000))
 def test_a_full_disk_ends_no_view(watched, tmp_path: Path, kilobytes: int) -> None:
     """There is room for nothing, or for the chunks but not for the database."""
