@@ -75,6 +75,7 @@ def test_a_publication_may_take_until_its_thread_goes_on(
         assert "publishes /image  in 10 ns or more" in str(database.flow(publication_id=1))
 
 
+@pytest.mark.thorough
 def test_a_flow_that_ends_at_a_node_which_publishes_says_so(
     empty_database: Path, tmp_path: Path
 ) -> None:

@@ -80,6 +80,7 @@ def test_handles_mean_what_they_meant_then(system: RosSystem, analyse: Analyse) 
     ]
 
 
+@pytest.mark.thorough
 def test_objects_that_were_never_initialised(system: RosSystem, analyse: Analyse) -> None:
     """A publisher is known by what it published, a subscription by its callback's takes."""
     system.add("ros2:rclcpp_subscription_init", MAIN, subscription_handle=0x11, subscription=0x2011)

@@ -329,6 +329,7 @@ def test_a_ring_buffer_belongs_to_the_callback_behind(system: RosSystem, analyse
     assert analysis.rows("SELECT DISTINCT status FROM stat_delivery") == [("delivered",)]
 
 
+@pytest.mark.thorough
 def test_a_placeholder_of_a_buffer_is_not_said_to_miss_messages(
     system: RosSystem, analyse: Analyse
 ) -> None:

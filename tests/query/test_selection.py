@@ -22,7 +22,7 @@ _ANSWERS: dict[str, list[dict[str, Any]]] = {}
 
 @pytest.fixture(scope="module")
 def database(simulated: Callable[..., Path]) -> Iterator[Database]:
-    with Database(simulated("demo", 0.2)) as opened:
+    with Database(simulated("demo", 0.1)) as opened:
         yield opened
 
 

@@ -161,6 +161,7 @@ def test_actions_in_the_graph(simulated: Callable[..., Path], serve: Serve, page
     assert any(shown(row["result_median_ns"]) in text for row in actions)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("way", few(["served", "file"], "served"))
 def test_executors(way: str, demo: Path, serve: Serve, report: Report, page: Page) -> None:
     with open_db(demo) as opened:
@@ -209,6 +210,7 @@ def as_compared(rows: list[dict[str, Any]], *verdicts: str) -> list[dict[str, An
     ]
 
 
+@pytest.mark.thorough
 def test_compare(systems: Path, serve: Serve, page: Page) -> None:
     with open_db(systems) as opened:
         wanted = opened.compare(2, 3, what="callbacks").result.to_arrow().to_pylist()

@@ -369,6 +369,7 @@ def test_an_error_is_in_duckdbs_words_and_marks_its_line(
     assert "too long" in said.inner_text()
 
 
+@pytest.mark.thorough
 def test_a_query_can_be_stopped(demo: Path, serve: Serve, page: Page) -> None:
     page.open(serve(demo).address)
     page.go("#/sql")

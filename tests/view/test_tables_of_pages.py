@@ -231,6 +231,7 @@ def test_processes_without_callbacks_are_named(
     page.page.get_by_text("No callback ran of").wait_for()
 
 
+@pytest.mark.thorough
 def test_timers_services_and_losses(systems: Path, demo: Path, serve: Serve, page: Page) -> None:
     with open_db(systems) as opened:
         services = opened.query("service-latency", run=1).to_arrow().to_pylist()

@@ -546,6 +546,7 @@ def test_of_a_finished_recording_windows_wait_for_a_host_that_begins_empty(
     assert not any(report.late_events for report in found)
 
 
+@pytest.mark.thorough
 def test_a_clock_that_is_ahead_makes_nothing_late(
     simulated: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
