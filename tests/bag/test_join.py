@@ -252,15 +252,24 @@ def test_what_is_no_bag(database: Path, tmp_path: Path) -> None:
         join(database, tmp_path / "nowhere")
 
 
-@pytest.mark.thorough
-def test_clocks_that_are_not_synchronised_are_refused(
-    simulated: Callable[..., Path], tmp_path: Path
-) -> None:
+@pytest.fixture
+def drifting(simulated: Callable[..., Path], tmp_path: Path) -> tuple[Path, Path]:
+    """A database of hosts whose clocks differ, and a bag of what was published in it."""
     path = Path(shutil.copyfile(simulated("demo", 0.1), tmp_path / "run.duckdb"))
-    sent = published(path)
-    bag = write_bag(tmp_path / "bag", [(one, name, at + 9_000) for one, name, at in sent])
+    sent = [(one, name, at + 9_000) for one, name, at in published(path)]
+    return path, write_bag(tmp_path / "bag", sent)
+
+
+def test_clocks_that_are_not_synchronised_are_refused(drifting: tuple[Path, Path]) -> None:
+    path, bag = drifting
     with pytest.raises(UsageError, match="not synchronised"):
         join(path, bag)
+
+
+@pytest.mark.thorough
+def test_clocks_that_were_brought_together_are_joined(drifting: tuple[Path, Path]) -> None:
+    path, bag = drifting
+    sent = published(path)
     with open_db(path) as opened:
         opened.apply_clocks("messages")
     found = join(path, bag)

@@ -54,7 +54,6 @@ def test_every_type_of_statement_is_in_the_attack() -> None:
                 assert [one.type.name for one in found] in ([kind], ["CREATE"]), statement
 
 
-@pytest.mark.thorough
 def test_no_statement_reads_or_changes_another_file(place: Path) -> None:
     before = content(place.parent)
     with msgflow.open_db(place) as database:

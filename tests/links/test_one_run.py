@@ -42,7 +42,6 @@ def declared(database: Path, tmp_path: Path) -> Path:
     return database
 
 
-@pytest.mark.thorough
 def test_of_another_run_there_is_nothing(declared: Path) -> None:
     con = connect(declared, read_only=True)
     counts = {
