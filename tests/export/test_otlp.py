@@ -163,6 +163,7 @@ def test_spans_say_what_they_are_in_the_words_of_opentelemetry(
     assert len(takes) > 5
 
 
+@pytest.mark.thorough
 def test_further_causes_are_links(simulated: Callable[..., Path], tmp_path: Path) -> None:
     with Database(simulated("partial_sync", 0.1)) as database:
         written = database.export_otlp(tmp_path / "traces.json")

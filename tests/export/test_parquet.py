@@ -279,6 +279,7 @@ def test_csv_tells_empty_and_missing_apart(recorded: Database, tmp_path: Path) -
     assert nodes[1:3] == ['1,1,1,,"","/camera",,,false', '2,1,1,,,"/detector",,,false']
 
 
+@pytest.mark.thorough
 def test_csv_can_be_read_back(recorded: Database, tmp_path: Path) -> None:
     out = tmp_path / "out"
     exported = recorded.export_csv(out)

@@ -116,6 +116,7 @@ def test_what_is_equal_is_rarely_called_different(compared: list[dict[str, Any]]
     assert {row["verdict"] for row in compared if row["statistic"] == "max"} == {"not estimated"}
 
 
+@pytest.mark.thorough
 def test_a_difference_is_found_and_lies_in_its_interval(fresh_database: Path) -> None:
     _fill(fresh_database, shift_ns=100_000)
     with msgflow.open_db(fresh_database) as database:
