@@ -77,6 +77,27 @@ RECORDED = {
     ),
 }
 
+# Real and emulated: three nodes in one busy executor, loops by a clock of their own, and timers in
+# step with the messages. What they answer; all else comes from timers and loops.
+ANSWERED = {
+    "1-rclpy-three-nodes": [("/o01q", "/o02", 267), ("/t1", "/o00", 2815), ("/t1", "/o01", 2762)],
+    "4-main-loops": [("/a_relay", "/ws_a", 290), ("/slow", "/loop4_relay", 10)],
+    "11-rclpy-step-timer": [
+        ("/a", "/py1_relay", 343),
+        ("/a", "/py2_relay", 343),
+        ("/a", "/py3_relay", 366),
+        ("/a", "/py4_relay", 341),
+    ],
+}
+
+
+@pytest.mark.parametrize("name", few(ANSWERED, "4-main-loops"))
+def test_only_answers_are_certain(recordings: Callable[[str], Ingested], name: str) -> None:
+    pairs = recordings(f"../wild/{name}.tar.xz").rows(PAIRS)
+    assert [
+        (*topics, count) for *topics, candidates, count in pairs if candidates == 1
+    ] == ANSWERED[name]
+
 
 @pytest.mark.parametrize("name", few(RECORDED, "real_py_mixed"))
 def test_recorded_timers_are_doubtful_and_no_path_follows_them(

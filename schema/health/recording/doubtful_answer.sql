@@ -1,12 +1,13 @@
 -- name: finding.doubtful_answer
 -- title: A node may publish by a timer what seems to answer messages
 -- description: A node without traced callbacks (rclpy, wait sets) publishes after messages, but not
---     as answers come: at the times of a timer, at intervals steadier than the delay after the
---     messages, in varying numbers per message, after a sleep, or too rarely to tell. Such links
---     are marked by candidate_count 2 in link_causal, and flows, paths and latencies do not follow
---     them.
--- cause: Timers of rclpy emit no event when they fire, so that what they publish follows some
---     message. Or callbacks are so long that the trace cannot tell.
+--     as answers come: at the times of a timer, at intervals that the messages do not have, more
+--     often than usual, after a message to another node, after a sleep, or too rarely to tell. Such
+--     links are marked by candidate_count 2 in link_causal, and flows, paths and latencies do not
+--     follow them.
+-- cause: Timers of rclpy emit no event when they fire, and loops with a clock of their own none
+--     either, so that what they publish follows some message. Or callbacks are so long that the
+--     trace cannot tell.
 -- cure: Say which it is in a file of links, kind independent or direct (docs/causes.md), and apply
 --     it with msgflow links apply FILE; msgflow suggest links prints the entries.
 -- grain: one row per node

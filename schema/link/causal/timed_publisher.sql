@@ -2,10 +2,11 @@
 -- kind: macro
 -- description: Publishers that a timer explains, among those that seem to answer takes without a
 --     callback. What a timer publishes comes when it is due, or as soon as the callback ends that
---     kept it waiting. So at least half comes after a moment, since the take, when the timer was
---     due, and within a tenth of its period. Or nearly all comes after such a moment, and within a
---     period before the thread takes its next message: else the timer would have published again.
---     Answers that take nearly a period follow such a moment by chance, but not all of them do.
+--     kept it waiting. So nearly all comes after a moment, since the take, when the timer was due,
+--     and within a period before the thread takes its next message: else the timer would have
+--     published again. Answers that take nearly a period follow such a moment by chance, but not
+--     all of them do. Where a timer waits for several callbacks, it was due before the last take:
+--     derive.answer_doubtful finds the period that its publications keep.
 --     A timer is due at its initialisation plus whole periods. Executors of rclpy initialise a
 --     timer for every wait that may time out: the first of each period stands for all.
 -- grain: one row per publisher and period of a timer of its process that explains it
@@ -44,7 +45,6 @@ explained AS (
     SELECT
         publisher_id,
         count(*) AS publication_count,
-        count(CASE WHEN late_ns <= least(delay_ns, period_ns / 10) THEN 1 END) AS prompt_count,
         count(CASE WHEN ends_in_period AND late_ns <= delay_ns THEN 1 END) AS due_count,
         -- So many would come after such a moment without any timer.
         sum(CASE WHEN ends_in_period THEN least(delay_ns, period_ns) / period_ns ELSE 0 END)
@@ -54,5 +54,4 @@ explained AS (
 )
 SELECT publisher_id
 FROM explained
-WHERE prompt_count >= 0.5 * publication_count
-    OR due_count - chance_count >= 0.8 * (publication_count - chance_count)
+WHERE due_count - chance_count >= 0.8 * (publication_count - chance_count)
