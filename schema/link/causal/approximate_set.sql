@@ -20,6 +20,7 @@ WITH follower AS MATERIALIZED (
         age_ns,
         lead(stamp_ns) OVER by_stamp AS next_ns,
         lead(start_event_id) OVER by_stamp AS next_event_id,
+        lead(age_ns) OVER by_stamp AS next_age_ns,
         stamp_ns < lag(stamp_ns) OVER by_arrival AS is_set_back
     FROM query_table(messages)
     WINDOW
@@ -29,11 +30,11 @@ WITH follower AS MATERIALIZED (
 -- Of every input the last message up to the pivot, and the one after it.
 around AS MATERIALIZED (
     SELECT
-        p.annotation_id, p.pivot_id, p.pivot_ns, p.subscription_id,
+        p.annotation_id, p.pivot_id, p.pivot_ns, p.pivot_age_ns, p.subscription_id,
         l.stamp_ns AS last_ns,
         l.start_ns AS last_start_ns,
         l.start_event_id AS last_event_id,
-        l.age_ns, l.next_ns, l.next_event_id, l.is_set_back,
+        l.age_ns, l.next_ns, l.next_event_id, l.next_age_ns, l.is_set_back,
         -- Where it goes on after it waited for this input: those with older messages have come.
         CASE
             WHEN bool_and(l.next_event_id IS NOT NULL) OVER before THEN
@@ -42,7 +43,7 @@ around AS MATERIALIZED (
     FROM (
         SELECT
             m.annotation_id, m.callback_instance_id AS pivot_id, m.stamp_ns AS pivot_ns,
-            i.subscription_id,
+            m.age_ns AS pivot_age_ns, i.subscription_id,
             count(*) OVER (PARTITION BY m.annotation_id, m.callback_instance_id) AS input_count
         FROM follower AS m
         JOIN store.annotation_input AS i ON m.annotation_id = i.annotation_id
@@ -131,7 +132,7 @@ proven AS (
     JOIN known AS k ON a.annotation_id = k.annotation_id AND a.pivot_id = k.pivot_id
     GROUP BY a.annotation_id, a.pivot_id, a.pivot_ns, k.event_id
 ),
--- Each end and each start may be older.
+-- Each end (a message after the pivot, or the pivot) and each start may be older.
 close AS (
     SELECT p.annotation_id, p.pivot_id
     FROM possible AS p
@@ -142,12 +143,15 @@ close AS (
     JOIN (
         SELECT
             annotation_id, pivot_id,
-            CASE WHEN count(*) = count(age_ns) THEN max(age_ns) END AS age_ns
+            CASE
+                WHEN count(*) + count(next_ns) = count(age_ns) + count(next_age_ns)
+                    THEN 11 * greatest(max(next_age_ns), max(pivot_age_ns)) + 10 * max(age_ns)
+            END AS doubt
         FROM around
         GROUP BY annotation_id, pivot_id
     ) AS a
         ON p.annotation_id = a.annotation_id AND p.pivot_id = a.pivot_id
-    WHERE coalesce(p.cost - n.cost <= (11 + 10) * a.age_ns, true)
+    WHERE coalesce(p.cost - n.cost <= a.doubt, true)
     UNION
     -- The clock of the stamps was set back: the filter has its messages in another order.
     SELECT annotation_id, pivot_id FROM around
