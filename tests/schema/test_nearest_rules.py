@@ -511,6 +511,25 @@ def test_a_message_of_somebody_else_may_take_the_place_of_one_that_nobody_took(
     assert found[UNUSUAL] == (9 if is_found else None, 1)
 
 
+@pytest.mark.parametrize(
+    ("delay", "stranger", "is_found"),
+    [(8_000, True, True), (7_999, True, False), (7_999, False, True)],
+)
+def test_a_message_of_somebody_else_comes_sooner_than_is_usual(
+    rules: duckdb.DuckDBPyConnection, delay: int, *, stranger: bool, is_found: bool
+) -> None:
+    """Nearly all take 10 µs or more, and half of them 11 µs."""
+    beside_strangers(rules, stranger=50 * MILLISECOND if stranger else None)
+    rules.execute(
+        "UPDATE message SET source_timestamp_ns = CASE source_timestamp_ns // $period "
+        "WHEN 9 THEN 9 * $period + $delay "
+        "ELSE source_timestamp_ns + 1000 * (source_timestamp_ns // $period % 4) END "
+        "WHERE source_timestamp_ns % $period <= 100000",
+        {"delay": delay, "period": PERIOD},
+    )
+    assert nearest(rules)[9 * PERIOD + delay] == (9 if is_found else None, 1)
+
+
 def test_another_topic_has_its_own_strangers(rules: duckdb.DuckDBPyConnection) -> None:
     """It has none: one message came before its publications began. Some stamps are the same."""
     beside_strangers(rules)
