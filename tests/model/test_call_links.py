@@ -90,6 +90,28 @@ def test_until_anything_else_is_taken_or_called(calls: RosSystem, analyse: Analy
     assert analysis.rows("SELECT count(*) FROM link_causal WHERE kind = 'direct'") == [(2,)]
 
 
+def test_in_a_callback_of_another_node_that_spins(calls: RosSystem, analyse: Analyse) -> None:
+    """What the node of the callback publishes afterwards is its own, and what no response led to."""
+    calls.node(CLIENT, 0x3, "spinning")
+    calls.timer(CLIENT, 0x31, callback=0xC3, node=0x3)
+    calls.publisher(CLIENT, 0x41, "/afterwards", node=0x3)
+    calls.start(CLIENT, 0xC3)
+    calls.publish(CLIENT, 0x11, 1)
+    calls.ready(CLIENT)
+    taken = respond(calls)
+    calls.publish(CLIENT, 0x11, 2)
+    calls.publish(CLIENT, 0x41, 3)
+    calls.ready(CLIENT)
+    calls.publish(CLIENT, 0x11, 4)
+    calls.end(CLIENT, 0xC3)
+    analysis = analyse(calls)
+    assert analysis.rows(LINKS) == [(2, taken, True, 1)]
+    assert analysis.rows(
+        "SELECT b.source_timestamp_ns FROM link_causal JOIN publication AS b USING (publication_id) "
+        "ORDER BY ALL"
+    ) == [(1,), (3,), (4,)]
+
+
 def test_not_across_a_gap(calls: RosSystem, analyse: Analyse) -> None:
     respond(calls)
     calls.lose()

@@ -6,6 +6,8 @@
 --     turn ends with the next event of the executor, the next take, and where a callback begins or
 --     ends. Of threads without executors and callbacks (rclpy) a trace shows one kind of turn: from
 --     the take of a request to the response that the same thread sends to it.
+--     Inside of a callback that spins, a response may be taken, too. What follows then is told by
+--     the node: it is the client's, and not that of the callback around it.
 --     Nothing is linked across a gap of the host. An object that the same thread also sends with
 --     where nothing was taken may do so here as well: then "nothing" is one more candidate. So is
 --     another process, where several with equal ids cannot be told apart.
@@ -60,22 +62,26 @@ turn AS (
     SEMI JOIN taken AS k ON t.thread_id = k.thread_id
     WHERE run_id = only_run
 ),
--- Inside of no callback instance.
+-- Inside of no callback instance, or of one of another node.
 sent AS (
     SELECT
         b.thread_id, b.start_ns AS sent_ns, 'publisher' AS kind, b.publisher_id AS object_id,
-        b.publication_id, NULL::BIGINT AS request_id, NULL::BIGINT AS response_id
+        b.publication_id, NULL::BIGINT AS request_id, NULL::BIGINT AS response_id,
+        CASE WHEN d.publication_id IS NOT NULL THEN p.node_id END AS only_node_id
     FROM store.publication AS b
     SEMI JOIN taken AS k ON b.thread_id = k.thread_id
-    ANTI JOIN derive.link_causal_direct(only_run) AS d ON b.publication_id = d.publication_id
-    WHERE b.run_id = only_run
+    LEFT JOIN derive.link_causal_direct(only_run) AS d ON b.publication_id = d.publication_id
+    LEFT JOIN store.callback_instance AS i ON d.callback_instance_id = i.callback_instance_id
+    LEFT JOIN store.callback AS c ON i.callback_id = c.callback_id
+    LEFT JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
+    WHERE b.run_id = only_run AND (d.publication_id IS NULL OR c.node_id <> p.node_id)
     UNION ALL
-    SELECT q.sender_thread_id, q.sent_ns, 'client', q.client_id, NULL, q.request_id, NULL
+    SELECT q.sender_thread_id, q.sent_ns, 'client', q.client_id, NULL, q.request_id, NULL, NULL
     FROM store.request AS q
     JOIN store.link_request AS l ON q.request_id = l.request_id
     WHERE q.run_id = only_run AND l.run_id = only_run AND l.callback_instance_id IS NULL
     UNION ALL
-    SELECT r.sender_thread_id, r.sent_ns, 'service', r.service_id, NULL, NULL, r.response_id
+    SELECT r.sender_thread_id, r.sent_ns, 'service', r.service_id, NULL, NULL, r.response_id, NULL
     FROM store.response AS r
     ANTI JOIN (
         SELECT r.response_id
@@ -93,6 +99,9 @@ behind AS MATERIALIZED (
     SELECT s.*, t.at_ns, t.taken_request_id, t.taken_response_id
     FROM sent AS s
     ASOF JOIN turn AS t ON s.thread_id = t.thread_id AND s.sent_ns > t.at_ns
+    LEFT JOIN store.response AS r ON t.taken_response_id = r.response_id
+    LEFT JOIN store.client AS c ON r.client_id = c.client_id
+    WHERE s.only_node_id IS NULL OR s.only_node_id = c.node_id
 ),
 -- Where something may be missing between the two, nothing is known.
 behind_gap AS (

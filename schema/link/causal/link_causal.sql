@@ -1,8 +1,9 @@
 -- name: derive.link_causal
 -- kind: macro
 -- description: Which callback instance made each publication. Lost events may spoil a link where a
---     gap touches the instance or the publication.
--- grain: one row per publication made inside a callback instance
+--     gap touches the instance or the publication. What a client does with a response that it takes
+--     inside of another callback follows from the response (derive.link_call).
+-- grain: one row per publication made by a callback instance
 -- also: derive.link_causal_by_hand, derive.link_causal_annotated
 -- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.link_causal(only_run) AS TABLE
@@ -10,6 +11,8 @@ WITH link AS (
     SELECT
         run_id, callback_instance_id, take_id, publication_id, publisher_id, 'direct' AS kind,
         NULL::BIGINT AS annotation_id, 1::BIGINT AS candidate_count, is_loss_affected
-    FROM derive.link_causal_direct(only_run)
+    FROM derive.link_causal_direct(only_run) AS d
+    ANTI JOIN (FROM store.link_call WHERE run_id = only_run) AS l
+        ON d.publication_id = l.publication_id
 )
 FROM derive.causal_link(only_run, 'link')
