@@ -2,8 +2,8 @@
 -- title: Messages delivered, dropped and lost by topic and subscription
 -- description: What became of the messages published in the time window at each subscription of
 --     their topic. Dropped: the queue was full, and newer messages took their place. Lost: they did
---     not arrive or could not be taken. Not connected: the two were not connected yet or any more.
---     Cut by the recording: it ended before they could be taken. Unknown: events are lost, or the
+--     not arrive or could not be taken, though earlier and later ones were. Not connected: the two
+--     were not connected yet, not any more, or never. Cut by the recording: it ended before they could be taken. Unknown: events are lost, or the
 --     trace does not decide; such messages may have been delivered. Together with delivered, these
 --     counts add up to what was published. The shares are of messages whose fate is known:
 --     delivered, dropped or lost. Only the depth of the queue decides whether a message counts as
@@ -17,7 +17,7 @@
 -- column: delivered BIGINT          Of these, taken
 -- column: dropped BIGINT            Of these, those that newer ones replaced in a full queue
 -- column: lost BIGINT               Of these, lost on the way
--- column: not_connected BIGINT      Of these, before or after the two were connected
+-- column: not_connected BIGINT      Of these, while the two were not connected
 -- column: cut_by_recording BIGINT   Of these, those that the end of the recording left untaken
 -- column: unknown BIGINT            Of these, with an unknown fate
 -- column: delivered_percent DOUBLE [%]  Share delivered, of those delivered, dropped or lost

@@ -17,7 +17,7 @@
 -- column: delivered BIGINT            Of the messages, counted at each subscription, those taken
 -- column: dropped BIGINT              Those that newer ones replaced in a full queue
 -- column: lost BIGINT                 Those lost on the way
--- column: not_connected BIGINT        Those before or after the two were connected
+-- column: not_connected BIGINT        Those while the two were not connected
 -- column: cut_by_recording BIGINT     Those that the end of the recording left untaken
 -- column: unknown BIGINT              Those with an unknown fate
 -- column: reasons VARCHAR             Why messages were not taken, with counts

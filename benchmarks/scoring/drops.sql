@@ -60,6 +60,12 @@ said AS (
         d.reason AS truth,
         v.reason,
         coalesce(v.reason, v.status, 'no row') AS said,
+        -- Nothing of the pair was taken; or nothing later.
+        CASE v.reason
+            WHEN 'never_taken' THEN NOT d.has_earlier AND NOT d.has_later
+            WHEN 'no_longer_taken' THEN d.has_earlier AND NOT d.has_later
+            ELSE false
+        END AS is_so,
         CASE
             WHEN v.reason = 'receiver_gap' THEN d.hidden
             WHEN v.reason = 'unknown' AND d.unclear IS NOT NULL THEN d.unclear
@@ -77,6 +83,7 @@ said AS (
         concat('delivered, ', t.cause),
         v.reason,
         v.reason,
+        false,
         CASE
             WHEN t.is_missing THEN 'its link is missing'
             -- The take is there; what would tell its message is not.
@@ -113,8 +120,8 @@ SELECT
     d.said AS reason,
     d.undecided,
     count(*) AS messages,
-    coalesce(bool_or(a.reason IS NOT NULL), false) AS is_right
+    coalesce(bool_or(a.reason IS NOT NULL OR d.is_so), false) AS is_right
 FROM said AS d
 LEFT JOIN accepted AS a ON d.truth = a.truth AND d.reason = a.reason
-GROUP BY ALL
+GROUP BY d.truth, d.said, d.undecided, d.is_so
 ORDER BY ALL;

@@ -214,6 +214,7 @@ nameless AS (
 SELECT
     u.publication_id::VARCHAR AS publication_id, s.host, s.pid, s.subscription_handle, s.life,
     u.reason, u.is_internal, x.hidden, x.unclear,
+    coalesce(s.has_earlier, false) AS has_earlier, s.has_later,
     CASE
         WHEN (p.host, p.pid) IN (SELECT (host, pid) FROM unnamed)
             OR (s.host, s.pid) IN (SELECT (host, pid) FROM unnamed)

@@ -29,6 +29,13 @@ successor AS (
         ) AS replaced_ns
     FROM store.subscription
     WHERE subscription_handle IS NOT NULL
+),
+-- Before Humble takes have no event of their own.
+showing AS (
+    SELECT DISTINCT p.host_id
+    FROM store.take AS t
+    JOIN store.process AS p ON t.process_id = p.process_id
+    WHERE t.source_timestamp_ns IS NOT NULL
 )
 SELECT
     s.run_id,
@@ -41,7 +48,8 @@ SELECT
     coalesce(r.last_seen_ns, p.last_seen_ns) AS last_seen_ns,
     x.replaced_ns,
     e.end_ns AS host_end_ns,
-    CASE WHEN r.thread_count = 1 THEN r.thread_id END AS only_thread_id
+    CASE WHEN r.thread_count = 1 THEN r.thread_id END AS only_thread_id,
+    p.host_id IN (SELECT host_id FROM showing) AS shows_takes
 FROM store.subscription AS s
 JOIN store.process AS p ON s.process_id = p.process_id
 JOIN store.host AS h ON p.host_id = h.host_id

@@ -1,17 +1,18 @@
 -- name: derive.undelivered
 -- kind: macro
 -- description: Why a subscription did not take a message of its topic; the first reason that holds.
---     Everything is compared on the clock of the receiver. `not_delivered` rests on a wait: a
+--     Everything is compared on the clock of the receiver. A message is lost only between two of its
+--     publisher that were taken: without one, the two were never connected; before the first, not
+--     yet; after the last, whether they still were does not show. `not_delivered` rests on a wait: a
 --     message in the queue would have ended it. A wait tells this only where a single thread reads,
 --     and only if it lasted ten times as long as messages usually need, at least a millisecond. A
 --     reader that gets no CPU seems to wait, too, but takes the message when it wakes up. Only the
 --     depth of the queue tells `overwritten` from `lost_in_transport`. A take that cannot be
---     identified may have been of the message. Then the reason is unknown: if it came before the
---     subscription is known not to have the message, or within ten times the usual time. Messages
---     are in order only if one thread sends them with one publisher, and one thread takes them. A
---     message is not `overwritten` if the subscription took none of the publisher and no later
---     one. A publisher may keep messages for subscriptions that come later. Those of its process
---     take them from a ring buffer, where nothing identifies them.
+--     identified may have been of the message. Then the reason is unknown: if it came before a later
+--     message was taken, or within ten times the usual time. Messages are in order only if one
+--     thread sends them with one publisher, and one thread takes them. A publisher may keep messages
+--     for subscriptions that come later. Those of its process take them from a ring buffer, where
+--     nothing identifies them.
 -- grain: one row per publication and subscription of its topic that is not known to have taken it
 CREATE OR REPLACE MACRO derive.undelivered(only_run) AS TABLE
 WITH arrival AS MATERIALIZED (
@@ -24,7 +25,7 @@ WITH arrival AS MATERIALIZED (
 life AS MATERIALIZED (
     SELECT
         subscription_id, topic_name, process_id, clock_id, queue_depth, created_ns, last_seen_ns,
-        replaced_ns, host_end_ns, only_thread_id
+        replaced_ns, host_end_ns, only_thread_id, shows_takes
     FROM derive.subscription_life
     WHERE run_id = only_run AND topic_name IS NOT NULL
 ),
@@ -167,11 +168,12 @@ known AS (
     SELECT
         m.publication_id, m.publisher_id, m.subscription_id, m.topic_name, m.clock_id,
         m.arrival_ns, m.has_no_stamp, s.process_id, s.queue_depth, s.created_ns,
-        s.last_seen_ns, s.replaced_ns, s.host_end_ns,
+        s.last_seen_ns, s.replaced_ns, s.host_end_ns, s.shows_takes,
         coalesce(c.longest_ns, derive.delivery_limit().longest_ns) AS longest_ns,
         coalesce(c.patience_ns, derive.delivery_limit().longest_ns) AS patience_ns,
         c.usual_ns,
         p.taken_ns AS publisher_taken_ns,
+        p.arrival_ns AS publisher_arrival_ns,
         n.taken_ns AS any_taken_ns,
         n.arrival_ns AS next_arrival_ns,
         e.arrival_ns > m.arrival_ns AS is_before_first,
@@ -203,7 +205,10 @@ due AS MATERIALIZED (
     SELECT
         *,
         arrival_ns + patience_ns AS due_ns,
-        count(*) OVER (PARTITION BY subscription_id, next_arrival_ns) AS row_length
+        count(*) OVER (PARTITION BY subscription_id, next_arrival_ns) AS row_length,
+        count(*) FILTER (arrival_ns <= last_seen_ns) OVER (
+            PARTITION BY subscription_id, publisher_id, publisher_arrival_ns
+        ) AS publisher_row_length
     FROM known
 ),
 due_stretch AS (
@@ -306,12 +311,9 @@ facts AS (
         i.covered_until_ns > b.introduced_ns AS has_earlier_gap,
         f.failed_ns <= b.until_ns AS has_failed_take,
         -- A later message may have overtaken it, unless one thread sent both, and one takes.
-        u.taken_ns <= coalesce(
-            b.waited_ns,
-            least(
-                CASE WHEN b.is_in_order THEN b.publisher_taken_ns END,
-                greatest(b.gone_ns, b.due_ns)
-            )
+        u.taken_ns <= least(
+            CASE WHEN b.is_in_order THEN b.publisher_taken_ns END,
+            greatest(b.gone_ns, b.due_ns)
         ) AS has_unidentified_take,
         q.count_so_far - o.position AS newer_count
     FROM bounded AS b
@@ -336,6 +338,34 @@ facts AS (
         ON b.topic_name = q.topic_name
         AND b.clock_id = q.clock_id
         AND b.gone_ns >= q.arrival_ns
+),
+-- What is said of several messages of a pair alike. Before the first that was taken: whether the
+-- queue had overflowed, so that as many newer ones had come as it holds (a queue of one always is
+-- full). Behind the last one: whether the reader waited, or many more are missing than before. Of
+-- all: whether the trace shows that none was taken, and whether there was time.
+judged AS (
+    SELECT
+        *,
+        min(newer_count) OVER stage = queue_depth
+        AND queue_depth > 1
+        AND count(waited_ns) OVER stage = 0 AS has_overflowed,
+        coalesce(count(waited_ns) FILTER (has_unidentified_take IS NOT TRUE) OVER stage > 0, false)
+        OR publisher_row_length > queue_depth + coalesce(
+            2 * max(publisher_row_length) FILTER (
+                publisher_taken_ns IS NOT NULL AND NOT is_before_first
+            ) OVER pair,
+            0
+        ) AS has_stopped,
+        min(arrival_ns) FILTER (coalesce(created_ns <= arrival_ns, true)) OVER pair + longest_ns
+        < last_seen_ns AS had_time,
+        shows_takes AND bool_or(has_unidentified_take) OVER pair IS NOT TRUE AS shows_none
+    FROM facts
+    WINDOW
+        pair AS (PARTITION BY subscription_id, publisher_id),
+        stage AS (
+            PARTITION BY
+                subscription_id, publisher_id, is_before_first, publisher_taken_ns IS NULL
+        )
 )
 SELECT
     only_run::BIGINT AS run_id,
@@ -352,15 +382,20 @@ SELECT
             THEN 'subscription_ended'
         WHEN has_unidentified_take THEN 'unknown'
         WHEN publication_id IN (SELECT publication_id FROM while_set) THEN 'unknown'
-        WHEN has_failed_take THEN 'take_failed'
-        WHEN is_before_first AND has_earlier_gap THEN 'unknown'
-        WHEN is_before_first THEN 'before_discovery'
-        WHEN waited_ns IS NOT NULL THEN 'not_delivered'
-        WHEN newer_count >= queue_depth AND (is_connected OR any_taken_ns IS NOT NULL)
-            THEN 'overwritten'
-        WHEN any_taken_ns IS NOT NULL AND newer_count < queue_depth THEN 'lost_in_transport'
+        WHEN NOT is_connected AND shows_none AND had_time THEN 'never_taken'
+        WHEN is_before_first THEN CASE
+            WHEN has_earlier_gap THEN 'unknown'
+            WHEN has_overflowed THEN 'overwritten'
+            ELSE 'before_discovery'
+        END
+        WHEN publisher_taken_ns IS NULL AND is_connected AND has_stopped THEN 'no_longer_taken'
+        WHEN publisher_taken_ns IS NOT NULL AND has_failed_take THEN 'take_failed'
+        WHEN publisher_taken_ns IS NOT NULL AND waited_ns IS NOT NULL THEN 'not_delivered'
+        WHEN is_connected AND newer_count >= queue_depth THEN 'overwritten'
+        WHEN publisher_taken_ns IS NOT NULL AND newer_count < queue_depth
+            THEN 'lost_in_transport'
         WHEN any_taken_ns IS NULL AND (newer_count < queue_depth OR newer_count = 0)
             THEN 'pending_at_end'
         ELSE 'unknown'
     END AS reason
-FROM facts
+FROM judged

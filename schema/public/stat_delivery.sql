@@ -11,12 +11,13 @@
 -- column: subscription_id BIGINT  Subscription that should have taken it
 -- column: take_id BIGINT  Take of the message; NULL: it was not taken, or that is not known
 -- column: status VARCHAR  'delivered', 'dropped' (the queue was full: newer messages took its
---     place), 'lost' (on the way), 'not_connected' (before or after the two were connected, as far
---     as traced), 'cut_by_recording' (the recording ended before it could be taken) or 'unknown'
---     (the trace does not tell)
+--     place), 'lost' (between two that arrived), 'not_connected' (the two were not connected yet,
+--     not any more, or never, as far as traced), 'cut_by_recording' (the recording ended before it
+--     could be taken) or 'unknown' (the trace does not tell)
 -- column: reason VARCHAR  Why it was not taken: 'before_subscription', 'subscription_ended',
---     'receiver_gap', 'take_failed', 'before_discovery', 'not_delivered', 'overwritten',
---     'lost_in_transport', 'pending_at_end' or 'unknown', the first that holds; NULL: delivered
+--     'receiver_gap', 'never_taken', 'before_discovery', 'no_longer_taken', 'take_failed',
+--     'not_delivered', 'overwritten', 'lost_in_transport', 'pending_at_end' or 'unknown', the first
+--     that holds; NULL: delivered
 SELECT
     run_id,
     publication_id,

@@ -22,7 +22,8 @@ CREATE TABLE derive.subscription_life (run_id BIGINT DEFAULT 1, subscription_id 
     topic_name VARCHAR DEFAULT '/a', process_id BIGINT DEFAULT 1, clock_id BIGINT DEFAULT 1,
     queue_depth BIGINT DEFAULT 10, created_ns BIGINT DEFAULT 0,
     last_seen_ns BIGINT DEFAULT 10_000_000_000, replaced_ns BIGINT,
-    host_end_ns BIGINT DEFAULT 10_000_000_000, only_thread_id BIGINT DEFAULT 1);
+    host_end_ns BIGINT DEFAULT 10_000_000_000, only_thread_id BIGINT DEFAULT 1,
+    shows_takes BOOLEAN DEFAULT true);
 CREATE TABLE gap (process_id BIGINT DEFAULT 1, start_ns BIGINT, covered_until_ns BIGINT);
 CREATE MACRO derive.process_gap(only_run) AS TABLE FROM gap;
 CREATE TABLE store.publisher (publisher_id BIGINT, created_ns BIGINT,
@@ -197,15 +198,51 @@ def test_a_wait_is_no_shorter_than_that(delivery: Delivery, length: int, reason:
     assert delivery.reason(missing) == reason
 
 
-@pytest.mark.parametrize(("more", "reason"), [(1, "not_delivered"), (0, "pending_at_end")])
-def test_the_patience_of_who_never_took_anything(
+@pytest.mark.parametrize(("more", "reason"), [(1, "never_taken"), (0, "pending_at_end")])
+def test_who_never_took_anything_of_a_publisher_had_time(
     delivery: Delivery, more: int, reason: str
 ) -> None:
-    """Ten milliseconds."""
-    delivery.lives()
+    """Ten milliseconds since the first message: one word for all that the pair had."""
+    delivery.lives(last_seen_ns=310 * MS + more, host_end_ns=310 * MS + more, created_ns=200 * MS)
+    early = delivery.publish(199 * MS)
+    messages = [delivery.publish(at * MS) for at in (300, 309)]
+    assert delivery.reason(early) == "before_subscription"
+    assert [delivery.reason(message) for message in messages] == [reason, reason]
+
+
+def test_who_never_took_anything_of_one_publisher_took_that_of_another(delivery: Delivery) -> None:
+    """Two domains in one recording; what the other one sends, its queue was never to hold."""
+    delivery.lives(queue_depth=1)
+    for at in range(1, 4):
+        delivery.publish(at * 100 * MS, at * 100 * MS + 300_000)
+    messages = [delivery.publish(at * 100 * MS + 50 * MS, publisher=2) for at in range(1, 4)]
+    delivery.waits(160 * MS, 200 * MS)
+    delivery.fails(155 * MS)
+    assert {delivery.reason(message) for message in messages} == {"never_taken"}
+
+
+@pytest.mark.parametrize(("shows_takes", "reason"), [(True, "never_taken"), (False, "unknown")])
+def test_takes_that_have_no_event_do_not_show(
+    delivery: Delivery, shows_takes: bool, reason: str
+) -> None:
+    """As before Humble."""
+    delivery.lives(queue_depth=1, shows_takes=shows_takes)
     missing = delivery.publish(300 * MS)
-    delivery.waits(300 * MS, 310 * MS + more)
+    delivery.publish(400 * MS)
     assert delivery.reason(missing) == reason
+
+
+def test_a_take_without_a_message_may_be_of_a_pair_that_seems_to_have_none(
+    delivery: Delivery,
+) -> None:
+    """That of one message may be known to be another one, but not of the two that came then."""
+    delivery.lives(queue_depth=1)
+    messages = [delivery.publish(at * MS) for at in (300, 600, 700)]
+    delivery.publish(310 * MS, 311 * MS, publisher=2)
+    delivery.takes_without_message(310 * MS)
+    assert [delivery.reason(message) for message in messages] == ["unknown"] * 2 + [
+        "pending_at_end"
+    ]
 
 
 @pytest.mark.parametrize(("late", "reason"), [(0, "not_delivered"), (1, "lost_in_transport")])
@@ -292,7 +329,7 @@ def test_a_gap_hides_a_take_for_as_long_as_messages_need(
     ("start", "taken", "reason"),
     [
         (320 * MS + 3 * MS, None, "receiver_gap"),
-        (320 * MS + 3 * MS + 1, None, "not_delivered"),
+        (320 * MS + 3 * MS + 1, None, "no_longer_taken"),
         # What the publisher sent next has been taken: the queue was empty.
         (320 * MS + 2 * MS, 320 * MS + 2 * MS, "receiver_gap"),
         (320 * MS + 2 * MS + 1, 320 * MS + 2 * MS, "not_delivered"),
@@ -486,6 +523,7 @@ def test_a_later_message_may_have_overtaken_one(
     delivery.lives(only_thread_id=reader)
     missing = delivery.miss()
     delivery.publish(300 * MS + 1, 301 * MS, publisher, thread)
+    delivery.publish(320 * MS, 320 * MS + 300_000, thread=thread)
     delivery.takes_without_message(until + more)
     assert delivery.reason(missing) == reason
 
@@ -504,11 +542,11 @@ def test_nothing_earlier_of_the_publisher_was_taken(
     assert delivery.reason(missing) == reason
 
 
-@pytest.mark.parametrize(("last", "reason"), [(0, "pending_at_end"), (1, "lost_in_transport")])
+@pytest.mark.parametrize(("last", "reason"), [(0, "pending_at_end"), (1, "unknown")])
 def test_a_later_message_of_another_publisher_was_taken(
     delivery: Delivery, last: int, reason: str
 ) -> None:
-    """One that arrived at the same time is not later."""
+    """One that arrived at the same time is not later. Only later ones of its own show a loss."""
     delivery.lives(last_seen_ns=400 * MS, host_end_ns=400 * MS)
     missing = delivery.miss()
     delivery.publish(300 * MS + last, 310 * MS, publisher=2)
@@ -602,6 +640,112 @@ def test_a_gap_that_begins_when_a_message_arrives(
 @pytest.mark.parametrize(
     ("depth", "newer", "reason"),
     [
+        (3, 2, "overwritten"),
+        (3, 1, "before_discovery"),
+        (3, 3, "before_discovery"),
+        # The queue is full with any message: that it is says nothing.
+        (1, 0, "before_discovery"),
+        (2, 1, "overwritten"),
+    ],
+)
+def test_a_queue_that_was_full_when_the_first_message_was_taken(
+    delivery: Delivery, depth: int, newer: int, reason: str
+) -> None:
+    """The reader came late: that first one is the oldest that the queue still held."""
+    delivery.lives(queue_depth=depth)
+    missing = [delivery.publish(at * MS) for at in range(100, 110)]
+    for at in range(newer + 1):
+        delivery.publish((200 + at) * MS, (300 + at) * MS)
+    delivery.publish(400 * MS, 401 * MS)
+    assert {delivery.reason(message) for message in missing} == {reason}
+
+
+def test_a_reader_that_waited_before_the_first_message_had_none(delivery: Delivery) -> None:
+    """As many as the queue holds came at once, when the two knew each other."""
+    delivery.lives(queue_depth=2)
+    usually(delivery, 300_000)
+    missing = [delivery.publish(at * MS, publisher=2) for at in range(300, 310)]
+    delivery.waits(305 * MS, 312 * MS)
+    for at in (312, 312):
+        delivery.publish(at * MS, at * MS + 300_000, publisher=2)
+    assert {delivery.reason(message) for message in missing} == {"before_discovery"}
+
+
+def test_what_failed_before_the_first_message_was_taken_shows_no_loss(delivery: Delivery) -> None:
+    delivery.lives()
+    missing = delivery.publish(300 * MS)
+    delivery.fails(301 * MS)
+    delivery.publish(310 * MS, 311 * MS)
+    assert delivery.reason(missing) == "before_discovery"
+
+
+@pytest.mark.parametrize(
+    ("missing_before", "missing_now", "reason"),
+    [
+        (0, 3, "pending_at_end"),
+        (0, 4, "no_longer_taken"),
+        (5, 13, "overwritten"),
+        (5, 14, "no_longer_taken"),
+    ],
+)
+def test_more_messages_are_missing_than_ever_before(
+    delivery: Delivery, missing_before: int, missing_now: int, reason: str
+) -> None:
+    """Twice as many, beside those that fit in the queue. What came before the first says nothing.
+
+    Nor do those that came when the reader had ended.
+    """
+    delivery.lives(queue_depth=3, last_seen_ns=900 * MS, host_end_ns=901 * MS)
+    for at in range(60):
+        delivery.publish(at * MS)
+    delivery.publish(100 * MS, 101 * MS)
+    for at in range(missing_before):
+        delivery.publish((200 + at) * MS)
+    delivery.publish(300 * MS, 301 * MS)
+    messages = [delivery.publish((400 + at) * MS) for at in range(missing_now)]
+    for _ in range(50):
+        delivery.publish(900 * MS + 1)
+    assert delivery.reason(messages[0]) == reason
+
+
+@pytest.mark.parametrize(("more", "reason"), [(1, "no_longer_taken"), (0, "pending_at_end")])
+def test_a_reader_that_waits_takes_nothing_more(
+    delivery: Delivery, more: int, reason: str
+) -> None:
+    """Its queue is empty. The message behind the wait has the same word."""
+    delivery.lives(last_seen_ns=400 * MS, host_end_ns=400 * MS)
+    usually(delivery, 300_000)
+    messages = [delivery.publish(at * MS) for at in (300, 399)]
+    delivery.waits(280 * MS, 303 * MS - 1 + more)
+    assert [delivery.reason(message) for message in messages] == [reason, reason]
+
+
+def test_a_wait_after_a_take_without_a_message_does_not_show_that_none_is_taken(
+    delivery: Delivery,
+) -> None:
+    """That take was of the message."""
+    delivery.lives(last_seen_ns=400 * MS, host_end_ns=400 * MS)
+    usually(delivery, 300_000)
+    messages = [delivery.publish(at * MS) for at in (300, 399)]
+    delivery.waits(302 * MS, 390 * MS)
+    delivery.takes_without_message(301 * MS)
+    assert [delivery.reason(message) for message in messages] == ["unknown", "pending_at_end"]
+
+
+def test_a_take_without_a_message_that_comes_later_than_the_wait(delivery: Delivery) -> None:
+    """The reader seemed to wait, but got no CPU: the message is no more lost than any other."""
+    delivery.lives()
+    usually(delivery, 300_000)
+    missing = delivery.publish(300 * MS)
+    delivery.waits(280 * MS, 309 * MS)
+    delivery.takes_without_message(309 * MS + 1)
+    delivery.publish(320 * MS, 320 * MS + 300_000)
+    assert delivery.reason(missing) == "unknown"
+
+
+@pytest.mark.parametrize(
+    ("depth", "newer", "reason"),
+    [
         (2, 1, "pending_at_end"),
         (2, 2, "unknown"),
         (None, 0, "pending_at_end"),
@@ -612,7 +756,7 @@ def test_messages_stay_in_a_queue_that_nobody_reads(
     delivery: Delivery, depth: int | None, newer: int, reason: str
 ) -> None:
     """As many as it holds; the last one in any case. It was never seen to get any."""
-    delivery.lives(queue_depth=depth, last_seen_ns=400 * MS, host_end_ns=400 * MS)
+    delivery.lives(queue_depth=depth, last_seen_ns=310 * MS, host_end_ns=310 * MS)
     missing = delivery.publish(300 * MS)
     for at in range(newer):
         delivery.publish(301 * MS + at)

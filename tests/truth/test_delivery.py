@@ -79,7 +79,7 @@ def test_reasons_of_what_ros_publishes_once(decided: Ingested) -> None:
     """Where nothing ever came, it cannot be told that the two did not know each other yet."""
     for true, ours in reasons(decided, "true"):
         if true == "before_discovery":
-            assert ours in ("before_discovery", "not_delivered", "pending_at_end")
+            assert ours in ("before_discovery", "never_taken", "pending_at_end")
         else:
             assert ours == (true or "before_subscription")
 
