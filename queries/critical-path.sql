@@ -4,7 +4,7 @@
 --     replaced by what they waited for, as far as the trace shows; where the kernel was traced,
 --     what a thread did by its states (docs/scheduling.md). The pieces add up to the latency.
 --     Unless detail is full, those below 1 % are summed up as 'rest'. Flows with a stored message
---     come last.
+--     have no latency, and are left out.
 -- grain: one row per flow and piece, node or activity
 -- param: from VARCHAR = NULL  Topics or nodes where flows start
 -- param: to VARCHAR = NULL  Topics or nodes where flows end, likewise
@@ -32,7 +32,7 @@
 -- column: duration_ns BIGINT [ns]  Duration; negative if parts of the flow overlap
 -- column: hop BIGINT               Number of the message on the path that it belongs or leads to
 -- column: part VARCHAR             Part of the flow: 'callback', 'cache', 'request_to_take',
---     'service', 'response_to_take', 'publish' or its layer, 'stored', 'publish_to_take' or
+--     'service', 'response_to_take', 'publish' or its layer, 'publish_to_take' or
 --     'take_to_callback'
 -- column: activity VARCHAR         What happened: the part itself; up to a take 'network_or_idle',
 --     'executor_busy' (it ran something else), 'all_threads_busy' (none of its threads was free),

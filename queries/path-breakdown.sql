@@ -4,10 +4,9 @@
 --     share:desc puts the largest part first. The parts of a flow follow each other
 --     from its start to its end and add up to its latency exactly. The parts of a hop are: the
 --     callback up to its publication; the wait in a cache for other messages or a timer; calls of
---     services; publishing by layer, up to the last one; the time for which a message was stored,
---     until its subscription existed; the time from there to the take; and the time from the take
---     to the callback. Flows with a stored message are part of the shares here, but not of the
---     latencies of e2e-latency. Publishing goes on behind the event of its last layer: it
+--     services; publishing by layer, up to the last one; the time from there to the take; and the time
+--     from the take to the callback. Flows with a stored message have no latency, and are left out
+--     here as in e2e-latency. Publishing goes on behind the event of its last layer: it
 --     is not known how long, and is part of the time up to the take. A trace does not say when a
 --     message arrived either, so that time is three parts, with the bounds of waits:
 --     network_or_idle, executor_busy (with other callbacks), and undecided (one or the other).
@@ -31,7 +30,7 @@
 -- column: path_id BIGINT           Number of the path
 -- column: hop BIGINT               Number of the message on the path that it belongs or leads to
 -- column: part VARCHAR             'callback', 'cache', 'service', a layer of publishing
---     ('intra', 'rclcpp', 'rcl', 'rmw', 'dds', or 'publish' where it is not known), 'stored',
+--     ('intra', 'rclcpp', 'rcl', 'rmw', 'dds', or 'publish' where it is not known),
 --     'network_or_idle', 'undecided', 'executor_busy', or exactly 'until_arrival', 'run_queue',
 --     'executor'; 'take_to_callback'
 -- column: node VARCHAR [node]  Node that runs the callback, waits for it or for the
@@ -200,7 +199,7 @@ ORDER BY
     p.run_id, p.path, m.path_id, m.hop, m.rank,
     list_position(
         [
-            'stored', 'until_arrival', 'run_queue', 'executor', 'network_or_idle', 'undecided',
+            'until_arrival', 'run_queue', 'executor', 'network_or_idle', 'undecided',
             'executor_busy'
         ],
         m.part

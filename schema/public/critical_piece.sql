@@ -12,8 +12,7 @@
 -- column: root_id BIGINT  Identity of the root
 -- column: take_id BIGINT  Take at the end of the path
 -- column: latency_ns BIGINT [ns]  From the start of the root to the end
--- column: flow_rank BIGINT  Number of the flow, the longest first; those with a stored
---     message last
+-- column: flow_rank BIGINT  Number of the flow, the longest first
 -- column: hop BIGINT  Number of the message on the path that it belongs or leads to
 -- column: position BIGINT  Order within the flow, from 1
 -- column: part VARCHAR  Part of the flow, as in main.end_to_end_part
@@ -45,12 +44,9 @@ WITH part AS MATERIALIZED (
     SELECT
         run_id, path_id, root_kind, root_id, take_id, latency_ns, hop, part, from_ns,
         to_ns, duration_ns, callback_instance_id, publication_id,
-        dense_rank() OVER (ORDER BY is_stored, latency_ns DESC, flow_id) AS flow_rank,
-        row_number() OVER (ORDER BY is_stored, latency_ns DESC, flow_id, position) AS position
-    FROM (
-        SELECT *, bool_or(part = 'stored') OVER (PARTITION BY flow_id) AS is_stored
-        FROM query_table(parts)
-    )
+        dense_rank() OVER (ORDER BY latency_ns DESC, flow_id) AS flow_rank,
+        row_number() OVER (ORDER BY latency_ns DESC, flow_id, position) AS position
+    FROM query_table(parts)
 ),
 waiting AS MATERIALIZED (
     SELECT position, part, from_ns, to_ns, callback_instance_id, publication_id

@@ -34,8 +34,7 @@
 -- column: take_id BIGINT  Take at the end of the path
 -- column: sink_event VARCHAR  Event that ended the flow, as in main.end_to_end
 -- column: sink_ns BIGINT [epoch ns]  End of the flow
--- column: latency_ns BIGINT [ns]  From the start of the root to the end, also where a message was
---     stored
+-- column: latency_ns BIGINT [ns]  From the start of the root to the end
 CREATE OR REPLACE MACRO main.end_to_end_flow(
     runs, from_topic := NULL, to_topic := NULL, from_event := 'callback_start',
     to_event := 'callback_end', window_start_ns := NULL, window_end_ns := NULL,
