@@ -2,7 +2,9 @@
 -- description: Takes of messages that were published before their subscription existed, and were
 --     stored until then (a publisher that is transient local: latched). The creation of the
 --     subscription decides, so a message that was only sent before the two were connected is not
---     among them. Between clocks the distance has to be more than the errors of both.
+--     among them. Nor is one that was sent so shortly before that it may have been on its way: its
+--     publisher may be volatile, and the event of the creation comes behind it. Between clocks the
+--     distance has to be more than the errors of both.
 -- grain: one row per such take
 WITH clock AS (
     SELECT
@@ -44,7 +46,7 @@ SELECT l.run_id, l.take_id, s.created_ns, s.created_ns - b.end_ns AS stored_ns
 FROM store.link_transport AS l
 JOIN sent AS b ON l.publication_id = b.publication_id
 JOIN created AS s ON l.subscription_id = s.subscription_id
-WHERE s.created_ns - b.end_ns > CASE
+WHERE s.created_ns - b.end_ns - derive.delivery_limit().longest_ns > CASE
         WHEN b.clock_id = s.clock_id THEN 0
         WHEN b.reference_clock_id = s.reference_clock_id
             THEN b.uncertainty_ns + s.uncertainty_ns
