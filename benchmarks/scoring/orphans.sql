@@ -25,6 +25,7 @@ WITH accepted AS (
         ('no event', 'no_stamp'),
         -- A publication without a trace comes from a process that was not traced.
         ('sent, no event', 'publisher_not_traced'),
+        ('sent, no event', 'publisher_without_events'),
         ('sent, no event', 'unknown')
     ) AS a(truth, reason)
 ),

@@ -8,7 +8,8 @@
 --     came from there. If the stamp is that of a message of another topic, and a gap lies after
 --     the creation of the subscription, another subscription may have its handle by then. If a
 --     publisher whose topic is not known published at that moment, it means nothing that all known
---     senders had ended.
+--     senders had ended. A publisher of the topic that was never seen to publish may have sent all
+--     that no other one did: some ways to publish have no event.
 -- grain: one row per take whose publication is not known
 -- when: derive.unlinked_take
 CREATE OR REPLACE MACRO derive.orphan_take(only_run) AS TABLE
@@ -83,7 +84,15 @@ nameless AS (
         AND EXISTS (SELECT 1 FROM orphan)
 ),
 sending AS (
-    SELECT topic_name, process_id, min(coalesce(created_ns, 0)) AS created_ns
+    SELECT
+        topic_name, process_id, min(coalesce(created_ns, 0)) AS created_ns,
+        bool_or(
+            publisher_id NOT IN (
+                SELECT publisher_id
+                FROM store.publication
+                WHERE run_id = only_run AND publisher_id IS NOT NULL
+            )
+        ) AS is_silent
     FROM store.publisher
     WHERE run_id = only_run
     GROUP BY topic_name, process_id
@@ -106,24 +115,25 @@ topic AS (
     SELECT DISTINCT topic_name FROM orphan WHERE topic_name IS NOT NULL
 ),
 candidate AS (
-    SELECT topic_name, process_id, created_ns, true AS is_known
+    SELECT topic_name, process_id, created_ns, true AS is_known, is_silent
     FROM sending
     WHERE topic_name IS NOT NULL
     UNION ALL
-    SELECT t.topic_name, i.process_id, 0, false
+    SELECT t.topic_name, i.process_id, 0, false, false
     FROM topic AS t
     CROSS JOIN incomplete AS i
     WHERE (t.topic_name, i.process_id) NOT IN (
         SELECT (topic_name, process_id) FROM sending WHERE topic_name IS NOT NULL
     )
     UNION ALL
-    SELECT NULL, process_id, min(created_ns), true
+    SELECT NULL, process_id, min(created_ns), true, false
     FROM sending
     GROUP BY process_id
 ),
 sender AS (
     SELECT
-        c.topic_name, c.process_id, c.created_ns, c.is_known, p.host_id, p.last_seen_ns,
+        c.topic_name, c.process_id, c.created_ns, c.is_known, c.is_silent, p.host_id,
+        p.last_seen_ns,
         coalesce(r.begin_ns, p.first_seen_ns) AS begin_ns,
         coalesce(r.recorded_from_ns, p.first_seen_ns) AS recorded_from_ns,
         c.process_id IN (SELECT process_id FROM stampless)
@@ -138,7 +148,7 @@ sender AS (
 sent AS (
     SELECT
         o.take_id, s.process_id, s.created_ns, s.last_seen_ns, s.recorded_from_ns, s.is_known,
-        s.is_stampless,
+        s.is_stampless, s.is_silent,
         o.stamp_ns + coalesce(h.shift_ns, 0) AS at_ns,
         o.stamp_ns + coalesce(h.greatest_shift_ns, 0) AS latest_ns
     FROM orphan AS o
@@ -172,7 +182,8 @@ judged AS (
             bool_or(n.end_ns >= s.at_ns - derive.delivery_limit().stamp_slack_ns), false
         ) AS has_nameless,
         bool_or(s.last_seen_ns < s.latest_ns OR s.at_ns < s.recorded_from_ns) AS has_absent,
-        bool_or(s.is_stampless AND s.created_ns <= s.at_ns) AS has_stampless
+        bool_or(s.is_stampless AND s.created_ns <= s.at_ns) AS has_stampless,
+        bool_or(s.is_silent) AS has_silent
     FROM sent AS s
     ASOF LEFT JOIN gap AS g
         ON s.process_id = g.process_id
@@ -236,11 +247,13 @@ SELECT
         WHEN coalesce(j.is_before_tracing, o.stamp_ns < (SELECT begin_ns FROM run_begin))
             THEN 'before_tracing'
         WHEN j.has_gap THEN 'publisher_gap'
+        WHEN j.has_none_left AND j.has_silent THEN 'publisher_without_events'
         WHEN j.has_none_left AND NOT j.has_nameless THEN 'publisher_trace_ends'
         WHEN o.take_id IN (
             SELECT take_id FROM derive.take_candidate(only_run)
         ) OR n.is_clock_set IS NOT NULL THEN 'ambiguous'
         WHEN o.take_id IN (SELECT take_id FROM replaced) THEN 'receiver_gap'
+        WHEN j.has_silent THEN 'publisher_without_events'
         WHEN j.take_id IS NULL OR NOT (j.has_absent OR j.has_stampless)
             THEN 'publisher_not_traced'
         ELSE 'unknown'

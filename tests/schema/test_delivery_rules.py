@@ -709,9 +709,7 @@ def test_more_messages_are_missing_than_ever_before(
 
 
 @pytest.mark.parametrize(("more", "reason"), [(1, "no_longer_taken"), (0, "pending_at_end")])
-def test_a_reader_that_waits_takes_nothing_more(
-    delivery: Delivery, more: int, reason: str
-) -> None:
+def test_a_reader_that_waits_takes_nothing_more(delivery: Delivery, more: int, reason: str) -> None:
     """Its queue is empty. The message behind the wait has the same word."""
     delivery.lives(last_seen_ns=400 * MS, host_end_ns=400 * MS)
     usually(delivery, 300_000)

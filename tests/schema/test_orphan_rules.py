@@ -24,7 +24,7 @@ CREATE TABLE store.subscription (run_id BIGINT DEFAULT 1, subscription_id BIGINT
     process_id BIGINT DEFAULT 9, topic_name VARCHAR DEFAULT '/a', created_ns BIGINT,
     is_inferred BOOLEAN DEFAULT false, is_internal BOOLEAN DEFAULT false);
 CREATE TABLE store.publisher (run_id BIGINT DEFAULT 1, process_id BIGINT DEFAULT 1,
-    publisher_id BIGINT,
+    publisher_id BIGINT DEFAULT 1,
     topic_name VARCHAR DEFAULT '/a', created_ns BIGINT DEFAULT 0,
     is_inferred BOOLEAN DEFAULT false, is_internal BOOLEAN DEFAULT false);
 CREATE TABLE store.callback_instance (take_id BIGINT, is_intra_process BOOLEAN);
@@ -50,6 +50,7 @@ CREATE MACRO derive.process_gap(only_run) AS TABLE FROM missed;
 CREATE MACRO derive.take_candidate(only_run) AS TABLE FROM rival;
 INSERT INTO store.subscription (created_ns) VALUES (0);
 INSERT INTO store.process (process_id) VALUES (1), (2), (9);
+INSERT INTO store.publication (publication_id, process_id, source_timestamp_ns) VALUES (0, 9, 1);
 INSERT INTO store.trace (start_ns) VALUES ({100 * MS});
 INSERT INTO store.trace (domain, start_ns) VALUES ('kernel', 0);
 """
@@ -103,6 +104,32 @@ def shifted(least: int, greatest: int, since: int = 0) -> str:
 
 def test_a_sender_that_was_recorded_all_the_time(con: duckdb.DuckDBPyConnection) -> None:
     assert reason(con, TAKE, SENDER, RECORDED) == "publisher_not_traced"
+
+
+@pytest.mark.parametrize(
+    ("publisher", "topic", "expected"),
+    [
+        (7, "/a", "publisher_without_events"),
+        (1, "/a", "publisher_not_traced"),
+        (7, "/b", "publisher_not_traced"),
+    ],
+)
+@pytest.mark.parametrize("last", [900 * MS, STAMP - 1])
+def test_a_publisher_that_was_never_seen_to_publish(
+    con: duckdb.DuckDBPyConnection, publisher: int, topic: str, expected: str, last: int
+) -> None:
+    """The player of a bag, before Jazzy: no more than its initialisation shows."""
+    other = (
+        "INSERT INTO store.publisher (process_id, publisher_id, topic_name) "
+        f"VALUES (2, {publisher}, '{topic}')"
+    )
+    if last < STAMP and expected == "publisher_not_traced":
+        expected = "publisher_trace_ends"
+    ends = (seen_until(last, 1), seen_until(last, 2))
+    assert (
+        reason(con, TAKE, SENDER, RECORDED, recorded(2, 100 * MS, 100 * MS), other, *ends)
+        == expected
+    )
 
 
 @pytest.mark.parametrize(
@@ -368,6 +395,7 @@ def test_a_sender_whose_publications_on_the_topic_have_no_event_of_the_middlewar
     published = (
         "INSERT INTO store.publication (publication_id, source_timestamp_ns) VALUES (1, 7);"
         f"INSERT INTO store.publisher (publisher_id, topic_name) VALUES (5, '{topic}');"
+        "INSERT INTO store.publication (publisher_id, source_timestamp_ns) VALUES (5, 1);"
         f"INSERT INTO unstamped VALUES (1, 5, {is_without_event})"
     )
     assert reason(con, TAKE, SENDER, RECORDED, published) == expected

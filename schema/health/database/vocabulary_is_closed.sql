@@ -77,7 +77,8 @@ WITH foreign_word AS (
     FROM store.orphan_take
     WHERE reason NOT IN (
         'no_stamp', 'receiver_gap', 'clock_set', 'before_tracing', 'publisher_gap',
-        'publisher_trace_ends', 'publisher_not_traced', 'ambiguous', 'unknown'
+        'publisher_without_events', 'publisher_trace_ends', 'publisher_not_traced', 'ambiguous',
+        'unknown'
     )
     UNION ALL
     SELECT DISTINCT run_id, 'finding.name', name
