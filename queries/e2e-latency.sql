@@ -88,7 +88,7 @@ WITH flow AS (
 root AS (
     SELECT run_id, path_id, status, reason
     FROM flow
-    WHERE is_first
+    WHERE is_first IS NOT false
 ),
 affected AS (
     SELECT path_id, count(*) AS number

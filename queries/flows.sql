@@ -67,9 +67,9 @@ LEFT JOIN (
     JOIN main.bag_message AS b ON l.publication_id = b.publication_id
 ) AS m ON f.take_id = m.take_id
 WHERE CASE $case
-    WHEN 'first' THEN f.is_first
-    WHEN 'last' THEN f.is_last
-    WHEN 'newest' THEN f.is_newest
+    WHEN 'first' THEN f.is_first IS NOT false
+    WHEN 'last' THEN f.is_last IS NOT false
+    WHEN 'newest' THEN f.is_newest IS NOT false
     ELSE true
 END
 ORDER BY f.run_id, p.path, f.path_id, f.root_ns, f.root_kind, f.root_id, f.sink_ns, f.take_id

@@ -81,7 +81,7 @@ WITH thing AS (
             WHEN wanted_case = 'newest' AND NOT e.is_newest THEN NULL
             ELSE e.latency_ns
         END AS value_ns,
-        e.is_first AND e.status NOT IN ('not_connected', 'cut_by_recording')
+        e.is_first IS NOT false AND e.status NOT IN ('not_connected', 'cut_by_recording')
             AS is_unit,
         e.status = 'reached' AS is_complete,
         e.is_loss_affected,

@@ -41,9 +41,9 @@
 --     'node_inactive' (a managed node), 'not_published' (one or the other cannot be known),
 --     'superseded', 'callback_not_finished', or a reason of main.stat_delivery for the message that
 --     stopped it
--- column: is_first BOOLEAN  First arrival of the root
--- column: is_last BOOLEAN  Last arrival of the root
--- column: is_newest BOOLEAN  Newest root of the arrival
+-- column: is_first BOOLEAN  First arrival of the root; NULL: it did not arrive
+-- column: is_last BOOLEAN  Last arrival of the root; NULL: it did not arrive
+-- column: is_newest BOOLEAN  Newest root of the arrival; NULL: it did not arrive
 -- column: is_loss_affected BOOLEAN  A gap of a trace overlaps its time, from the root to the end;
 --     if it did not arrive, as long as the longest flow of the path took
 CREATE OR REPLACE MACRO main.end_to_end(
@@ -229,7 +229,7 @@ ranked AS (
         coalesce(o.sink_ns, o.root_ns + coalesce(l.longest_ns, 0)) AS until_ns,
         row_number() OVER of_root = 1 AS is_first,
         lead(true) OVER of_root IS NULL AS is_last,
-        o.take_id IS NULL OR row_number() OVER (
+        row_number() OVER (
             PARTITION BY o.path_id, o.take_id ORDER BY o.root_ns DESC, o.root_key DESC
         ) = 1 AS is_newest
     FROM outcome AS o
@@ -256,9 +256,9 @@ SELECT
         ELSE 'unknown'
     END AS status,
     CASE WHEN x.is_cached AND NOT x.is_cut THEN 'superseded' ELSE x.reason END AS reason,
-    r.is_first,
-    r.is_last,
-    r.is_newest,
+    CASE WHEN r.take_id IS NOT NULL THEN r.is_first END AS is_first,
+    CASE WHEN r.take_id IS NOT NULL THEN r.is_last END AS is_last,
+    CASE WHEN r.take_id IS NOT NULL THEN r.is_newest END AS is_newest,
     coalesce(g.covered_until_ns >= r.root_ns, false) AS is_loss_affected
 FROM ranked AS r
 ASOF LEFT JOIN gap AS g ON r.run_id = g.run_id AND r.until_ns >= g.start_ns

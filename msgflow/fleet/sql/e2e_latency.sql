@@ -56,7 +56,7 @@ completeness AS (
         count(*) AS roots,
         histogram(status)::MAP(VARCHAR, BIGINT) AS number
     FROM arrival
-    WHERE is_first
+    WHERE is_first IS NOT false
     GROUP BY label_group, path
 ),
 affected AS (
@@ -76,7 +76,7 @@ reason AS (
     FROM (
         SELECT label_group, path, reason, count(*) AS number
         FROM arrival
-        WHERE is_first AND status <> 'reached'
+        WHERE status <> 'reached'
         GROUP BY label_group, path, reason
     )
     GROUP BY label_group, path

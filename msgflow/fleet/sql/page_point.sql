@@ -25,6 +25,6 @@ SELECT
     count(*) FILTER (WHERE f.status = 'lost') AS lost
 FROM flow AS f
 JOIN run AS r ON f.run = r.run
-WHERE f.is_first
+WHERE f.is_first IS NOT false
 GROUP BY f.path, f.run, r.start_ns
 ORDER BY f.path, r.start_ns, f.run

@@ -22,5 +22,5 @@ SELECT
 FROM main.end_to_end(
     [$run], NULL, NULL, 'callback_start', 'callback_end', $start_ns, $end_ns
 )
-WHERE is_first
+WHERE is_first IS NOT false
 ORDER BY path_id, root_at, root_kind, root_id

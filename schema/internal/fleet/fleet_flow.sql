@@ -20,9 +20,9 @@
 -- column: status VARCHAR  'reached', 'superseded', 'dropped', 'lost', 'no_output',
 --     'not_connected', 'cut_by_recording' or 'unknown'
 -- column: reason VARCHAR  Why it did not arrive
--- column: is_first BOOLEAN  First arrival of the root
--- column: is_last BOOLEAN  Last arrival of the root
--- column: is_newest BOOLEAN  Newest root of the arrival
+-- column: is_first BOOLEAN  First arrival of the root; NULL: it did not arrive
+-- column: is_last BOOLEAN  Last arrival of the root; NULL: it did not arrive
+-- column: is_newest BOOLEAN  Newest root of the arrival; NULL: it did not arrive
 -- column: is_loss_affected BOOLEAN  A gap of a trace overlaps its time
 SELECT
     e.run_id,
