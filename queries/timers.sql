@@ -27,9 +27,9 @@
 -- column: lateness_p95_ns BIGINT [ns]  95 % of the calls were at most this late
 -- column: lateness_p99_ns BIGINT [ns]  99 % of the calls were at most this late
 -- column: lateness_max_ns BIGINT [ns]  Greatest lateness
--- column: off_grid VARCHAR          Why jitter and lateness say little of it: 'reset', since it
---     runs a constant time after the instants that its creation suggests while the executor is
---     idle; 'clock', since it runs more often than its period allows (simulated time)
+-- column: off_grid VARCHAR          Why its lateness is not known: 'reset', since it keeps its
+--     period at other instants than its creation suggests; 'clock', since it keeps another period
+--     (simulated time)
 -- column: busy_share DOUBLE [share] Share of all lateness for which the executor was busy with
 --     callbacks, 0 to 1
 -- column: run_queue_share DOUBLE [share] Share of all lateness for which its thread waited for a
@@ -112,16 +112,15 @@ kept AS (
     WHERE i.interval_ns IS NOT NULL AND NOT i.is_loss_affected
     GROUP BY i.callback_id
 ),
--- How far behind the grid of its creation a timer is called. Its creation is recorded a little
--- later than the instant from which periods count: a hundredth of the period is allowed for that.
+-- How far behind the grid of its creation a timer is called that does not keep it.
 placed AS (
     SELECT
         i.callback_id,
-        quantile_disc(
-            (i.start_ns - a.created_ns + a.period_ns // 100) % a.period_ns, [0.25, 0.75]
-        ) AS place
+        count(*) AS count,
+        quantile_disc((i.start_ns - a.created_ns) % a.period_ns, [0.25, 0.75]) AS place
     FROM instance AS i
     JOIN asked AS a ON i.callback_id = a.callback_id
+    ANTI JOIN late AS l ON i.callback_instance_id = l.callback_instance_id
     WHERE a.period_ns > 0
     GROUP BY i.callback_id
 ),
@@ -205,14 +204,12 @@ SELECT
         -- On its grid a timer takes count - 2 periods for that many calls at the least. One more is
         -- for how long starting takes.
         WHEN c.span_ns < (c.count - 3) * a.period_ns THEN 'clock'
-        -- What a busy executor adds is not that constant, and calls of fast timers are late by more
-        -- than a hundredth of their period for the time that waking takes. Fewer than ten may be
-        -- equally late by chance.
+        WHEN c.count >= 10 AND d.known IS NULL AND k.jitter[1] > a.period_ns // 10 THEN 'clock'
+        -- Fewer than ten may be equally late by chance.
         WHEN
-            d.known >= 10
-            AND g.place[2] - g.place[1] <= a.period_ns // 100
-            AND g.place[1] > a.period_ns // 10
-            AND d.busy_share < 0.5
+            g.count >= 10
+            AND g.place[1] > least(a.period_ns // 10, 1000000)
+            AND g.place[2] - g.place[1] <= a.period_ns // 10
             THEN 'reset'
     END AS off_grid,
     d.busy_share,

@@ -3,8 +3,7 @@
 -- description: Since when a callback instance can have been due (its release), and by when it was
 --     due for certain. A message can have been due since the end of its publication, or since its
 --     stamp where the two clocks cannot be compared; a request since it was sent. A timer is due
---     since the first instant after its previous call that is a whole number of periods after its
---     creation; if it ran before that instant, it was reset. All times are those of the
+--     as derive.timer_due says, in any case after its previous call. All times are those of the
 --     executor's clock; times of other clocks are brought to it.
 -- grain: one row per callback instance that is not nested in another
 -- param: executors VARCHAR  Name of rows of executor_id, until_ns: those to look at. Callback
@@ -15,57 +14,24 @@ WITH every_run AS (
     SELECT
         run_id, callback_instance_id, callback_id, process_id, thread_id, start_ns, take_id,
         request_id, depth,
-        lag(start_ns) OVER in_time AS previous_start_ns,
-        -- Of lag with an offset, older versions of DuckDB cannot read the definition.
-        any_value(start_ns) OVER (in_time ROWS BETWEEN 2 PRECEDING AND 2 PRECEDING)
-            AS earlier_start_ns
+        lag(start_ns) OVER (
+            PARTITION BY run_id, callback_id ORDER BY start_ns, callback_instance_id
+        ) AS previous_start_ns
     FROM store.callback_instance
     -- A plain comparison DuckDB expects to leave few rows, and so compares each with all waits.
     WHERE (start_ns > (SELECT max(until_ns) FROM query_table(executors))) IS DISTINCT FROM true
-    WINDOW in_time AS (
-        PARTITION BY run_id, callback_id ORDER BY start_ns, callback_instance_id
-    )
-),
--- A timer is due at creation + k periods. Its creation is recorded a little later than the instant
--- from which the periods count: a hundredth of the period is allowed for that.
-slotted AS (
-    SELECT
-        i.run_id, x.executor_id, i.thread_id, i.callback_id, i.callback_instance_id, i.start_ns,
-        i.previous_start_ns, i.take_id, i.request_id, t.period_ns, t.created_ns,
-        (i.previous_start_ns + t.period_ns // 100 - t.created_ns) // t.period_ns AS slot,
-        (i.earlier_start_ns + t.period_ns // 100 - t.created_ns) // t.period_ns AS earlier_slot
-    FROM every_run AS i
-    JOIN store.executor_thread AS x ON i.thread_id = x.thread_id
-    JOIN store.callback AS c ON i.callback_id = c.callback_id
-    LEFT JOIN store.timer AS t ON c.timer_id = t.timer_id AND t.period_ns > 0
-    WHERE i.depth = 1
-        AND x.executor_id IN (SELECT executor_id FROM query_table(executors))
-),
--- A call shortly before such an instant was for that instant, or for the one before it, almost a
--- period late. In the second case the instant is still to come.
-timed AS (
-    SELECT
-        run_id, executor_id, thread_id, callback_id, callback_instance_id, start_ns,
-        previous_start_ns, take_id, request_id, period_ns,
-        created_ns + period_ns * CASE
-            WHEN previous_start_ns < created_ns + period_ns * slot
-                AND coalesce(earlier_slot, 0) + 1 < slot
-                THEN slot
-            ELSE slot + 1
-        END AS next_ns
-    FROM slotted
 ),
 started AS (
     SELECT
-        run_id, executor_id, thread_id, callback_id, callback_instance_id, start_ns,
-        previous_start_ns, take_id, request_id,
-        previous_start_ns + period_ns AS latest_ns,
-        CASE
-            WHEN next_ns <= start_ns THEN next_ns
-            WHEN next_ns - period_ns > previous_start_ns THEN next_ns - period_ns
-            WHEN next_ns - start_ns <= period_ns // 100 THEN start_ns
-        END AS due_ns
-    FROM timed
+        i.run_id, x.executor_id, i.thread_id, i.callback_id, i.callback_instance_id, i.start_ns,
+        i.previous_start_ns, i.take_id, i.request_id, d.due_ns, d.latest_ns,
+        CASE WHEN c.kind = 'timer' THEN i.previous_start_ns END AS called_ns
+    FROM every_run AS i
+    JOIN store.executor_thread AS x ON i.thread_id = x.thread_id
+    JOIN store.callback AS c ON i.callback_id = c.callback_id
+    LEFT JOIN derive.timer_due(executors) AS d ON i.callback_instance_id = d.callback_instance_id
+    WHERE i.depth = 1
+        AND x.executor_id IN (SELECT executor_id FROM query_table(executors))
 ),
 message AS (
     SELECT
@@ -126,7 +92,7 @@ SELECT
         WHEN q.origin_ns IS NOT NULL THEN least(q.origin_ns, i.start_ns)
         ELSE m.origin_ns
     END AS origin_ns,
-    m.created_ns AS subscribed_ns,
+    coalesce(m.created_ns, i.called_ns) AS subscribed_ns,
     least(i.latest_ns, q.taken_ns, m.taken_ns, i.start_ns) AS latest_ns
 FROM started AS i
 LEFT JOIN message AS m ON i.take_id = m.take_id
