@@ -3,11 +3,13 @@
 -- description: How long callbacks ran, and how far apart their starts were. Instances without an
 --     end are counted separately. Where the kernel was traced, CPU time and the time without a CPU
 --     stand beside the duration. The longest 99th percentile comes first.
--- grain: one row per callback object that ran
+-- grain: one row per callback object that ran; one for all timers that a node made of one function
+--     and period
 -- variant: each BOOLEAN = false  Each callback instance, the longest first
 -- column: run_id BIGINT             Run
 -- column: node VARCHAR [node]  Node of the callback
 -- column: callback VARCHAR [callback]  What triggers it
+-- column: objects BIGINT            Callback objects that it stands for, timers made anew
 -- column: count BIGINT              Callback instances that began in the time window
 -- column: open BIGINT               Instances without an end
 -- column: rate_hz DOUBLE [Hz]      Instances per second, from the first start to the last; NULL:
@@ -27,7 +29,7 @@
 -- column: preempted_p99_ns BIGINT [ns]  99 % lost the CPU to other threads for at most this long
 -- column: preempted_ns BIGINT [ns]      Sum of the time for which others had the CPU
 -- column: symbol VARCHAR            Function registered for the callback
--- column: callback_id BIGINT        Identity of the callback
+-- column: callback_id BIGINT        Identity of the callback, of the first of several
 -- column: is_internal BOOLEAN       Infrastructure of ROS
 -- brief: node, callback, count, median_ns, p99_ns, max_ns, running_p99_ns, preempted_p99_ns,
 --     p95_ns, period_median_ns, mean_ns
@@ -35,7 +37,8 @@
 WITH instance AS (
     SELECT
         i.run_id,
-        i.callback_id,
+        k.alike_id AS callback_id,
+        k.objects,
         i.start_ns,
         i.end_ns - i.start_ns AS duration_ns,
         i.start_ns - lag(i.start_ns) OVER (
@@ -44,6 +47,7 @@ WITH instance AS (
         s.running_ns,
         s.preempted_ns
     FROM main.callback_instance AS i
+    JOIN main.callback_alike AS k ON i.callback_id = k.callback_id
     LEFT JOIN main.callback_schedule AS s ON i.callback_instance_id = s.callback_instance_id
     WHERE list_contains($runs, i.run_id) AND i.start_ns >= $start_ns AND i.start_ns < $end_ns
 ),
@@ -51,6 +55,7 @@ measured AS (
     SELECT
         run_id,
         callback_id,
+        any_value(objects) AS objects,
         count(*) AS count,
         count(*) - count(duration_ns) AS open,
         max(start_ns) - min(start_ns) AS span_ns,
@@ -72,6 +77,7 @@ SELECT
     m.run_id,
     l.node,
     l.label AS callback,
+    m.objects,
     m.count,
     m.open,
     CASE WHEN

@@ -95,7 +95,8 @@ WHERE a.is_exact AND a.executor_ns IS NOT NULL;
 -- Between clocks that are apart the time that they show may be shorter than the executor was busy.
 WITH piece AS (
     SELECT
-        p.path_id, p.flow_id, p.hop, p.rank, p.part, p.duration_ns, p.callback_id, p.is_turning,
+        p.path_id, p.flow_id, p.hop, p.rank, p.part, p.duration_ns, p.is_turning,
+        k.alike_id AS callback_id,
         least(coalesce(p.busy_min_ns, 0), greatest(p.duration_ns, 0)) AS busy_min_ns,
         least(coalesce(p.busy_max_ns, p.duration_ns), greatest(p.duration_ns, 0)) AS busy_max_ns,
         a.run_queue_ns,
@@ -114,6 +115,7 @@ WITH piece AS (
     ) AS p
     LEFT JOIN breakdown_arrival AS a
         ON p.flow_id = a.flow_id AND p.hop = a.hop AND p.part = 'publish_to_take'
+    LEFT JOIN main.callback_alike AS k ON p.callback_id = k.callback_id
 ),
 part AS (
     SELECT

@@ -8,10 +8,12 @@
 --     were due meanwhile (missed), and is followed by one sooner than usual (bunched). A timer
 --     waits for what its executor runs, else for the executor itself, or for a CPU. Calls after a
 --     gap of the trace are not counted in any of this.
--- grain: one row per callback of a timer, called or not
+-- grain: one row per timer, called or not; one for all timers that a node made of one function and
+--     period
 -- column: run_id BIGINT             Run
 -- column: node VARCHAR [node]       Node of the timer
 -- column: callback VARCHAR [callback]  The timer, by its period
+-- column: objects BIGINT            Timers that it stands for
 -- column: period_ns BIGINT [ns]     Period asked for; empty: not in the trace
 -- column: period_median_ns BIGINT [ns]  Median time from one start to the next
 -- column: rate_hz DOUBLE [Hz]       Calls per second, between the first and the last
@@ -40,21 +42,25 @@
 --     first call
 -- column: loss_affected BIGINT      Of count, those with a gap of the trace since the call before
 -- column: symbol VARCHAR            Function registered for the callback
--- column: timer_id BIGINT           Identity of the timer
--- column: callback_id BIGINT        Identity of the callback
+-- column: timer_id BIGINT           Identity of the timer, of the first of several
+-- column: callback_id BIGINT        Identity of the callback, of the first of several
 -- column: is_internal BOOLEAN       Infrastructure of ROS
 -- brief: node, callback, count, missed, lateness_p99_ns, lateness_max_ns, off_grid, jitter_p99_ns,
---     meanwhile, busy_share, run_queue_share, lateness_median_ns, rate_hz, bunched
+--     meanwhile, objects, busy_share, run_queue_share, lateness_median_ns, rate_hz, bunched
 -- note: callbacks
 WITH asked AS (
-    SELECT c.run_id, c.callback_id, c.timer_id, c.symbol, t.period_ns, t.created_ns
+    SELECT
+        c.run_id, c.callback_id, c.timer_id, c.symbol, t.period_ns, t.created_ns, k.alike_id,
+        k.objects
     FROM main.callback AS c
     JOIN main.timer AS t ON c.timer_id = t.timer_id
+    JOIN main.callback_alike AS k ON c.callback_id = k.callback_id
     WHERE list_contains($runs, c.run_id)
 ),
 called AS (
     SELECT
-        i.callback_id,
+        a.alike_id AS callback_id,
+        a.created_ns,
         i.callback_instance_id,
         i.thread_id,
         x.executor_id,
@@ -74,6 +80,7 @@ broken AS (
 instance AS (
     SELECT
         c.callback_id,
+        c.created_ns,
         c.callback_instance_id,
         c.thread_id,
         c.start_ns,
@@ -117,7 +124,7 @@ placed AS (
     SELECT
         i.callback_id,
         count(*) AS count,
-        quantile_disc((i.start_ns - a.created_ns) % a.period_ns, [0.25, 0.75]) AS place
+        quantile_disc((i.start_ns - i.created_ns) % a.period_ns, [0.25, 0.75]) AS place
     FROM instance AS i
     JOIN asked AS a ON i.callback_id = a.callback_id
     ANTI JOIN late AS l ON i.callback_instance_id = l.callback_instance_id
@@ -154,9 +161,10 @@ ran AS (
     FROM late
 ),
 pair AS (
-    SELECT callback_id, meanwhile_id, sum(overlap_ns) AS overlap_ns
-    FROM ran
-    GROUP BY callback_id, meanwhile_id
+    SELECT r.callback_id, k.alike_id AS meanwhile_id, sum(r.overlap_ns) AS overlap_ns
+    FROM ran AS r
+    JOIN main.callback_alike AS k ON r.meanwhile_id = k.callback_id
+    GROUP BY r.callback_id, k.alike_id
 ),
 ranked AS (
     SELECT
@@ -186,6 +194,7 @@ SELECT
     a.run_id,
     n.node,
     n.label AS callback,
+    a.objects,
     a.period_ns,
     u.median_ns AS period_median_ns,
     c.rate_hz,
@@ -203,7 +212,7 @@ SELECT
     CASE
         -- On its grid a timer takes count - 2 periods for that many calls at the least. One more is
         -- for how long starting takes.
-        WHEN c.span_ns < (c.count - 3) * a.period_ns THEN 'clock'
+        WHEN c.span_ns * a.objects < (c.count - 3 * a.objects) * a.period_ns THEN 'clock'
         WHEN c.count >= 10 AND d.known IS NULL AND k.jitter[1] > a.period_ns // 10 THEN 'clock'
         -- Fewer than ten may be equally late by chance.
         WHEN
@@ -229,4 +238,5 @@ LEFT JOIN kept AS k ON a.callback_id = k.callback_id
 LEFT JOIN delayed AS d ON a.callback_id = d.callback_id
 LEFT JOIN placed AS g ON a.callback_id = g.callback_id
 LEFT JOIN meanwhile AS m ON a.callback_id = m.callback_id
+WHERE a.callback_id = a.alike_id
 ORDER BY a.run_id, lateness_p99_ns DESC NULLS LAST, n.node, n.label, a.callback_id

@@ -10,7 +10,8 @@
 --     callback instances in the time window. The callback that others kept waiting longest comes
 --     first. With --by instance, the waits are listed one by one, with --by pair, the callbacks
 --     that ran meanwhile.
--- grain: one row per callback object that ran
+-- grain: one row per callback object that ran; one for all timers that a node made of one function
+--     and period
 -- variant: by VARCHAR {callback|pair|instance} = 'callback'  What a row is: a callback that
 --     waited, with another that ran meanwhile, or one of its waits
 -- column: run_id BIGINT             Run
@@ -52,11 +53,13 @@
 -- note: clocks
 WITH waited AS MATERIALIZED (
     SELECT
-        run_id, callback_instance_id, callback_id, wait_ns, busy_min_ns, busy_max_ns,
-        held_max_ns, is_loss_affected, meanwhile_callback_ids, meanwhile_ns, until_arrival_ns,
-        run_queue_ns, preempted_ns, cpu_taken_by, cpu_taken_ns
-    FROM main.executor_wait_explained($runs)
-    WHERE start_ns >= $start_ns AND start_ns < $end_ns
+        w.run_id, w.callback_instance_id, k.alike_id AS callback_id, w.wait_ns, w.busy_min_ns,
+        w.busy_max_ns, w.held_max_ns, w.is_loss_affected, w.meanwhile_callback_ids,
+        w.meanwhile_ns, w.until_arrival_ns, w.run_queue_ns, w.preempted_ns, w.cpu_taken_by,
+        w.cpu_taken_ns
+    FROM main.executor_wait_explained($runs) AS w
+    JOIN main.callback_alike AS k ON w.callback_id = k.callback_id
+    WHERE w.start_ns >= $start_ns AND w.start_ns < $end_ns
 ),
 measured AS (
     SELECT
@@ -92,9 +95,10 @@ ran AS (
     FROM waited
 ),
 pair AS (
-    SELECT callback_id, meanwhile_id, sum(overlap_ns) AS overlap_ns
-    FROM ran
-    GROUP BY callback_id, meanwhile_id
+    SELECT r.callback_id, k.alike_id AS meanwhile_id, sum(r.overlap_ns) AS overlap_ns
+    FROM ran AS r
+    JOIN main.callback_alike AS k ON r.meanwhile_id = k.callback_id
+    GROUP BY r.callback_id, k.alike_id
 ),
 ranked AS (
     SELECT

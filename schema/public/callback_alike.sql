@@ -1,0 +1,21 @@
+-- name: main.callback_alike
+-- description: Callbacks that are told as one: those of timers that a node makes of one function
+--     and period, such as a new one-shot timer for each event. Every other callback is alone.
+-- grain: one row per callback object
+-- column: callback_id BIGINT  Identity of the callback
+-- column: run_id BIGINT  Run that the row belongs to
+-- column: alike_id BIGINT  The first of those like it
+-- column: objects BIGINT  How many there are of them, with itself
+SELECT
+    c.callback_id,
+    c.run_id,
+    min(c.callback_id) OVER alike AS alike_id,
+    count(*) OVER alike AS objects
+FROM store.callback AS c
+LEFT JOIN store.timer AS t ON c.timer_id = t.timer_id
+WINDOW alike AS (
+    PARTITION BY
+        c.run_id, c.node_id, c.symbol, t.period_ns,
+        CASE WHEN c.node_id IS NULL OR c.symbol IS NULL OR t.period_ns IS NULL
+            THEN c.callback_id END
+)
