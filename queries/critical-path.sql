@@ -61,15 +61,19 @@
 -- column: publication_id BIGINT    Message
 -- column: take_id BIGINT           Take at the end of the flow
 -- column: latency_ns BIGINT [ns]   Latency of the whole flow
--- column: path VARCHAR [path]      Nodes and topics of the flow; only in its first row
--- heading: rank, latency_ns, take_id, path
+-- column: is_ambiguous BOOLEAN     The flow passes a link that may be another one (a
+--     candidate_count above 1), so that it may be none; only in its first row, as the next two
+-- column: is_cut BOOLEAN           Paths of the run were left out beyond max_depth or max_paths:
+--     one may have a slower flow
+-- column: path VARCHAR [path]      Nodes and topics of the flow
+-- heading: rank, latency_ns, take_id, is_ambiguous, path
 -- brief: rank, at_ns, duration_ns, share, activity, state, who, node, what, is_certain, pieces,
 --     hop, part, thread, wakers, priority, who_priority
 -- note: clocks
 CREATE OR REPLACE TEMP TABLE path_outcome AS
 SELECT
     run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns, status,
-    reason, is_first, is_last, is_newest, is_loss_affected
+    reason, is_first, is_last, is_newest, is_loss_affected, is_ambiguous
 FROM main.end_to_end(
     $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns,
     max_depth := $max_depth, max_paths := $max_paths
@@ -102,7 +106,8 @@ WITH path AS (
         )), false)
 )
 SELECT
-    flow_id, run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns
+    flow_id, run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns,
+    is_ambiguous
 FROM main.chosen_flow(
     'path_outcome', $case, sink_take_id := $take, most_flows := $slowest,
     at_quantile := CASE $quantile WHEN 'median' THEN 0.5 WHEN 'p90' THEN 0.9 WHEN 'p95' THEN 0.95
@@ -315,6 +320,15 @@ ordered AS (
                 row_key
         ) AS place
     FROM summed
+),
+doubted AS (
+    SELECT DISTINCT c.flow_rank, f.is_ambiguous
+    FROM critical_piece AS c
+    JOIN critical_flow AS f
+        ON c.path_id = f.path_id
+        AND c.root_kind = f.root_kind
+        AND c.root_id = f.root_id
+        AND c.take_id = f.take_id
 )
 SELECT
     s.run_id,
@@ -341,7 +355,13 @@ SELECT
     s.take_id,
     s.latency_ns,
     -- The path of a flow of a thousand hops is long: only the first of its rows has it.
+    CASE WHEN s.place = 1 THEN d.is_ambiguous END AS is_ambiguous,
+    CASE
+        WHEN s.place = 1
+            THEN s.run_id IN (SELECT run_id FROM named_path WHERE is_cut)
+    END AS is_cut,
     n.path
 FROM ordered AS s
+JOIN doubted AS d ON s.flow_rank = d.flow_rank
 LEFT JOIN named_path AS n ON s.path_id = n.path_id AND s.place = 1
 ORDER BY s.run_id, s.flow_rank, s.place

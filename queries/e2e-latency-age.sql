@@ -15,6 +15,8 @@
 -- column: run_id BIGINT            Run
 -- column: outputs BIGINT           Outputs in the time window
 -- column: loss_affected BIGINT     Outputs with a gap of a trace in the time since their input
+-- column: ambiguous BIGINT         Outputs that pass a link that may be another one (a
+--     candidate_count above 1)
 -- column: min_ns BIGINT [ns]       Lowest age of an output
 -- column: median_ns BIGINT [ns]    Median age of outputs
 -- column: mean_ns BIGINT [ns]      Mean age of outputs
@@ -29,7 +31,7 @@
 --     never shows a callback
 -- column: is_cut BOOLEAN           The path goes on or has siblings beyond max_depth or max_paths
 -- column: path VARCHAR [path]  Nodes and topics
--- brief: path, outputs, median_ns, p99_ns, max_ns, peak_max_ns, loss_affected, p95_ns,
+-- brief: path, outputs, median_ns, p99_ns, max_ns, peak_max_ns, ambiguous, loss_affected, p95_ns,
 --     peak_median_ns, peak_p95_ns, mean_ns
 -- note: clocks
 WITH output AS (
@@ -39,6 +41,7 @@ WITH output AS (
         sink_ns,
         sink_ns - root_ns AS age_ns,
         is_loss_affected,
+        is_ambiguous,
         lead(sink_ns) OVER (PARTITION BY path_id ORDER BY sink_ns, take_id) - root_ns AS peak_ns
     FROM main.end_to_end(
         $runs, $from, $to, $from_event, $to_event,
@@ -52,6 +55,7 @@ measured AS (
         path_id,
         count(*) AS outputs,
         count(*) FILTER (WHERE is_loss_affected) AS loss_affected,
+        count(*) FILTER (WHERE is_ambiguous) AS ambiguous,
         any_value(sink_event) AS sink_event,
         min(age_ns) AS min_ns,
         quantile_disc(age_ns, [0.5, 0.95, 0.99]) AS quantiles,
@@ -71,6 +75,7 @@ SELECT
     p.run_id,
     coalesce(m.outputs, 0) AS outputs,
     coalesce(m.loss_affected, 0) AS loss_affected,
+    coalesce(m.ambiguous, 0) AS ambiguous,
     m.min_ns,
     m.quantiles[1] AS median_ns,
     m.mean_ns,

@@ -19,6 +19,8 @@
 -- column: intervals BIGINT         Intervals between inputs that the times are computed from
 -- column: unanswered BIGINT        Inputs that no output followed
 -- column: loss_affected BIGINT     Intervals with a gap of a trace in the time of their input
+-- column: ambiguous BIGINT         Intervals whose output passes a link that may be another one (a
+--     candidate_count above 1)
 -- column: min_ns BIGINT [ns]       Shortest reaction time
 -- column: median_ns BIGINT [ns]    Median reaction time
 -- column: mean_ns BIGINT [ns]      Mean reaction time
@@ -30,7 +32,7 @@
 --     never shows a callback
 -- column: is_cut BOOLEAN           The path goes on or has siblings beyond max_depth or max_paths
 -- column: path VARCHAR [path]  Nodes and topics
--- brief: path, inputs, median_ns, p99_ns, max_ns, unanswered, loss_affected, p95_ns,
+-- brief: path, inputs, median_ns, p99_ns, max_ns, unanswered, ambiguous, loss_affected, p95_ns,
 --     event_mean_ns, intervals, mean_ns, min_ns
 -- note: clocks
 WITH input AS (
@@ -41,7 +43,8 @@ WITH input AS (
         any_value(root_ns) AS root_ns,
         min(sink_ns) AS first_ns,
         any_value(sink_event) AS sink_event,
-        bool_or(is_loss_affected) AS is_loss_affected
+        bool_or(is_loss_affected) AS is_loss_affected,
+        arg_min(is_ambiguous, sink_ns) AS is_ambiguous
     FROM main.end_to_end(
         $runs, $from, $to, $from_event, $to_event,
         -9223372036854775807::BIGINT, 9223372036854775807::BIGINT,
@@ -56,18 +59,22 @@ answered AS (
         sink_event,
         is_loss_affected,
         lag(root_ns) OVER in_time AS previous_ns,
-        min(first_ns) OVER (
+        min(first_ns) OVER from_here AS answer_ns,
+        arg_min(is_ambiguous, first_ns) OVER from_here AS is_ambiguous
+    FROM input
+    WINDOW
+        in_time AS (PARTITION BY path_id ORDER BY root_ns, root_kind, root_id),
+        from_here AS (
             PARTITION BY path_id ORDER BY root_ns DESC, root_kind DESC, root_id DESC
             ROWS UNBOUNDED PRECEDING
-        ) AS answer_ns
-    FROM input
-    WINDOW in_time AS (PARTITION BY path_id ORDER BY root_ns, root_kind, root_id)
+        )
 ),
 windowed AS (
     SELECT
         path_id,
         sink_event,
         is_loss_affected,
+        is_ambiguous,
         answer_ns,
         root_ns - previous_ns AS interval_ns,
         answer_ns - previous_ns AS reaction_ns,
@@ -82,6 +89,7 @@ measured AS (
         count(reaction_ns) AS intervals,
         count(*) FILTER (WHERE answer_ns IS NULL) AS unanswered,
         count(*) FILTER (WHERE is_loss_affected AND reaction_ns IS NOT NULL) AS loss_affected,
+        count(*) FILTER (WHERE is_ambiguous AND reaction_ns IS NOT NULL) AS ambiguous,
         any_value(sink_event) AS sink_event,
         min(reaction_ns) AS min_ns,
         quantile_disc(reaction_ns, [0.5, 0.95, 0.99]) AS quantiles,
@@ -100,6 +108,7 @@ SELECT
     coalesce(m.intervals, 0) AS intervals,
     coalesce(m.unanswered, 0) AS unanswered,
     coalesce(m.loss_affected, 0) AS loss_affected,
+    coalesce(m.ambiguous, 0) AS ambiguous,
     m.min_ns,
     m.quantiles[1] AS median_ns,
     m.mean_ns,

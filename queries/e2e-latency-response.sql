@@ -18,6 +18,8 @@
 -- column: run_id BIGINT            Run
 -- column: response VARCHAR         'all', 'best', 'worst' or 'worst-with-external-latency'
 -- column: count BIGINT             Response times: inputs for 'all', else outputs
+-- column: ambiguous BIGINT         Those whose output passes a link that may be another one (a
+--     candidate_count above 1)
 -- column: min_ns BIGINT [ns]       Shortest
 -- column: median_ns BIGINT [ns]    Median
 -- column: mean_ns BIGINT [ns]      Mean
@@ -28,7 +30,7 @@
 --     never shows a callback
 -- column: is_cut BOOLEAN           The path goes on or has siblings beyond max_depth or max_paths
 -- column: path VARCHAR [path]  Nodes and topics
--- brief: path, response, count, median_ns, p99_ns, max_ns, p95_ns, mean_ns, min_ns
+-- brief: path, response, count, median_ns, p99_ns, max_ns, ambiguous, p95_ns, mean_ns, min_ns
 -- note: clocks
 WITH input AS (
     SELECT
@@ -37,7 +39,8 @@ WITH input AS (
         root_id,
         any_value(root_ns) AS root_ns,
         min(sink_ns) AS first_ns,
-        any_value(sink_event) AS sink_event
+        any_value(sink_event) AS sink_event,
+        arg_min(is_ambiguous, sink_ns) AS is_ambiguous
     FROM main.end_to_end(
         $runs, $from, $to, $from_event, $to_event,
         -9223372036854775807::BIGINT, 9223372036854775807::BIGINT,
@@ -50,11 +53,13 @@ answered AS (
         path_id,
         root_ns,
         sink_event,
-        min(first_ns) OVER (
-            PARTITION BY path_id ORDER BY root_ns DESC, root_kind DESC, root_id DESC
-            ROWS UNBOUNDED PRECEDING
-        ) AS answer_ns
+        min(first_ns) OVER from_here AS answer_ns,
+        arg_min(is_ambiguous, first_ns) OVER from_here AS is_ambiguous
     FROM input
+    WINDOW from_here AS (
+        PARTITION BY path_id ORDER BY root_ns DESC, root_kind DESC, root_id DESC
+        ROWS UNBOUNDED PRECEDING
+    )
 ),
 cycle AS (
     SELECT
@@ -62,7 +67,8 @@ cycle AS (
         answer_ns,
         min(root_ns) AS oldest_ns,
         max(root_ns) AS newest_ns,
-        any_value(sink_event) AS sink_event
+        any_value(sink_event) AS sink_event,
+        bool_or(is_ambiguous) AS is_ambiguous
     FROM answered
     WHERE answer_ns IS NOT NULL
     GROUP BY path_id, answer_ns
@@ -70,7 +76,7 @@ cycle AS (
 ),
 response AS (
     SELECT
-        path_id, sink_event, newest_ns AS input_ns,
+        path_id, sink_event, is_ambiguous, newest_ns AS input_ns,
         unnest([
             {response: 'best', response_ns: answer_ns - newest_ns},
             {response: 'worst', response_ns: answer_ns - oldest_ns},
@@ -83,7 +89,8 @@ response AS (
         ], recursive := true)
     FROM cycle
     UNION ALL
-    SELECT a.path_id, a.sink_event, a.root_ns, 'all', a.answer_ns - a.root_ns
+    SELECT
+        a.path_id, a.sink_event, a.is_ambiguous, a.root_ns, 'all', a.answer_ns - a.root_ns
     FROM answered AS a
     JOIN cycle AS c ON a.path_id = c.path_id AND a.answer_ns = c.answer_ns
 ),
@@ -92,6 +99,7 @@ measured AS (
         path_id,
         response,
         count(response_ns) AS count,
+        count(response_ns) FILTER (WHERE is_ambiguous) AS ambiguous,
         any_value(sink_event) AS sink_event,
         min(response_ns) AS min_ns,
         quantile_disc(response_ns, [0.5, 0.95, 0.99]) AS quantiles,
@@ -105,6 +113,7 @@ SELECT
     p.run_id,
     m.response,
     m.count,
+    m.ambiguous,
     m.min_ns,
     m.quantiles[1] AS median_ns,
     m.mean_ns,

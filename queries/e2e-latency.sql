@@ -34,6 +34,8 @@
 -- column: cut_by_recording BIGINT  Roots too close to the start or end of the recording to know
 -- column: loss_affected BIGINT     Roots with a gap of a trace in their time: their status may be
 --     wrong
+-- column: ambiguous BIGINT         Pairs that pass a link that may be another one (a
+--     candidate_count above 1), so that the pair may be none
 -- column: pairs BIGINT             Pairs of root and arrival that the latencies are computed from
 -- column: stored BIGINT            Pairs left out of the latencies: a message on the way was
 --     published before its subscription existed, and stored until then
@@ -52,15 +54,15 @@
 -- column: is_cut BOOLEAN           The path goes on or has siblings beyond max_depth or max_paths
 -- column: reasons VARCHAR          Why roots did not reach the end of the path, with counts
 -- column: path VARCHAR [path]  Nodes and topics
--- brief: path, median_ns, p99_ns, max_ns, reached, lost, loss_affected, dropped, roots, p95_ns,
---     superseded, no_output, reasons, not_connected, unknown, cut_by_recording, mean_ns, min_ns,
---     pairs, stored
+-- brief: path, median_ns, p99_ns, max_ns, reached, lost, ambiguous, loss_affected, dropped, roots,
+--     p95_ns, superseded, no_output, reasons, not_connected, unknown, cut_by_recording, mean_ns,
+--     min_ns, pairs, stored
 -- answer: roots
 -- note: clocks
 CREATE OR REPLACE TEMP TABLE path_outcome AS
 SELECT
     run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns, status,
-    reason, is_first, is_last, is_newest, is_loss_affected
+    reason, is_first, is_last, is_newest, is_loss_affected, is_ambiguous
 FROM main.end_to_end(
     $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns,
     max_depth := $max_depth, max_paths := $max_paths
@@ -75,7 +77,7 @@ FROM main.flow_path(
 WITH flow AS (
     SELECT
         run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, latency_ns, status,
-        reason, is_first, is_loss_affected,
+        reason, is_first, is_loss_affected, is_ambiguous,
         CASE $case
             WHEN 'first' THEN is_first
             WHEN 'last' THEN is_last
@@ -123,6 +125,7 @@ latency AS (
         path_id,
         count(latency_ns) AS pairs,
         count(*) - count(latency_ns) AS stored,
+        count(*) FILTER (WHERE is_ambiguous) AS ambiguous,
         any_value(sink_event) AS sink_event,
         min(latency_ns) AS min_ns,
         quantile_disc(latency_ns, [0.5, 0.95, 0.99]) AS quantiles,
@@ -168,6 +171,7 @@ SELECT
     coalesce(c.number['unknown'], 0) AS unknown,
     coalesce(c.number['cut_by_recording'], 0) AS cut_by_recording,
     coalesce(a.number, 0) AS loss_affected,
+    coalesce(l.ambiguous, 0) AS ambiguous,
     coalesce(l.pairs, 0) AS pairs,
     coalesce(l.stored, 0) AS stored,
     coalesce(o.number, 0) AS looped,

@@ -24,17 +24,21 @@
 -- column: status VARCHAR           'reached', 'superseded', 'dropped', 'lost', 'no_output',
 --     'not_connected', 'cut_by_recording' or 'unknown'
 -- column: reason VARCHAR           Why it did not arrive
+-- column: is_ambiguous BOOLEAN     It passes a link that may be another one (a candidate_count
+--     above 1), so that it may be none
+-- column: is_cut BOOLEAN           The path goes on or has siblings beyond max_depth or max_paths
 -- column: path VARCHAR [path]  Nodes and topics
 -- column: size_bytes BIGINT [bytes]  Size of the message at the end; empty: no bag has it
 -- column: age_from_stamp_ns BIGINT [ns]  From header.stamp of the message at the end, which nodes
 --     pass on from the sensor's message, to the end; empty: no bag has it
 -- slowest: latency_ns
--- brief: path, root_ns, latency_ns, age_from_stamp_ns, status, reason, take_id, sink_ns, root_id
+-- brief: path, root_ns, latency_ns, age_from_stamp_ns, status, reason, is_ambiguous, take_id,
+--     sink_ns, root_id
 -- note: clocks
 CREATE OR REPLACE TEMP TABLE path_outcome AS
 SELECT
     run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns, status,
-    reason, is_first, is_last, is_newest, is_loss_affected
+    reason, is_first, is_last, is_newest, is_loss_affected, is_ambiguous
 FROM main.end_to_end(
     $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns,
     max_depth := $max_depth, max_paths := $max_paths
@@ -56,6 +60,8 @@ SELECT
     f.latency_ns,
     f.status,
     f.reason,
+    f.is_ambiguous,
+    p.is_cut,
     p.path,
     m.size_bytes,
     f.sink_ns - m.stamp_ns AS age_from_stamp_ns

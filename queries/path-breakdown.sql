@@ -38,6 +38,8 @@
 --     until_arrival
 -- column: what VARCHAR             The callback, or the topic of the message
 -- column: flows BIGINT             Flows with this part
+-- column: ambiguous BIGINT         Flows of the path that pass a link that may be another one (a
+--     candidate_count above 1)
 -- column: overlaps BIGINT          Flows in which it is negative
 -- column: median_ns BIGINT [ns]    Median duration
 -- column: mean_ns BIGINT [ns]      Mean duration
@@ -46,15 +48,16 @@
 -- column: share DOUBLE [share]     Part of the time of all flows of the path, rounded to 4
 --     places
 -- column: total_ns BIGINT [ns]     Sum over all flows; all parts add up to their time
+-- column: is_cut BOOLEAN           The path goes on or has siblings beyond max_depth or max_paths
 -- column: path VARCHAR [path]  Nodes and topics
--- brief: path, hop, part, node, what, median_ns, share, max_ns, p95_ns, mean_ns, total_ns, flows,
---     overlaps
+-- brief: path, hop, part, node, what, median_ns, share, max_ns, ambiguous, p95_ns, mean_ns,
+--     total_ns, flows, overlaps
 -- zero: total_ns
 -- note: clocks
 CREATE OR REPLACE TEMP TABLE path_outcome AS
 SELECT
     run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns, status,
-    reason, is_first, is_last, is_newest, is_loss_affected
+    reason, is_first, is_last, is_newest, is_loss_affected, is_ambiguous
 FROM main.end_to_end(
     $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns,
     max_depth := $max_depth, max_paths := $max_paths
@@ -68,7 +71,8 @@ FROM main.flow_path(
 
 CREATE OR REPLACE TEMP TABLE breakdown_flow AS
 SELECT
-    flow_id, run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns
+    flow_id, run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns,
+    is_ambiguous
 FROM main.chosen_flow('path_outcome', $case);
 
 CREATE OR REPLACE TEMP TABLE breakdown_trail AS
@@ -160,13 +164,18 @@ measured AS (
 ),
 message AS (
     SELECT
-        p.run_id, p.path_id, p.path,
+        p.run_id, p.path_id, p.path, p.is_cut,
         unnest(range(1, len(p.topics) + 1)) AS hop,
         unnest(p.topics) AS topic_name,
         unnest(p.publishers) AS publisher_id,
         unnest(p.subscriptions) AS subscription_id
     FROM named_path AS p
     WHERE p.is_path
+),
+doubted AS (
+    SELECT path_id, count(*) FILTER (WHERE is_ambiguous) AS flows
+    FROM breakdown_flow
+    GROUP BY path_id
 )
 SELECT
     p.run_id,
@@ -179,6 +188,7 @@ SELECT
     END AS node,
     coalesce(l.label, h.topic_name) AS what,
     m.flows,
+    d.flows AS ambiguous,
     m.overlaps,
     m.quantiles[1] AS median_ns,
     m.mean_ns,
@@ -186,8 +196,10 @@ SELECT
     m.max_ns,
     round(m.total_ns / nullif(sum(m.total_ns) OVER (PARTITION BY m.path_id), 0), 4) AS share,
     m.total_ns,
+    p.is_cut,
     p.path
 FROM measured AS m
+JOIN doubted AS d ON m.path_id = d.path_id
 JOIN message AS p ON m.path_id = p.path_id AND p.hop = 1
 LEFT JOIN message AS h ON m.path_id = h.path_id AND m.hop = h.hop
 LEFT JOIN main.publisher AS b ON h.publisher_id = b.publisher_id

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 _PATHS = 3
 # Titles, and the columns that answer the question.
 _SHOWN = {
-    "paths": ("paths", "path reached roots median_ns p95_ns max_ns reasons"),
+    "paths": ("paths", "path reached roots ambiguous median_ns p95_ns max_ns reasons"),
     "nodes": ("time by node, on {}", "node share part what median_ns max_ns"),
     "slowest_flow": (
         "its slowest flow",

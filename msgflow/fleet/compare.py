@@ -223,6 +223,9 @@ def _doubts(result: QueryResult, confidence: float) -> Iterator[str]:
         affected = sum(row[f"{side}_loss_affected"] or 0 for row in _of_paths(result))
         if affected:
             yield f"{affected:,} flows of {side.upper()} have a gap of a trace in their time"
+        doubted = sum(row[f"{side}_ambiguous"] or 0 for row in _of_paths(result))
+        if doubted:
+            yield f"{doubted:,} flows of {side.upper()} pass a link that may be another one"
     intervals = [row for row in rows if row["low_ns"] is not None]
     shown = sum(row["verdict"] in _SHOWN for row in rows)
     if shown:

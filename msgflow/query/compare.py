@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from msgflow.errors import UsageError
 from msgflow.files.resources import resource_directory
 from msgflow.query.clock_notes import clock_notes
+from msgflow.query.doubt_notes import AMBIGUOUS, doubt_notes
 from msgflow.query.names import require_places
 from msgflow.query.runner import bind
 from msgflow.query.schedule_notes import schedule_notes
@@ -373,6 +374,9 @@ def _doubts(
                 f" events: {affected} of its {_UNITS[what]} have a gap in their time, others may be"
                 " missing altogether"
             )
+        doubted = result.table.select(["subject", f"{side}_{AMBIGUOUS}"])
+        for note in doubt_notes(connection, [run], doubted.rename_columns(["subject", AMBIGUOUS])):
+            yield f"run {side.upper()}, {run.title}, {note}"
     if any(row["verdict"] == "too few independent values" for row in rows):
         yield (
             "values that follow each other are alike, so that they count as few independent ones:"

@@ -11,6 +11,7 @@ import duckdb
 
 from msgflow.errors import UsageError
 from msgflow.query.clock_notes import clock_notes
+from msgflow.query.doubt_notes import doubt_notes
 from msgflow.query.names import PLACE_PARAMETERS, require_ids, require_names, require_places
 from msgflow.query.selection import (
     COUNTS,
@@ -125,6 +126,7 @@ def run_query(
         if narrowing and not untraced:
             why = _missing_way(connection, runs, own) or "try with less"
             notes.append(f"nothing fits {' '.join(narrowing)}: {why}")
+    notes += doubt_notes(connection, runs, table)
     if header.note in {"clocks", "requests"} and table.num_rows:
         notes += clock_notes(connection, runs)
     if header.note == "callbacks":

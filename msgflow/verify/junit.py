@@ -47,6 +47,8 @@ def junit_xml(result: QueryResult, run: Run, *, allow_not_measured: bool) -> str
             if tag == "error":
                 attributes["type"] = row["verdict"]
             ElementTree.SubElement(case, tag, attributes)
+        if row["value"] is not None and row["reason"] is not None:
+            ElementTree.SubElement(case, "system-out").text = printable(row["reason"])
     ElementTree.indent(root)
     text = ElementTree.tostring(root, encoding="unicode")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}'

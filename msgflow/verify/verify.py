@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from msgflow.files.default_files import DEFAULT_PATHS
 from msgflow.query.catalogue import load_query
+from msgflow.query.doubt_notes import AMBIGUOUS
 from msgflow.query.runner import run_query
 from msgflow.query.selection import Selection, conditions_of
 from msgflow.result.query_result import QueryResult
@@ -54,7 +55,7 @@ _COLUMNS = (
     Column("value", "DOUBLE", None, "What was measured, in `unit`"),
     Column("unit", "VARCHAR", None, "'ns', 'Hz', 'share' (0 to 1) or 'count'"),
     Column("samples", "BIGINT", None, "How many values it is from"),
-    Column("reason", "VARCHAR", None, "Why there is no value"),
+    Column("reason", "VARCHAR", None, "Why there is no value, or why it may be wrong"),
     Column("worst_ns", "BIGINT", "ns", "The worst case of what is too long or lost"),
     Column("worst_at_ns", "BIGINT", "epoch ns", "When that began"),
     Column("see", "VARCHAR", None, "The command that shows it"),
@@ -221,6 +222,8 @@ class _Work:
             columns.append(f"({value})::DOUBLE AS value_{place}")
             columns.append(f"({metric.samples})::BIGINT AS samples_{place}")
             columns.append(f"{key} AS key_{place}")
+        if any(column.name == AMBIGUOUS for column in load_query(name).columns):
+            columns.append(AMBIGUOUS)
         given: dict[str, Value] = {}
         if target.path_name is not None:
             places = self._paths[target.path_name.value]
@@ -299,7 +302,7 @@ class _Work:
             "measured": None if value is None else format_value(value, metric.dimension),
             "value": value,
             "samples": row[f"samples_{place}"],
-            "reason": (metric.lacking or metric.missing) if value is None else None,
+            "reason": (metric.lacking or metric.missing) if value is None else _doubt(row),
             "worst_ns": worst.duration_ns if worst else None,
             "worst_at_ns": worst.at_ns if worst else None,
             "see": worst.command if worst else None,
@@ -341,6 +344,12 @@ class _Work:
             rows = self._ask("flows", LOST_FLOW, target, {"subject": subject})
             return worst_case_of(list(rows[0].values())) if rows else None
         return find_worst_case(self._connection, kind, key, self._window)
+
+
+def _doubt(row: Mapping[str, Any]) -> str | None:
+    """Return why a value may be wrong: it is made of links that may be other ones."""
+    doubted = row.get(AMBIGUOUS)
+    return f"{doubted:,} values pass a link that may be another one" if doubted else None
 
 
 def _without_value(metric: Metric) -> Verdict:

@@ -22,7 +22,8 @@ Row = dict[str, Any]
 
 _PATH = (
     "path", "roots", "reached", "superseded", "dropped", "lost", "no_output", "not_connected",
-    "unknown", "cut_by_recording", "loss_affected", "median_ns", "p99_ns", "max_ns", "reasons",
+    "unknown", "cut_by_recording", "loss_affected", "ambiguous", "median_ns", "p99_ns", "max_ns",
+    "reasons",
 )  # fmt: skip
 _EXECUTOR = (
     "host", "nodes", "process", "pid", "tid", "executor_kind", "callback_share", "callbacks",

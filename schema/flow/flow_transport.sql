@@ -1,8 +1,11 @@
 -- name: derive.flow_transport
 -- description: Messages handed over on the topics of the application, with both objects. ROS's own
---     topics, self loops and copies that no callback gets are no part of a path.
+--     topics, self loops and copies that no callback gets are no part of a path. A row is ambiguous
+--     where another publication may have been taken instead.
 -- grain: one row per take whose publication is known
-SELECT l.run_id, l.publication_id, l.publisher_id, l.take_id, l.subscription_id
+SELECT
+    l.run_id, l.publication_id, l.publisher_id, l.take_id, l.subscription_id,
+    coalesce(l.candidate_count > 1, false) AS is_ambiguous
 FROM store.link_transport AS l
 JOIN store.publisher AS p ON l.publisher_id = p.publisher_id
 JOIN store.subscription AS s ON l.subscription_id = s.subscription_id

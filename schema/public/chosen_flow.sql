@@ -22,6 +22,7 @@
 -- column: sink_event VARCHAR  Event that ended the flow, as in main.end_to_end
 -- column: sink_ns BIGINT [epoch ns]  End of the flow
 -- column: latency_ns BIGINT [ns]  From the start of the root to the end
+-- column: is_ambiguous BOOLEAN  It passes a link that may be another one, as in main.end_to_end
 CREATE OR REPLACE MACRO main.chosen_flow(
     outcomes, flow_case := 'first', sink_take_id := NULL, most_flows := NULL, at_quantile := NULL,
     path_ids := NULL
@@ -31,7 +32,8 @@ SELECT
         ORDER BY e.path_id, e.root_ns, e.root_kind, e.root_id, e.sink_ns, e.take_id
     ) AS flow_id,
     e.run_id, e.path_id, e.root_kind, e.root_id, e.root_ns, e.take_id, e.sink_event, e.sink_ns,
-    e.sink_ns - e.root_ns AS latency_ns
+    e.sink_ns - e.root_ns AS latency_ns,
+    e.is_ambiguous
 FROM query_table(outcomes) AS e
 WHERE derive.known_word('flow_case', flow_case, ['first', 'last', 'newest', 'every_pair'])
     AND e.status = 'reached'

@@ -55,6 +55,9 @@
 -- column: a_loss_affected BIGINT  How many of those roots, callback instances or takes have a gap
 --     in their time, so that their values may be wrong
 -- column: b_loss_affected BIGINT  The same for run B
+-- column: a_ambiguous BIGINT  How many values of run A are of flows or messages with a link that
+--     may be another one (a candidate_count above 1)
+-- column: b_ambiguous BIGINT  The same for run B
 -- column: a_warm_up_ns BIGINT [ns]  Time from the start of run A to the last of its longest values,
 --     if at least three of its first quarter exceed all later ones, as in a system that warms up;
 --     else NULL
@@ -85,6 +88,7 @@ WITH thing AS (
             AS is_unit,
         e.status = 'reached' AS is_complete,
         e.is_loss_affected,
+        e.is_ambiguous,
         p.is_cut
     FROM main.end_to_end(
         [run_a, run_b], from_topic, to_topic, 'callback_start', 'callback_end',
@@ -107,6 +111,7 @@ WITH thing AS (
         true AS is_unit,
         i.end_ns IS NOT NULL AS is_complete,
         i.is_loss_affected,
+        false AS is_ambiguous,
         false AS is_cut
     FROM main.callback_instance AS i
     JOIN main.callback_label AS l ON i.callback_id = l.callback_id
@@ -123,6 +128,7 @@ WITH thing AS (
         true AS is_unit,
         l.take_id IS NOT NULL AS is_complete,
         t.is_loss_affected OR coalesce(l.is_loss_affected, false) AS is_loss_affected,
+        l.candidate_count > 1 AS is_ambiguous,
         false AS is_cut
     FROM main.take AS t
     LEFT JOIN main.link_transport AS l ON t.take_id = l.take_id
@@ -144,7 +150,7 @@ side AS (
 sided AS MATERIALIZED (
     SELECT
         s.side, t.subject, t.at_ns, t.id, t.value_ns, t.is_unit, t.is_complete,
-        t.is_loss_affected, t.is_cut
+        t.is_loss_affected, t.is_ambiguous, t.is_cut
     FROM thing AS t
     JOIN side AS s ON t.run_id = s.run_id
     JOIN main.run AS r ON t.run_id = r.run_id
@@ -163,6 +169,7 @@ measured AS MATERIALIZED (
         count(*) FILTER (WHERE is_unit AND is_complete) / nullif(count(*) FILTER (WHERE is_unit), 0)
             AS share,
         count(*) FILTER (WHERE is_unit AND is_loss_affected) AS loss_affected,
+        count(value_ns) FILTER (WHERE is_ambiguous) AS ambiguous,
         bool_or(is_cut) AS is_cut
     FROM sided
     GROUP BY side, subject
@@ -220,6 +227,7 @@ value AS (
         m.number,
         m.share,
         m.loss_affected,
+        m.ambiguous,
         w.warm_up_ns,
         m.is_cut,
         unnest(['median', 'mean', 'p95', 'p99', 'max']) AS statistic,
@@ -247,6 +255,8 @@ paired AS (
         b.share AS b_share,
         a.loss_affected AS a_loss_affected,
         b.loss_affected AS b_loss_affected,
+        a.ambiguous AS a_ambiguous,
+        b.ambiguous AS b_ambiguous,
         a.warm_up_ns AS a_warm_up_ns,
         b.warm_up_ns AS b_warm_up_ns,
         coalesce(a.is_cut, false) OR coalesce(b.is_cut, false) AS is_cut
@@ -257,8 +267,8 @@ paired AS (
 judged AS (
     SELECT
         p.subject, p.statistic, p.a_ns, p.b_ns, p.a_count, p.b_count, p.a_independent,
-        p.b_independent, p.a_share, p.b_share, p.a_loss_affected, p.b_loss_affected, p.a_warm_up_ns,
-        p.b_warm_up_ns, p.is_cut,
+        p.b_independent, p.a_share, p.b_share, p.a_loss_affected, p.b_loss_affected, p.a_ambiguous,
+        p.b_ambiguous, p.a_warm_up_ns, p.b_warm_up_ns, p.is_cut,
         CASE WHEN least(p.a_count, p.b_count) >= 20 THEN e.cliffs_delta END AS cliffs_delta,
         CASE
             WHEN p.a_count = 0 AND p.b_count = 0 THEN 'too few values'
@@ -309,6 +319,8 @@ SELECT
     round(b_share, 4) AS b_share,
     a_loss_affected,
     b_loss_affected,
+    a_ambiguous,
+    b_ambiguous,
     a_warm_up_ns,
     b_warm_up_ns,
     is_cut,

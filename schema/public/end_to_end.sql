@@ -46,6 +46,8 @@
 -- column: is_newest BOOLEAN  Newest root of the arrival; NULL: it did not arrive
 -- column: is_loss_affected BOOLEAN  A gap of a trace overlaps its time, from the root to the end;
 --     if it did not arrive, as long as the longest flow of the path took
+-- column: is_ambiguous BOOLEAN  It passes a link that may be another one (a candidate_count above
+--     1)
 CREATE OR REPLACE MACRO main.end_to_end(
     runs, from_topic := NULL, to_topic := NULL, from_event := 'callback_start',
     to_event := 'callback_end', window_start_ns := NULL, window_end_ns := NULL, max_depth := 32,
@@ -103,13 +105,20 @@ root AS MATERIALIZED (
         AND coalesce(coalesce(i.start_ns, b.start_ns) >= window_start_ns, true)
         AND coalesce(coalesce(i.start_ns, b.start_ns) < window_end_ns, true)
 ),
+stored AS MATERIALIZED (
+    SELECT take_id FROM derive.stored_take WHERE list_contains(runs, run_id)
+),
 transport AS NOT MATERIALIZED (
-    SELECT publication_id, publisher_id, take_id, subscription_id
+    SELECT
+        publication_id, publisher_id, take_id, subscription_id, is_ambiguous,
+        take_id IN (SELECT take_id FROM stored) AS is_stored
     FROM derive.flow_transport
     WHERE list_contains(runs, run_id)
 ),
 step AS MATERIALIZED (
-    SELECT c.take_id AS from_take_id, w.way_id, t.take_id
+    SELECT
+        c.take_id AS from_take_id, w.way_id, t.take_id, t.is_stored,
+        c.is_ambiguous OR t.is_ambiguous AS is_ambiguous
     FROM derive.flow_continuation AS c
     JOIN transport AS t ON c.publication_id = t.publication_id
     JOIN way AS w
@@ -118,8 +127,10 @@ step AS MATERIALIZED (
         AND c.route = w.route
     WHERE list_contains(runs, c.run_id)
 ),
-reached (path_id, root_key, take_id) AS (
-    SELECT p.path_id, r.root_key, t.take_id
+-- What is so of one step is so of all that it leads to: a stored message says when its reader came,
+-- not how long anything took, and a link that may be another one leads to a flow that may be none.
+reached (path_id, root_key, take_id, is_stored, is_ambiguous) AS (
+    SELECT p.path_id, r.root_key, t.take_id, t.is_stored, t.is_ambiguous
     FROM root AS r
     JOIN transport AS t ON r.publication_id = t.publication_id
     JOIN path AS p
@@ -127,28 +138,19 @@ reached (path_id, root_key, take_id) AS (
         AND t.subscription_id = p.subscription_id
         AND r.route = p.route
         AND p.depth = 1
-    UNION
-    SELECT p.path_id, r.root_key, s.take_id
+    UNION ALL
+    SELECT
+        p.path_id, r.root_key, s.take_id,
+        bool_or(r.is_stored OR s.is_stored), bool_or(r.is_ambiguous OR s.is_ambiguous)
     FROM reached AS r
     JOIN path AS p ON r.path_id = p.parent_path_id
     JOIN step AS s ON r.take_id = s.from_take_id AND p.way_id = s.way_id
-),
--- What a stored message led to. How long that took says when its reader came.
-stored (path_id, root_key, take_id) AS (
-    SELECT r.path_id, r.root_key, r.take_id
-    FROM reached AS r
-    JOIN derive.stored_take AS z ON r.take_id = z.take_id
-    WHERE list_contains(runs, z.run_id)
-    UNION
-    SELECT p.path_id, z.root_key, s.take_id
-    FROM stored AS z
-    JOIN path AS p ON z.path_id = p.parent_path_id
-    JOIN step AS s ON z.take_id = s.from_take_id AND p.way_id = s.way_id
+    GROUP BY p.path_id, r.root_key, s.take_id
 ),
 arrival AS MATERIALIZED (
     SELECT
-        r.path_id, r.root_key, r.take_id, t.taken_ns, i.start_ns, i.end_ns,
-        i.callback_instance_id
+        r.path_id, r.root_key, r.take_id, r.is_stored, r.is_ambiguous, t.taken_ns, i.start_ns,
+        i.end_ns, i.callback_instance_id
     FROM reached AS r
     JOIN path AS p ON r.path_id = p.path_id AND p.is_path
     JOIN main.take AS t ON r.take_id = t.take_id
@@ -164,7 +166,7 @@ sink AS (
 ),
 pair AS MATERIALIZED (
     SELECT
-        a.path_id, a.root_key, a.take_id,
+        a.path_id, a.root_key, a.take_id, a.is_stored, a.is_ambiguous,
         CASE k.sink_event
             WHEN 'take' THEN a.taken_ns
             WHEN 'callback_start' THEN a.start_ns
@@ -194,11 +196,12 @@ missing AS MATERIALIZED (
 ),
 -- All flows go through here: what is said of a path or of a missing arrival is added at the end.
 outcome AS MATERIALIZED (
-    SELECT a.path_id, a.root_key, e.root_ns, a.take_id, a.sink_ns
+    SELECT
+        a.path_id, a.root_key, e.root_ns, a.take_id, a.sink_ns, a.is_stored, a.is_ambiguous
     FROM pair AS a
     JOIN expected AS e ON a.path_id = e.path_id AND a.root_key = e.root_key
     UNION ALL
-    SELECT path_id, root_key, root_ns, NULL, NULL FROM missing
+    SELECT path_id, root_key, root_ns, NULL, NULL, false, false FROM missing
 ),
 longest AS (
     SELECT path_id, max(sink_ns - root_ns) AS longest_ns
@@ -225,7 +228,8 @@ gap AS (
 ),
 ranked AS (
     SELECT
-        p.run_id, o.path_id, o.root_key, o.root_ns, o.take_id, o.sink_ns,
+        p.run_id, o.path_id, o.root_key, o.root_ns, o.take_id, o.sink_ns, o.is_stored,
+        o.is_ambiguous,
         coalesce(o.sink_ns, o.root_ns + coalesce(l.longest_ns, 0)) AS until_ns,
         row_number() OVER of_root = 1 AS is_first,
         lead(true) OVER of_root IS NULL AS is_last,
@@ -246,7 +250,7 @@ SELECT
     r.take_id,
     CASE WHEN r.take_id IS NOT NULL THEN k.sink_event END AS sink_event,
     r.sink_ns,
-    CASE WHEN z.take_id IS NULL THEN r.sink_ns - r.root_ns END AS latency_ns,
+    CASE WHEN NOT r.is_stored THEN r.sink_ns - r.root_ns END AS latency_ns,
     CASE
         WHEN r.take_id IS NOT NULL THEN 'reached'
         WHEN derive.delivery_status(x.reason) <> 'unknown' THEN derive.delivery_status(x.reason)
@@ -259,10 +263,9 @@ SELECT
     CASE WHEN r.take_id IS NOT NULL THEN r.is_first END AS is_first,
     CASE WHEN r.take_id IS NOT NULL THEN r.is_last END AS is_last,
     CASE WHEN r.take_id IS NOT NULL THEN r.is_newest END AS is_newest,
-    coalesce(g.covered_until_ns >= r.root_ns, false) AS is_loss_affected
+    coalesce(g.covered_until_ns >= r.root_ns, false) AS is_loss_affected,
+    r.is_ambiguous
 FROM ranked AS r
 ASOF LEFT JOIN gap AS g ON r.run_id = g.run_id AND r.until_ns >= g.start_ns
 LEFT JOIN sink AS k ON r.path_id = k.path_id
 LEFT JOIN explained AS x ON r.path_id = x.path_id AND r.root_key = x.root_key
-LEFT JOIN stored AS z
-    ON r.path_id = z.path_id AND r.root_key = z.root_key AND r.take_id = z.take_id

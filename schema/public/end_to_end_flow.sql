@@ -35,6 +35,7 @@
 -- column: sink_event VARCHAR  Event that ended the flow, as in main.end_to_end
 -- column: sink_ns BIGINT [epoch ns]  End of the flow
 -- column: latency_ns BIGINT [ns]  From the start of the root to the end
+-- column: is_ambiguous BOOLEAN  It passes a link that may be another one, as in main.end_to_end
 CREATE OR REPLACE MACRO main.end_to_end_flow(
     runs, from_topic := NULL, to_topic := NULL, from_event := 'callback_start',
     to_event := 'callback_end', window_start_ns := NULL, window_end_ns := NULL,
@@ -44,14 +45,15 @@ CREATE OR REPLACE MACRO main.end_to_end_flow(
 WITH outcome AS NOT MATERIALIZED (
     SELECT
         run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns,
-        status, is_first, is_last, is_newest
+        status, is_first, is_last, is_newest, is_ambiguous
     FROM main.end_to_end(
         runs, from_topic, to_topic, from_event, to_event, window_start_ns, window_end_ns,
         max_depth := max_depth, max_paths := max_paths
     )
 )
 SELECT
-    flow_id, run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns
+    flow_id, run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns,
+    is_ambiguous
 FROM main.chosen_flow(
     'outcome', flow_case, sink_take_id := sink_take_id, most_flows := most_flows,
     at_quantile := at_quantile, path_ids := path_ids

@@ -45,7 +45,7 @@ def fill(folder: Path, runs: Iterable[tuple[Mapping[str, str], Mapping[str, floa
             for part in SHAPE
         ]
     for flow in flows:
-        flow |= {"status": "reached", "is_loss_affected": False}
+        flow |= {"status": "reached", "is_loss_affected": False, "is_ambiguous": False}
         flow |= dict.fromkeys(("is_first", "is_last", "is_newest"), True)
     for name, table in (("flow", flows), ("e2e_latency", paths)):
         lake.put_table(part_path(name, "all"), name, pa.Table.from_pylist(table), "1")
@@ -252,7 +252,8 @@ def test_students_t_is_close_where_runs_are_few() -> None:
         con.execute(
             "CREATE TABLE measured AS SELECT side, unit, unit AS run, 'x' AS subject,"
             " 'median' AS statistic, round(value_ns)::BIGINT AS value_ns, true AS is_enough,"
-            " 99 AS number, 99 AS roots, 99 AS reached, 0 AS loss_affected, false AS is_cut"
+            " 99 AS number, 99 AS roots, 99 AS reached, 0 AS loss_affected, 0 AS ambiguous,"
+            " false AS is_cut"
             " FROM value"
         )
         values = {"z": Z95, "least_units": LEAST_RUNS}
@@ -281,7 +282,8 @@ def test_five_values_of_a_run_beyond_a_quantile_are_enough(
     with duckdb.connect() as con:
         con.execute(
             "CREATE TABLE flow AS SELECT 'r' AS run, '/a' AS path, 'reached' AS status, "
-            "false AS is_loss_affected, true AS is_first, true AS is_last, true AS is_newest, "
+            "false AS is_loss_affected, false AS is_ambiguous, true AS is_first, "
+            "true AS is_last, true AS is_newest, "
             "n AS latency_ns FROM range(?) AS r(n)",
             [number],
         )

@@ -18,6 +18,7 @@ Report = Callable[..., str]
 Serve = Callable[[Path], Served]
 SELDOM = (
     "superseded", "no_output", "not_connected", "unknown", "cut_by_recording", "loss_affected",
+    "ambiguous",
 )  # fmt: skip
 
 

@@ -10,7 +10,7 @@ from msgflow.cli.show.watch_screen import WatchScreen
 from msgflow.run.window import Window
 from msgflow.watch import WindowReport
 
-FATES = {"dropped": 0, "lost": 0, "no_output": 0, "unknown": 3}
+FATES = {"dropped": 0, "lost": 0, "no_output": 0, "unknown": 3, "ambiguous": 0}
 
 
 def shown(*reports: WindowReport) -> str:
@@ -60,6 +60,18 @@ def test_latencies_may_be_negative() -> None:
     ]
     assert "-2 ms" in shown(reports[0], reports[2])
     assert "▁█▁" in shown(*reports)
+
+
+def test_latencies_by_links_that_may_be_others_are_doubted() -> None:
+    path = {"path": "/z", "reached": 9, "median_ns": 2_000_000, "p99_ns": None, "max_ns": 3_000_000}
+    report = WindowReport(
+        window=Window(0, 2_000_000_000),
+        paths=[path | FATES | {"ambiguous": 1}],
+        executors=(),
+        losses=(),
+        discarded_events=0,
+    )
+    assert "2 ms?" in shown(report)
 
 
 def test_long_names_leave_the_columns_whole() -> None:

@@ -154,7 +154,10 @@ class WatchScreen:
             table.add_row(
                 _short(path["path"], _PATH_WIDTH),
                 f"{path['reached'] / seconds:.0f}",
-                *(_duration(path[name]) for name in ("median_ns", "p99_ns", "max_ns")),
+                *(
+                    _duration(path[name]) + "?" * bool(path["ambiguous"])
+                    for name in ("median_ns", "p99_ns", "max_ns")
+                ),
                 Text(str(lost), style="bold red" if lost else ""),
                 _sparkline(self._slowest[path["path"]]),
                 style="reverse" if path["path"] == self._picked else "",
@@ -204,8 +207,10 @@ def _fates(path: Row) -> Text:
     counts = ", ".join(f"{path[name]:,} {name.replace('_', ' ')}" for name in _FATES if path[name])
     text = Text(printable(path["path"]), style="bold")
     reasons = f" ({path['reasons']})" if path["reasons"] else ""
+    doubt = f"; {path['ambiguous']:,} pass a link that may be another one" * bool(path["ambiguous"])
     text.append(
-        "\n" + printable(f"{path['roots']:,} flows: {counts or 'none'}{reasons}"), style="not bold"
+        "\n" + printable(f"{path['roots']:,} flows: {counts or 'none'}{reasons}{doubt}"),
+        style="not bold",
     )
     return text
 

@@ -18,6 +18,8 @@
 -- column: unknown BIGINT           Roots that end where the trace does not show
 -- column: cut_by_recording BIGINT  Roots too close to the start or end of a recording to know
 -- column: loss_affected BIGINT     Roots with a gap of a trace in their time
+-- column: ambiguous BIGINT         Pairs that pass a link that may be another one (a
+--     candidate_count above 1)
 -- column: pairs BIGINT             Pairs of root and arrival that the latencies are computed from
 -- column: stored BIGINT            Pairs left out of the latencies: a message on the way was
 --     published before its subscription existed, and stored until then
@@ -34,12 +36,12 @@
 -- column: reasons VARCHAR          Why roots did not reach the end of the path, with counts
 -- column: path VARCHAR [path]  Nodes and topics
 -- brief: path, median_ns, p95_ns, max_ns, runs, reached, roots, dropped, lost,
---     superseded, no_output, p99_ns, not_connected, unknown, cut_by_recording, reasons, mean_ns,
---     min_ns, loss_affected, pairs, stored
+--     ambiguous, superseded, no_output, p99_ns, not_connected, unknown, cut_by_recording, reasons,
+--     mean_ns, min_ns, loss_affected, pairs, stored
 WITH arrival AS MATERIALIZED (
     SELECT
         g.label_group, f.run, f.path, f.path_id, f.root_kind, f.root_id, f.latency_ns,
-        f.sink_event, f.status, f.reason, f.is_first, f.is_loss_affected,
+        f.sink_event, f.status, f.reason, f.is_first, f.is_loss_affected, f.is_ambiguous,
         CASE $case
             WHEN 'first' THEN f.is_first
             WHEN 'last' THEN f.is_last
@@ -87,6 +89,7 @@ latency AS (
         path,
         count(latency_ns) AS pairs,
         count(*) - count(latency_ns) AS stored,
+        count(*) FILTER (WHERE is_ambiguous) AS ambiguous,
         string_agg(DISTINCT sink_event, ', ' ORDER BY sink_event) AS sink_event,
         min(latency_ns) AS min_ns,
         quantile_disc(latency_ns, [0.5, 0.95, 0.99]) AS quantiles,
@@ -120,6 +123,7 @@ SELECT
     coalesce(c.number['unknown'], 0) AS unknown,
     coalesce(c.number['cut_by_recording'], 0) AS cut_by_recording,
     coalesce(a.number, 0) AS loss_affected,
+    coalesce(l.ambiguous, 0) AS ambiguous,
     coalesce(l.pairs, 0) AS pairs,
     coalesce(l.stored, 0) AS stored,
     k.looped,

@@ -86,6 +86,8 @@ const TITLES = {
   run_id: "run",
   roots: "flows",
   loss_affected: "touched by losses",
+  ambiguous: "by a link in doubt",
+  is_ambiguous: "by a link in doubt",
   sink_event: "ends with",
   is_cut: "search cut",
   what: "what",

@@ -36,6 +36,7 @@ const COLUMNS = [
   "unknown",
   "cut_by_recording",
   "loss_affected",
+  "ambiguous",
   "reasons",
 ];
 // Shown only where they are not 0 or empty on every path.
@@ -46,6 +47,7 @@ const SELDOM = [
   "unknown",
   "cut_by_recording",
   "loss_affected",
+  "ambiguous",
   "reasons",
 ];
 const FATES = [

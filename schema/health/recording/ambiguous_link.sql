@@ -1,16 +1,24 @@
 -- name: finding.ambiguous_link
 -- title: Messages that several publications could have been
--- description: The publication of a message was chosen among several.
+-- description: The publication of a message was chosen among several. Flows follow it all the same:
+--     paths and latencies count it in their column ambiguous.
 -- cause: Messages carry no stamp of their publication, or several have the same one.
 -- cure: Leave out links with a candidate_count above 1 where only certain ones are to count.
--- grain: one row per run
+-- grain: one row per node
 -- severity: warning
 -- when: store.link_transport WHERE candidate_count > 1
 SELECT
-    run_id,
+    l.run_id,
+    main.node_label(n.full_name, p.name, p.pid) AS subject,
     count(*) AS count,
-    'messages that several publications could have been: see candidate_count of link_transport'
-        AS detail
-FROM store.link_transport
-WHERE candidate_count > 1
-GROUP BY run_id
+    printf(
+        '%s on %s may be of other publications',
+        derive.counted(count(*), 'message'),
+        string_agg(DISTINCT coalesce(s.topic_name, '?'), ', ' ORDER BY coalesce(s.topic_name, '?'))
+    ) AS detail
+FROM store.link_transport AS l
+LEFT JOIN store.subscription AS s ON l.subscription_id = s.subscription_id
+LEFT JOIN store.process AS p ON s.process_id = p.process_id
+LEFT JOIN store.node AS n ON s.node_id = n.node_id
+WHERE l.candidate_count > 1
+GROUP BY l.run_id, s.node_id, n.full_name, p.process_id, p.name, p.pid

@@ -26,10 +26,12 @@
 -- column: b_share DOUBLE            Share that arrived in run B
 -- column: a_count BIGINT            Values of run A
 -- column: b_count BIGINT            Values of run B
+-- column: a_ambiguous BIGINT        Of these, values that pass a link that may be another one
+-- column: b_ambiguous BIGINT        The same of run B
 -- column: path VARCHAR              Path, callback or topic
 -- brief: path, change, median_percent, p95_percent, p95_verdict, max_percent, max_verdict, of,
 --     a_median_ns, b_median_ns, a_p95_ns, b_p95_ns, median_verdict, a_max_ns, b_max_ns,
---     separation, a_count, b_count
+--     separation, a_ambiguous, b_ambiguous, a_count, b_count
 WITH subject AS (
     SELECT
         subject,
@@ -41,6 +43,8 @@ WITH subject AS (
         any_value(b_share) AS b_share,
         any_value(a_count) AS a_count,
         any_value(b_count) AS b_count,
+        any_value(a_ambiguous) AS a_ambiguous,
+        any_value(b_ambiguous) AS b_ambiguous,
         string_agg(statistic, ', ') FILTER (WHERE verdict IN ('B is longer', 'B is shorter'))
             AS differing,
         string_agg(statistic, ', ') FILTER (WHERE verdict = 'no difference shown') AS estimated,
@@ -75,7 +79,7 @@ SELECT
     longest.b AS b_max_ns,
     longest.percent AS max_percent,
     longest.verdict AS max_verdict,
-    separation, a_share, b_share, a_count, b_count, subject AS path
+    separation, a_share, b_share, a_count, b_count, a_ambiguous, b_ambiguous, subject AS path
 FROM subject
 WHERE NOT $only_different OR is_longer OR is_shorter OR only_in IS NOT NULL
 ORDER BY

@@ -35,6 +35,8 @@
 -- column: b_share DOUBLE  Share of the roots of all runs of B that reached the end
 -- column: a_loss_affected BIGINT  Roots of A with a gap of a trace in their time
 -- column: b_loss_affected BIGINT  Roots of B with a gap of a trace in their time
+-- column: a_ambiguous BIGINT  Flows of A that pass a link that may be another one
+-- column: b_ambiguous BIGINT  Flows of B that do
 -- column: is_cut BOOLEAN  Paths of a run were left out beyond the limits
 -- column: subject VARCHAR  Nodes and topics of the path
 WITH of_side AS (
@@ -46,6 +48,7 @@ WITH of_side AS (
         sum(roots) AS roots,
         sum(reached) AS reached,
         sum(loss_affected)::BIGINT AS loss_affected,
+        sum(ambiguous)::BIGINT AS ambiguous,
         bool_or(is_cut) AS is_cut,
         count(DISTINCT unit) FILTER (value_ns IS NOT NULL) AS units,
         -- Short runs count where there are no others, and then there is no interval.
@@ -130,6 +133,7 @@ known AS (
         s.roots,
         s.reached,
         s.loss_affected,
+        s.ambiguous,
         s.is_cut,
         s.units,
         s.is_enough,
@@ -162,6 +166,8 @@ paired AS (
         b.reached / nullif(b.roots, 0) AS b_share,
         a.loss_affected AS a_loss_affected,
         b.loss_affected AS b_loss_affected,
+        a.ambiguous AS a_ambiguous,
+        b.ambiguous AS b_ambiguous,
         coalesce(a.is_cut, false) OR coalesce(b.is_cut, false) AS is_cut,
         b.centre - a.centre AS difference,
         sqrt(a.error + b.error) AS error,
@@ -249,6 +255,8 @@ SELECT
     round(b_share, 4) AS b_share,
     a_loss_affected,
     b_loss_affected,
+    a_ambiguous,
+    b_ambiguous,
     is_cut,
     subject
 FROM (

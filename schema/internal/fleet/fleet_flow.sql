@@ -24,6 +24,8 @@
 -- column: is_last BOOLEAN  Last arrival of the root; NULL: it did not arrive
 -- column: is_newest BOOLEAN  Newest root of the arrival; NULL: it did not arrive
 -- column: is_loss_affected BOOLEAN  A gap of a trace overlaps its time
+-- column: is_ambiguous BOOLEAN  It passes a link that may be another one (a candidate_count above
+--     1)
 SELECT
     e.run_id,
     p.path,
@@ -40,7 +42,8 @@ SELECT
     e.is_first,
     e.is_last,
     e.is_newest,
-    e.is_loss_affected
+    e.is_loss_affected,
+    e.is_ambiguous
 FROM main.end_to_end($runs) AS e
 JOIN main.flow_path($runs, only_paths := true) AS p ON e.path_id = p.path_id
 ORDER BY

@@ -17,6 +17,7 @@
 -- column: roots BIGINT  Roots, without those not connected or cut by the recording
 -- column: reached BIGINT  Those of them that reached the end
 -- column: loss_affected BIGINT  Those of them that have a gap of a trace in their time
+-- column: ambiguous BIGINT  Values of flows that pass a link that may be another one
 -- column: is_cut BOOLEAN  Paths of the run were left out beyond the limits
 WITH cut AS (
     SELECT run, bool_or(is_cut) AS is_cut
@@ -35,13 +36,15 @@ measured AS (
         max(value_ns) AS max_ns,
         count(*) FILTER (is_root) AS roots,
         count(*) FILTER (is_root AND f.status = 'reached') AS reached,
-        count(*) FILTER (is_root AND f.is_loss_affected) AS loss_affected
+        count(*) FILTER (is_root AND f.is_loss_affected) AS loss_affected,
+        count(value_ns) FILTER (f.is_ambiguous) AS ambiguous
     FROM (
         SELECT
             run,
             path,
             status,
             is_loss_affected,
+            is_ambiguous,
             is_first IS NOT false AND status NOT IN ('not_connected', 'cut_by_recording') AS is_root,
             CASE
                 WHEN status <> 'reached' THEN NULL
@@ -77,6 +80,7 @@ SELECT
     v.roots,
     v.reached,
     v.loss_affected,
+    v.ambiguous,
     coalesce(c.is_cut, false) AS is_cut
 FROM value AS v
 LEFT JOIN cut AS c ON v.run = c.run

@@ -4,7 +4,8 @@
 --     the flow (first arrivals), age of the data at their ends by the output, latency from
 --     publication to take of topics by the take, duration of callbacks and the time for which
 --     executors kept them waiting by their start. A topic has the names of what it measures. If
---     several have them, their identity comes behind.
+--     several have them, their identity comes behind. Flows that pass a link that may be another
+--     one are a series of their own, /ambiguous.
 -- grain: one row per value
 -- param: runs BIGINT[]  Runs
 -- param: start_ns BIGINT  Begin of the window, epoch ns
@@ -13,7 +14,9 @@
 -- column: at_ns BIGINT [epoch ns]  When
 -- column: value_ms DOUBLE [ms]  The value
 WITH flow AS MATERIALIZED (
-    SELECT path_id, root_ns, sink_ns, take_id, latency_ns, is_first, is_newest
+    SELECT
+        path_id, root_ns, sink_ns, take_id, latency_ns, is_first, is_newest,
+        CASE WHEN is_ambiguous THEN '/ambiguous' ELSE '' END AS doubt
     FROM main.end_to_end($runs)
     WHERE status = 'reached' AND latency_ns IS NOT NULL AND (is_first OR is_newest)
 ),
@@ -52,12 +55,14 @@ callback AS MATERIALIZED (
     WHERE list_contains($runs, run_id) AND NOT is_internal
 ),
 value AS (
-    SELECT p.subject || '/latency_ms' AS subject, f.root_ns AS at_ns, f.latency_ns AS value_ns
+    SELECT
+        p.subject || f.doubt || '/latency_ms' AS subject, f.root_ns AS at_ns,
+        f.latency_ns AS value_ns
     FROM flow AS f
     JOIN path AS p ON f.path_id = p.path_id
     WHERE f.is_first
     UNION ALL
-    SELECT p.subject || '/age_ms', f.sink_ns, f.sink_ns - f.root_ns
+    SELECT p.subject || f.doubt || '/age_ms', f.sink_ns, f.sink_ns - f.root_ns
     FROM flow AS f
     JOIN path AS p ON f.path_id = p.path_id
     WHERE f.is_newest
