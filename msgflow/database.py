@@ -461,10 +461,10 @@ class Database:
 
         one = self._ask(Slice(part.get("run")).one_run, "an explanation")
         times = Slice(one.run_id, part.get("start"), part.get("end"))
-        dead_ends = [
-            (finding.subject, finding.detail)
-            for finding in self.findings(run=one.run_id)
-            if finding.name == "dead_end"
+        found = self.findings(run=one.run_id)
+        dead_ends = [(each.subject, each.detail) for each in found if each.name == "dead_end"]
+        hanging = [
+            f"{each.subject}: {each.detail}" for each in found if each.name == "hanging_callback"
         ]
 
         def explained(connection: duckdb.DuckDBPyConnection) -> Explanation:
@@ -474,7 +474,7 @@ class Database:
                     result = run_query(connection, load_query(name), given, times, steps=steps)
                     return with_path_numbers(connection, result)
 
-                return explain(ask, one, place, dead_ends)
+                return explain(ask, one, place, dead_ends, hanging)
 
         return self._ask(explained)
 

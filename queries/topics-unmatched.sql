@@ -5,10 +5,11 @@
 -- grain: one row per take without a publication, or publication and subscription without a take
 -- param: side VARCHAR {take|publication} = NULL   Only takes without a publication, or only
 --     publications without a take
--- param: reason VARCHAR {before_subscription|subscription_ended|receiver_gap|never_taken|
---     before_discovery|no_longer_taken|take_failed|not_delivered|overwritten|lost_in_transport|
---     pending_at_end|no_stamp|clock_set|before_tracing|publisher_gap|
---     publisher_without_events|publisher_trace_ends|publisher_not_traced|ambiguous|unknown} = NULL  Only this reason
+-- param: reason VARCHAR {before_subscription|subscription_ended|reader_in_callback|receiver_gap|
+--     never_taken|before_discovery|no_longer_taken|take_failed|not_delivered|overwritten|
+--     lost_in_transport|pending_at_end|no_stamp|clock_set|before_tracing|publisher_gap|
+--     publisher_without_events|publisher_trace_ends|publisher_not_traced|ambiguous|
+--     unknown} = NULL  Only this reason
 -- column: run_id BIGINT           Run
 -- column: at_ns BIGINT [epoch ns]  Start of the publication, or the take
 -- column: side VARCHAR            'publication' or 'take': the side that is known

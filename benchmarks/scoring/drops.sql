@@ -21,8 +21,11 @@ WITH accepted AS (
         ('expired', 'not_delivered'),
         ('expired', 'take_failed'),
         ('subscription_ended', 'subscription_ended'),
+        -- Killed in a callback, or never back from it.
+        ('subscription_ended', 'reader_in_callback'),
         ('pending_at_end', 'pending_at_end'),
         ('pending_at_end', 'subscription_ended'),
+        ('pending_at_end', 'reader_in_callback'),
         ('delivered, late start', 'receiver_gap'),
         ('delivered, pause', 'receiver_gap'),
         ('delivered, loss', 'receiver_gap'),

@@ -78,7 +78,11 @@ class Explanation:
 
 
 def explain(
-    ask: Ask, run: Run, place: str | None, dead_ends: Sequence[tuple[str, str]]
+    ask: Ask,
+    run: Run,
+    place: str | None,
+    dead_ends: Sequence[tuple[str, str]],
+    hanging: Sequence[str],
 ) -> Explanation:
     """Return why flows are late that end at a topic or node.
 
@@ -87,6 +91,7 @@ def explain(
         run: that run.
         place: a topic or node, or a glob; the path with the slowest flow of all when None.
         dead_ends: nodes that publish and at which messages end, with what is said of it.
+        hanging: what is said of callbacks that never ended.
 
     Raises:
         UsageError: there is no such place, or no flow arrives there.
@@ -124,6 +129,7 @@ def explain(
         notes=tuple(
             dict.fromkeys(
                 [
+                    *hanging,
                     *ends_here,
                     *_preempted(pieces),
                     *_unexplained(pieces),

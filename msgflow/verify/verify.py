@@ -349,7 +349,7 @@ class _Work:
 def _doubt(row: Mapping[str, Any]) -> str | None:
     """Return why a value may be wrong: it is made of links that may be other ones."""
     doubted = row.get(AMBIGUOUS)
-    return f"{doubted:,} values pass a link that may be another one" if doubted else None
+    return f"values by links that may be other ones: {doubted:,}" if doubted else None
 
 
 def _without_value(metric: Metric) -> Verdict:

@@ -152,6 +152,12 @@ long_wait AS (
         AND w.end_ns - w.start_ns > coalesce(p.patience_ns, derive.delivery_limit().longest_ns)
         AND s.subscription_id IN (SELECT subscription_id FROM missing)
 ),
+kept_waiting AS (
+    SELECT s.subscription_id
+    FROM life AS s
+    JOIN derive.hanging_callback AS c ON s.only_thread_id = c.thread_id
+    WHERE c.run_id = only_run
+),
 -- While a clock is set, no take shows which message it is of.
 while_set AS MATERIALIZED (
     SELECT b.publication_id
@@ -379,7 +385,8 @@ SELECT
         WHEN replaced_ns < arrival_ns THEN 'subscription_ended'
         WHEN has_gap THEN 'receiver_gap'
         WHEN arrival_ns > last_seen_ns AND host_end_ns - first_unseen_ns > longest_ns
-            THEN 'subscription_ended'
+            THEN CASE WHEN subscription_id IN (SELECT subscription_id FROM kept_waiting)
+                THEN 'reader_in_callback' ELSE 'subscription_ended' END
         WHEN has_unidentified_take THEN 'unknown'
         WHEN publication_id IN (SELECT publication_id FROM while_set) THEN 'unknown'
         WHEN NOT is_connected AND shows_none AND had_time THEN 'never_taken'

@@ -5,9 +5,10 @@
 --     or, of messages that were published and not taken, none earlier (their readers were not there
 --     yet). What became of a message that was taken is recorded until its process ends:
 --     `recorded_until_ns`. Nothing is cut where the callback of the message ended without an
---     output, where the node was inactive, or where the reader went on without the message. Whether a callback had an output is not known if
---     events may be missing in it. A publisher that published while its node was inactive does not
---     depend on its state.
+--     output, where the node was inactive, where the reader went on without the message, or did
+--     not come back from a callback. Whether a callback had an output is not known if events may
+--     be missing in it. A publisher that published while its node was inactive does not depend on
+--     its state.
 -- grain: one row per path and root that did not arrive
 -- param: missing VARCHAR  Name of rows of path_id, root_key, publication_id: the root's last one
 -- param: lineages VARCHAR  Name of rows of path_id, prefix_id, depth: paths, with their beginnings
@@ -133,7 +134,8 @@ SELECT
     s.publication_id IS NULL AND s.is_cached AS is_cached,
     coalesce(
         CASE
-            WHEN w.reason IS NOT NULL OR u.reason = 'no_longer_taken' THEN false
+            WHEN w.reason IS NOT NULL OR u.reason IN ('no_longer_taken', 'reader_in_callback')
+                THEN false
             WHEN s.publisher_id IS NULL THEN s.taken_ns > f.last_ns
             WHEN s.publication_id IS NOT NULL THEN
                 b.start_ns < d.first_ns OR b.start_ns > d.last_ns

@@ -15,9 +15,9 @@
 --     not any more, or never, as far as traced), 'cut_by_recording' (the recording ended before it
 --     could be taken) or 'unknown' (the trace does not tell)
 -- column: reason VARCHAR  Why it was not taken: 'before_subscription', 'subscription_ended',
---     'receiver_gap', 'never_taken', 'before_discovery', 'no_longer_taken', 'take_failed',
---     'not_delivered', 'overwritten', 'lost_in_transport', 'pending_at_end' or 'unknown', the first
---     that holds; NULL: delivered
+--     'reader_in_callback', 'receiver_gap', 'never_taken', 'before_discovery', 'no_longer_taken',
+--     'take_failed', 'not_delivered', 'overwritten', 'lost_in_transport', 'pending_at_end' or
+--     'unknown', the first that holds; NULL: delivered
 SELECT
     run_id,
     publication_id,

@@ -67,7 +67,7 @@ def test_a_requirement_does_not_pass_in_silence(database: Path, tmp_path: Path) 
         (row["metric"], row["verdict"], row["reason"])
         for row in verification.result.to_arrow().to_pylist()
     ]
-    doubt = "2 values pass a link that may be another one"
+    doubt = "values by links that may be other ones: 2"
     assert sorted(reasons, key=str) == [
         ("completeness", "passed", doubt),
         ("latency", "passed", doubt),

@@ -46,6 +46,7 @@ INSERT INTO store.host VALUES (1, 1);
 CREATE TABLE store.callback_instance (take_id BIGINT, is_intra_process BOOLEAN);
 CREATE TABLE derive.empty_take (run_id BIGINT DEFAULT 1, subscription_id BIGINT DEFAULT 1,
     failed_ns BIGINT);
+CREATE TABLE derive.hanging_callback (run_id BIGINT DEFAULT 1, thread_id BIGINT);
 CREATE TABLE derive.executor_interval (run_id BIGINT DEFAULT 1, thread_id BIGINT DEFAULT 1,
     state VARCHAR DEFAULT 'wait', start_ns BIGINT, end_ns BIGINT);
 INSERT INTO store.publisher VALUES (1, 0, 1), (2, 0, 1);
@@ -300,6 +301,23 @@ def test_others_go_on_for_longer_than_any_message_took(
     for at in range(1, 5):
         delivery.publish(at * 30 * MS, at * 30 * MS + 300_000)
     missing = delivery.publish(300 * MS)
+    assert delivery.reason(missing) == reason
+
+
+@pytest.mark.parametrize(
+    ("thread", "seen", "reason"),
+    [
+        pytest.param(1, -1, "reader_in_callback", id="it_reads"),
+        pytest.param(2, -1, "subscription_ended", id="another_thread"),
+        pytest.param(1, 0, "pending_at_end", id="it_was_seen"),
+    ],
+)
+def test_a_reader_that_did_not_come_back_from_a_callback(
+    delivery: Delivery, thread: int, seen: int, reason: str
+) -> None:
+    delivery.con.execute("INSERT INTO derive.hanging_callback (thread_id) VALUES (?)", [thread])
+    delivery.lives(last_seen_ns=300 * MS + seen, host_end_ns=400 * MS)
+    missing = delivery.miss()
     assert delivery.reason(missing) == reason
 
 

@@ -68,9 +68,9 @@ WITH foreign_word AS (
     SELECT DISTINCT run_id, 'undelivered.reason', reason
     FROM store.undelivered
     WHERE reason NOT IN (
-        'before_subscription', 'subscription_ended', 'receiver_gap', 'never_taken',
-        'before_discovery', 'no_longer_taken', 'take_failed', 'not_delivered', 'overwritten',
-        'lost_in_transport', 'pending_at_end', 'unknown'
+        'before_subscription', 'subscription_ended', 'reader_in_callback', 'receiver_gap',
+        'never_taken', 'before_discovery', 'no_longer_taken', 'take_failed', 'not_delivered',
+        'overwritten', 'lost_in_transport', 'pending_at_end', 'unknown'
     )
     UNION ALL
     SELECT DISTINCT run_id, 'orphan_take.reason', reason

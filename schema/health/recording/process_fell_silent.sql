@@ -2,18 +2,19 @@
 -- title: A process that fell silent
 -- description: The process has no event in the last half second of the recording or longer, though
 --     messages were sent to it meanwhile, and its middleware did not say goodbye, as it does when
---     ROS is shut down. These messages count as not delivered (subscription_ended). Processes whose
---     middleware does not say in the trace what it has (ros_discovery_info) are not looked at.
+--     ROS is shut down. These messages count as not delivered (subscription_ended), or wait where
+--     it did not come back from a callback (reader_in_callback). Processes whose middleware does
+--     not say in the trace what it has (ros_discovery_info) are not looked at.
 -- cause: It was killed (SIGKILL, out of memory), crashed, hangs, or is busy in a callback.
 -- cure: See its output, and dmesg. Callbacks without an end show what it did last.
 -- grain: one row per process
 -- severity: warning
--- when: store.undelivered WHERE reason = 'subscription_ended'
+-- when: store.undelivered WHERE reason = 'subscription_ended' OR reason = 'reader_in_callback'
 WITH missed AS (
     SELECT s.process_id, count(DISTINCT u.publication_id) AS number
     FROM store.undelivered AS u
     JOIN store.subscription AS s ON u.subscription_id = s.subscription_id
-    WHERE u.reason = 'subscription_ended' AND NOT s.is_internal
+    WHERE u.reason IN ('subscription_ended', 'reader_in_callback') AND NOT s.is_internal
     GROUP BY s.process_id
 ),
 -- What the middleware publishes for itself.
