@@ -360,7 +360,8 @@ CREATE TABLE store.node (
     process_id BIGINT NOT NULL,  -- Process it lives in {to process}
     name VARCHAR,  -- Name without namespace
     namespace VARCHAR,  -- Namespace, beginning with /
-    full_name VARCHAR,  -- Namespace and name
+    full_name VARCHAR,  -- Namespace and name; behind @ the host or process, where nodes of several
+        -- processes have that name at a time
     node_handle UBIGINT,  -- rcl node handle; an address, valid in its process until reused
     created_ns BIGINT,  -- rcl_node_init [epoch ns] {clock process_id}
     is_inferred BOOLEAN DEFAULT false NOT NULL  -- Its initialisation was not traced

@@ -29,6 +29,43 @@ def test_full_names(system: RosSystem, analyse: Analyse) -> None:
     )
 
 
+def names(system: RosSystem, analyse: Analyse) -> list[str]:
+    found: list[str] = analyse(system).column("SELECT full_name FROM node ORDER BY node_id")
+    return found
+
+
+def test_equal_names_at_one_time_go_with_host_or_process(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    """Two robots, two domains, or both; where one is there after the other, the name is enough."""
+    system.add_source(0, "alpha", "boot-a")
+    system.add_source(1, "beta", "boot-b")
+    one, two, other = Thread(100), Thread(200), Thread(100, trace=1)
+    system.node(Thread(300), 0x1, "again")
+    system.node(Thread(400), 0x1, "again")
+    for handle, name in enumerate(("lidar", "planner", "base", "camera"), start=1):
+        system.node(one, handle, name)
+    for handle, name in enumerate(("planner", "base"), start=1):
+        system.node(two, handle, name)
+    for handle, name in enumerate(("lidar", "base"), start=1):
+        system.node(other, handle, name)
+    system.context(one)
+    system.context(two)
+    assert names(system, analyse) == [
+        "/again", "/again", "/lidar@alpha", "/planner@100", "/base@alpha 100", "/camera",
+        "/planner@200", "/base@alpha 200", "/lidar@beta", "/base@beta",
+    ]  # fmt: skip
+
+
+def test_equal_names_in_containers_that_share_host_and_process_id(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    for namespace in (1, 2, 1):
+        system.node(Thread(7, pid_ns=namespace), namespace, "lidar")
+    found = names(system, analyse)
+    assert found == ["/lidar@7 #1", "/lidar@7 #2", "/lidar@7 #1"]
+
+
 def test_rosout_may_be_created_inside_its_node(system: RosSystem, analyse: Analyse) -> None:
     """Foxy to Iron: the node's own event comes after it."""
     system.publisher(MAIN, 0x10, "/rosout", node=0x1)

@@ -96,7 +96,11 @@ Table(
     process_id(),
     text("name", "Name without namespace"),
     text("namespace", "Namespace, beginning with /"),
-    text("full_name", "Namespace and name"),
+    text(
+        "full_name",
+        "Namespace and name; behind @ the host or process, where nodes of several processes have "
+        "that name at a time",
+    ),
     handle("node_handle", "rcl node handle"),
     moment("created_ns", "rcl_node_init", clock="process_id"),
     flag("is_inferred", "Its initialisation was not traced"),
