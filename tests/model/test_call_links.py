@@ -91,7 +91,7 @@ def test_until_anything_else_is_taken_or_called(calls: RosSystem, analyse: Analy
 
 
 def test_in_a_callback_of_another_node_that_spins(calls: RosSystem, analyse: Analyse) -> None:
-    """What the node of the callback publishes afterwards is its own, and what no response led to."""
+    """What the node of the callback publishes afterwards, or without a response, is its own."""
     calls.node(CLIENT, 0x3, "spinning")
     calls.timer(CLIENT, 0x31, callback=0xC3, node=0x3)
     calls.publisher(CLIENT, 0x41, "/afterwards", node=0x3)
@@ -107,7 +107,8 @@ def test_in_a_callback_of_another_node_that_spins(calls: RosSystem, analyse: Ana
     analysis = analyse(calls)
     assert analysis.rows(LINKS) == [(2, taken, True, 1)]
     assert analysis.rows(
-        "SELECT b.source_timestamp_ns FROM link_causal JOIN publication AS b USING (publication_id) "
+        "SELECT b.source_timestamp_ns FROM link_causal "
+        "JOIN publication AS b USING (publication_id) "
         "ORDER BY ALL"
     ) == [(1,), (3,), (4,)]
 

@@ -451,17 +451,22 @@ def test_answers_of_one_node_to_messages_of_another() -> None:
     assert process.doubtful_publishers() == {ANSWER: 0, TICK: 1}
 
 
-def test_what_comes_beyond_the_usual_number() -> None:
+@pytest.mark.parametrize(("more", "is_doubtful"), [(10, False), (11, True)])
+def test_another_number_per_message(more: int, is_doubtful: bool) -> None:
+    """After more than a tenth of the messages; if it is less, only what comes beyond."""
     process = steady(100, [2], 100)
-    beyond = [(number * 100 + 30, TICK, 1) for number in range(1, 30)]
+    beyond = [(number * 100 + 30, TICK, 1) for number in range(1, more + 1)]
     process.publications += beyond
-    assert process.doubtful() == [(TICK, at) for at, _, _ in beyond]
+    expected = process.publications if is_doubtful else beyond
+    assert process.doubtful() == sorted((TICK, round(at, 6)) for at, _, _ in expected)
 
 
-def test_a_smaller_number_than_usual() -> None:
+@pytest.mark.parametrize(("fewer", "is_doubtful"), [(9, False), (11, True)])
+def test_a_smaller_number_per_message(fewer: int, is_doubtful: bool) -> None:
     process = steady(100, [2, 30], 100)
-    process.publications = [each for each in process.publications if each[0] % 300 != 30]
-    assert process.doubtful() == []
+    for number in range(1, fewer + 1):
+        process.publications.remove((number * 100 + 30, TICK, 1))
+    assert process.doubtful_publishers() == {TICK: float(is_doubtful)}
 
 
 def test_what_comes_beyond_the_usual_number_of_few_messages() -> None:
@@ -492,7 +497,7 @@ def test_the_usual_number_may_differ_by_subscription() -> None:
 def test_a_burst_is_closer_than_a_tenth_of_the_interval(gap: float, is_doubtful: bool) -> None:
     process = steady(100, [2], 100)
     process.publications += [(number * 100 + 2 + gap, TICK, 1) for number in range(1, 50)]
-    assert process.doubtful_publishers() == {TICK: 49 / 149 if is_doubtful else 0}
+    assert process.doubtful_publishers() == {TICK: float(is_doubtful)}
 
 
 @pytest.mark.parametrize("count", [1, 4, 5])

@@ -4,12 +4,13 @@
 --     than its message. In rclpy a timer shows no event. What it publishes follows some message,
 --     too, and so does what a loop publishes by a clock of its own. So a publisher is doubtful if a
 --     timer explains it (derive.timed_publisher), if its intervals are steadier than its delay
---     after the takes, or if it keeps its interval while the number of messages in between differs.
---     Intervals with a gap do not count if five others are left. Fewer than five messages prove
---     nothing: then it is doubtful if its process has timers, or if it or a subscription is older
---     than the recording, since a timer may then be older as well. Of a publisher that answers,
---     what it publishes beyond the usual number per message is doubtful. So is what one node
---     publishes after a message to another.
+--     after the takes, if it publishes more often after some messages than after others, or if it
+--     keeps its interval while the number of messages in between differs. Intervals with a gap do
+--     not count if five others are left. Fewer than five messages prove nothing: then it is
+--     doubtful if its process has timers, or if it or a subscription is older than the recording,
+--     since a timer may then be older as well. Of a publisher that answers, what it publishes
+--     beyond the usual number per message is doubtful. So is what one node publishes after a
+--     message to another.
 -- grain: one row per publication that is not surely an answer
 -- param: only_run BIGINT  Run to look at
 -- param: links VARCHAR  Name of the rows of derive.link_causal_take_adjacent
@@ -89,7 +90,10 @@ follower AS MATERIALIZED (
     ) AS n ON l.thread_id = n.thread_id AND l.start_event_id < n.start_event_id
 ),
 usual AS (
-    SELECT subscription_id, publisher_id, quantile_disc(number, 0.5) AS usual_number
+    SELECT
+        subscription_id, publisher_id,
+        quantile_disc(number, 0.5) AS usual_number,
+        count(*) >= 5 AND quantile_disc(number, 0.1) < quantile_disc(number, 0.9) AS differs
     FROM (
         SELECT subscription_id, publisher_id, sum(number) AS number
         FROM follower
@@ -112,6 +116,8 @@ doubtful AS (
     END
     UNION
     FROM derive.timed_publisher(only_run, 'follower')
+    UNION
+    SELECT publisher_id FROM usual WHERE differs
 )
 SELECT f.publication_id
 FROM follower AS f
