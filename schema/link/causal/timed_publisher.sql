@@ -11,8 +11,8 @@
 --     timer for every wait that may time out: the first of each period stands for all.
 -- grain: one row per publisher and period of a timer of its process that explains it
 -- param: only_run BIGINT  Run to look at
--- param: followers VARCHAR  Name of rows of publisher_id, start_ns, delay_ns (since the take),
---     rest_ns (until the next take; NULL: none)
+-- param: followers VARCHAR  Name of rows of publisher_id, process_id, start_ns, delay_ns (since the
+--     take), rest_ns (until the next take; NULL: none)
 CREATE OR REPLACE MACRO derive.timed_publisher(only_run, followers) AS TABLE
 WITH timer AS (
     SELECT process_id, period_ns, min(created_ns) AS created_ns
@@ -20,26 +20,16 @@ WITH timer AS (
     WHERE run_id = only_run AND period_ns > 0
     GROUP BY process_id, period_ns
 ),
-publisher AS (
-    SELECT p.publisher_id, p.process_id, min(f.start_ns) AS first_ns
-    FROM query_table(followers) AS f
-    JOIN store.publisher AS p ON f.publisher_id = p.publisher_id
-    WHERE p.run_id = only_run
-    GROUP BY p.publisher_id, p.process_id
-),
-possible AS (
-    SELECT p.publisher_id, t.period_ns, t.created_ns
-    FROM publisher AS p
-    JOIN timer AS t ON p.process_id = t.process_id
-    WHERE t.created_ns < p.first_ns
-),
 late AS (
     SELECT
         f.publisher_id, f.delay_ns, t.period_ns,
         (f.start_ns - t.created_ns) % t.period_ns AS late_ns,
         coalesce(f.rest_ns <= t.period_ns, true) AS ends_in_period
-    FROM query_table(followers) AS f
-    JOIN possible AS t ON f.publisher_id = t.publisher_id
+    FROM (
+        SELECT *, min(start_ns) OVER (PARTITION BY publisher_id) AS first_ns
+        FROM query_table(followers)
+    ) AS f
+    JOIN timer AS t ON f.process_id = t.process_id AND t.created_ns < f.first_ns
 ),
 explained AS (
     SELECT
