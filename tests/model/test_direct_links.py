@@ -66,6 +66,26 @@ def test_in_a_run_that_never_ended(system: RosSystem, analyse: Analyse) -> None:
     assert runs == [(1, start), (2, None), (3, last)]
 
 
+def test_a_nested_run_whose_end_is_lost_may_have_gone_on(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    outer = system.start(MAIN, 0xC1)
+    inner = system.start(MAIN, 0xC2)
+    system.publish(MAIN, 0x10, 1)
+    system.ready(MAIN)
+    system.publish(MAIN, 0x10, 2)
+    nested = system.start(MAIN, 0xC2)
+    system.publish(MAIN, 0x10, 3)
+    system.end(MAIN, 0xC2)
+    system.publish(MAIN, 0x10, 4)
+    system.end(MAIN, 0xC1)
+    assert analyse(system).rows(
+        "SELECT b.source_timestamp_ns, i.start_ns, l.candidate_count FROM link_causal AS l "
+        "JOIN publication AS b USING (publication_id) "
+        "JOIN callback_instance AS i USING (callback_instance_id) ORDER BY b.publication_id"
+    ) == [(1, inner, 1), (2, outer, 2), (3, nested, 1), (4, outer, 1)]
+
+
 def test_not_across_a_gap(system: RosSystem, analyse: Analyse) -> None:
     start = system.start(MAIN, 0xC1)
     system.publish(MAIN, 0x10, 1)

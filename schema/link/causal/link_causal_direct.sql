@@ -4,14 +4,15 @@
 --     effective end; of nested instances the innermost counts. The order of events decides, not
 --     time. The last begin or end of a callback before the publication tells which instance that
 --     is: the one that began there, unless it was over; else the nearest one around it that was
---     not over.
+--     not over. Where the end of one inside was lost, it may have been that one: then there are two
+--     candidates.
 -- grain: one row per publication made inside a callback instance
 -- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.link_causal_direct(only_run) AS TABLE
 WITH RECURSIVE around AS (
     SELECT
         b.run_id, b.publication_id, b.publisher_id, b.is_loss_affected,
-        b.start_event_id AS event_id, i.parent_id
+        b.start_event_id AS event_id, i.parent_id, i.end_event_id IS NULL AS is_doubtful
     FROM store.publication AS b
     JOIN store.callback_instance AS i ON b.callback_event_id = i.start_event_id
     WHERE b.run_id = only_run
@@ -21,20 +22,21 @@ WITH RECURSIVE around AS (
     UNION ALL
     SELECT
         b.run_id, b.publication_id, b.publisher_id, b.is_loss_affected, b.start_event_id,
-        i.parent_id
+        i.parent_id, false
     FROM store.publication AS b
     JOIN store.callback_instance AS i ON b.callback_event_id = i.end_event_id
     WHERE b.run_id = only_run AND i.run_id = only_run AND i.parent_id IS NOT NULL
     UNION ALL
     SELECT
-        a.run_id, a.publication_id, a.publisher_id, a.is_loss_affected, a.event_id, i.parent_id
+        a.run_id, a.publication_id, a.publisher_id, a.is_loss_affected, a.event_id, i.parent_id,
+        a.is_doubtful OR i.end_event_id IS NULL
     FROM around AS a
     JOIN store.callback_instance AS i ON a.parent_id = i.callback_instance_id
     WHERE i.parent_id IS NOT NULL AND a.event_id >= i.effective_end_event_id
 )
 SELECT
     b.run_id, i.callback_instance_id, b.publication_id, i.take_id, b.publisher_id,
-    i.is_loss_affected OR b.is_loss_affected AS is_loss_affected
+    i.is_loss_affected OR b.is_loss_affected AS is_loss_affected, 1::BIGINT AS candidate_count
 FROM store.publication AS b
 JOIN store.callback_instance AS i ON b.callback_event_id = i.start_event_id
 WHERE b.run_id = only_run
@@ -43,7 +45,7 @@ WHERE b.run_id = only_run
 UNION ALL
 SELECT
     a.run_id, i.callback_instance_id, a.publication_id, i.take_id, a.publisher_id,
-    i.is_loss_affected OR a.is_loss_affected
+    i.is_loss_affected OR a.is_loss_affected, 1 + a.is_doubtful::BIGINT
 FROM around AS a
 JOIN store.callback_instance AS i ON a.parent_id = i.callback_instance_id
 WHERE a.event_id < i.effective_end_event_id
