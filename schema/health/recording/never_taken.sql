@@ -11,8 +11,6 @@
 -- grain: one row per topic, publishing node and subscribing node
 -- severity: warning
 -- when: store.undelivered WHERE reason = 'never_taken'
-SELECT
-    run_id, subject, number AS count,
-    printf('none of %s was taken', messages) AS detail
+SELECT run_id, subject, number AS count, printf('none of %s was taken', messages) AS detail
 FROM untaken_pair
 WHERE reason = 'never_taken'
