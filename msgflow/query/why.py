@@ -132,7 +132,7 @@ def explain(
                     *hanging,
                     *ends_here,
                     *_preempted(pieces),
-                    *_unexplained(pieces),
+                    *_unexplained(pieces, waits.table.to_pylist()),
                     *paths.notes,
                     *flow.notes,
                 ]
@@ -187,15 +187,31 @@ def _preempted(pieces: Sequence[dict[str, Any]]) -> Iterator[str]:
     )
 
 
-def _unexplained(pieces: Sequence[dict[str, Any]]) -> Iterator[str]:
-    """Yield what would explain the slowest flow, if most of it was over without a known reason."""
+def _unexplained(
+    pieces: Sequence[dict[str, Any]], waits: Sequence[dict[str, Any]]
+) -> Iterator[str]:
+    """Yield what may explain the slowest flow, if most of it was over without a known reason.
+
+    The groups of callbacks are not in a trace: one thread may be free, and must not run them.
+    """
     latency_ns = pieces[0]["latency_ns"]
     total_ns = sum(
         row["duration_ns"]
         for row in pieces
         if row["activity"] == "network_or_idle" and row["state"] is None
     )
-    if 2 * total_ns > latency_ns:
+    if 2 * total_ns <= latency_ns:
+        return
+    others = [row for row in waits if row["meanwhile_callback"] and 2 * row["worst_ns"] > total_ns]
+    if others:
+        other = max(others, key=lambda row: row["worst_ns"])
+        yield (
+            f"for {100 * total_ns / latency_ns:.0f} % of the slowest flow a thread of the executor"
+            f" was free, but others ran {other['meanwhile_callback']} of {other['meanwhile_node']}"
+            f" (for up to {format_duration(other['worst_ns'])} of a wait): one callback group may"
+            " have both"
+        )
+    else:
         yield (
             f"for {100 * total_ns / latency_ns:.0f} % of the slowest flow the message was on its"
             " way, or its thread had no CPU: a kernel trace shows which (msgflow record --kernel)"
