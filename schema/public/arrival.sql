@@ -2,9 +2,10 @@
 -- description: When messages arrived, where a kernel trace tells: the last waking of the thread
 --     before it took the message. Without one after the begin of the publication the thread was
 --     awake when the message came, and there is no row. It is exact where the take is the first
---     thing that the thread did then, and a thread of the middleware, the publishing thread or an
---     interrupt woke it; else the waking may have been for something else. Threads of the
---     middleware have its names or that of the process, and execute no callbacks.
+--     thing that the thread did then, and a thread of the middleware (by its name), the publishing
+--     thread, another ROS process or an interrupt woke it. Else the waking may have been for
+--     something else: any other thread of its own process may hand over work, and the message wait
+--     for that in the queue of its node.
 -- grain: one row per take whose publication is known and before which its thread was woken
 -- column: run_id BIGINT  Run that the row belongs to
 -- column: take_id BIGINT  The take
@@ -71,11 +72,9 @@ SELECT
     coalesce(x.name, o.name) AS waker_name,
     coalesce(d.at_ns < w.arrived_ns, true) AND CASE w.waker_kind
         WHEN 'thread' THEN coalesce(
-            w.waker_thread_id = w.publishing_thread_id
-            OR x.process_id = t.process_id
-            AND x.thread_id NOT IN (SELECT thread_id FROM main.callback_instance),
-            o.name LIKE 'dds.%' OR o.name LIKE 'recv%' OR o.name LIKE 'dq.%'
-            OR o.name = p.name
+            w.waker_thread_id = w.publishing_thread_id OR x.process_id <> t.process_id
+            OR regexp_matches(coalesce(x.name, o.name), '^(dds\.|recv|dq\.)'),
+            false
         )
         ELSE w.waker_kind IN ('interrupt', 'softirq')
     END AS is_exact,
@@ -84,7 +83,6 @@ SELECT
     w.taken_ns - c.on_cpu_ns AS executor_ns
 FROM woken AS w
 JOIN main.thread AS t ON w.thread_id = t.thread_id
-JOIN main.process AS p ON t.process_id = p.process_id
 LEFT JOIN main.thread AS x ON w.waker_thread_id = x.thread_id
 LEFT JOIN main.other_thread AS o ON w.waker_other_thread_id = o.other_thread_id
 LEFT JOIN behind AS d ON w.take_id = d.take_id
