@@ -93,6 +93,7 @@ CREATE TABLE staging.cpu_wait (number BIGINT, thread_id BIGINT, tid INTEGER, sta
 CREATE TABLE staging.deferred_end (start_event_id BIGINT, end_ns BIGINT);
 CREATE TABLE staging.executor (executor_id BIGINT, process_id BIGINT, kind VARCHAR,
     is_inferred BOOLEAN, first_thread_id BIGINT, executor_event_id BIGINT);
+CREATE TABLE staging.executor_alternating (thread_id BIGINT, first_event_id BIGINT);
 CREATE TABLE staging.executor_callback (executor_event_id BIGINT, callback_instance_id BIGINT);
 CREATE TABLE staging.executor_first (thread_id BIGINT, event_id BIGINT);
 CREATE TABLE staging.executor_member (thread_id BIGINT, process_id BIGINT, first_thread_id BIGINT,

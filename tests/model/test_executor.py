@@ -45,6 +45,38 @@ def test_threads_that_share_callbacks_are_one_executor(system: RosSystem, analys
     assert model.value("SELECT count(*) FROM executor_state WHERE executor_id IS NULL") == 0
 
 
+@pytest.mark.parametrize(("turns", "at_once", "kinds"), [
+    (6, False, [("multi_threaded", 2)]),
+    # Too few turns to say, or two threads that wait at once: executors of their own.
+    (4, False, [("single_threaded", 1), ("single_threaded", 1)]),
+    (6, True, [("single_threaded", 1), ("single_threaded", 1)]),
+])  # fmt: skip
+def test_threads_that_take_turns_in_waiting_are_one_executor(
+    system: RosSystem,
+    analyse: Analyse,
+    turns: int,
+    at_once: bool,
+    kinds: list[tuple[str, int]],
+) -> None:
+    """As those of an action server, whose callbacks have no events: a lock keeps them apart."""
+    threads = (Thread(100, 101), Thread(100, 102))
+    for _ in range(turns):
+        for thread in threads:
+            system.ready(thread)
+            system.idle(thread)
+            system.ready(thread)
+    if at_once:
+        for thread in threads:
+            system.idle(thread)
+    assert (
+        analyse(system).rows(
+            "SELECT any_value(e.kind), count(*) FROM executor AS e "
+            "JOIN executor_thread USING (executor_id) GROUP BY e.executor_id ORDER BY e.executor_id"
+        )
+        == kinds
+    )
+
+
 def test_threads_without_executor_events(system: RosSystem, analyse: Analyse) -> None:
     """One may run callbacks without any (static executors, Python); others are no executor."""
     system.start(Thread(100), 0xC1)

@@ -1,7 +1,7 @@
 -- name: staging.executor_member
 -- description: Which threads work for the same executor: those of a process that execute callbacks
---     of an executor that names itself, else the same callbacks, directly or through others. The
---     smallest thread of such a group stands for it.
+--     of an executor that names itself, else the same callbacks, directly or through others, or
+--     that take turns in waiting for work. The smallest thread of such a group stands for it.
 -- grain: one row per thread that runs callbacks or emits executor events
 -- when: staging.callback_number, staging.executor_first
 WITH RECURSIVE
@@ -30,6 +30,8 @@ runs AS (
     JOIN staging.callback_number AS n ON r.start_event_id = n.start_event_id
     ANTI JOIN staging.callback_group_entry AS s
         ON n.callback_id = s.callback_id AND s.executor_event_id IS NOT NULL
+    UNION ALL
+    SELECT thread_id, -1 - first_event_id FROM staging.executor_alternating
 ),
 -- Each thread is tied to the smallest one that shares something with it, not to all.
 neighbour AS (
