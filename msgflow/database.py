@@ -766,6 +766,10 @@ class Database:
             text: one query, or EXPLAIN of one.
             limit: most rows returned, all when None; a note says if there are more.
 
+        Returns:
+            The rows. Columns that Python or Parquet cannot hold (such as INTERVAL, UNION, or times
+            after the year 9999) are text.
+
         Raises:
             UsageError: there is no SQL.
             QueryError: a statement that may do more than read, several statements, or one that the
@@ -1106,8 +1110,10 @@ def _rows_of(connection: duckdb.DuckDBPyConnection, /, query: str, **given: Valu
 def _rows(connection: duckdb.DuckDBPyConnection, query: str) -> pa.Table:
     import duckdb
 
+    from msgflow.result.plain import plain
+
     try:
-        return connection.sql(query).to_arrow_table()
+        return plain(connection, connection.sql(query).to_arrow_table())
     except (duckdb.BinderException, duckdb.CatalogException):
         # A relation does not say in which line. Such an error comes before anything runs.
         connection.execute(query)
