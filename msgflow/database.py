@@ -6,6 +6,7 @@ import os
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar, Unpack
 
@@ -364,8 +365,9 @@ class Database:
     ) -> QueryResult:
         """Run a named query.
 
-        Rows can be chosen by the kinds of names in the columns of the query. Names may be globs,
-        and several in a list or between commas.
+        Rows can be chosen by the kinds of names in the columns of the query. Names may be globs.
+        Names in a list are taken as they are. A text is the name that a run has, else several names
+        between commas.
 
         Args:
             name: of the query, see `list_queries`.
@@ -391,6 +393,7 @@ class Database:
         """
         from msgflow.db.objects import public_names
         from msgflow.db.sql_guard import require_condition
+        from msgflow.query.names import names_in
         from msgflow.query.path_numbers import with_path_numbers
         from msgflow.query.runner import run_query
         from msgflow.query.selection import make_selection
@@ -417,7 +420,8 @@ class Database:
         def ask(connection: duckdb.DuckDBPyConnection) -> QueryResult:
             if where is not None:
                 require_condition(connection, where)
-            chosen = make_selection(selection)
+            runs = part.runs(connection)
+            chosen = make_selection(selection, partial(names_in, connection, runs))
             result = run_query(
                 connection, header, parameters, part, internal=internal, selection=chosen
             )
@@ -432,7 +436,7 @@ class Database:
         name: str,
         file: Path,
         part: Slice,
-    ) -> dict[str, str]:
+    ) -> dict[str, list[str]]:
         """Return the arguments of `query` that a named path stands for."""
         if not any(param.name == "from" for param in header.params):
             raise UsageError(f"{header.words} has no paths — --path {name}", "leave it out")
@@ -532,7 +536,7 @@ class Database:
         take_id: int | None = None,
         callback_instance_id: int | None = None,
         run: str | int | None = None,
-        from_: str | None = None,
+        from_: str | Sequence[str] | None = None,
         case: str = "every_pair",
         by: str = "piece",
         detail: str = "short",
@@ -558,7 +562,7 @@ class Database:
         given = (publication_id, take_id, callback_instance_id, None, None)
         number, topic, run_id = self._ask(find_take, self._ask(_start, place, given, at, run))
         return self.query(
-            "critical-path", run=run_id, take=number, from_=from_, to=topic, case=case, by=by,
+            "critical-path", run=run_id, take=number, from_=from_, to=[topic], case=case, by=by,
             detail=detail, internal=internal,
         )  # fmt: skip
 
@@ -1020,9 +1024,7 @@ class Database:
 
         words = {"from": from_, "to": to, "via": via, "without": without}
         choice: dict[str, Value] = {
-            word: text if isinstance(text, str) else ",".join(text)
-            for word, text in words.items()
-            if text
+            word: text if isinstance(text, str) else [*text] for word, text in words.items() if text
         }
         if path is not None:
             if choice:
@@ -1035,7 +1037,7 @@ class Database:
 
 def _words_of_path(
     connection: duckdb.DuckDBPyConnection, name: str, file: Path, part: Slice
-) -> dict[str, str]:
+) -> dict[str, list[str]]:
     from msgflow.paths import read_paths
 
     named = read_paths(file)

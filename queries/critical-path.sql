@@ -91,14 +91,14 @@ WITH path AS (
     FROM named_path
     WHERE ($via IS NOT NULL OR $without IS NOT NULL)
         AND coalesce(list_bool_and(list_transform(
-            string_split($via, ','),
+            $via::VARCHAR[],
             lambda each: list_bool_or(list_transform(
                 string_split(path, ' → '),
                 lambda step: step = trim(each) OR trim(step, '()') GLOB trim(each)
             ))
         )), true)
         AND NOT coalesce(list_bool_or(list_transform(
-            string_split($without, ','),
+            $without::VARCHAR[],
             lambda each: list_bool_or(list_transform(
                 string_split(path, ' → '),
                 lambda step: step = trim(each) OR trim(step, '()') GLOB trim(each)

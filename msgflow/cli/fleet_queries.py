@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from msgflow.cli.operation import operation
+from msgflow.cli.options import one_text
 from msgflow.cli.sql import DEFAULT_LIMIT, FileOption, sql_of
 from msgflow.errors import UsageError
 from msgflow.export.formats import Format
@@ -71,16 +72,16 @@ def query(
         Lake.open(lake),
         name,
         where=where,
-        group_by=values_of(group_by),
+        group_by=values_of(one_text(group_by)),
         internal=internal,
         selection={
-            "node": node,
-            "topic": topic,
-            "callback": callback,
-            "host": host,
-            "via": via,
-            "without": without,
-            "sort": sort,
+            "node": one_text(node),
+            "topic": one_text(topic),
+            "callback": one_text(callback),
+            "host": one_text(host),
+            "via": one_text(via),
+            "without": one_text(without),
+            "sort": one_text(sort),
             "limit": limit,
         },
         **own,

@@ -10,7 +10,7 @@ import typer
 
 from msgflow.cli.header_options import header_option
 from msgflow.cli.operation import operation
-from msgflow.cli.options import OUTPUT, SELECTION
+from msgflow.cli.options import OUTPUT, SELECTION, one_text
 from msgflow.errors import UsageError
 from msgflow.files.default_files import DEFAULT_DATABASE
 from msgflow.query.catalogue import load_query
@@ -154,7 +154,7 @@ def command(
             ids = ("request_id", "response_id")
             start = {name: value for name, value in found[0].items() if name not in ids}
             counted = case or ("every_pair" if slowest is None else "first")
-            begin = ",".join(from_ or []) if slowest is None else ""
+            begin = one_text(from_) if slowest is None else None
             words = {"from_": begin, "by": by, "detail": detail}
             chosen: dict[str, Any] = {name: value for name, value in words.items() if value}
             result = opened.flow_why(**start, case=counted, internal=internal, **chosen)
@@ -202,10 +202,7 @@ def _slowest(
     internal: bool,
 ) -> list[dict[str, Any]]:
     """Return the rows of the slowest flows, the slowest first, as the query flows has them."""
-    words: dict[str, Any] = {
-        "from_": ",".join(from_ or []) or None,
-        "to": ",".join(to or []) or None,
-    }
+    words: dict[str, Any] = {"from_": one_text(from_), "to": one_text(to)}
     if case is not None:
         words["case"] = case
     found = database.query("flows", run=run, internal=internal, slowest=number, **words)

@@ -9,6 +9,7 @@ import typer
 
 from msgflow.cli.completion import complete
 from msgflow.cli.operation import escape
+from msgflow.cli.options import one_text
 from msgflow.query.names import PLACE_PARAMETERS
 
 if TYPE_CHECKING:
@@ -70,7 +71,5 @@ def given_of(words: Mapping[str, Any]) -> dict[str, Any]:
     """Return the values of those parameters of a header that were given."""
     own = {name.removeprefix(OWN): value for name, value in words.items() if name.startswith(OWN)}
     return {
-        name: ",".join(value) if isinstance(value, list) else value
-        for name, value in own.items()
-        if value is not None and value != []
+        name: one_text(value) for name, value in own.items() if value is not None and value != []
     }

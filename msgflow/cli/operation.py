@@ -20,10 +20,11 @@ import docstring_parser
 import typer
 from typer.models import OptionInfo
 
-from msgflow.cli.options import SHARED, path_of
+from msgflow.cli.options import SHARED, one_text, path_of
 from msgflow.files.default_files import DEFAULT_DATABASE
 
 Command = Callable[..., None]
+_PLACES = {"from_", "to", "via", "without"}
 
 
 def operation(function: Command) -> Command:
@@ -52,6 +53,7 @@ def asks(method: Callable[..., Any]) -> Callable[[Command], Command]:
             from msgflow.database import Database
 
             words = {each.name: given[each.name] for each in asked}
+            words |= {name: one_text(words[name]) for name in _PLACES & words.keys()}
             said = {name: value for name, value in words.items() if value not in (None, [])}
             with Database(given["database"]) as opened:
                 found = method(opened, **said)

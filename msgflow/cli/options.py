@@ -40,6 +40,11 @@ def bytes_of(size: str) -> int:
     return round(float(match[1]) * _UNITS[(match[2] or "").upper()]) if match else 0
 
 
+def one_text(given: Any) -> Any:
+    """Return what an option was given: once, it is a text, in which commas may part names."""
+    return given[0] if isinstance(given, list) and len(given) == 1 else given
+
+
 def path_of(text: str | Path) -> Path:
     """Return the path of an option; no shell replaces the `~` of `--db=~/x`."""
     return Path(os.path.expanduser(text))

@@ -14,7 +14,7 @@ from typer.core import TyperCommand, TyperOption
 
 from msgflow.cli.header_options import given_of, header_parameter
 from msgflow.cli.operation import escape, parameters_of, set_parameters
-from msgflow.cli.options import DefaultGroup
+from msgflow.cli.options import DefaultGroup, one_text
 from msgflow.database import Database
 from msgflow.errors import UsageError
 from msgflow.export.formats import Format, format_of
@@ -181,7 +181,9 @@ def build_command(
 
 def _result(name: str, own: dict[str, Any], given: dict[str, Any]) -> QueryResult:
     asked = {word: given[word] for word in _DEFAULTS if word in given}
-    said = {word: value for word, value in asked.items() if value not in (_DEFAULTS[word], [])}
+    said = {
+        word: one_text(value) for word, value in asked.items() if value not in (_DEFAULTS[word], [])
+    }
     with Database(given["database"], memory_limit=given["memory_limit"]) as database:
         return database.query(name, **said, **own)
 

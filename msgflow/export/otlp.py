@@ -92,8 +92,8 @@ def _keep_spans(
     ((identity,),) = internal_sql().run(connection, "run_identity", of_run).fetchall()
     values = {**of_run, "identity": identity or run.name}
     if choice is not None:
-        require_places(connection, [run], choice)
-        flows = internal_sql().run(connection, "otlp_flow", {**of_run, **choice})
+        places = require_places(connection, [run], choice)
+        flows = internal_sql().run(connection, "otlp_flow", {**of_run, **choice, **places})
         values["keys"] = [key for (key,) in flows.fetchall()]
     internal_sql().keep(connection, "otlp_span", values)
     (counts,) = connection.sql(_COUNTS).fetchall()

@@ -42,9 +42,9 @@ class NamedPath:
     name: Text
     places: dict[str, tuple[Text, ...]]
 
-    def words(self) -> dict[str, str]:
+    def words(self) -> dict[str, list[str]]:
         """Return the arguments of `Database.query` for this path."""
-        return {word: ",".join(text.value for text in texts) for word, texts in self.places.items()}
+        return {word: [text.value for text in texts] for word, texts in self.places.items()}
 
 
 @dataclass(frozen=True)

@@ -277,6 +277,7 @@ def _compared(
     is_strict: bool = True,
 ) -> Comparison:
     what = str(asked["what"])
+    asked = asked | require_places(connection, [first, second], asked)
     for run in (first, second):
         require_places(connection, [run], {"from": asked["from"], "to": asked["to"]})
     with query_errors("the comparison", "the comparison failed: {}"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
+from msgflow.query.selection import values_of
 from msgflow.text.name_suggestions import did_you_mean
 
 if TYPE_CHECKING:
@@ -64,18 +65,34 @@ WHERE NOT EXISTS (
 
 def require_places(
     connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], bound: Mapping[str, Value]
-) -> None:
-    """Raise unless the chosen runs have every topic and node among the parameters of a query.
+) -> dict[str, Value]:
+    """Return the topics and nodes among the parameters of a query, as lists.
 
-    Without runs, every name passes.
+    Raise unless the chosen runs have each of them. Without runs, every name passes.
     """
-    places = []
+    places: dict[str, Value] = {}
     for key in PLACE_PARAMETERS:
         given = bound.get(key)
-        texts = given.split(",") if isinstance(given, str) else given
-        if isinstance(texts, list):
-            places += [str(text).strip() for text in texts]
-    require_names(connection, runs, "place", places)
+        if isinstance(given, str):
+            given = [*names_in(connection, runs, "place", given)]
+        if isinstance(given, list):
+            require_names(connection, runs, "place", [str(each) for each in given])
+            places[key] = given
+    return places
+
+
+def names_in(
+    connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], kind: str, text: str
+) -> tuple[str, ...]:
+    """Return the names that one text means: a name that the runs have, else several with commas."""
+    parts = values_of(text)
+    if parts == (text,):
+        return parts
+    known = connection.execute(
+        f"SELECT 1 FROM ({_KNOWN[kind][0]}) AS known WHERE known.name = $name LIMIT 1",
+        {"runs": [run.run_id for run in runs], "name": text},
+    ).fetchall()
+    return (text,) if known else parts
 
 
 def require_names(

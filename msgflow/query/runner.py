@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import re
 import shlex
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import duckdb
 
@@ -92,7 +92,7 @@ def run_query(
     window = part.window(runs)
     reserved: dict[str, Value] = {"runs": [run.run_id for run in runs], **window.bindings}
     own = bind(header, parameters)
-    require_places(connection, runs, own)
+    own |= require_places(connection, runs, own)
     require_ids(connection, runs, own)
     selection = selection or Selection()
     sql, chosen = selected(header, selection, internal)
@@ -136,35 +136,36 @@ def run_query(
 
 def _narrowing(parameters: Mapping[str, Value], selection: Selection) -> list[str]:
     """Return the options that leave rows out, as a user types them."""
-    given: dict[str, object] = {name: parameters.get(name) for name in ("from", "to")}
-    given |= {name: ",".join(getattr(selection, name)) for name in (*KINDS, "via", "without")}
-    given["where"] = selection.where
-    return [f"--{name} {shlex.quote(str(value))}" for name, value in given.items() if value]
+    given: dict[str, Any] = {name: parameters.get(name) or () for name in ("from", "to")}
+    given |= {name: getattr(selection, name) for name in (*KINDS, "via", "without")}
+    given["where"] = (selection.where,) if selection.where else ()
+    return [f"--{name} {shlex.quote(each)}" for name, texts in given.items() for each in texts]
 
 
 def _missing_way(
     connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], parameters: Mapping[str, Value]
 ) -> str | None:
     """Return why no path leads from one place to another, if both are given and none does."""
-    places = {name: parameters.get(name) for name in ("from", "to")}
+    places: dict[str, Any] = {name: parameters.get(name) for name in ("from", "to")}
     if not all(places.values()):
         return None
     chosen = {"runs": [run.run_id for run in runs], **places}
+    begin, end = (", ".join(names) for names in places.values())
     found = internal_sql().run(connection, "missing_way", chosen).fetchall()
     if not found:
         return None
     ((last, topics, first, is_joint, is_dead_end, is_sink),) = found
     if last is None:
-        return f"no message of {places['from']} was received"
+        return f"no message of {begin} was received"
     cure = ": msgflow suggest links" if is_dead_end else ""
     if not is_dead_end and not is_sink:
         cure = ": a link may be missing (msgflow links apply FILE)"
-    ends = f"flows from {places['from']} end at {last} (on {topics})"
+    ends = f"flows from {begin} end at {last} (on {topics})"
     if is_joint:
-        return f"{ends}, which publishes towards {places['to']}{cure}"
+        return f"{ends}, which publishes towards {end}{cure}"
     if first is None:
-        return f"{ends}, and nothing arrives at {places['to']}{cure}"
-    return f"{ends}, and those to {places['to']} begin at {first}{cure}"
+        return f"{ends}, and nothing arrives at {end}{cure}"
+    return f"{ends}, and those to {end} begin at {first}{cure}"
 
 
 def bind(
@@ -201,7 +202,7 @@ def bind(
 def _fit(command: str, param: Param, value: Value) -> Value:
     option = f"--{param.name.replace('_', '-')}"
     if param.name in PLACE_PARAMETERS and isinstance(value, list | tuple):
-        value = ",".join(map(str, value))
+        value = [str(each) for each in value] or None
     if isinstance(value, str):
         try:
             value = parse_text(value, param.type)

@@ -9,7 +9,7 @@ from msgflow.errors import UsageError
 from msgflow.text.name_suggestions import column_named
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from msgflow.sql.header import Header
     from msgflow.sql.value import Value
@@ -147,7 +147,9 @@ def _parts(header: Header, column: str, kind: str) -> str:
     (kept,) = (known for known in header.columns if known.name == column)
     if kept.type.endswith("[]"):
         return f'result."{column}"'
-    return f"string_split(result.\"{column}\", '{_SEPARATOR.get(kind, ', ')}')"
+    parts = f"string_split(result.\"{column}\", '{_SEPARATOR.get(kind, ', ')}')"
+    # A name may have the separator inside.
+    return f'list_append({parts}, result."{column}")'
 
 
 def _is_any(header: Header, column: str, patterns: str, kind: str) -> str:
@@ -211,15 +213,22 @@ def _what_it_has(header: Header) -> str:
 
 
 def values_of(given: str | Sequence[str] | None) -> tuple[str, ...]:
-    """Return the names that a user gave: one, several, or one text with commas."""
+    """Return the names that a user gave: several as they are, or one text, in which commas part."""
     if given is None:
         return ()
-    texts = [given] if isinstance(given, str) else list(given)
-    return tuple(part.strip() for text in texts for part in text.split(",") if part.strip())
+    parts = (part.strip(" ") for part in given.split(",")) if isinstance(given, str) else given
+    return tuple(part for part in parts if part)
 
 
-def make_selection(given: Mapping[str, object]) -> Selection:
+def make_selection(
+    given: Mapping[str, object],
+    names_in: Callable[[str, str], Sequence[str]] = lambda _, text: values_of(text),
+) -> Selection:
     """Return the selection that the words of `Database.query` mean.
+
+    Args:
+        given: words and values.
+        names_in: returns the names that a text means, of a kind or 'place'.
 
     Raises:
         UsageError: a limit below one, or a word of another kind.
@@ -232,6 +241,8 @@ def make_selection(given: Mapping[str, object]) -> Selection:
             words[word] = value
         elif word == "where":
             words[word] = value
+        elif isinstance(value, str) and word != "sort":
+            words[word] = tuple(names_in(word if word in KINDS else "place", value))
         elif value is None or isinstance(value, str) or _is_texts(value):
             words[word] = values_of(value)  # type: ignore[arg-type]
         else:

@@ -282,5 +282,9 @@ def _steps(
     yield ("flow", "--take", str(pieces[0]["take_id"]), "--why")
     if len(losses):
         topics = set(losses.table["topic_name"].to_pylist())
-        named = () if None in topics else ("--topic", ",".join(sorted(topics)))
+        named = (
+            []
+            if None in topics
+            else [word for topic in sorted(topics) for word in ("--topic", topic)]
+        )
         yield ("query", "topics", "--measure", "unmatched", *named)

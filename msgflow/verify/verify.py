@@ -272,9 +272,9 @@ class _Work:
         own: dict[str, Value] = dict(given)
         if target.path_name is not None:
             places = self._paths[target.path_name.value]
-            own |= {word: ",".join(places[word]) for word in ("from", "to") if word in places}
+            own |= {word: [*places[word]] for word in ("from", "to") if word in places}
         elif target.kind == PATH:
-            own |= {"from": target.topics[0].value, "to": target.topics[-1].value}
+            own |= {"from": [target.topics[0].value], "to": [target.topics[-1].value]}
         if any(param.name == "case" for param in header.params):
             own["case"] = self._case
         part = self._part if header.has_window else Slice(self._part.run)

@@ -39,9 +39,10 @@ def critical_path(
     if not ends:
         return encode(pa.table({"at_ns": pa.array([], pa.int64())}))
     (end,) = ends
+    first = from_topic or end["from_topic"]
     asked = {
-        "from": from_topic or end["from_topic"],
-        "to": end["to_topic"],
+        "from": [first],
+        "to": [end["to_topic"]],
         "take": end["take_id"],
         # Whatever was picked has a flow, also one that is not the first arrival of its root.
         "case": "every_pair",
@@ -54,8 +55,8 @@ def critical_path(
     return encode(
         result.to_arrow().drop_columns(["path"]),
         meta={
-            "from": asked["from"],
-            "to": asked["to"],
+            "from": first,
+            "to": end["to_topic"],
             "take_id": asked["take"],
             "notes": result.notes,
             "columns": {
@@ -63,7 +64,7 @@ def critical_path(
                 for column in header.columns
                 if column.name != "path"
             },
-            "command": shlex.join([*command, "--from", asked["from"], "--detail", "full"]),
+            "command": shlex.join([*command, "--from", first, "--detail", "full"]),
         },
         origin_ns=origin_ns,
         units=result.units,

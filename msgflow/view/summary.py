@@ -179,7 +179,7 @@ def blame_section(
     header = load_query("critical-path")
     results, commands = [], []
     for rank, (first, last, take) in enumerate(flows, 1):
-        given: dict[str, Value] = {"from": first, "to": last, "take": take, "by": "node"}
+        given: dict[str, Value] = {"from": [first], "to": [last], "take": take, "by": "node"}
         result = run_query(connection, header, given, part.slice)
         table = result.table
         ranks = pa.array([rank] * len(result), pa.int64())

@@ -216,8 +216,8 @@ def blamed(pieces: Sequence[Row], path: str | None) -> Iterator[str]:
 def _ends(path: str | None) -> Row:
     """Return the topics between which a flow counts: a target may be part of a longer path."""
     topics = (path or "").split(" → ")[1:-1]
-    ends = {"from": topics[0], "to": topics[-1]} if topics else {}
-    return {word: topic for word, topic in ends.items() if topic.startswith("/")}
+    ends = {"from": topics[:1], "to": topics[-1:]} if topics else {}
+    return {word: named for word, named in ends.items() if named[0].startswith("/")}
 
 
 def _sender(hop: int | None, path: str | None) -> str | None:

@@ -5,11 +5,16 @@
 --     it publishes.
 -- grain: one row per topic, and per node
 -- param: runs BIGINT[]  Runs to look at
--- param: names VARCHAR  Names or globs
+-- param: names VARCHAR[]  Names or globs: a list, or a text with commas between
 CREATE OR REPLACE MACRO derive.place(runs, names) AS TABLE
 WITH wanted AS (
-    SELECT DISTINCT trim(pattern) AS pattern
-    FROM (SELECT unnest(string_split(names::VARCHAR, ',')) AS pattern)
+    -- The text of a list is a list again; any other text is none, and its names have no spaces.
+    SELECT DISTINCT unnest(
+        coalesce(
+            try_cast(names::VARCHAR AS VARCHAR[]),
+            list_transform(string_split(names::VARCHAR, ','), lambda each: trim(each))
+        )
+    ) AS pattern
 ),
 topic AS MATERIALIZED (
     SELECT DISTINCT w.pattern, p.topic_name

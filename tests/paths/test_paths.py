@@ -138,8 +138,10 @@ def test_suggestions_tell_paths_apart_that_begin_and_end_alike(tmp_path: Path) -
     file.write_text(suggest_paths(rows), encoding="utf-8")
     paths = read_paths(file).paths
     assert [path.name.value for path in paths] == ["t-to-d", "t-to-d-2", "nul-to-d"]
-    assert paths[0].words() == {"from": "/t", "to": "/d", "via": "/b,/u", "without": "/c,/v"}
-    assert read_paths(file).paths[2].words() == {"from": "/nul", "to": "/d"}
+    assert paths[0].words() == {
+        "from": ["/t"], "to": ["/d"], "via": ["/b", "/u"], "without": ["/c", "/v"],
+    }  # fmt: skip
+    assert read_paths(file).paths[2].words() == {"from": ["/nul"], "to": ["/d"]}
     file.write_text(suggest_paths([]), encoding="utf-8")
     assert read_paths(file).paths == ()
 
@@ -157,4 +159,4 @@ def test_suggestions_are_no_wider_than_a_narrow_terminal(tmp_path: Path) -> None
     file = tmp_path / "paths.yaml"
     file.write_text(text, encoding="utf-8")
     words = read_paths(file).paths[0].words()
-    assert words["via"].count(",") == words["without"].count(",") == 17
+    assert len(words["via"]) == len(words["without"]) == 18

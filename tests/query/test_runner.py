@@ -192,20 +192,31 @@ def with_topics(connection: duckdb.DuckDBPyConnection) -> duckdb.DuckDBPyConnect
 
 
 @pytest.mark.parametrize(
-    ("run", "given"),
+    ("run", "given", "first", "last"),
     [
-        ("first", {"from": "/camera", "to": "/scan"}),
-        ("first", {"from": "/cam*, /driver", "to": "[main 812]"}),
-        ("first", {"from": None, "to": "/reset"}),
-        ("first", {"from": None}),
-        ("all", {"from": "/lidar", "to": "/scan"}),
+        ("first", {"from": "/camera", "to": "/scan"}, ["/camera"], ["/scan"]),
+        ("first", {"from": "/cam*, /driver", "to": "[main 812]"}, ["/cam*", "/driver"],
+         ["[main 812]"]),
+        ("first", {"from": None, "to": "/reset"}, None, ["/reset"]),
+        ("first", {"from": None}, None, None),
+        ("all", {"from": "/lidar", "to": "/scan"}, ["/lidar"], ["/scan"]),
+        # A name that the run has is no list, whatever is in it; a list is taken as it is.
+        ("first", {"from": "/a,/b", "to": "/b,/a"}, ["/a,/b"], ["/b", "/a"]),
+        ("first", {"from": ["/a,/b", "/a"], "to": " /s\u2028 "}, ["/a,/b", "/a"], [" /s\u2028 "]),
     ],
-)
+)  # fmt: skip
 def test_topics_of_the_chosen_runs_will_do(
-    with_topics: duckdb.DuckDBPyConnection, run: str, given: dict[str, Value]
+    with_topics: duckdb.DuckDBPyConnection,
+    run: str,
+    given: dict[str, Value],
+    first: list[str] | None,
+    last: list[str] | None,
 ) -> None:
+    with_topics.execute(
+        "INSERT INTO publisher VALUES (1, '/a,/b', false), (1, ' /s\u2028 ', false)"
+    )
     (row,) = run_query(with_topics, header(TOPICS), given, Slice(run)).to_arrow().to_pylist()
-    assert (row["first"], row["last"]) == (given["from"], given.get("to"))
+    assert (row["first"], row["last"]) == (first, last)
 
 
 @pytest.mark.parametrize(

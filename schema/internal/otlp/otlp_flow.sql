@@ -17,14 +17,14 @@ WITH path AS (
     FROM main.flow_path($runs, $from, $to, only_paths := true)
     WHERE ($via IS NOT NULL OR $without IS NOT NULL)
         AND coalesce(list_bool_and(list_transform(
-            string_split($via::VARCHAR, ','),
+            $via::VARCHAR[],
             lambda each: list_bool_or(list_transform(
                 string_split(path, ' → '),
                 lambda step: step = trim(each) OR trim(step, '()') GLOB trim(each)
             ))
         )), true)
         AND NOT coalesce(list_bool_or(list_transform(
-            string_split($without::VARCHAR, ','),
+            $without::VARCHAR[],
             lambda each: list_bool_or(list_transform(
                 string_split(path, ' → '),
                 lambda step: step = trim(each) OR trim(step, '()') GLOB trim(each)
