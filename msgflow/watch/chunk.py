@@ -23,6 +23,8 @@ _TIME = "%Y%m%dT%H%M%S%z"
 # Seconds from one search for further recordings to the next, or more: a search is no longer part
 # of the time than this.
 _BETWEEN_SEARCHES = 1.0
+# Rotations in a second, at most.
+_MOST_A_SECOND = 20
 _MOST_OF_TIME = 0.05
 
 
@@ -57,8 +59,10 @@ class ChunkFinder:
         self._refused: set[Path] = set()
         # The names that each `archives` had at the last look.
         self._names: dict[Path, set[str]] = {}
-        # Of each source, which recording its last chunk belongs to, and the number of the chunk.
-        self._last: dict[Path, tuple[int, int]] = {}
+        # Of each source, which recording its last chunk belongs to, its number and its end.
+        self._last: dict[Path, tuple[int, int, datetime]] = {}
+        # The number of the last directory of a source that did not go on from there.
+        self._odd: dict[Path, int] = {}
         self._next_search = 0.0
 
     def further(self) -> list[Chunk]:
@@ -91,28 +95,37 @@ class ChunkFinder:
             # It may come back, with other chunks.
             del self._names[archives]
             return
-        matches = [
-            match for name in names - self._names[archives] if (match := _NAME.fullmatch(name))
-        ]
+        found = [each for name in names - self._names[archives] if (each := _read(archives / name))]
         self._names[archives] = names
         source = archives.parent
-        recording, last = self._last.get(source, (0, -1))
-        numbers = [int(match["number"]) for match in matches]
-        if len(set(numbers)) == len(numbers) and all(number > last for number in numbers):
-            # A clock that is set does not mix them up.
-            matches.sort(key=lambda match: int(match["number"]))
-        else:
-            matches.sort(key=lambda match: (_time(match["begin"]), int(match["number"])))
-        for match in matches:
-            number = int(match["number"])
+        last = self._last[source][1] if source in self._last else -1
+        numbers = [number for number, *_ in found]
+        # A clock that is set does not mix them up.
+        is_by_number = len(set(numbers)) == len(numbers) and all(each > last for each in numbers)
+        found.sort(key=lambda each: each[0] if is_by_number else (each[1], each[0]))
+        for number, begin, end, path in found:
+            if not self._goes_on(source, number, begin):
+                self._odd[source] = number
+                continue
+            recording, last, _ = self._last.get(source, (0, -1, end))
             recording += number <= last
-            last = number
-            path = archives / match.string
+            self._last[source] = (recording, number, end)
             if os.access(path, os.R_OK | os.X_OK):
                 yield recording, Chunk(number, source, path)
             else:
                 self._fail(PermissionError(0, "permission denied", str(archives)))
-        self._last[source] = (recording, last)
+
+    def _goes_on(self, source: Path, number: int, begin: datetime) -> bool:
+        """Tell whether a chunk follows the last one, or there was time for those in between."""
+        if source not in self._last or number == self._odd.get(source, number) + 1:
+            return True
+        _, last, end = self._last[source]
+        missing = number - last - 1 if number > last else number
+        passed_s = (begin - end).total_seconds()
+        # Names have whole seconds.
+        return number == last + 1 or (
+            passed_s >= -1 and missing <= _MOST_A_SECOND * max(passed_s, 1)
+        )
 
     def _fail(self, error: OSError) -> None:
         # What has gone meanwhile is no fault.
@@ -144,6 +157,17 @@ def finished_chunks(directory: Path) -> list[Chunk]:
 def remove_chunk(path: Path) -> None:
     """Remove a chunk from the disk; its session goes on."""
     shutil.rmtree(path, ignore_errors=True)
+
+
+def _read(path: Path) -> tuple[int, datetime, datetime, Path] | None:
+    """Return number, begin, end and path of a chunk; None of what LTTng does not write."""
+    match = _NAME.fullmatch(path.name)
+    if match is None or path.is_symlink() or not path.is_dir():
+        return None
+    try:
+        return int(match["number"]), _time(match["begin"]), _time(match["end"]), path
+    except ValueError:
+        return None
 
 
 def _time(text: str) -> datetime:

@@ -72,6 +72,37 @@ def test_a_clock_that_is_set_does_not_mix_up_chunks(tmp_path: Path) -> None:
     assert numbers(finished_chunks(tmp_path)) == [0, 1, 2]
 
 
+def test_what_is_no_chunk_of_the_session_is_left_out(finder: ChunkFinder, tmp_path: Path) -> None:
+    (tmp_path / "elsewhere").mkdir()
+    for number in (0, 1):
+        make(tmp_path, number, 2 * number)
+    make(tmp_path, 99_999, 5)
+    archives = tmp_path / "archives"
+    (archives / "99999999T999999+9999-20260314T092600+0100-2").mkdir()
+    (archives / "20260314T092604+0100-20260314T092606+0100-2").symlink_to(tmp_path / "elsewhere")
+    (archives / "20260314T092606+0100-20260314T092608+0100-3").touch()
+    assert numbers(finder.further()) == [0, 1]
+    make(tmp_path, 4, 8)
+    assert numbers(finder.further()) == [4]
+    # A session that is created anew is later than the earlier one.
+    make(tmp_path, 2, 1)
+    make(tmp_path, 5, 10)
+    assert numbers(finder.further()) == [5]
+
+
+def test_a_gap_is_believed_when_the_recording_goes_on_behind_it(
+    finder: ChunkFinder, tmp_path: Path
+) -> None:
+    make(tmp_path, 0, 30)
+    assert numbers(finder.further()) == [0]
+    # The clock was set back, and chunks are missing.
+    make(tmp_path, 7, 0)
+    assert numbers(finder.further()) == []
+    make(tmp_path, 8, 2)
+    make(tmp_path, 9, 4)
+    assert numbers(finder.further()) == [8, 9]
+
+
 def test_a_directory_that_is_replaced(finder: ChunkFinder, tmp_path: Path) -> None:
     path = make(tmp_path, 0)
     assert numbers(finder.further()) == [0]
