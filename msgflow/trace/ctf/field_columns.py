@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 _WIDEST_ROW = 256
 _WORD = 8
+_MOST_WORDS = 256
 _ONES = np.uint64(0x0101010101010101)
 _HIGHS = np.uint64(0x8080808080808080)
 
@@ -202,7 +203,9 @@ def text_lengths(memory: Memory, begins: NDArray[np.int64]) -> NDArray[np.int64]
     at = begins
     rows = np.arange(begins.size)
     words_at = memory.view("<u8")
-    while rows.size:
+    for _ in range(_MOST_WORDS):
+        if not rows.size:
+            break
         words = words_at[at]
         # The lowest bit that is set marks the first byte that is zero.
         marks = (words - _ONES) & ~words & _HIGHS
@@ -212,6 +215,9 @@ def text_lengths(memory: Memory, begins: NDArray[np.int64]) -> NDArray[np.int64]
         ended = rows[found]
         lengths[ended] = at[found] - begins[ended] + below // _WORD
         rows, at = rows[~found], at[~found] + _WORD
+    # Few texts are longer, if any: one after the other.
+    for row, begin in zip(rows.tolist(), at.tolist(), strict=True):
+        lengths[row] = memory.data.find(0, begin) - begins[row]
     return lengths
 
 
