@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
 
 from msgflow.errors import TraceError, UsageError
+from msgflow.trace.compression import CORRUPT, open_plain
+from msgflow.trace.extraction import LIMIT_VARIABLE, limit_of
+from msgflow.trace.regular_file import irregular
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -25,6 +29,7 @@ _SCHEMA = pa.schema(
     }
 )
 _ROWS_AT_ONCE = 50_000
+_BYTES_AT_ONCE = 1 << 20
 
 
 def read_bag(bag: Path) -> Iterator[pa.Table]:
@@ -44,6 +49,7 @@ def read_bag(bag: Path) -> Iterator[pa.Table]:
         ) from None
     if not bag.exists():
         raise TraceError(f"no such bag — {bag}", "give the directory of a rosbag2")
+    _require_safe(bag)
     try:
         # Bags from before Iron do not hold their types. The reader knows those of ROS itself.
         with AnyReader([bag], default_typestore=get_typestore(Stores.LATEST)) as reader:
@@ -54,6 +60,24 @@ def read_bag(bag: Path) -> Iterator[pa.Table]:
             f"cannot read as a bag of ROS 2: {said[0] if said else type(error).__name__} — {bag}",
             "give the directory of a rosbag2; ros2 bag reindex repairs one that was cut off",
         ) from error
+
+
+def _require_safe(bag: Path) -> None:
+    """Raise where a bag would hang its reader, or fill the disk that it is unpacked to."""
+    files = [bag, *(bag.rglob("*") if bag.is_dir() else ())]
+    for file in files:
+        if kind := irregular(file):
+            raise TraceError(f"{kind}, no file — {file}", "copy the bag again, with cp -rL")
+        if file.suffix == ".zstd" and file.is_file():
+            with file.open("rb") as packed, contextlib.suppress(*CORRUPT):
+                content, left = open_plain(packed), limit_of(file)
+                while left >= 0 and (chunk := content.read(_BYTES_AT_ONCE)):
+                    left -= len(chunk)
+                if left < 0:
+                    raise TraceError(
+                        f"the file has more than {limit_of(file):,} bytes unpacked — {file}",
+                        f"{LIMIT_VARIABLE}=100GB msgflow … reads it, if you know who made it",
+                    )
 
 
 def _tables(reader: Any) -> Iterator[pa.Table]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import random
 import shutil
 from collections import Counter
@@ -10,9 +11,11 @@ from pathlib import Path
 from typing import Any
 
 import duckdb
+import pyarrow as pa
 import pytest
 from thorough import few
 
+from msgflow.bag.messages import read_bag
 from msgflow.database import open_db
 from msgflow.errors import TraceError, UsageError
 
@@ -239,6 +242,27 @@ def test_a_damaged_bag_is_an_error_and_changes_nothing(
     with pytest.raises(TraceError, match="cannot read as a bag"):
         join(database, bag)
     assert stored(database) == before
+
+
+@pytest.mark.parametrize("name", ["metadata.yaml", "bag.mcap"])
+def test_a_pipe_is_refused(tmp_path: Path, name: str) -> None:
+    os.mkfifo(tmp_path / name)
+    for bag in (tmp_path, tmp_path / name):
+        with pytest.raises(TraceError, match="a pipe, no file"):
+            next(read_bag(bag))
+
+
+def test_a_file_that_unpacks_to_much_more_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    content = bytes(10_000_000)
+    (tmp_path / "bag.db3.zstd").write_bytes(pa.compress(content, "zstd", asbytes=True))
+    monkeypatch.setenv("MSGFLOW_UNPACK_LIMIT", "9MB")
+    with pytest.raises(TraceError, match="more than 9,000,000 bytes unpacked"):
+        next(read_bag(tmp_path))
+    monkeypatch.setenv("MSGFLOW_UNPACK_LIMIT", "11MB")
+    with pytest.raises(TraceError, match="cannot read as a bag"):
+        next(read_bag(tmp_path))
 
 
 def test_what_is_no_bag(database: Path, tmp_path: Path) -> None:
