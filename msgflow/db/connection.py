@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import duckdb
 
-from msgflow.db.definition_check import require_ours
+from msgflow.db.definition_check import require_ours, require_tables
 from msgflow.db.objects import definition_hash, head_revision, known_revisions
 from msgflow.db.sandbox import open_file, opening, remove_abandoned_spills, require_file
 from msgflow.errors import DatabaseError
@@ -106,6 +106,8 @@ def require_current(con: duckdb.DuckDBPyConnection, path: Path) -> None:
         )
     with database_errors(path):
         if not has_current_views(con):
+            # An upgrade would refuse other tables.
+            require_tables(con, path)
             raise DatabaseError(f"database has the views of another msgflow version — {path}", hint)
 
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections import Counter
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
@@ -91,12 +93,24 @@ def simulate(
         recording: how it is recorded; as the scenario says if None.
 
     Raises:
-        UsageError: unknown scenario or layout, factor not positive, directory not empty.
+        UsageError: unknown scenario or layout, factor not positive, directory not empty, or one
+            that cannot be written: it is then as it was before.
     """
     chosen = _choose(scenario, layout, recording)
     if not 0 < factor < float("inf"):
         raise UsageError(f"the factor must be a positive number — {factor}")
-    target = _empty_directory(Path(directory))
+    with _filled(Path(directory)) as target:
+        return _simulate(chosen, target, factor, seed, clock_offset_ns, clock_drift_ppm)
+
+
+def _simulate(
+    chosen: Scenario,
+    target: Path,
+    factor: float,
+    seed: int,
+    clock_offset_ns: int,
+    clock_drift_ppm: float,
+) -> Simulation:
     # The course of events depends on name and seed only: a longer run begins like a shorter one.
     # Yet traces that differ in anything never pass for the same.
     course = f"{chosen.name}/{seed}"
@@ -246,13 +260,26 @@ def _subscriptions(scenario: Scenario) -> Counter[str]:
     return expected
 
 
-def _empty_directory(directory: Path) -> Path:
-    if directory.exists() and (not directory.is_dir() or any(directory.iterdir())):
+@contextmanager
+def _filled(directory: Path) -> Iterator[Path]:
+    """Make an empty directory to write to; what did not become complete is removed again."""
+    is_new = not directory.exists()
+    if not is_new and (not directory.is_dir() or any(directory.iterdir())):
         raise UsageError(
             f"not an empty directory — {directory}", "name a directory that does not exist yet"
         )
-    directory.mkdir(parents=True, exist_ok=True)
-    return directory
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        yield directory
+    except BaseException as error:
+        for entry in [directory] if is_new else [*directory.iterdir()]:
+            shutil.rmtree(entry, ignore_errors=True)
+        if isinstance(error, OSError):
+            raise UsageError(
+                f"cannot write the trace ({error.strerror or error}) — {directory}",
+                "name a directory on a disk with room: -o DIR",
+            ) from error
+        raise
 
 
 def _clocks(hosts: Sequence[Host], offset_ns: int, drift_ppm: float) -> list[HostClock]:

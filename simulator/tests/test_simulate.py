@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import json
+import resource
 from dataclasses import replace
+from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
@@ -184,3 +186,18 @@ def _scenario(*processes, hosts=("alpha",)):
 def test_refuses_a_system_that_cannot_be(make, message):
     with pytest.raises(UsageError, match=message):
         make()
+
+
+@pytest.mark.parametrize("is_there", [False, True])
+def test_where_nothing_can_be_written_no_part_stays(tmp_path: Path, is_there: bool) -> None:
+    directory = tmp_path / "out"
+    if is_there:
+        directory.mkdir()
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, hard))
+    try:
+        with pytest.raises(UsageError, match=r"cannot write the trace \(File too large\) — .*out"):
+            simulate("pipeline", directory, factor=0.1)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert [*tmp_path.rglob("*")] == ([directory] if is_there else [])
