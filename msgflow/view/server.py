@@ -14,6 +14,7 @@ import re
 import socket
 import threading
 from contextlib import contextmanager, suppress
+from functools import partial
 from typing import TYPE_CHECKING, Any, Protocol
 
 import anyio
@@ -21,6 +22,7 @@ import anyio.to_thread
 import duckdb
 import uvicorn
 from starlette.applications import Starlette
+from starlette.datastructures import Headers
 from starlette.responses import JSONResponse, PlainTextResponse, RedirectResponse, Response
 from starlette.routing import Route
 
@@ -435,9 +437,37 @@ def listening(
     listener = listen(port)
     token = kept_token(place)
     address = f"http://{HOST}:{listener.getsockname()[1]}/?token={token}"
+    with listener:
+        yield _server(make(token)), listener, address
+
+
+def serve_text(address: str, port: int, make: Callable[[], bytes], media_type: str) -> None:
+    """Serve one text at any path, in a thread, until the process ends.
+
+    An address of this machine alone answers no request that names another host.
+
+    Raises:
+        OSError: the port cannot be used.
+    """
+    family = socket.AF_INET6 if ":" in address else socket.AF_INET
+    listener = socket.create_server((address, port), family=family)
+
+    async def answer(scope: Scope, receive: Receive, send: Send) -> None:
+        host = Headers(scope=scope).get("host", "")
+        response = (
+            PlainTextResponse("error: this server answers for this machine alone\n", 421)
+            if is_local(address) and not is_local(host)
+            else Response(make(), media_type=media_type)
+        )
+        await response(scope, receive, send)
+
+    run = partial(_server(answer).run, sockets=[listener])
+    threading.Thread(target=run, daemon=True).start()
+
+
+def _server(app: ASGIApp) -> uvicorn.Server:
     config = uvicorn.Config(
-        timed(make(token)), log_level="error", access_log=False, lifespan="off", ws="none",
+        timed(app), log_level="error", access_log=False, lifespan="off", ws="none",
         timeout_graceful_shutdown=1, server_header=False, proxy_headers=False, http=Connection,
     )  # fmt: skip
-    with listener:
-        yield uvicorn.Server(config), listener, address
+    return uvicorn.Server(config)

@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 BOUNDS_S = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
 """Bounds of the buckets of latencies [s]."""
 
+MOST_LABELS = 1_000
+"""Paths, and subscriptions that lost messages, that metrics have at most."""
+
 _SECOND_NS = 1_000_000_000
 _STATUSES = "SELECT path, status, count(*) FROM watched_flow GROUP BY ALL"
 # Where clocks are apart, latencies may be negative: a sum that falls would be no counter.
@@ -81,16 +84,23 @@ class Exporter:
             UsageError: prometheus-client is missing, or the port cannot be used.
         """
         try:
-            from prometheus_client import CollectorRegistry, start_http_server
+            from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, generate_latest
         except ImportError:
             raise UsageError(
                 "prometheus-client is not installed", "pip install 'ros2-msgflow[prometheus]'"
             ) from None
+        from msgflow.view.server import HOST, serve_text
+
         address, _, port = place.rpartition(":")
         registry = CollectorRegistry()
         registry.register(self)
         try:
-            start_http_server(int(port), address or "127.0.0.1", registry)
+            serve_text(
+                address.strip("[]") or HOST,
+                int(port),
+                lambda: generate_latest(registry),
+                CONTENT_TYPE_LATEST,
+            )
         except (OSError, ValueError, OverflowError) as error:
             raise UsageError(
                 f"cannot serve metrics at {place}: {error}", "--prometheus 9464"
@@ -118,10 +128,26 @@ class Exporter:
         with self._lock:
             self._statuses.update({(path, status): number for path, status, number in statuses})
             self._sums_ns.update(dict(sums))
-            self._counts.update(dict(counts))
+            for path, number in counts:
+                # What was seen last comes last.
+                self._counts[path] = self._counts.pop(path, 0) + number
             self._buckets.update({(path, bound): number for path, bound, number in buckets})
-            self._losses.update({tuple(labels): number for *labels, number in losses})
+            for *labels, number in losses:
+                self._losses[tuple(labels)] = self._losses.pop(tuple(labels), 0) + number
             self._discarded += discarded
+            self._forget()
+
+    def _forget(self) -> None:
+        """Drop the labels that were seen longest ago: restarts make new ones, for ever."""
+        gone = [*self._counts][: max(len(self._counts) - MOST_LABELS, 0)]
+        for path in gone:
+            del self._counts[path], self._sums_ns[path]
+            for status in [key for key in self._statuses if key[0] == path]:
+                del self._statuses[status]
+            for bound in BOUNDS_S:
+                del self._buckets[path, bound]
+        for labels in [*self._losses][: max(len(self._losses) - MOST_LABELS, 0)]:
+            del self._losses[labels]
 
     def show(self, report: WindowReport) -> None:
         """Take over how it is now."""

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import json
 import re
+import socket
+import threading
+import urllib.error
 import urllib.request
 from collections import Counter
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -195,6 +199,37 @@ def test_the_lag_grows_where_nothing_comes(monkeypatch: pytest.MonkeyPatch) -> N
     # A finished recording has none.
     exporter.show(shown())
     assert metrics(exporter, "msgflow_watch_lag_seconds") == {}
+
+
+def test_what_has_gone_is_dropped(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("msgflow.watch.prometheus.MOST_LABELS", 2)
+    exporter = Exporter()
+    for number in (0, 1, 2, 0, 3):
+        path = f"/p{number}"
+        exporter._statuses.update({(path, "reached"): 1, (path, "lost"): 1})
+        exporter._counts[path] = exporter._counts.pop(path, 0) + 1
+        exporter._losses[path, "[a 1]", "lost", "?"] = 1
+        exporter._forget()
+    assert metrics(exporter, "msgflow_path_flows") == {
+        ("/p0", "reached"): 1, ("/p0", "lost"): 1, ("/p3", "reached"): 1, ("/p3", "lost"): 1,
+    }  # fmt: skip
+    assert len(metrics(exporter, "msgflow_messages_undelivered")) == 2
+
+
+def test_another_host_is_refused_and_open_connections_take_no_thread(
+    exporter: Exporter, unused_port: int
+) -> None:
+    exporter.serve(str(unused_port))
+    before = threading.active_count()
+    with ExitStack() as stack:
+        for _ in range(100):
+            stack.enter_context(socket.create_connection(("127.0.0.1", unused_port)))
+        request = urllib.request.Request(
+            f"http://127.0.0.1:{unused_port}/metrics", headers={"Host": "evil.example"}
+        )
+        with pytest.raises(urllib.error.HTTPError, match="421"):
+            urllib.request.urlopen(request)
+        assert threading.active_count() <= before + 1
 
 
 def test_metrics_are_served(exporter: Exporter, unused_port: int) -> None:
