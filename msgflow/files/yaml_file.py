@@ -152,7 +152,8 @@ def in_quotes(text: str) -> str:
     # JSON leaves characters as they are that end a line of YAML, or that YAML forbids.
     from ruamel.yaml import YAML
 
-    yaml, stream = YAML(typ="safe", pure=True), StringIO()
+    yaml: Any = YAML(typ="safe", pure=True)
+    stream = StringIO()
     yaml.default_style = '"'
     yaml.width = sys.maxsize
     yaml.dump(text, stream)
