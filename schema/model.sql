@@ -103,6 +103,7 @@ CREATE TABLE staging.executor_named (event_id BIGINT, process_id BIGINT, executo
 CREATE TABLE staging.executor_polled (thread_id BIGINT, process_id BIGINT, polls BIGINT,
     waits BIGINT);
 CREATE TABLE staging.executor_thread (executor_id BIGINT, thread_id BIGINT);
+CREATE TABLE staging.executor_undelimited (thread_id BIGINT, process_id BIGINT);
 CREATE TABLE staging.failed_take (trace_id INTEGER, subscription_id BIGINT, process_id BIGINT,
     thread_id BIGINT, failed_ns BIGINT);
 CREATE TABLE staging.finding (run_id BIGINT, trace_id BIGINT, name VARCHAR, subject VARCHAR,

@@ -21,6 +21,10 @@ silent AS (
     SEMI JOIN enabled AS e ON p.trace_index = e.trace_index
     ANTI JOIN staging.executor_first AS x ON p.thread_id = x.thread_id
     ANTI JOIN staging.thread_break AS b ON p.thread_id = b.thread_id
+    -- Of these the recording left the events out.
+    ANTI JOIN (SELECT process_id FROM staging.executor_named WHERE kind IN (
+        'single_threaded_executor', 'multi_threaded_executor'
+    )) AS n ON p.process_id = n.process_id
     GROUP BY p.process_id, p.thread_id, p.trace_index
     -- An executor chose the first one before the recording began, perhaps. It would have said so
     -- before the next.

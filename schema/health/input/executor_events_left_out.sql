@@ -1,0 +1,32 @@
+-- name: finding.executor_events_left_out
+-- title: Executors without the events that delimit their states
+-- description: An executor says that it waits for work, looks for what is ready, and executes. The
+--     recording has not all of these, so nothing shows when its threads waited: they have no
+--     executor states, only callbacks, services and takes. Links are not affected.
+-- cause: The session left out rclcpp_executor_wait_for_work or rclcpp_executor_get_next_ready, such
+--     as against busy waiting, or all events of executors.
+-- cure: Record all three events where it matters what executors do.
+-- grain: one row per process with such threads
+-- severity: warning
+-- when: staging.executor_undelimited, staging.executor_named
+WITH left_out AS (
+    SELECT process_id, thread_id
+    FROM staging.executor_undelimited
+    UNION
+    -- CARET says of which kind the executor is: one that has these events.
+    SELECT p.process_id, p.thread_id
+    FROM staging.callback_pair AS p
+    ANTI JOIN staging.executor_first AS f ON p.thread_id = f.thread_id
+    WHERE p.process_id IN (SELECT process_id FROM staging.executor_named WHERE kind IN (
+        'single_threaded_executor', 'multi_threaded_executor'
+    ))
+    GROUP BY p.process_id, p.thread_id
+    HAVING count(*) > 1
+)
+SELECT
+    l.label AS subject,
+    count(*) AS count,
+    printf('nothing shows when %d threads waited for work', count(*)) AS detail
+FROM left_out AS o
+JOIN process_label AS l ON o.process_id = l.process_id
+GROUP BY o.process_id, l.label
