@@ -22,7 +22,9 @@ WITH seen AS MATERIALIZED (
             FROM store.finding WHERE run_id = $run_id AND name = 'process_without_rclcpp'
         ) AS is_without_rclcpp,
         EXISTS (
-            FROM store.finding WHERE run_id = $run_id AND name = 'executor_without_events'
+            FROM store.finding
+            WHERE run_id = $run_id
+                AND name IN ('executor_without_events', 'executor_events_left_out')
         ) AS is_without_executor
     FROM store.run
     WHERE run_id = $run_id
