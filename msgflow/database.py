@@ -129,7 +129,7 @@ class Database:
         """Return what `work` returns for the connection; Ctrl-C interrupts it."""
         import duckdb
 
-        from msgflow.sql.failure import database_errors, out_of_memory
+        from msgflow.sql.failure import database_errors, out_of_memory, out_of_range
         from msgflow.sql.interrupt import interruptible
 
         connection = self.connection
@@ -140,6 +140,8 @@ class Database:
                 )
         except duckdb.OutOfMemoryException as error:
             raise out_of_memory(str(self.path)) from error
+        except duckdb.OutOfRangeException as error:
+            raise out_of_range(error, self.path) from error
 
     def ingest(
         self,

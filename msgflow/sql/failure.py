@@ -74,6 +74,14 @@ def out_of_memory(
     return QueryError(f"more memory is needed than the database may take — {what}", hint)
 
 
+def out_of_range(error: duckdb.OutOfRangeException, path: Path) -> DatabaseError:
+    """Return the error of a database that no ingest has made, with whose values SQL calculates."""
+    return DatabaseError(
+        f"the database has values that no recording has: {first_line(error)} — {path}",
+        "ingest the traces into a new one",
+    )
+
+
 @contextmanager
 def query_errors(what: str, message: str) -> Iterator[None]:
     """Turn errors of a statement into a QueryError; errors of the database file pass."""

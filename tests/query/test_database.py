@@ -149,3 +149,15 @@ def test_a_missing_database_is_named_when_it_is_asked(tmp_path: Path) -> None:
     with pytest.raises(DatabaseError, match=r"none\.duckdb"):
         database.runs()
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("value", [2**63 - 1, -(2**63)])
+def test_values_that_no_recording_has_are_said(small_database: Path, value: int) -> None:
+    with duckdb.connect(str(small_database)) as connection:
+        connection.execute("UPDATE store.publication SET start_ns = $value", {"value": value})
+        connection.execute("UPDATE store.clock SET offset_ns = $value", {"value": value})
+    with (
+        msgflow.open_db(small_database) as database,
+        pytest.raises(DatabaseError, match="values that no recording has: Overflow"),
+    ):
+        database.flow("/chatter")
