@@ -407,7 +407,7 @@ class Database:
                 raise _path_and_others(path)
             words = self._ask(self._named_path, header, path, Path(paths), part)
             via, without = words.pop("via", None), words.pop("without", None)
-            parameters |= words
+            parameters |= {word: [*names] for word, names in words.items()}
         selection = {
             "node": node, "topic": topic, "callback": callback, "host": host, "via": via,
             "without": without, "where": where, "sort": sort, "limit": limit, "slowest": slowest,
@@ -538,7 +538,7 @@ class Database:
         take_id: int | None = None,
         callback_instance_id: int | None = None,
         run: str | int | None = None,
-        from_: str | Sequence[str] | None = None,
+        from_: Value = None,
         case: str = "every_pair",
         by: str = "piece",
         detail: str = "short",
@@ -1031,7 +1031,8 @@ class Database:
         if path is not None:
             if choice:
                 raise _path_and_others(path)
-            choice |= self._ask(_words_of_path, path, Path(paths), Slice(**part))
+            named = self._ask(_words_of_path, path, Path(paths), Slice(**part))
+            choice |= {word: [*names] for word, names in named.items()}
         if slowest is not None:
             choice["slowest"] = slowest
         return self._ask(write_otlp, Path(output), Slice(**part), choice or None)
