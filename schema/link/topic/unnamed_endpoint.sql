@@ -26,7 +26,9 @@ SELECT
     e.run_id, e.kind, e.id, e.vertex, e.node_id, e.handle, e.topic_name, e.is_topic_declared,
     p.name AS process_name, p.pid, h.hostname,
     printf('%s: 0x%x', e.kind, e.handle)
-    || CASE WHEN e.is_handle_repeated THEN printf(', process: %d, host: %s', p.pid, to_json(h.hostname))
+    || CASE
+        WHEN e.is_handle_repeated
+        THEN printf(', process: %d, host: %s', p.pid, to_json(h.hostname))
         ELSE '' END AS entry
 FROM counted AS e
 JOIN store.process AS p ON e.process_id = p.process_id
