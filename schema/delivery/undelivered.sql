@@ -1,18 +1,18 @@
 -- name: derive.undelivered
 -- kind: macro
 -- description: Why a subscription did not take a message of its topic; the first reason that holds.
---     Everything is compared on the clock of the receiver. A message is lost only between two of its
---     publisher that were taken: without one, the two were never connected; before the first, not
---     yet; after the last, whether they still were does not show. `not_delivered` rests on a wait: a
---     message in the queue would have ended it. A wait tells this only where a single thread reads,
---     and only if it lasted ten times as long as messages usually need, at least a millisecond. A
---     reader that gets no CPU seems to wait, too, but takes the message when it wakes up. Only the
---     depth of the queue tells `overwritten` from `lost_in_transport`. A take that cannot be
---     identified may have been of the message. Then the reason is unknown: if it came before a later
---     message was taken, or within ten times the usual time. Messages are in order only if one
---     thread sends them with one publisher, and one thread takes them. A publisher may keep messages
---     for subscriptions that come later. Those of its process take them from a ring buffer, where
---     nothing identifies them.
+--     Everything is compared on the clock of the receiver. A message is lost only between two of
+--     its publisher that were taken: without one, the two were never connected; before the first,
+--     not yet; after the last, whether they still were does not show. `not_delivered` rests on a
+--     wait: a message in the queue would have ended it. A wait tells this only where a single
+--     thread reads, and only if it lasted ten times as long as messages usually need, at least a
+--     millisecond. A reader that gets no CPU seems to wait, too, but takes the message when it
+--     wakes up. Only the depth of the queue tells `overwritten` from `lost_in_transport`. A take
+--     that cannot be identified may have been of the message. Then the reason is unknown: if it
+--     came before a later message was taken, or within ten times the usual time. Messages are in
+--     order only if one thread sends them with one publisher, and one thread takes them. A
+--     publisher may keep messages for subscriptions that come later. Those of its process take them
+--     from a ring buffer, where nothing identifies them.
 -- grain: one row per publication and subscription of its topic that is not known to have taken it
 CREATE OR REPLACE MACRO derive.undelivered(only_run) AS TABLE
 WITH arrival AS MATERIALIZED (

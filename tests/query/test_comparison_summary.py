@@ -20,7 +20,7 @@ def compared(subject: str, verdicts: dict[str, str], difference_ns: int | None, 
             "b_ns": None if difference_ns is None else 1_000 + difference_ns,
             "change_percent": None if difference_ns is None else difference_ns / 10,
             "separation": None, "a_share": 1.0, "b_share": 0.5, "a_count": 30, "b_count": 20,
-            **more,
+            "a_ambiguous": 0, "b_ambiguous": 0, **more,
         }
         for statistic, verdict in verdicts.items()
     ]  # fmt: skip

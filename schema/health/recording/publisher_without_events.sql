@@ -1,8 +1,8 @@
 -- name: finding.publisher_without_events
 -- title: A publisher whose publications are not traced
--- description: Messages of a topic were taken whose publication is not in the traces. A publisher of
---     the topic was recorded, but not one publication of it. Flows of these messages begin at the
---     take, and topics --measure rate does not know them.
+-- description: Messages of a topic were taken whose publication is not in the traces. A publisher
+--     of the topic was recorded, but not one publication of it. Flows of these messages begin at
+--     the take, and topics --measure rate does not know them.
 -- cause: Serialized messages, as the player of a bag (ros2 bag play) and bridges publish them, have
 --     no event before Jazzy. Or a publisher that is not traced sends on the topic, too.
 -- cure: None needed to follow messages from the take on. For the publications, record with Jazzy or

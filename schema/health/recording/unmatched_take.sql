@@ -5,8 +5,8 @@
 -- cause: The publisher is not traced, events of it were lost, or the message carries no stamp. Of
 --     messages that are matched by time (Humble, Iron), several publications may be meant.
 -- cure: msgflow query topics --measure unmatched gives the reason of each. The findings
---     publisher_not_traced, publisher_without_events, trace_ends_early and message_without_stamp say
---     what can be done.
+--     publisher_not_traced, publisher_without_events, trace_ends_early and message_without_stamp
+--     say what can be done.
 -- grain: one row per trace, for messages with a stamp and without
 -- severity: warning
 -- when: store.orphan_take

@@ -45,7 +45,8 @@ measured AS (
             status,
             is_loss_affected,
             is_ambiguous,
-            is_first IS NOT false AND status NOT IN ('not_connected', 'cut_by_recording') AS is_root,
+            is_first IS NOT false
+            AND status NOT IN ('not_connected', 'cut_by_recording') AS is_root,
             CASE
                 WHEN status <> 'reached' THEN NULL
                 WHEN $case = 'first' AND NOT is_first THEN NULL

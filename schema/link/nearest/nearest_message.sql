@@ -9,11 +9,10 @@
 --     come into question; where two messages may both be of one publication; where another
 --     publication or message is within what a drift could move it, if the drift is not known; if it
 --     was stamped sooner after a publication than is usual, and another publication may be lost; if
---     the thread was writing another just before; if others publish on the topic, and it came sooner
---     than this publisher's messages do. Nearly all messages come some time after their
---     write, and the difference of the clocks may be wrong by that time.
---     Nor has it one where the difference of the clocks is not known, or explains less than half of
---     the messages.
+--     the thread was writing another just before; if others publish on the topic, and it came
+--     sooner than this publisher's messages do. Nearly all messages come some time after their
+--     write, and the difference of the clocks may be wrong by that time. Nor has it one where the
+--     difference of the clocks is not known, or explains less than half of the messages.
 -- grain: one row per message that has, or might have, a publication
 -- param: only_run BIGINT  Run to look at
 -- when: store.stamp_clock
