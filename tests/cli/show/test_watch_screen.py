@@ -22,6 +22,7 @@ def path(name: str, max_ms: float, lost: int = 0) -> dict[str, Any]:
     return dict.fromkeys(others, 0) | {
         "path": name,
         "reached": 100,
+        "ambiguous": 0,
         "lost": lost,
         "median_ns": int(max_ms * MS / 2),
         "p99_ns": int(max_ms * MS),
