@@ -1,8 +1,7 @@
 -- name: staging.executor_state
 -- kind: inline
 -- description: The literal reading of the executor's three events: each begins a state. When it
---     ended is not stored: derive.executor_interval reads it off the next one. Where the recording
---     leaves out an event that ends a wait or begins one, nothing is known of states.
+--     ended is not stored: derive.executor_interval reads it off the next one.
 -- grain: one row per executor event
 SELECT
     e.thread_id,
@@ -19,4 +18,3 @@ SELECT
     ) AS callback_instance_id,
     e.event_id AS start_event_id
 FROM staging.executor_event AS e
-WHERE NOT EXISTS (FROM staging.executor_undelimited)
