@@ -11,7 +11,8 @@ WITH published AS (
     WHERE s.k = 'publication'
 ),
 said AS (
-    SELECT p.*, n.full_name AS node
+    -- A node with a name that others have, too, goes with its host or process.
+    SELECT p.*, regexp_replace(n.full_name, '@.*', '') AS node
     FROM analysed.main.stat_delivery AS d
     JOIN published AS p ON d.publication_id = p.publication_id
     JOIN analysed.store.subscription AS s ON d.subscription_id = s.subscription_id

@@ -10,7 +10,8 @@ from thorough import SHOWN, few
 
 from msgflow_sim import scenarios
 
-# Table of truth, what is compared of it, and the same from the public views.
+# Table of truth, what is compared of it, and the same from the public views. Nodes of one name at a
+# time go with their host or process there.
 CASES = {
     "publication": (
         """
@@ -20,7 +21,8 @@ CASES = {
         WHERE publication_id IN (FROM named)
         """,
         """
-        SELECT p.hostname, p.pid, p.tid, n.full_name, u.topic_name, u.publisher_handle,
+        SELECT p.hostname, p.pid, p.tid, regexp_replace(n.full_name, '@.*', ''),
+            u.topic_name, u.publisher_handle,
             b.rclcpp_ns, b.rcl_ns, b.rmw_ns, b.source_timestamp_ns
         FROM publication AS b
         JOIN place AS p USING (thread_id)
@@ -36,7 +38,8 @@ CASES = {
         WHERE method = 'rmw'
         """,
         """
-        SELECT p.hostname, p.pid, p.tid, n.full_name, s.topic_name, s.subscription_handle,
+        SELECT p.hostname, p.pid, p.tid, regexp_replace(n.full_name, '@.*', ''),
+            s.topic_name, s.subscription_handle,
             t.taken_ns, t.source_timestamp_ns
         FROM take AS t
         JOIN place AS p USING (thread_id)
@@ -53,7 +56,8 @@ CASES = {
         LEFT JOIN truth_take AS t ON c.take_id = t.take_id AND t.method = 'rmw'
         """,
         """
-        SELECT p.hostname, p.pid, p.tid, n.full_name, c.kind, c.callback_handle, i.start_ns,
+        SELECT p.hostname, p.pid, p.tid, regexp_replace(n.full_name, '@.*', ''),
+            c.kind, c.callback_handle, i.start_ns,
             CASE WHEN NOT i.is_end_inferred THEN i.end_ns END, t.taken_ns
         FROM callback_instance AS i
         JOIN place AS p USING (thread_id)
