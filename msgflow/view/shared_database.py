@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 # More than the questions of one page are apart, less than it takes to type a command.
 SECONDS_UNTIL_FREE = 3.0
 _SECONDS_BETWEEN_LOOKS = 0.1
+_MOST_SECONDS_TO_END = 5.0
 
 
 class ReplacedError(DatabaseError):
@@ -254,12 +255,15 @@ class SharedDatabase:
 
     def close(self) -> None:
         """Close the database."""
+        end = time.monotonic() + _MOST_SECONDS_TO_END
         with self._changed:
-            while self._cursors:
+            while self._cursors and time.monotonic() < end:
                 self._end_questions()
             self._is_closed = True
             self._changed.notify_all()
-            self._free()
+            # One interrupt in a thousand makes DuckDB go round for ever: it ends with the process.
+            if not self._cursors:
+                self._free()
             self._forget()
         self._idle.join()
 

@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,7 @@ from msgflow.errors import DatabaseInUseError
 from msgflow.view import pages
 from msgflow.view.kept_token import kept_token
 from msgflow.view.pages import Pages
+from msgflow.view.shared_database import SharedDatabase
 
 HOLD = (
     "import duckdb, sys; con = duckdb.connect(sys.argv[1]); print('held', flush=True);"
@@ -229,3 +231,26 @@ def test_where_nothing_can_be_kept_a_token_is_new(state: Path) -> None:
     state.parent.write_text("no directory")
     assert len(kept_token("/a")) == 32
     assert kept_token("/a") != kept_token("/a")
+
+
+def test_a_question_that_no_interrupt_ends_keeps_nothing_open_for_ever(
+    small_database: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun, ended = threading.Event(), threading.Event()
+
+    def answer(*_: object) -> bytes:
+        begun.set()
+        ended.wait(60)
+        return b""
+
+    monkeypatch.setattr(Pages, "answer", answer)
+    monkeypatch.setattr("msgflow.view.shared_database._MOST_SECONDS_TO_END", 0.2)
+    shared = SharedDatabase(small_database, None)
+    with ThreadPoolExecutor(1) as beside:
+        asked = beside.submit(shared.answer, "run", {}, None, lambda _: None)
+        begun.wait(60)
+        begin = time.monotonic()
+        shared.close()
+        assert time.monotonic() - begin < 30
+        assert not asked.done()
+        ended.set()
