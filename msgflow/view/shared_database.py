@@ -261,7 +261,7 @@ class SharedDatabase:
                 self._end_questions()
             self._is_closed = True
             self._changed.notify_all()
-            # One interrupt in a thousand makes DuckDB go round for ever: it ends with the process.
+            # Now and then an interrupt leaves a query of DuckDB that only the process ends.
             if not self._cursors:
                 self._free()
             self._forget()
