@@ -50,7 +50,7 @@ def answer(
 
 
 def _cut(table: pa.Table) -> pa.Table:
-    """Return the first rows, of which a page can show all bytes."""
+    """Return as many of the first rows as a page can show."""
     while len(table) and table.nbytes > MOST_BYTES:
         # Rows differ in size: the first may take more than their share.
         table = table.slice(0, len(table) * MOST_BYTES // table.nbytes)

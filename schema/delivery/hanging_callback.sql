@@ -1,8 +1,7 @@
 -- name: derive.hanging_callback
 -- description: Threads that did not come back from a callback: the last one that they began has no
---     end, and nothing shows that its thread did anything else afterwards. Callbacks whose end may
---     be hidden by a gap are left out, and so are processes of which no end of a callback is
---     recorded.
+--     end, and nothing shows that its thread did anything else afterwards. A callback is left
+--     out if a gap may hide its end, or if its process recorded no end of any callback.
 -- grain: one row per such thread
 WITH last_run AS (
     SELECT

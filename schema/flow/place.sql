@@ -8,7 +8,7 @@
 -- param: names VARCHAR[]  Names or globs: a list, or a text with commas between
 CREATE OR REPLACE MACRO derive.place(runs, names) AS TABLE
 WITH wanted AS (
-    -- The text of a list is a list again; any other text is none, and its names have no spaces.
+    -- A list becomes a text and a list again. Commas part any other text; spaces around are cut.
     SELECT DISTINCT unnest(
         coalesce(
             try_cast(names::VARCHAR AS VARCHAR[]),

@@ -1,6 +1,6 @@
 -- name: main.callback_alike
--- description: Callbacks that are told as one: those of timers that a node makes of one function
---     and period, such as a new one-shot timer for each event. Every other callback is alone.
+-- description: Answers count some callbacks as one: a node may make many timers of one function
+--     and period, such as a one-shot timer for each event. Every other callback counts alone.
 -- grain: one row per callback object
 -- column: callback_id BIGINT  Identity of the callback
 -- column: run_id BIGINT  Run that the row belongs to

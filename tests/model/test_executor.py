@@ -133,7 +133,7 @@ def test_a_recording_without_an_event_that_delimits_states_is_named(
         run(system, MAIN, 0xC1)
     assert analyse(system).rows(
         "SELECT count, detail FROM finding WHERE name = 'executor_events_left_out'"
-    ) == [(1, "nothing shows when 1 threads waited for work")]
+    ) == [(1, "nothing shows when its threads waited for work")]
 
 
 def test_an_executor_inside_a_callback(system: RosSystem, analyse: Analyse) -> None:

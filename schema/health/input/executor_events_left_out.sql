@@ -13,7 +13,7 @@ WITH left_out AS (
     SELECT process_id, thread_id
     FROM staging.executor_undelimited
     UNION
-    -- CARET says of which kind the executor is: one that has these events.
+    -- CARET names the kind of the executor. These kinds have events.
     SELECT p.process_id, p.thread_id
     FROM staging.callback_pair AS p
     ANTI JOIN staging.executor_first AS f ON p.thread_id = f.thread_id
@@ -26,7 +26,7 @@ WITH left_out AS (
 SELECT
     l.label AS subject,
     count(*) AS count,
-    printf('nothing shows when %d threads waited for work', count(*)) AS detail
+    'nothing shows when its threads waited for work' AS detail
 FROM left_out AS o
 JOIN process_label AS l ON o.process_id = l.process_id
 GROUP BY o.process_id, l.label

@@ -6,8 +6,8 @@
 --     turn ends with the next event of the executor, the next take, and where a callback begins or
 --     ends. Of threads without executors and callbacks (rclpy) a trace shows one kind of turn: from
 --     the take of a request to the response that the same thread sends to it.
---     Inside of a callback that spins, a response may be taken, too. What follows then is told by
---     the node: it is the client's, and not that of the callback around it.
+--     A callback that spins may take a response, too. The node tells what follows: the client's
+--     node publishes with the response, the node of the callback around it does not.
 --     Nothing is linked across a gap of the host. An object that the same thread also sends with
 --     where nothing was taken may do so here as well: then "nothing" is one more candidate. So is
 --     another process, where several with equal ids cannot be told apart.
