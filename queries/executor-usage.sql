@@ -2,11 +2,12 @@
 -- title: What executor threads spent their time on
 -- description: Time of each executor thread by what it did (executor_activity): wait for work, look
 --     for what is ready, take messages, run callbacks, or stand blocked. A thread of a
---     multi-threaded executor is blocked after a callback, until it gets the lock of the executor
---     and may look for work again. Meanwhile another thread may hold the lock and wait for work:
---     then the executor has nothing to do. These times add up to the time for which the thread was
---     seen. Of an executor without events of its own (events executor, static executor, rclpy) only
---     takes and callbacks are known.
+--     multi-threaded executor is blocked after a callback, and after it looked in vain, until it
+--     gets the lock of the executor and may look for work again. Meanwhile another thread may hold
+--     the lock and wait for work: then the executor has nothing to do. These times add up to the
+--     time for which the thread was seen. Only takes and callbacks are known of an executor without
+--     events of its own (events executor, static executor, rclpy), or whose events the recording
+--     leaves out (finding executor_events_left_out).
 -- grain: one row per executor thread
 -- column: run_id BIGINT             Run
 -- column: host VARCHAR [host]  Host
@@ -23,10 +24,9 @@
 -- column: take_ns BIGINT [ns]       Taking messages, up to the callback
 -- column: callback_ns BIGINT [ns]   In callbacks, services included; nested time counts once. A
 --     callback never seen to end lasts until the first event that cannot be inside it
--- column: blocked_ns BIGINT [ns]    Waiting for the lock of a multi-threaded executor after a
---     callback
+-- column: blocked_ns BIGINT [ns]    Waiting for the lock of a multi-threaded executor
 -- column: unknown_ns BIGINT [ns]    Not known: before the first event of the executor, in a gap of
---     the trace, or outside of callbacks where the executor has no events
+--     the trace, or outside of callbacks where events of the executor are missing
 -- column: longest_callback VARCHAR  The callback that kept the thread longest at one call, with its
 --     node if the process has several; the first of equally long ones
 -- column: longest_ns BIGINT [ns]    For how long within the time window, without what was nested in
@@ -45,7 +45,9 @@ WITH member AS (
         greatest(t.first_seen_ns, $start_ns) AS first_ns,
         least(t.last_seen_ns, $end_ns) AS last_ns,
         x.thread_id IN (
-            SELECT thread_id FROM main.executor_state WHERE list_contains($runs, run_id)
+            SELECT thread_id
+            FROM main.executor_state
+            WHERE list_contains($runs, run_id) AND end_ns IS NOT NULL
         ) AS has_states
     FROM main.executor_thread AS x
     JOIN main.executor AS e ON x.executor_id = e.executor_id

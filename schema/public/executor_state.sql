@@ -7,7 +7,7 @@
 -- column: state
 -- column: start_ns
 -- column: end_ns BIGINT [epoch ns]  Next executor event of the thread; NULL: not known (the last,
---     or a gap follows)
+--     a gap follows, or the recording leaves out events that end states)
 -- column: callback_instance_id
 SELECT
     s.run_id,

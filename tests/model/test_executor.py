@@ -131,9 +131,32 @@ def test_a_recording_without_an_event_that_delimits_states_is_named(
     for _ in range(2):
         system.ready(MAIN)
         run(system, MAIN, 0xC1)
-    assert analyse(system).rows(
+    model = analyse(system)
+    assert model.rows(
         "SELECT count, detail FROM finding WHERE name = 'executor_events_left_out'"
     ) == [(1, "nothing shows when its threads waited for work")]
+    assert model.value("SELECT count(*) FROM executor_state WHERE end_ns IS NOT NULL") == 0
+    assert model.rows("SELECT activity, count(*) FROM executor_activity GROUP BY ALL") == [
+        ("callback", 2)
+    ]
+
+
+def test_a_thread_that_looked_in_vain_is_blocked(system: RosSystem, analyse: Analyse) -> None:
+    """Another thread waits for work and holds the lock under which it would look again."""
+    threads = (Thread(100, 101), Thread(100, 102))
+    for thread in threads:
+        run(system, thread, 0xC1)
+    system.ready(threads[0])
+    system.idle(threads[0])
+    in_vain = system.ready(threads[0])
+    system.ready(threads[1])
+    system.idle(threads[1])
+    system.ready(threads[1])
+    again = system.ready(threads[0])
+    assert analyse(system).rows(
+        "SELECT start_ns, end_ns FROM executor_activity JOIN thread USING (thread_id) "
+        f"WHERE tid = 101 AND start_ns >= {in_vain} AND activity = 'blocked'"
+    ) == [(in_vain, again)]
 
 
 def test_an_executor_inside_a_callback(system: RosSystem, analyse: Analyse) -> None:
@@ -144,12 +167,12 @@ def test_an_executor_inside_a_callback(system: RosSystem, analyse: Analyse) -> N
     system.start(MAIN, 0xC2)
     system.end(MAIN, 0xC2)
     system.end(MAIN, 0xC1)
-    last = system.ready(MAIN)
+    last = system.idle(MAIN)
     assert analyse(system).rows(STATES) == [
         ("execute", outer, nested[0], 1),
         ("process", nested[0], nested[1], None),
         ("execute", nested[1], last, 2),
-        ("process", last, None, None),
+        ("wait", last, None, None),
     ]
 
 

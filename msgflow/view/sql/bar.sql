@@ -3,7 +3,7 @@
 --     and responses of services, from sending to taking, what executor threads did, states of
 --     threads to the kernel, states of managed nodes, and, without a length, events of the user's own tracepoints and messages that
 --     were not taken. Threads have their states as recorded, but
---     for the time after the callback: main.executor_activity would take far longer for a window.
+--     for the time in which they are blocked: main.executor_activity would take far longer for a window.
 -- grain: one row per bar
 -- kind: inline
 -- column: run_id BIGINT  Run
@@ -61,12 +61,21 @@ FROM main.response AS r
 JOIN main.thread AS t ON coalesce(r.receiver_thread_id, r.sender_thread_id) = t.thread_id
 UNION ALL
 SELECT
-    s.run_id, 8 * s.thread_id + 6, CASE s.state WHEN 'wait' THEN 5 WHEN 'process' THEN 6 ELSE 7 END,
+    s.run_id, 8 * s.thread_id + 6,
+    CASE s.state WHEN 'wait' THEN 5 WHEN 'execute' THEN 7 ELSE
+        -- It looked in vain, and looks again when it has the lock.
+        CASE WHEN s.next_state = 'process' AND e.kind LIKE 'multi_threaded%' THEN 9 ELSE 6 END END,
     coalesce(s.callback_instance_id, -1), s.start_ns,
     CASE WHEN s.state = 'execute' THEN least(coalesce(s.end_ns, s.start_ns), i.end_ns)
         ELSE coalesce(s.end_ns, s.start_ns) END,
     (2 * (s.end_ns IS NULL)::UTINYINT)::UTINYINT
-FROM main.executor_state AS s
+FROM (
+    SELECT
+        run_id, executor_id, thread_id, state, start_ns, end_ns, callback_instance_id,
+        lead(state) OVER (PARTITION BY thread_id ORDER BY start_ns) AS next_state
+    FROM main.executor_state
+) AS s
+LEFT JOIN main.executor AS e ON s.executor_id = e.executor_id
 LEFT JOIN main.callback_instance AS i ON s.callback_instance_id = i.callback_instance_id
 UNION ALL
 SELECT

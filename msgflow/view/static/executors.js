@@ -11,7 +11,7 @@ import { fill, section } from "./overview.js";
 // What a thread did, its colour, and what it is called.
 const ACTIVITIES = [
   ["callback", "execute", "takes and callbacks"],
-  ["blocked", "blocked", "blocked: after a callback, waits for the lock of the executor"],
+  ["blocked", "blocked", "blocked: waits for the lock of the executor"],
   ["select", "process", "select: looks for what is ready"],
   ["wait", "wait", "wait: for work"],
 ];

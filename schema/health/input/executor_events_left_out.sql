@@ -1,8 +1,8 @@
 -- name: finding.executor_events_left_out
 -- title: Executors without the events that delimit their states
 -- description: An executor says that it waits for work, looks for what is ready, and executes. The
---     recording has not all of these, so nothing shows when its threads waited: another state seems
---     to last as long. Callbacks, services, takes and links are not affected.
+--     recording has not all of these, so nothing shows when its threads waited, and their states
+--     have no end. Callbacks, services, takes and links are not affected.
 -- cause: The session left out rclcpp_executor_wait_for_work or rclcpp_executor_get_next_ready, such
 --     as against busy waiting, or all events of executors.
 -- cure: Record all three events where it matters what executors do.

@@ -61,6 +61,7 @@ change AS (
         run_id, thread_id, start_event_id, 2, start_ns, NULL,
         CASE state WHEN 'wait' THEN 1 WHEN 'process' THEN 2 ELSE 3 END, NULL
     FROM executor_state
+    SEMI JOIN derive.delimited_thread USING (thread_id)
     UNION ALL
     SELECT run_id, thread_id, start_event_id, 3, start_ns, callback_instance_id, 0, kind
     FROM instance
@@ -133,7 +134,8 @@ split AS (
         CASE WHEN state_mark // 4 >= break_event_id THEN state_mark % 4 ELSE 0 END AS state,
         lead(at_ns) OVER on_thread AS next_ns,
         lead(step) OVER on_thread AS next_step,
-        lead(kind) OVER on_thread AS next_kind
+        lead(kind) OVER on_thread AS next_kind,
+        lead(state_mark) OVER on_thread % 4 AS next_state
     FROM situation
     WHERE step < 4 OR state_mark IS NULL OR state_mark % 4 = 2 OR state_mark // 4 < break_event_id
     WINDOW on_thread AS (PARTITION BY run_id, thread_id ORDER BY place)
@@ -145,7 +147,8 @@ run_change AS (
 ),
 described AS (
     SELECT
-        s.run_id, s.thread_id, s.at_ns, s.next_ns, s.next_step, s.next_kind, s.step, s.state,
+        s.run_id, s.thread_id, s.at_ns, s.next_ns, s.next_step, s.next_kind, s.next_state, s.step,
+        s.state,
         s.kind IS NOT NULL AS has_callback,
         coalesce(s.run_event_id > s.state_event_id, false) AS has_run,
         i.callback_instance_id,
@@ -174,7 +177,8 @@ classified AS (
             WHEN t.state = 1 AND NOT t.has_run THEN 'wait'
             WHEN t.state = 3 AND NOT t.has_run
                 THEN CASE WHEN t.next_kind = 'timer' THEN 'select' ELSE 'take' END
-            WHEN t.has_run
+            -- It ran a callback, or looked in vain, and looks next under the lock of the executor.
+            WHEN (t.has_run OR t.state = 2 AND t.next_step = 2 AND t.next_state = 2)
                 AND t.callback_instance_id IS NULL
                 AND e.kind LIKE 'multi_threaded%'
                 THEN 'blocked'
