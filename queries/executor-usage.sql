@@ -45,9 +45,13 @@ WITH member AS (
         greatest(t.first_seen_ns, $start_ns) AS first_ns,
         least(t.last_seen_ns, $end_ns) AS last_ns,
         x.thread_id IN (
-            SELECT thread_id
+            SELECT thread_id FROM main.executor_state WHERE list_contains($runs, run_id)
+        ) AND x.run_id IN (
+            SELECT run_id
             FROM main.executor_state
-            WHERE list_contains($runs, run_id) AND end_ns IS NOT NULL
+            WHERE list_contains($runs, run_id) AND state IN ('wait', 'process')
+            GROUP BY run_id
+            HAVING count(DISTINCT state) = 2
         ) AS has_states
     FROM main.executor_thread AS x
     JOIN main.executor AS e ON x.executor_id = e.executor_id

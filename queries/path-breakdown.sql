@@ -84,9 +84,12 @@ FROM main.end_to_end_trail(
 CREATE OR REPLACE TEMP TABLE breakdown_callback AS
 SELECT
     i.callback_instance_id, i.callback_id, i.take_id, i.start_ns, i.end_ns, w.busy_min_ns,
-    w.busy_max_ns
+    -- Of one thread: while it neither waited nor ran callbacks, the message may lie in its queue.
+    w.busy_max_ns + CASE WHEN e.kind LIKE 'multi_threaded%' THEN 0
+        ELSE coalesce(w.held_max_ns, 0) END AS busy_max_ns
 FROM main.callback_instance AS i
 LEFT JOIN main.executor_wait AS w ON i.callback_instance_id = w.callback_instance_id
+LEFT JOIN main.executor AS e ON w.executor_id = e.executor_id
 WHERE list_contains($runs, i.run_id);
 
 CREATE OR REPLACE TEMP TABLE breakdown_arrival AS

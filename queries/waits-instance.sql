@@ -21,7 +21,8 @@
 -- column: busy_max_ns BIGINT [ns]   Executor busy with others meanwhile, at most
 -- column: held_max_ns BIGINT [ns]   No thread of an executor of several waited for work meanwhile,
 --     though not all ran callbacks: they were blocked by its lock, or looked for work; or the
---     thread that ran this callback had picked it, and did not start it yet
+--     thread that ran this callback had picked it, and did not start it yet. Of one thread:
+--     time between two waits without a callback, if that is a millisecond or more
 -- column: reason VARCHAR            What took the most of the wait, if the message came at once:
 --     'executor busy' (it ran others; its threads are one, or when they waited is not known), 'all
 --     threads busy', 'excluded' (a callback ran that never runs beside this one) or 'network or
@@ -50,7 +51,10 @@ WITH waited AS MATERIALIZED (
     SELECT
         run_id, callback_instance_id, callback_id, start_ns, since, wait_ns, busy_min_ns,
         busy_max_ns, blocked_max_ns, held_max_ns, is_loss_affected, meanwhile_callback_ids,
-        meanwhile_ns, until_arrival_ns, run_queue_ns, preempted_ns, cpu_taken_by, cpu_taken_ns
+        meanwhile_ns, until_arrival_ns, run_queue_ns, preempted_ns, cpu_taken_by, cpu_taken_ns,
+        executor_id IN (
+            SELECT executor_id FROM main.executor WHERE kind NOT LIKE 'multi_threaded%'
+        ) OR held_max_ns IS NULL AS is_alone
     FROM main.executor_wait_explained($runs)
     WHERE start_ns >= $start_ns
         AND start_ns < $end_ns
@@ -110,7 +114,7 @@ SELECT
         WHEN 2 * w.until_arrival_ns > w.wait_ns THEN 'until arrival'
         WHEN 2 * (w.busy_max_ns + coalesce(w.held_max_ns, 0)) < w.wait_ns THEN 'network or idle'
         WHEN 2 * w.blocked_max_ns > w.busy_max_ns + coalesce(w.held_max_ns, 0) THEN 'excluded'
-        WHEN w.held_max_ns IS NULL THEN 'executor busy'
+        WHEN w.is_alone THEN 'executor busy'
         ELSE 'all threads busy'
     END AS reason,
     w.wait_ns - w.busy_max_ns - coalesce(w.held_max_ns, 0) AS rest_min_ns,

@@ -195,6 +195,14 @@ def _unexplained(
     The groups of callbacks are not in a trace: one thread may be free, and must not run them.
     """
     latency_ns = pieces[0]["latency_ns"]
+    undecided = [row for row in pieces if row["activity"] == "undecided"]
+    undecided_ns = sum(row["duration_ns"] for row in undecided)
+    if 2 * undecided_ns > latency_ns:
+        nodes = ", ".join(dict.fromkeys(row["node"] or "?" for row in undecided))
+        yield (
+            f"for {100 * undecided_ns / latency_ns:.0f} % of the slowest flow nothing shows whether"
+            f" the message was on its way or waited in the queue of {nodes}"
+        )
     total_ns = sum(
         row["duration_ns"]
         for row in pieces

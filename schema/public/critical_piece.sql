@@ -66,7 +66,8 @@ waited AS MATERIALIZED (
 ready AS MATERIALIZED (
     SELECT
         run_id, executor_id, thread_id, callback_id, callback_instance_id, since, origin_ns,
-        earliest_ns, latest_ns, start_ns, picked_ns, thread_count
+        earliest_ns, latest_ns, start_ns, picked_ns, thread_count, previous_wait_end_ns,
+        wait_start_ns, is_loss_affected
     FROM derive.callback_ready('waited')
     WHERE callback_instance_id IN (SELECT callback_instance_id FROM waiting)
 ),
@@ -79,7 +80,13 @@ wait AS MATERIALIZED (
         ) AS earliest_ns,
         derive.corrected_ns(r.latest_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS latest_ns,
         derive.corrected_ns(r.start_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS start_ns,
-        r.earliest_ns IS NOT NULL AS is_bounded
+        r.earliest_ns IS NOT NULL AS is_bounded,
+        CASE WHEN r.thread_count = 1 AND NOT r.is_loss_affected THEN derive.corrected_ns(
+            greatest(r.earliest_ns, r.previous_wait_end_ns),
+            c.offset_ns, c.drift_ppb, c.reference_ns
+        ) END AS away_ns,
+        derive.corrected_ns(r.wait_start_ns, c.offset_ns, c.drift_ppb, c.reference_ns)
+            AS back_ns
     FROM ready AS r
     JOIN store.thread AS t ON r.thread_id = t.thread_id
     JOIN derive.process_clock AS c ON t.process_id = c.process_id
@@ -237,6 +244,15 @@ candidate AS (
     LEFT JOIN wait AS i ON w.callback_instance_id = i.callback_instance_id
     WHERE (w.part IN ('publish_to_take', 'request_to_take') OR c.position IS NOT NULL)
         AND i.is_bounded IS DISTINCT FROM true
+    UNION ALL
+    -- Nor did it look for input while its one thread did something else for long.
+    SELECT w.position, 5, 'undecided', i.away_ns, i.back_ns, NULL, w.callback_instance_id,
+        w.publication_id
+    FROM waiting AS w
+    JOIN wait AS i ON w.callback_instance_id = i.callback_instance_id
+    WHERE w.part IN ('publish_to_take', 'request_to_take')
+        AND i.is_bounded
+        AND i.back_ns - i.away_ns >= 1_000_000
     UNION ALL
     SELECT c.position, 6, 'unpublished', w.from_ns, coalesce(c.publishing_ns, c.published_ns),
         NULL, c.publishing_id, c.publication_id

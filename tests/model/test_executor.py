@@ -208,6 +208,36 @@ def test_an_executor_that_waits_only_afterwards_was_not_idle(
     ) == [(100, 0), (300, None)]
 
 
+def test_a_message_may_lie_in_the_queue_while_its_thread_is_away(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    """A loop polls the executor, and sleeps in between: neither waiting nor a callback."""
+    source, slept_ns = Thread(200), 50_000_000
+    system.node(source, 0x1, "source")
+    system.node(MAIN, 0x1, "sink")
+    system.publisher(source, 0x10, "/topic")
+    system.subscription(MAIN, 0x30, "/topic", callback=0xC1)
+    for number in (1, 2):
+        system.idle(MAIN)
+        system.ready(MAIN)
+        system.publish(source, 0x10, number)
+        system.wait(slept_ns)
+        system.idle(MAIN)
+        system.ready(MAIN)
+        system.execute(MAIN, 0x30)
+        system.take(MAIN, 0x30, number)
+        system.start(MAIN, 0xC1)
+        system.end(MAIN, 0xC1)
+    model = analyse(system)
+    assert model.rows(
+        "SELECT wait_ns - held_max_ns < 100, busy_max_ns FROM executor_wait ORDER BY start_ns"
+    ) == [(True, 0), (True, 0)]
+    assert model.rows(
+        "SELECT activity, duration_ns >= 50000000 FROM critical_path([1]) "
+        "WHERE duration_ns > 1000000"
+    ) == [("undecided", True)]
+
+
 def test_threads_that_poll(system: RosSystem, analyse: Analyse) -> None:
     """Most of their waits have a timeout of 0."""
     timeouts = {101: [0, 0, -1], 102: [0, -1], 103: [0], 104: [0, 0, -1, -1], 105: [5, 5]}

@@ -2,7 +2,8 @@
 -- title: An executor that a loop polls
 -- description: Threads ask their executor for work at times of their own. What such a thread does
 --     between two polls looks like 'process', the state of looking for what is ready, though it may
---     sleep. What is ready meanwhile waits for the next poll: that time is in no part of a wait.
+--     sleep. What is ready meanwhile waits for the next poll: that time is held_max_ns of a wait,
+--     and undecided in paths, since nothing shows when the message came.
 -- cause: A loop in the program calls spin_some, or spin_once with a timeout of 0.
 -- cure: None needed. Where messages wait for the loop, let the executor spin.
 -- grain: one row per process

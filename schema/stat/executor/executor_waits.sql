@@ -156,7 +156,10 @@ measured AS (
             ELSE r.wait_end_ns - r.wait_start_ns
                 + coalesce(r.wait_before_ns - p.idle_earliest_ns, 0)
         END AS idle_ns,
-        r.thread_count
+        r.thread_count,
+        -- From the end of one wait to the begin of the next, which found the input.
+        CASE WHEN r.thread_count = 1 AND r.earliest_ns IS NOT NULL AND NOT r.is_loss_affected
+            THEN r.wait_start_ns - greatest(r.earliest_ns, r.previous_wait_end_ns) END AS away_ns
     FROM ready AS r
     LEFT JOIN passed AS p ON r.callback_instance_id = p.callback_instance_id
     LEFT JOIN waiting AS w ON r.executor_id = w.executor_id
@@ -183,7 +186,11 @@ SELECT
         r.start_ns - r.earliest_ns - r.idle_ns
         - (r.busy_start_ns - r.busy_earliest_ns + r.blocked_max_ns),
         0
-    ) END AS held_max_ns
+    )
+        -- Less is what an executor does between two waits anyway.
+        WHEN r.away_ns - (r.busy_latest_ns - r.busy_earliest_ns) >= 1_000_000
+            THEN r.away_ns - (r.busy_latest_ns - r.busy_earliest_ns)
+    END AS held_max_ns
 FROM measured AS r
 JOIN store.thread AS t ON r.thread_id = t.thread_id
 JOIN derive.process_clock AS c ON t.process_id = c.process_id

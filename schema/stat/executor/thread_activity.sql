@@ -61,7 +61,7 @@ change AS (
         run_id, thread_id, start_event_id, 2, start_ns, NULL,
         CASE state WHEN 'wait' THEN 1 WHEN 'process' THEN 2 ELSE 3 END, NULL
     FROM executor_state
-    SEMI JOIN derive.delimited_thread USING (thread_id)
+    SEMI JOIN derive.delimited_run USING (run_id)
     UNION ALL
     SELECT run_id, thread_id, start_event_id, 3, start_ns, callback_instance_id, 0, kind
     FROM instance
