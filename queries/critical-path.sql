@@ -321,14 +321,10 @@ ordered AS (
         ) AS place
     FROM summed
 ),
+-- Flows in the order of their pieces.
 doubted AS (
-    SELECT DISTINCT c.flow_rank, f.is_ambiguous
-    FROM critical_piece AS c
-    JOIN critical_flow AS f
-        ON c.path_id = f.path_id
-        AND c.root_kind = f.root_kind
-        AND c.root_id = f.root_id
-        AND c.take_id = f.take_id
+    SELECT dense_rank() OVER (ORDER BY latency_ns DESC, flow_id) AS flow_rank, is_ambiguous
+    FROM critical_flow
 )
 SELECT
     s.run_id,

@@ -26,11 +26,9 @@
 -- brief: kind, node, inputs, outputs, evidence, doubt
 WITH named_node AS (
     SELECT
-        n.run_id, n.node_id, split_part(n.full_name, '@', 1) AS full_name, p.name AS process,
+        n.run_id, n.node_id, main.node_name(n.full_name) AS full_name, p.name AS process,
         p.pid, h.hostname AS host,
-        count(*) OVER (
-            PARTITION BY n.run_id, split_part(n.full_name, '@', 1)
-        ) > 1 AS is_name_repeated
+        count(*) OVER (PARTITION BY n.run_id, main.node_name(n.full_name)) > 1 AS is_name_repeated
     FROM main.node AS n
     JOIN main.process AS p ON n.process_id = p.process_id
     JOIN main.host AS h ON p.host_id = h.host_id

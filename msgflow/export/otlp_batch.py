@@ -30,6 +30,7 @@ WITH span AS (
             {'key': 'thread.name', 'text': thread, 'number': NULL},
             {'key': 'msgflow.' || kind || '_id', 'text': NULL, 'number': id},
             {'key': 'msgflow.link', 'text': cause, 'number': NULL},
+            {'key': 'msgflow.candidate_count', 'text': NULL, 'number': candidate_count},
             {'key': 'msgflow.latency_ns', 'text': NULL, 'number': latency_ns}
         ] AS attributes,
         coalesce(list_zip(link_trace_ids, link_span_ids, link_causes), []) AS links

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from msgflow.links.links_file import DeclaredLink, LinksFile
 
 _NODES = """
-SELECT n.node_id, split_part(n.full_name, '@', 1), n.process_id, p.name, p.pid, h.hostname
+SELECT n.node_id, main.node_name(n.full_name), n.process_id, p.name, p.pid, h.hostname
 FROM main.node AS n
 JOIN main.process AS p ON n.process_id = p.process_id
 JOIN main.host AS h ON p.host_id = h.host_id

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 LEARNED_FILE = "links.yaml"
 _PAIRS = """
 SELECT
-    split_part(n.full_name, '@', 1), o.pid, h.hostname, s.topic_name, p.topic_name,
+    main.node_name(n.full_name), o.pid, h.hostname, s.topic_name, p.topic_name,
     2 * count(*) FILTER (l.candidate_count = 1) >= count(*)
 FROM store.link_causal AS l
 JOIN store.publisher AS p ON l.publisher_id = p.publisher_id

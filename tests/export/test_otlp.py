@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -161,6 +162,26 @@ def test_spans_say_what_they_are_in_the_words_of_opentelemetry(
     for take, span in takes.items():
         assert span["end"] - span["start"] == max(latencies[take], 1)
     assert len(takes) > 5
+
+
+def test_what_has_several_possible_causes_says_so(
+    simulated: Callable[..., Path], tmp_path: Path
+) -> None:
+    path = Path(shutil.copy(simulated(SYSTEM, 0.1), tmp_path / "run.duckdb"))
+    with duckdb.connect(str(path)) as connection:
+        connection.execute("UPDATE store.link_transport SET candidate_count = 2")
+        connection.execute(
+            "UPDATE store.link_causal SET candidate_count = 3 WHERE publication_id % 2 = 0"
+        )
+    with Database(path) as database:
+        database.export_otlp(tmp_path / "traces.json")
+    for span in spans_of(read_file(tmp_path / "traces.json")):
+        wanted = None
+        if "msgflow.latency_ns" in span:
+            wanted = 2
+        elif span.get("msgflow.link") == "direct" and "msgflow.publication_id" in span:
+            wanted = None if span["msgflow.publication_id"] % 2 else 3
+        assert span.get("msgflow.candidate_count") == wanted, span
 
 
 @pytest.mark.thorough

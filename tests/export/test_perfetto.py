@@ -128,6 +128,8 @@ def exported(
     path = Path(shutil.copy(simulated(request.param, 0.1), directory / "run.duckdb"))
     if request.param == "demo":
         apply_clocks(path, read_clock_sync("messages"), run=None)
+    with duckdb.connect(str(path)) as connection:
+        connection.execute("UPDATE store.link_transport SET candidate_count = 2 + take_id % 2")
     with open_db(path) as database:
         written = database.export_perfetto(directory / "run.pftrace")
     decoded = decode(written.path)
@@ -165,6 +167,17 @@ def test_callbacks_and_publications_are_slices_of_their_threads(exported: Export
     ).fetchall()
     assert len(expected) > 50
     assert found == set(expected)
+
+
+def test_what_has_several_possible_causes_says_so(exported: Exported) -> None:
+    connection, decoded = exported
+    found = {
+        one.notes["take_id"]: one.notes["candidate_count"]
+        for one in decoded.slices
+        if "candidate_count" in one.notes and "take_id" in one.notes
+    }
+    links = connection.sql("SELECT take_id, candidate_count FROM link_transport").fetchall()
+    assert found == dict(links)
 
 
 def test_slices_are_nested_as_callbacks_are(exported: Exported) -> None:

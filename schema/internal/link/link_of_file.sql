@@ -30,8 +30,8 @@ output AS (
 ),
 named AS (
     SELECT
-        node_id, split_part(full_name, '@', 1) AS full_name, process_id,
-        count(*) OVER (PARTITION BY run_id, split_part(full_name, '@', 1)) > 1 AS is_name_repeated
+        node_id, main.node_name(full_name) AS full_name, process_id,
+        count(*) OVER (PARTITION BY main.node_name(full_name)) > 1 AS is_name_repeated
     FROM store.node
     WHERE run_id = $run_id
 )

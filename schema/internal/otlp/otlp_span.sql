@@ -34,6 +34,7 @@
 -- column: service VARCHAR  Service of the request, response or callback
 -- column: symbol VARCHAR  Function of the callback
 -- column: cause VARCHAR  Kind of the link from its parent
+-- column: candidate_count BIGINT  How many causes are possible; NULL: one
 -- column: not_delivered VARCHAR  Subscriptions that did not get the message, and why
 -- column: link_trace_ids VARCHAR[]  Traces of its further causes
 -- column: link_span_ids VARCHAR[]  Spans of these, in the same order
@@ -204,6 +205,7 @@ SELECT
     s.service,
     s.symbol,
     s.link_kind AS cause,
+    a.candidate_count,
     f.not_delivered,
     w.trace_ids AS link_trace_ids,
     w.span_ids AS link_span_ids,
@@ -213,6 +215,7 @@ JOIN described AS o ON s.root_key = o.key
 LEFT JOIN root AS p ON s.cause_key = p.key
 LEFT JOIN described AS u ON s.link_kind = 'transport' AND s.cause_key = u.key
 LEFT JOIN further AS w ON s.key = w.key
+LEFT JOIN derive.ambiguous_effect AS a ON s.kind = a.kind AND s.id = a.id AND a.run_id = $run_id
 LEFT JOIN fate AS f ON s.kind = 'publication' AND s.id = f.publication_id
 JOIN main.process AS e ON s.process_id = e.process_id
 JOIN main.host AS h ON e.host_id = h.host_id

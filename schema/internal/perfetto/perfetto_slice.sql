@@ -14,6 +14,7 @@
 -- column: code INTEGER  What kind of slice it is
 -- column: id BIGINT  What it is of
 -- column: symbol_id BIGINT  Callback whose symbol it has; NULL: none
+-- column: candidate_count BIGINT  How many causes of it are possible; NULL: one
 -- column: outgoing UBIGINT[]  Links that begin there
 -- column: incoming UBIGINT[]  Links that end there
 WITH slice AS MATERIALIZED (
@@ -129,8 +130,11 @@ event AS (
 )
 SELECT
     e.track, e.at_ns, e.rank, e.object_id * 8 + e.code + 1 AS name, e.code, e.id,
-    e.symbol_id, o.arrows AS outgoing, i.arrows AS incoming
+    e.symbol_id, a.candidate_count, o.arrows AS outgoing, i.arrows AS incoming
 FROM event AS e
 LEFT JOIN outgoing AS o ON e.rank > 0 AND e.code = o.code AND e.id = o.id
 LEFT JOIN incoming AS i ON e.rank > 0 AND e.code = i.code AND e.id = i.id
+LEFT JOIN derive.ambiguous_effect AS a
+    ON e.rank > 0 AND e.id = a.id AND a.run_id = $run_id
+    AND e.code = CASE a.kind WHEN 'take' THEN 2 ELSE 1 END
 ORDER BY e.track, e.at_ns, e.rank, e.far_ns DESC, e.code, e.id
