@@ -39,7 +39,7 @@ def ingest(
     timeout: str = "1h",
     memory: str | None = None,
     scratch: Path | None = None,
-    views: Annotated[bool, typer.Option()] = True,
+    views: Annotated[bool, typer.Option()] = False,
     database: Annotated[bool, typer.Option()] = True,
     clock_sync: Annotated[str, typer.Option()] = "none",
     reader: Reader = Reader.AUTO,
@@ -65,7 +65,7 @@ def ingest(
         timeout (TIME): What one recording may take: 90s, 2h.
         memory (SIZE): What one recording may take, such as 4GB; else no limit.
         scratch (DIR): Folder of each worker; by default that of the system.
-        views: Also write the public views.
+        views: Also write the public views, for other programs: msgflow finds them in databases.
         database: Also write the database of each run.
         clock_sync (none|messages): As msgflow ingest has it, for each.
     """

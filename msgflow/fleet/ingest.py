@@ -53,7 +53,7 @@ class Options:
     """
 
     ingest: Mapping[str, Any] = field(default_factory=dict)
-    views: bool = True
+    views: bool = False
     database: bool = True
     replace: bool = False
     retry_failed: bool = False

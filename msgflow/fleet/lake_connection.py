@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import re
 import shlex
-from contextlib import contextmanager
+import tempfile
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import duckdb
@@ -21,6 +23,7 @@ from msgflow.db.sql_guard import require_condition
 from msgflow.errors import DatabaseError, UsageError
 from msgflow.fleet.answers import answers
 from msgflow.fleet.layout import RUN, VIEWS, part_path
+from msgflow.fleet.run_views import write_views
 from msgflow.sql.failure import first_line
 from msgflow.sql.quoting import identifier
 from msgflow.text.name_suggestions import meant_or, nearest
@@ -136,20 +139,24 @@ class Reading:
         tables: those of them that these runs have.
     """
 
-    def __init__(self, choice: Choice, tables: Sequence[str] | None = None) -> None:
-        """Open runs for reading."""
+    def __init__(
+        self, choice: Choice, tables: Sequence[str] | None = None, *, listed: bool = False
+    ) -> None:
+        """Open runs for reading.
+
+        Args:
+            choice: the runs.
+            tables: tables and public views to read, `view/NAME`; all when None.
+            listed: names and columns of all others are wanted, too.
+        """
         self.choice = choice
         self.tables: set[str] = set()
         self._local_files: list[str] = []
-        store = choice.lake.store
-        if tables is None:
-            tables = [answer.table for answer in answers()]
-            if any(part is not None for part in choice.runs["view_part"].to_pylist()):
-                tables += [f"{VIEWS}/{name}" for name in store.folders(VIEWS)]
-        self.connection = open_memory()
+        self._resources = ExitStack()
+        self.connection = self._resources.enter_context(open_memory())
         try:
             with lake_errors(choice.lake):
-                self._fill(tables)
+                self._fill(tables, listed)
             shut_in(self.connection, files=self._local_files)
         except BaseException:
             self.close()
@@ -163,9 +170,9 @@ class Reading:
 
     def close(self) -> None:
         """Close the connection."""
-        self.connection.close()
+        self._resources.close()
 
-    def _fill(self, tables: Sequence[str]) -> None:
+    def _fill(self, tables: Sequence[str] | None, listed: bool) -> None:
         con = self.connection
         # A query that needs more than the memory fails: there is no good place for spilled files.
         con.execute("SET temp_directory = ''")
@@ -175,18 +182,39 @@ class Reading:
         con.execute(f"CREATE TABLE {RUN} AS FROM chosen_run")
         con.unregister("chosen_run")
         con.execute(f"CREATE SCHEMA {identifier(VIEWS)}")
+        made = self._made(tables, listed)
+        if tables is None or listed:
+            views = {f"{VIEWS}/{name}" for name in self.choice.lake.store.folders(VIEWS)}
+            tables = [*(answer.table for answer in answers()), *sorted(views | made.keys())]
         for table in tables:
             is_view = table.startswith(f"{VIEWS}/")
-            key = "view_part" if is_view else "part"
-            found = self._files(table, key)
-            if not found:
+            found = self._files(table, "view_part" if is_view else "part")
+            scans = [self._scan(table, found)] if found else []
+            if table in made:
+                scans.append(self._local_scan(f"made of {table}", made[table]))
+            if not scans:
                 continue
             self.tables.add(table)
             name = ".".join(map(identifier, table.split("/")))
+            part = "coalesce(r.view_part, r.database_part)" if is_view else "r.part"
             con.execute(
-                f"CREATE VIEW {name} AS SELECT t.* EXCLUDE (part) FROM {self._scan(table, found)} "
-                f"AS t SEMI JOIN main.{RUN} AS r ON t.run = r.run AND t.part = r.{key}"
+                f"CREATE VIEW {name} AS SELECT t.* EXCLUDE (part) "
+                f"FROM (FROM {' UNION ALL BY NAME FROM '.join(scans)}) AS t "
+                f"SEMI JOIN main.{RUN} AS r ON t.run = r.run AND t.part = {part}"
             )
+
+    def _made(self, tables: Sequence[str] | None, listed: bool) -> dict[str, list[str]]:
+        """Return files with the views of runs that have them in their databases only."""
+        wanted = None if tables is None else {name for name in tables if name.startswith(VIEWS)}
+        runs = [
+            run
+            for run in self.choice.runs.to_pylist()
+            if run["view_part"] is None and run["database_part"] is not None
+        ]
+        if not runs or not (wanted is None or wanted or listed):
+            return {}
+        folder = self._resources.enter_context(tempfile.TemporaryDirectory(prefix="msgflow-"))
+        return write_views(self.choice.lake, runs, Path(folder), wanted, listed=listed)
 
     def _files(self, table: str, key: str) -> dict[str, str]:
         """Return the files of a table, each with the version that wrote it; earlier may lack it."""
@@ -204,15 +232,18 @@ class Reading:
                 raise FileNotFoundError(f"a file is gone: {path}")
         return {path: version for path, version in sorted(wanted.items()) if path in there}
 
+    def _local_scan(self, name: str, paths: list[str]) -> str:
+        self._local_files += paths
+        self.connection.execute(f"SET VARIABLE {identifier(name)} = $paths", {"paths": paths})
+        return f"read_parquet(getvariable('{name}'), union_by_name = true)"
+
     def _scan(self, table: str, files: dict[str, str]) -> str:
         """Return SQL for the rows of a table."""
         store = self.choice.lake.store
         name = f"files of {table}"
         paths = [store.full(path) for path in files]
         if store.is_local:
-            self._local_files += paths
-            self.connection.execute(f"SET VARIABLE {identifier(name)} = $paths", {"paths": paths})
-            return f"read_parquet(getvariable('{name}'), union_by_name = true)"
+            return self._local_scan(name, paths)
         import pyarrow as pa
         import pyarrow.dataset as ds
         import pyarrow.parquet as pq

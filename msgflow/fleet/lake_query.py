@@ -153,7 +153,8 @@ def fleet_sql(
     """Run SQL that only reads on the tables of a lake."""
     choice = choose(lake, where)
     try:
-        with Reading(choice, _named_tables(text)) as reading:
+        listed = _LISTS.search(text) is not None
+        with Reading(choice, _named_tables(text), listed=listed) as reading:
             con = reading.connection
             with lake_errors(lake, is_query=True):
                 return guarded_rows(con, text, "msgflow fleet sql 'FROM run'", limit)
@@ -220,10 +221,8 @@ def _require_tables(reading: Reading, header: Header) -> None:
             )
 
 
-def _named_tables(text: str) -> list[str] | None:
-    """Return the tables of the lake that SQL names; None if it may look at any."""
-    if _LISTS.search(text):
-        return None
+def _named_tables(text: str) -> list[str]:
+    """Return the tables of the lake that SQL names."""
     known = {answer.table for answer in answers()}
     words = set(re.findall(r"\w+", text.lower()))
     return [name for name in sorted(known) if name in words] + (

@@ -40,7 +40,7 @@ class Content:
         database: the database itself.
     """
 
-    views: bool = True
+    views: bool = False
     database: bool = True
 
 
@@ -77,10 +77,8 @@ def write_part(
         rows = answer.read(connection, run_id).to_reader(_ROWS_AT_ONCE)
         writer.table(answer.table, part_path(answer.table, part), rows)
     if content.views:
-        for view in _views(connection):
-            # A name of the catalogue: it needs no more than quotes.
-            relation = connection.sql(f'SELECT * FROM main."{view}" ORDER BY ALL')
-            writer.table(view, view_path(view, part), relation.to_arrow_reader(_ROWS_AT_ONCE))
+        for view in public_views(connection):
+            writer.table(view, view_path(view, part), view_rows(connection, view))
     if content.database:
         writer.database(database, database_path(part))
     return {
@@ -105,12 +103,35 @@ def _keyed(schema: pa.Schema) -> pa.Schema:
     return pa.schema([pa.field(KEY, pa.string()), pa.field(PART, pa.string()), *rest])
 
 
-def _views(connection: duckdb.DuckDBPyConnection) -> list[str]:
+def public_views(connection: duckdb.DuckDBPyConnection) -> list[str]:
+    """Return the names of the public views that a lake may hold."""
     found = connection.execute(
         "SELECT view_name FROM duckdb_views() WHERE database_name = current_database() "
         "AND schema_name = 'main' AND NOT internal ORDER BY view_name"
     ).fetchall()
     return [name for (name,) in found if name not in _LEFT_OUT]
+
+
+def view_rows(connection: duckdb.DuckDBPyConnection, view: str) -> pa.RecordBatchReader:
+    """Return the rows of a public view in a fixed order."""
+    # A name of the catalogue: it needs no more than quotes.
+    relation = connection.sql(f'SELECT * FROM main."{view}" ORDER BY ALL')
+    return relation.to_arrow_reader(_ROWS_AT_ONCE)
+
+
+def write_rows(
+    file: Path, table: str, rows: pa.RecordBatchReader, first: Mapping[str, str], revision: str
+) -> None:
+    """Write rows of a run into a file, behind columns with the same value in each of them."""
+    import pyarrow as pa
+    import pyarrow.parquet
+
+    schema = _keyed(rows.schema).with_metadata(metadata(table, revision))
+    with pyarrow.parquet.ParquetWriter(file, schema, compression="zstd") as writer:
+        for batch in rows:
+            same = [pa.repeat(pa.scalar(value), len(batch)) for value in first.values()]
+            columns = [*same, *(batch[each] for each in schema.names[len(same) :])]
+            writer.write_batch(pa.record_batch(columns, schema=schema))
 
 
 class _Writer:
@@ -126,16 +147,8 @@ class _Writer:
 
     def table(self, name: str, path: str, rows: pa.RecordBatchReader) -> None:
         """Write the rows of a table."""
-        import pyarrow as pa
-        import pyarrow.parquet
-
-        schema = _keyed(rows.schema).with_metadata(metadata(name, self._revision))
         file = self._scratch / "table.parquet"
-        with pyarrow.parquet.ParquetWriter(file, schema, compression="zstd") as writer:
-            for batch in rows:
-                first = [pa.repeat(pa.scalar(value), len(batch)) for value in self._first.values()]
-                columns = [*first, *(batch[each] for each in schema.names[len(first) :])]
-                writer.write_batch(pa.record_batch(columns, schema=schema))
+        write_rows(file, name, rows, self._first, self._revision)
         self._put(path, file)
 
     def database(self, database: Path, path: str) -> None:

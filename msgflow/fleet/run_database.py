@@ -6,6 +6,7 @@ import contextlib
 import os
 import secrets
 import shlex
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,6 +19,10 @@ from msgflow.fleet.part import run_key
 from msgflow.trace.extraction import LIMIT_VARIABLE, limit_of
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    import duckdb
+
     from msgflow.fleet.lake import Lake
 
 _CHUNK = 8 * 1024 * 1024
@@ -64,7 +69,8 @@ def open_run(lake: Lake, run: str, path: Path | None = None) -> OpenedRun:
     aside = target.with_name(f".{target.name}.{secrets.token_hex(4)}.part")
     try:
         _fetch(lake, row, aside)
-        before = _verified(lake, row, aside)
+        before = _upgraded(lake, row, aside)
+        _opened(lake, row, aside).close()
         try:
             # This fails if the file exists by now.
             os.link(aside, target)
@@ -80,6 +86,25 @@ def open_run(lake: Lake, run: str, path: Path | None = None) -> OpenedRun:
         for left in (aside, aside.with_name(f"{aside.name}.zst"), Path(f"{aside}.wal")):
             left.unlink(missing_ok=True)
     return OpenedRun(row["run"], row["name"], target, target.stat().st_size, before)
+
+
+@contextmanager
+def run_database(
+    lake: Lake, row: Mapping[str, Any], folder: Path
+) -> Iterator[duckdb.DuckDBPyConnection]:
+    """Open the database of a run for reading, in a file of this folder that is gone afterwards."""
+    file = folder / f"{row['run']}.duckdb"
+    try:
+        _fetch(lake, row, file)
+        try:
+            con = _opened(lake, row, file)
+        except DatabaseError:  # an earlier msgflow made it
+            _upgraded(lake, row, file)
+            con = _opened(lake, row, file)
+        with contextlib.closing(con):
+            yield con
+    finally:
+        file.unlink(missing_ok=True)
 
 
 def _row(lake: Lake, run: str) -> dict[str, Any]:
@@ -100,7 +125,7 @@ def _row(lake: Lake, run: str) -> dict[str, Any]:
     return found[0]
 
 
-def _fetch(lake: Lake, row: dict[str, Any], target: Path) -> None:
+def _fetch(lake: Lake, row: Mapping[str, Any], target: Path) -> None:
     import pyarrow as pa
 
     path = database_path(row["database_part"])
@@ -132,21 +157,30 @@ def _fetch(lake: Lake, row: dict[str, Any], target: Path) -> None:
         packed.unlink(missing_ok=True)
 
 
-def _verified(lake: Lake, row: dict[str, Any], file: Path) -> str | None:
-    """Upgrade a database and return its revision before; raise if it is not that of the run."""
+def _upgraded(lake: Lake, row: Mapping[str, Any], file: Path) -> str | None:
+    """Upgrade a database and return its revision before; None if it was the current one."""
     try:
         done = upgrade(file)
-        with contextlib.closing(connect(file, read_only=True)) as con:
-            ids = con.execute("SELECT run_id FROM main.run").fetchall()
-            is_it = len(ids) == 1 and run_key(con, ids[0][0]) == row["run"]
     except MsgflowError as error:
         raise _damaged(lake, row, error.message.partition(" — ")[0]) from error
-    if not is_it:
-        raise _damaged(lake, row, "it is that of another run")
     return done.before if done.before != done.after else None
 
 
-def _damaged(lake: Lake, row: dict[str, Any], words: str) -> DatabaseError:
+def _opened(lake: Lake, row: Mapping[str, Any], file: Path) -> duckdb.DuckDBPyConnection:
+    """Open a database for reading; raise if it is not that of the run."""
+    try:
+        con = connect(file, read_only=True)
+        ids = con.execute("SELECT run_id FROM main.run").fetchall()
+        is_it = len(ids) == 1 and run_key(con, ids[0][0]) == row["run"]
+    except MsgflowError as error:
+        raise _damaged(lake, row, error.message.partition(" — ")[0]) from error
+    if not is_it:
+        con.close()
+        raise _damaged(lake, row, "it is that of another run")
+    return con
+
+
+def _damaged(lake: Lake, row: Mapping[str, Any], words: str) -> DatabaseError:
     return DatabaseError(
         f"the database in the lake cannot be used: {words}"
         f" — {lake.store.url_of(database_path(row['database_part']))}",

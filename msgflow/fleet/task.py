@@ -63,7 +63,7 @@ class Task:
     source: str
     lake: str
     options: dict[str, Any] = field(default_factory=dict)
-    views: bool = True
+    views: bool = False
     database: bool = True
     timeout: float = 3600.0
     most_memory: int | None = None

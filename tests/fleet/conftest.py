@@ -40,7 +40,8 @@ def written(
     parts = []
     for database in databases:
         with Database(database) as opened:
-            parts.append(write_part(opened.connection, database, lake.store, folder, Content()))
+            content = Content(views=True)
+            parts.append(write_part(opened.connection, database, lake.store, folder, content))
     return folder / "lake", parts[0], parts[1]
 
 

@@ -181,7 +181,7 @@ def test_what_was_mended_is_tried_again(
     lake, recordings = tmp_path / "lake", tmp_path / "recordings"
     shutil.copytree(filled.lake, lake)
     shutil.copytree(filled.recordings / "broken", recordings / "broken")
-    sources = (recordings / "broken", "--lake", lake, "--no-views", "--no-database")
+    sources = (recordings / "broken", "--lake", lake, "--no-database")
     assert run("ingest", *sources).exit_code == 3
     assert run("ingest", *sources).exit_code == 3
     shutil.rmtree(recordings / "broken")

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import duckdb
+import pyarrow as pa
 import pytest
 from object_store import KEYS, ObjectStore, object_store
 from sql_attack import ALLOWED, SECRET, answered, attack, content
@@ -14,9 +15,9 @@ from sql_attack import ALLOWED, SECRET, answered, attack, content
 from msgflow.errors import DatabaseError, UsageError
 from msgflow.fleet.file_store import Store
 from msgflow.fleet.lake import Lake
-from msgflow.fleet.lake_connection import Reading, choose
+from msgflow.fleet.lake_connection import Choice, Reading, choose
 from msgflow.fleet.lake_query import fleet_query, fleet_sql, fleet_worst
-from msgflow.fleet.layout import part_path
+from msgflow.fleet.layout import part_path, view_path
 from msgflow.fleet.run_database import open_run
 from msgflow.result.query_result import QueryResult
 
@@ -193,6 +194,19 @@ def test_a_bucket_answers_as_a_folder_does(
         fleet_sql(night, text, where=where).table
     )
     assert len(fleet_worst(lake, "/", limit=3)) == 3
+    # Views of one run from the lake, of the other from its database.
+    runs = choose(night, "name IN ('first', 'second')").runs
+    parts = [part if name == "second" else None for name, part in zip(
+        runs["name"].to_pylist(), runs["view_part"].to_pylist(), strict=True
+    )]  # fmt: skip
+    place = runs.column_names.index("view_part")
+    (kept,) = (view_path("topic", part) for part in parts if part)
+    lake.store.put(kept, night.store.read(kept) or b"")
+    mixed = runs.set_column(place, "view_part", pa.array(parts, pa.string()))
+    topics = "FROM view.topic ORDER BY ALL"
+    with Reading(Choice(lake, mixed, (), 3), ["view/topic"]) as reading:
+        found = reading.connection.execute(topics).fetchall()
+    assert found == list(zip(*fleet_sql(night, topics).table.to_pydict().values(), strict=True))
     # The text for DuckDB has no credentials, and DuckDB reaches nothing itself.
     with Reading(choose(lake), ["flow"]) as reading:
         said = str(reading.connection.execute("FROM duckdb_settings()").fetchall())

@@ -185,7 +185,7 @@ def test_goals_of_several_runs_are_added_up(tmp_path: Path) -> None:
         ingest([recording], path)
         with Database(path) as database:
             part = write_part(
-                database.connection, path, lake.store, tmp_path, Content(database=False)
+                database.connection, path, lake.store, tmp_path, Content(views=True, database=False)
             )
             alone += database.query("action-latency").to_arrow().to_pylist()
         commits.append({**part, "labels": {}, "source": str(seed)})

@@ -54,7 +54,7 @@ def start_ingest(
     command = [sys.executable, "-m", "msgflow", "fleet", "ingest", *sources, "--lake", lake]
     command += ["--ray", address, "--scratch", str(scratch), "--tries", "5"]
     return subprocess.Popen(
-        [*command, "--no-views", "--no-database"],
+        [*command, "--no-database"],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,
