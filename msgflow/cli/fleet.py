@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 app = typer.Typer()
 
 _TIME = re.compile(r"(\d+(?:\.\d+)?) ?(s|min|h|d)?")
+_SHARD = re.compile(r"(\d{1,9})/(\d{1,9})", re.ASCII)
 _SECONDS = {None: 1.0, "s": 1.0, "min": 60.0, "h": 3_600.0, "d": 86_400.0}
 _MOST_FAILURES = 20
 
@@ -32,6 +33,7 @@ def ingest(
     *,
     lake: str,
     label: list[str] | None = None,
+    shard: str | None = None,
     ray: str | None = None,
     replace: bool = False,
     retry_failed: bool = False,
@@ -57,6 +59,8 @@ def ingest(
         sources (SOURCE...): Recordings: directories, archives, patterns ('s3://bucket/night/*'), or
             manifests (.csv, .jsonl, .parquet) with a column path and labels.
         label (KEY=VALUE): Say so of all; may be repeated.
+        shard (I/N): Do one part of N, from 0/N to N-1/N; other jobs do the others into the same
+            lake, in any order. A source's name alone tells its part.
         ray (ADDRESS): Ray cluster that does the work: its address, auto, or local; by default this
             process.
         replace: Ingest again what the lake has already.
@@ -74,7 +78,7 @@ def ingest(
             f"a fleet has no offsets in common — {clock_sync}", "--clock-sync messages, or none"
         )
     labels = _labels(label or [])
-    seconds, most = _time(timeout), _size(memory)
+    seconds, most, part = _time(timeout), _size(memory), _shard(shard)
     from msgflow.cli.progress import fleet_progress
     from msgflow.fleet.ingest import Options, fleet_ingest
 
@@ -98,9 +102,9 @@ def ingest(
     )
     with fleet_progress(quiet) as progress:
         report = fleet_ingest(
-            sources, lake, ray=ray, options=options, labels=labels, progress=progress
+            sources, lake, ray=ray, options=options, labels=labels, shard=part, progress=progress
         )
-    _print_report(report, lake, quiet)
+    _print_report(report, f"{lake}, shard {shard}" if shard else lake, quiet)
     if report.in_lake < report.total:
         raise typer.Exit(ExitCode.FAILED if report.in_lake else ExitCode.TRACE)
 
@@ -120,8 +124,8 @@ def _print_report(report: FleetProgress, lake: str, quiet: bool) -> None:
         }
         words = ", ".join(f"{number:,} {kind}" for kind, number in kinds.items() if number)
         print_status(
-            f"{count(report.total, 'recording')} for {lake}: {words}; {report.events:,} events in"
-            f" {report.seconds:.1f} s"
+            f"{count(report.total, 'recording')} for {lake}: {words or 'none'}; {report.events:,}"
+            f" events in {report.seconds:.1f} s"
         )
         for worker, number in sorted(report.workers.items()):
             print_status(f"  {worker}: {count(number, 'recording')}")
@@ -194,7 +198,7 @@ def remove(keys: list[str], *, lake: str) -> None:
 @app.command("pack")
 @operation
 def pack(*, lake: str) -> None:
-    """Put the answers of many runs into few files, and delete those that no run needs.
+    """Put answers and views of many runs into few files, and delete those that no run needs.
 
     Nothing else may use the lake meanwhile: no ingest, and no query.
     """
@@ -205,7 +209,7 @@ def pack(*, lake: str) -> None:
 
     done = packed(Lake.open(lake))
     print_status(
-        f"answers of {count(done.runs, 'run')} put into {count(done.packs, 'part')};"
+        f"files of {count(done.runs, 'run')} put into {count(done.packs, 'part')};"
         f" {count(done.deleted, 'file')} deleted, {done.size / 1e6:,.1f} MB"
     )
 
@@ -274,6 +278,15 @@ def _labels(texts: list[str]) -> dict[str, str]:
         for key, value in labels.items():
             require_label(key, value)
     return labels
+
+
+def _shard(text: str | None) -> tuple[int, int] | None:
+    if text is None:
+        return None
+    match = _SHARD.fullmatch(text)
+    if match is None or int(match[1]) >= int(match[2]):
+        raise UsageError(f"--shard takes I/N — {text}", "the shards of 3 are 0/3, 1/3 and 2/3")
+    return int(match[1]), int(match[2])
 
 
 def _size(text: str | None) -> int | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
+import hashlib
 import heapq
 import itertools
 import json
@@ -18,7 +18,7 @@ from msgflow.errors import MsgflowError, TraceError, UsageError
 from msgflow.fleet.failure import forget_failure, read_failures, write_failure
 from msgflow.fleet.file_store import S3, normal_url
 from msgflow.fleet.lake import Lake
-from msgflow.fleet.recording import is_archive_name, look_at
+from msgflow.fleet.recording import Recording, is_archive_name, look_at
 from msgflow.fleet.sources import find_recordings
 from msgflow.fleet.task import PASSING, Outcome, Reason, Task, needs, without_secrets
 from msgflow.fleet.workers import make_workers
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
     from pathlib import Path
 
-    from msgflow.fleet.recording import Recording, State
+    from msgflow.fleet.recording import State
     from msgflow.fleet.workers import Workers
 
 _LOOKING_AT_ONCE = 8
@@ -126,9 +126,13 @@ def fleet_ingest(
     ray: str | None = None,
     options: Options | None = None,
     labels: Mapping[str, str] | None = None,
+    shard: tuple[int, int] | None = None,
     progress: Callable[[FleetProgress], None] | None = None,
 ) -> FleetProgress:
-    """Ingest recordings into a lake, each as one run; a failure does not stop the others."""
+    """Ingest recordings into a lake, each as one run; a failure does not stop the others.
+
+    `shard` (I, N) does those of N parts that other processes do, 0 to N - 1.
+    """
     recordings = find_recordings(sources, labels)
     url = normal_url(lake)
     # A pattern may fit the lake itself.
@@ -136,8 +140,21 @@ def fleet_ingest(
     if not recordings:
         raise UsageError(f"the lake itself is no recording — {url}", "give other sources")
     opened = Lake.open_or_create(lake)
+    mine, places = recordings, {}
+    if shard is not None:
+        mine = [each for each in recordings if is_in_shard(each.source, *shard)]
+        places = {each.source: (place, each) for place, each in enumerate(recordings)}
     with opened.writing():
-        return _Ingest(opened, recordings, options or Options(), progress).run(ray)
+        return _Ingest(opened, mine, places, options or Options(), progress).run(ray)
+
+
+def is_in_shard(source: str, shard: int, shards: int) -> bool:
+    """Tell whether a recording belongs to a shard: by its source alone, whatever others there are.
+
+    So shards that list the sources at different moments still do each recording once.
+    """
+    digest = hashlib.sha256(source.encode(errors="surrogateescape")).digest()
+    return int.from_bytes(digest[:8], "big") % shards == shard
 
 
 @dataclass
@@ -157,12 +174,15 @@ class _Ingest:
         self,
         lake: Lake,
         recordings: Sequence[Recording],
+        places: Mapping[str, tuple[int, Recording]],
         options: Options,
         progress: Callable[[FleetProgress], None] | None,
     ) -> None:
         self._lake = lake
         self._options = options
         self._recordings = recordings
+        # The order of the recordings of all shards, by source; empty if this process does all.
+        self._places = places
         self._report = progress
         self._begin = time.monotonic()
         self._progress = FleetProgress(len(recordings))
@@ -245,10 +265,11 @@ class _Ingest:
         run = self._runs.get(self._sources.get(recording.source, ""))
         is_relabelled = run is not None and _is_relabelled(run, recording)
         if run is not None and is_relabelled:
-            run = self._as_it_is_now(run["run"])
-        if run is not None and self._is_there(run, found):
-            if is_relabelled:
-                self._commit({**run, "labels": dict(recording.labels)})
+            with self._lake.changing():
+                run = self._as_it_is_now(run["run"])
+                if run is not None and self._is_there(run, recording, found):
+                    self._commit({**run, "labels": dict(recording.labels)})
+        if run is not None and self._is_there(run, recording, found):
             self._forget(item)
             self._progress.there += 1
             self._tell()
@@ -264,10 +285,11 @@ class _Ingest:
             return None
         return item
 
-    def _is_there(self, run: Mapping[str, Any], state: State) -> bool:
+    def _is_there(self, run: Mapping[str, Any], recording: Recording, state: State) -> bool:
         options = self._options
         return (
             not options.replace
+            and run["source"] == recording.source
             and run["source_signature"] == state.signature
             and run["options"] == json.dumps(dict(options.ingest), sort_keys=True)
             and (run["view_part"] is not None or not options.views)
@@ -328,28 +350,31 @@ class _Ingest:
         # The earlier run of the source, if that had other packets.
         before = self._runs.get(self._sources.get(item.recording.source, key))
         before = None if before is None or before["run"] == key else before
-        there = self._as_it_is_now(key)
-        if (
-            there is not None
-            and there["source"] != item.recording.source
-            and (not self._options.replace or key in self._written)
-        ):
+        self._forget(item)
+        with self._lake.changing():
+            there = self._as_it_is_now(key)
+            is_other = there is not None and there["source"] != item.recording.source
+            if there is None or not is_other or self._takes(item, there):
+                # A recording without labels keeps those that it had.
+                had = {} if is_other and self._places else there or before or {}
+                labels = dict(item.recording.labels) or dict(had.get("labels") or ())
+                row = {
+                    **outcome.values,
+                    "labels": labels,
+                    "committed_ns": there and there["committed_ns"],
+                    "seconds": outcome.seconds,
+                    "tries": item.tries,
+                    "worker": outcome.worker,
+                }
+                if there is not None and is_other:
+                    self._displace(there, row)
+                self._commit(row)
+                is_other = False
+        if there is not None and is_other:
             self._same_packets(item, there, before, outcome)
             return
-        # A recording without labels keeps those that it had.
-        labels = dict(item.recording.labels) or dict((there or before or {}).get("labels") or ())
-        row = {
-            **outcome.values,
-            "labels": labels,
-            "committed_ns": there and there["committed_ns"],
-            "seconds": outcome.seconds,
-            "tries": item.tries,
-            "worker": outcome.worker,
-        }
-        self._commit(row)
-        self._leave(before)
+        self._leave(item, before)
         self._written.add(key)
-        self._forget(item)
         if there is not None or before is not None:
             self._progress.replaced += 1
         else:
@@ -357,7 +382,35 @@ class _Ingest:
         self._progress.events += row["event_count"] or 0
         self._tell()
 
-    def _leave(self, before: Mapping[str, Any] | None) -> None:
+    def _takes(self, item: _Item, there: Mapping[str, Any]) -> bool:
+        """Tell whether a recording takes the run of another one with the same packets."""
+        other = self._places.get(there["source"])
+        if other is None:
+            return self._options.replace and there["run"] not in self._written
+        # The first one in the order of the command that has them, whichever shard was faster.
+        return self._places[item.recording.source][0] < other[0] or _has_changed(there)
+
+    def _displace(self, there: Mapping[str, Any], row: Mapping[str, Any]) -> None:
+        """Write what a recording of another shard would say of the one that takes its run."""
+        _, other = self._places.get(there["source"], (0, None))
+        if other is None or not other.labels or dict(other.labels) == row["labels"]:
+            return
+        if not _has_changed(there):
+            known = {name: there[name] for name in ("source", "source_signature", "tries")}
+            known |= {"labels": dict(other.labels), "worker": there["worker"]}
+            write_failure(self._lake, known | self._of_same_packets(row))
+
+    def _of_same_packets(self, there: Mapping[str, Any]) -> dict[str, Any]:
+        hint = "leave out one of the two"
+        return {
+            "reason": str(Reason.SAME_PACKETS),
+            "stage": "committing",
+            "error": f"its packets are in the lake already, with other labels, from"
+            f" {there['source']} (run {there['run']})",
+            "hint": hint if self._options.replace else f"{hint}, or give --replace",
+        }
+
+    def _leave(self, item: _Item, before: Mapping[str, Any] | None) -> None:
         """Remove the earlier run of a source with new packets.
 
         If another recording of this call has the packets of that run, the run becomes that one's.
@@ -370,8 +423,7 @@ class _Ingest:
             return
         self._know(before["run"], None)
         self._packed.pop(before["run"], None)
-        with contextlib.suppress(UsageError):  # another process has removed it
-            self._lake.remove([before["run"]])
+        self._lake.remove([before["run"]], of=item.recording.source)
 
     def _same_packets(
         self,
@@ -383,24 +435,12 @@ class _Ingest:
         labels = dict(item.recording.labels)
         if not labels or labels == dict(there["labels"] or ()):
             self._alike[there["run"]] = outcome.values or {}
-            self._leave(before)
-            self._forget(item)
+            self._leave(item, before)
             self._progress.same += 1
             self._tell()
             return
-        hint = "leave out one of the two"
-        self._failed_now(
-            item,
-            Outcome(
-                reason=Reason.SAME_PACKETS,
-                stage="committing",
-                error=f"its packets are in the lake already, with other labels, from"
-                f" {there['source']} (run {there['run']})",
-                hint=hint if self._options.replace else f"{hint}, or give --replace",
-                signature=outcome.signature,
-                worker=outcome.worker,
-            ),
-        )
+        said = self._of_same_packets(there)
+        self._failed_now(item, Outcome(**said, signature=outcome.signature, worker=outcome.worker))
 
     def _commit(self, row: Mapping[str, Any]) -> None:
         self._lake.commit([row])
@@ -455,6 +495,12 @@ class _Ingest:
 
 def _is_relabelled(run: Mapping[str, Any], recording: Recording) -> bool:
     return bool(recording.labels) and dict(run["labels"] or ()) != dict(recording.labels)
+
+
+def _has_changed(run: Mapping[str, Any]) -> bool:
+    """Tell whether the source of a run is another recording now."""
+    found = _look(Recording(run["source"]))
+    return not isinstance(found, MsgflowError) and found.signature != run["source_signature"]
 
 
 def _look(recording: Recording) -> State | MsgflowError:

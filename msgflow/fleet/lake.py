@@ -11,7 +11,7 @@ import os
 import shlex
 import time
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 
 from msgflow.db.sandbox import open_memory
@@ -81,10 +81,12 @@ class Lake:
     def open_or_create(cls, url: str | Path) -> Lake:
         """Return the lake at an address, which is created if there is nothing."""
         store = Store(url, follows_links=False)
+        # First: what another process writes meanwhile, it writes behind the file that is read next.
+        is_free = _is_free(store)
         content = store.read(ABOUT, MOST_BYTES)
         if content is not None:
             require_readable(content, store.url)
-        elif store.entries(recursive=False) or store.folders():
+        elif not is_free:
             raise DatabaseError(
                 f"it holds something else than a lake — {store.url}",
                 "give an empty or a new place with --lake",
@@ -170,17 +172,23 @@ class Lake:
         revision = max((row["schema_revision"] or "" for row in whole), default="")
         self.put_table(run_path(name), RUN, table, revision)
 
-    def remove(self, keys: Iterable[str]) -> int:
+    def remove(self, keys: Iterable[str], *, of: str | None = None) -> int:
         """Remove runs from the lake; `msgflow fleet pack` deletes their files.
+
+        `of` leaves runs that are not of this source, or no longer there.
 
         Returns:
             Their number, without keys that are given twice.
         """
         wanted = dict.fromkeys(keys)
         # Of two at the same time, the second would write again what the first one took out.
-        with self._locked(RUN, alone=True, wait=True):
+        with self.changing():
             rows = self._rows(PACKED)
             packed = rows.to_pylist() if rows is not None else []
+            if of is not None:
+                now = {row["run"]: row["source"] for row in packed}
+                now |= {key: row["source"] for key in wanted if (row := self.run(key))}
+                wanted = {key: None for key in wanted if now.get(key) == of}
             kept = [row for row in packed if row["run"] not in wanted]
             here = {row["run"] for row in packed}
             for key in wanted:
@@ -232,6 +240,15 @@ class Lake:
             yield
 
     @contextmanager
+    def changing(self) -> Iterator[None]:
+        """Keep others from changing the table `run` meanwhile, where there are locks."""
+        if self.store.is_local:
+            with suppress(OSError):  # writing there will tell
+                os.makedirs(self.store.full(RUN), exist_ok=True)
+        with self._locked(RUN, alone=True, wait=True):
+            yield
+
+    @contextmanager
     def _locked(self, path: str, *, alone: bool, wait: bool) -> Iterator[None]:
         """Hold the lock of a folder of the lake, where there are such."""
         folder = self.store.full(path)
@@ -249,6 +266,12 @@ class Lake:
             yield
         finally:
             os.close(descriptor)
+
+
+def _is_free(store: Store) -> bool:
+    """Tell whether there is nothing, or no more than another process that makes a lake there."""
+    found = [each.path for each in store.entries(recursive=False)] + store.folders()
+    return all(name.startswith(f".{ABOUT}.") for name in found)
 
 
 def _require_sound(rows: pa.Table, name: str, url: str) -> None:

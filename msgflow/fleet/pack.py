@@ -1,4 +1,4 @@
-"""Packs: the answers of many runs in few, large files. What no run needs any more is deleted.
+"""Packs: answers and views of many runs in few, large files. What no run needs is deleted.
 
 It works offline. All packs count from the moment when the file with the rows of all runs is there;
 until then all runs are as they were, so that an end in between does no harm.
@@ -48,7 +48,7 @@ class Packed:
     """What was packed.
 
     Attributes:
-        runs: runs whose answers are in a new part now.
+        runs: runs whose answers or views are in a new part now.
         packs: new parts.
         deleted: deleted files.
         size: their bytes.
@@ -61,48 +61,53 @@ class Packed:
 
 
 def pack(lake: Lake) -> Packed:
-    """Put the answers of many runs together, and delete files that no run needs.
+    """Put answers and views of many runs together, and delete files that no run needs.
 
     No other process may use the lake meanwhile.
     """
     with lake.writing(alone=True):
-        runs = lake.runs().to_pylist()
-        sizes = Counter[str]()
-        for answer in answers():
-            for entry in lake.store.entries(answer.table):
-                sizes[part_of(entry.path) or ""] += entry.size
-        groups = _groups(runs, sizes)
-        packed = {row["run"]: row for row in runs}
-        for group in groups:
-            part = _pack(lake, group)
-            packed |= {row["run"]: {**row, "part": part} for row in group}
+        packed = {row["run"]: row for row in lake.runs().to_pylist()}
+        before = dict(packed)
+        packs = 0
+        views = sorted({entry.path.rpartition("/")[0] for entry in lake.store.entries(VIEWS)})
+        for key, tables in (("part", [answer.table for answer in answers()]), ("view_part", views)):
+            sizes = Counter[str]()
+            for table in tables:
+                for entry in lake.store.entries(table):
+                    sizes[part_of(entry.path) or ""] += entry.size
+            for group in _groups(list(packed.values()), key, sizes):
+                part = _pack(lake, group, key, tables)
+                packed |= {row["run"]: {**row, key: part} for row in group}
+                packs += 1
+        changed = sum(packed[run] != before[run] for run in packed)
         own = {run_path(key) for key in packed}
-        if groups or own.intersection(entry.path for entry in lake.store.entries(RUN)):
+        if packs or own.intersection(entry.path for entry in lake.store.entries(RUN)):
             lake.pack_runs(list(packed.values()))
         # Without a run, no row is left to keep.
         deleted = _clean_up(lake, own or {run_path(PACKED)}, packed.values())
-    return Packed(
-        sum(map(len, groups)), len(groups), len(deleted), sum(entry.size for entry in deleted)
-    )
+    return Packed(changed, packs, len(deleted), sum(entry.size for entry in deleted))
 
 
 def _groups(
-    runs: Sequence[Mapping[str, Any]], sizes: Mapping[str, int]
+    runs: Sequence[Mapping[str, Any]], key: str, sizes: Mapping[str, int]
 ) -> list[list[Mapping[str, Any]]]:
-    """Return groups of runs, each of one version, whose answers are to go into one part."""
-    living = Counter(row["part"] for row in runs if row["part"] is not None)
+    """Return groups of runs, each of one version, whose files are to go into one part.
+
+    `key` is the column of `run` that names the part: that of the answers, or of the views.
+    """
+    living = Counter(row[key] for row in runs if row[key] is not None)
     full = {
         part
         for part in living
         if living[part] == packed_runs(part)
         and (living[part] > _MOST_RUNS // 2 or sizes[part] > _MOST_BYTES // 2)
     }
-    loose = [row for row in runs if row["part"] is not None and row["part"] not in full]
+    loose = [row for row in runs if row[key] is not None and row[key] not in full]
     loose.sort(key=lambda row: (*_version(row), row["start_ns"] or 0, row["run"]))
     groups: list[list[Mapping[str, Any]]] = [[]]
     size = 0.0
     for row in loose:
-        share = sizes[row["part"]] / living[row["part"]]
+        share = sizes[row[key]] / living[row[key]]
         last = groups[-1]
         if last and (
             size + share > _MOST_BYTES
@@ -117,7 +122,7 @@ def _groups(
     return [
         group
         for group in groups
-        if len(parts := {row["part"] for row in group}) > 1
+        if len(parts := {row[key] for row in group}) > 1
         or any(packed_runs(part) > living[part] for part in parts)
     ]
 
@@ -126,34 +131,33 @@ def _version(row: Mapping[str, Any]) -> tuple[str, str]:
     return row["schema_revision"] or "", row["msgflow_version"] or ""
 
 
-def _pack(lake: Lake, rows: Sequence[Mapping[str, Any]]) -> str:
-    """Write the answers of some runs into a new part."""
+def _pack(lake: Lake, rows: Sequence[Mapping[str, Any]], key: str, tables: Sequence[str]) -> str:
+    """Write the tables of some runs into a new part."""
     part = new_pack(len(rows))
-    for answer in answers():
-        table = _together(lake, answer.table, rows, part)
-        if table is not None:
-            lake.put_table(
-                part_path(answer.table, part), answer.table, table, rows[0]["schema_revision"] or ""
-            )
+    for table in tables:
+        whole = _together(lake, table, rows, key, part)
+        if whole is not None:
+            revision = rows[0]["schema_revision"] or ""
+            lake.put_table(part_path(table, part), table.rpartition("/")[2], whole, revision)
     return part
 
 
 def _together(
-    lake: Lake, table: str, rows: Sequence[Mapping[str, Any]], pack: str
+    lake: Lake, table: str, rows: Sequence[Mapping[str, Any]], key: str, pack: str
 ) -> pa.Table | None:
-    """Return the answers of some runs, run after run; None if no part has the table."""
+    """Return the rows of some runs, run after run; None if no part has the table."""
     import pyarrow as pa
     import pyarrow.compute as pc
 
     wanted: dict[str, list[str]] = {}
     for row in rows:
-        wanted.setdefault(row["part"], []).append(row["run"])
+        wanted.setdefault(row[key], []).append(row["run"])
     with ThreadPoolExecutor(_READ_AT_ONCE) as pool:
         read = pool.map(lambda part: _read(lake, table, part, wanted[part]), wanted)
         found = dict(zip(wanted, read, strict=True))
     there = {part: rows for part, rows in found.items() if rows is not None}
-    # Those of an earlier msgflow may all lack the table.
-    if not there and rows[0]["msgflow_version"] != __version__:
+    # Those of an earlier msgflow may all lack the table, and views may be of another one.
+    if not there and (key != "part" or rows[0]["msgflow_version"] != __version__):
         return None
     for part, runs in wanted.items():
         if part not in there:

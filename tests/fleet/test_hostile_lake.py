@@ -65,7 +65,7 @@ def test_no_module_of_the_current_folder_is_imported(
         pytest.importorskip("ray", reason="ray is not installed")
     given = ["fleet", "ingest", "r0", "--lake", str(tmp_path / "lake"), "--events", "my_pkg:*"]
     done = CliRunner().invoke(
-        app, [*given, "--no-database", *([] if ray is None else ["--ray", ray])]
+        app, [*given, "--views", "--no-database", *([] if ray is None else ["--ray", ray])]
     )
     assert done.exit_code == 0, done.stderr
     assert not (tmp_path / "run").exists()

@@ -17,7 +17,7 @@ from lakes import content, copied, paths, read, rows_of
 
 from msgflow.fleet.answers import answers
 from msgflow.fleet.lake import Lake
-from msgflow.fleet.layout import PACKED, part_of, run_path
+from msgflow.fleet.layout import PACKED, VIEWS, part_of, run_path
 from msgflow.fleet.pack import pack
 
 Row = dict[str, Any]
@@ -82,20 +82,21 @@ def dies(program: str, lake: Lake, steps: int, *more: Path) -> None:
 @pytest.mark.parametrize(
     "steps",
     [
-        pytest.param(3, marks=pytest.mark.thorough),
+        pytest.param(-70, marks=pytest.mark.thorough),
         # The rows of the pack are not there yet.
-        pytest.param(_TABLES, marks=pytest.mark.thorough),
+        pytest.param(0, marks=pytest.mark.thorough),
         # Both the rows of the pack and files of runs are there.
-        _TABLES + 2,
-        pytest.param(_TABLES + 10, marks=pytest.mark.thorough),
+        2,
+        pytest.param(10, marks=pytest.mark.thorough),
     ],
 )
 def test_a_pack_that_is_killed_changes_no_answer(
     holding: tuple[Lake, Row, Row], steps: int
 ) -> None:
+    """It is killed some steps after it has written all answers and views."""
     lake, *_ = holding
     before, files = content(lake), paths(lake, "")
-    dies(_PACKS, lake, steps)
+    dies(_PACKS, lake, _TABLES + len(lake.store.folders(VIEWS)) + steps)
     assert paths(lake, "") != files
     assert content(lake) == before
     pack(lake)
@@ -104,6 +105,7 @@ def test_a_pack_that_is_killed_changes_no_answer(
     assert paths(lake, "run") == {run_path(PACKED)}
     tables = paths(lake, *(answer.table for answer in answers()))
     assert {part_of(path) for path in tables} == {part}
+    assert len(paths(lake, VIEWS)) == len(lake.store.folders(VIEWS))
 
 
 @pytest.mark.thorough

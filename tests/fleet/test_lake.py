@@ -15,7 +15,15 @@ from msgflow.errors import DatabaseError, UsageError
 from msgflow.fleet.answers import answers
 from msgflow.fleet.file_store import Store
 from msgflow.fleet.lake import Lake
-from msgflow.fleet.layout import PACKED, part_of, part_path, run_path, run_schema, view_path
+from msgflow.fleet.layout import (
+    PACKED,
+    VIEWS,
+    part_of,
+    part_path,
+    run_path,
+    run_schema,
+    view_path,
+)
 from msgflow.fleet.pack import pack
 from msgflow.fleet.part import Content, write_part
 
@@ -249,17 +257,21 @@ def test_packing_changes_no_answer(
     lake.commit([first, other])
     before = content(lake)
     done = pack(lake)
-    assert (done.runs, done.packs) == (2, 1)
+    assert (done.runs, done.packs) == (2, 2)
     assert content(lake) == before
-    (part,) = set(lake.runs()["part"].to_pylist())
     assert paths(lake, "run") == {run_path(PACKED)}
-    assert {part_of(path) for path in paths(lake, *(a.table for a in answers()))} == {part}
+    views = lake.store.folders(VIEWS)
+    for key, tables in (("part", [a.table for a in answers()]), ("view_part", [VIEWS])):
+        (part,) = set(lake.runs()[key].to_pylist())
+        assert {part_of(path) for path in paths(lake, *tables)} == {part}
+    assert len(paths(lake, VIEWS)) == len(views) > 60
     assert len(paths(lake, "database")) == 2
     assert pack(lake).deleted == 0
     # A replaced run has a file of its own again.
     again = write(lake, databases[0], tmp_path)
     lake.commit([again])
-    assert content(lake)[1:] == before[1:]
+    answered = slice(1, 1 + len(answers()))
+    assert content(lake)[answered] == before[answered]
     assert paths(lake, "run") == {run_path(PACKED), run_path(first["run"])}
     # Neither row is left after a removal.
     lake.remove([first["run"]])
@@ -267,11 +279,13 @@ def test_packing_changes_no_answer(
     assert first["run"] not in lake.runs()["run"].to_pylist()
     assert read(lake, "SELECT run FROM run") == [(other["run"],)]
     assert {row[0] for row in rows_of(lake, "flow")} == {other["run"]}
-    # The pack still has its answers.
+    # The pack still has its answers and views.
     done = pack(lake)
-    assert (done.runs, done.packs) == (1, 1)
-    (flow,) = paths(lake, "flow")
-    assert set(pq.ParquetFile(lake.store.full(flow)).read()["run"].to_pylist()) == {other["run"]}
+    assert (done.runs, done.packs) == (1, 2)
+    for table in ("flow", f"{VIEWS}/node"):
+        (file,) = paths(lake, table)
+        kept = pq.ParquetFile(lake.store.full(file)).read()
+        assert set(kept["run"].to_pylist()) == {other["run"]}
     assert not any(first["run"] in path for path in paths(lake, ""))
     lake.remove([other["run"]])
     pack(lake)

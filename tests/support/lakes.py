@@ -12,7 +12,7 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from msgflow.fleet.answers import answers
-from msgflow.fleet.layout import new_part, part_path
+from msgflow.fleet.layout import VIEWS, new_part, part_path
 
 if TYPE_CHECKING:
     from msgflow.fleet.lake import Lake
@@ -27,6 +27,7 @@ _ROWS = (
     "SELECT t.* EXCLUDE part FROM read_parquet('LAKE/{table}/*.parquet') AS t "
     "JOIN run USING (run, part) ORDER BY ALL"
 )
+_OF_VIEW = _ROWS.replace("JOIN run", "JOIN (SELECT run, view_part AS part FROM run)")
 
 
 def read(lake: Lake, sql: str) -> list[tuple[Any, ...]]:
@@ -40,9 +41,11 @@ def rows_of(lake: Lake, table: str) -> list[tuple[Any, ...]]:
 
 
 def content(lake: Lake) -> list[list[tuple[Any, ...]]]:
-    """Return all runs and their answers."""
-    runs = "SELECT * EXCLUDE (part, committed_ns) FROM run ORDER BY run"
-    return _answers(lake, runs, *(_ROWS.format(table=answer.table) for answer in answers()))
+    """Return all runs, their answers, and the views that are there."""
+    runs = "SELECT * EXCLUDE (part, view_part, committed_ns) FROM run ORDER BY run"
+    tables = [_ROWS.format(table=answer.table) for answer in answers()]
+    views = [_OF_VIEW.format(table=f"{VIEWS}/{view}") for view in lake.store.folders(VIEWS)]
+    return _answers(lake, runs, *tables, *views)
 
 
 def _answers(lake: Lake, *statements: str) -> list[list[tuple[Any, ...]]]:
