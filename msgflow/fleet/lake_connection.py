@@ -205,7 +205,9 @@ class Reading:
 
     def _made(self, tables: Sequence[str] | None, listed: bool) -> dict[str, list[str]]:
         """Return files with the views of runs that have them in their databases only."""
-        wanted = None if tables is None else {name for name in tables if name.startswith(VIEWS)}
+        wanted = (
+            None if tables is None else {each for each in tables if each.startswith(f"{VIEWS}/")}
+        )
         runs = [
             run
             for run in self.choice.runs.to_pylist()

@@ -159,7 +159,13 @@ def fleet_sql(
             with lake_errors(lake, is_query=True):
                 return guarded_rows(con, text, "msgflow fleet sql 'FROM run'", limit)
     except duckdb.Error as error:
-        raise sql_error(error, "ask about fewer runs with --where") from error
+        said = sql_error(error, "ask about fewer runs with --where")
+        parts = choice.runs.select(["view_part", "database_part"]).to_pylist()
+        if isinstance(error, duckdb.CatalogException) and not any(
+            part for row in parts for part in row.values()
+        ):
+            said.hint = "these runs have no views: --no-database left them out, and not --views"
+        raise said from error
 
 
 def fleet_worst(

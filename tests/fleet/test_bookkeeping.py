@@ -5,21 +5,25 @@ A recording here is a folder with a file that names its packets; it is not reall
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
-from collections.abc import Callable
+import shutil
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+import pyarrow as pa
 import pytest
 from typer.testing import CliRunner
 
 from msgflow.cli.app import app
 from msgflow.errors import DatabaseError, UsageError
+from msgflow.fleet import ingest as fleet_ingest_module
 from msgflow.fleet import task_process, workers
 from msgflow.fleet.failure import read_failures
-from msgflow.fleet.file_store import Store
-from msgflow.fleet.ingest import FleetProgress, Options, fleet_ingest
+from msgflow.fleet.file_store import Store, normal_url
+from msgflow.fleet.ingest import FleetProgress, Options, fleet_ingest, is_in_shard
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.layout import new_part
 from msgflow.fleet.pack import pack
@@ -254,7 +258,7 @@ def test_of_two_runs_of_a_source_the_earlier_one_goes(
     """A writer was killed when the new run was there and the earlier one not yet removed."""
     ingest(record("a", "first"))
 
-    def killed(self: Lake, keys: object) -> int:
+    def killed(self: Lake, keys: object, of: str) -> int:
         raise KeyboardInterrupt
 
     record("a", "second")
@@ -304,3 +308,89 @@ def test_a_run_is_removed_once(place: Path) -> None:
     assert runs() == {"second": "b"}
     with pytest.raises(UsageError, match=r"(?s)no such run — first.*--lake .*lake"):
         Lake.open("lake").remove(["first"])
+
+
+def shards(*sources: str, order: Sequence[int]) -> None:
+    """Ingest by shards, one after the other."""
+    for shard in order:
+        options = Options(database=False)
+        fleet_ingest(sources, "lake", options=options, shard=(shard, len(order)))
+
+
+def table(rows: pa.Table) -> list[dict[str, Any]]:
+    """Return rows without what differs from time to time."""
+    left = {"part", "committed_ns", "failed_ns", "worker", "seconds", "tries"}
+    return [
+        {name: value for name, value in row.items() if name not in left} for row in rows.to_pylist()
+    ]
+
+
+def test_shards_do_each_recording_once(place: Path) -> None:
+    sources = [record(f"r{number}", f"run{number}") for number in range(20)]
+    known = [normal_url(source) for source in sources]
+    done = [[source for source in known if is_in_shard(source, n, 3)] for n in range(3)]
+    assert sorted(itertools.chain(*done)) == sorted(known)
+    assert all(done)
+    totals = [fleet_ingest(sources, "lake", shard=(n, 3)).total for n in range(3)]
+    assert totals == [len(each) for each in done]
+    assert len(runs()) == 20
+    # A source is of the same shard whatever stands beside it.
+    (source,) = known[7:8]
+    mine = next(n for n in range(3) if source in done[n])
+    assert fleet_ingest([source], "lake", shard=(mine, 3)).total == 1
+    assert fleet_ingest([source], "lake", shard=((mine + 1) % 3, 3)).total == 0
+    given = ["fleet", "ingest", source, "--lake", "lake", "--shard", f"{(mine + 1) % 3}/3"]
+    nothing = CliRunner().invoke(app, given)
+    assert nothing.exit_code == 0
+    assert "0 recordings for lake, shard" in nothing.stderr
+    for text in ("3/3", "1", "-1/3", "a/b", "0/0"):
+        wrong = CliRunner().invoke(app, [*given[:-1], text])
+        assert (wrong.exit_code, "--shard takes I/N" in wrong.stderr) == (2, True)
+
+
+@pytest.mark.parametrize("labels", [{"a": "A", "b": "B"}, {"a": "A", "b": "A"}, {"b": "B"}, {}])
+def test_no_order_of_shards_matters(place: Path, labels: dict[str, str]) -> None:
+    """Two have the same packets, in different shards: the first of the command becomes the run."""
+    record("a", "first")
+    other = next(
+        name
+        for name in map("b{}".format, itertools.count())
+        if is_in_shard(f"{place}/{name}", 0, 2) != is_in_shard(f"{place}/a", 0, 2)
+    )
+    record(other, "first")
+    robots = f"path,robot\na,{labels.get('a', '')}\n{other},{labels.get('b', '')}\n"
+    Path("night.csv").write_text(robots)
+    found = []
+    for order in ((), (0, 1), (1, 0)):
+        shutil.rmtree("lake", ignore_errors=True)
+        if order:
+            shards("night.csv", order=order)
+        else:
+            ingest("night.csv")
+        lake = Lake.open("lake")
+        found.append((table(lake.runs()), table(read_failures(lake))))
+        assert runs() == {"first": "a"}
+    assert found[0] == found[1] == found[2]
+    # A restart changes nothing, of whichever shard.
+    for order in ((0, 1), (1, 0)):
+        shards("night.csv", order=order)
+        assert (table(lake.runs()), table(read_failures(lake))) == found[0]
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+@pytest.mark.parametrize("sources", [("a", "z"), ("z", "a")])
+def test_a_recording_that_was_moved_stays_with_shards(
+    place: Path, monkeypatch: pytest.MonkeyPatch, sources: tuple[str, str], order: tuple[int, int]
+) -> None:
+    monkeypatch.setattr(
+        fleet_ingest_module, "is_in_shard", lambda source, n, _: source.endswith("az"[n])
+    )
+    ingest(record("z", "first"))
+    record("a", "first")
+    record("z", "second")
+    rows = [f"{source},robot {source}" for source in sources]
+    Path("night.csv").write_text("\n".join(["path,robot", *rows]))
+    shards("night.csv", order=order)
+    assert runs() == {"first": "a", "second": "z"}
+    assert labels_of("first") == {"robot": "robot a"}
+    assert failures() == {}

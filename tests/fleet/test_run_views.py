@@ -11,7 +11,7 @@ import duckdb
 import pyarrow as pa
 import pytest
 
-from msgflow.errors import DatabaseError
+from msgflow.errors import DatabaseError, QueryError
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.lake_connection import Choice, Reading, choose
 from msgflow.fleet.lake_query import fleet_sql
@@ -70,6 +70,12 @@ def test_sql_fetches_the_databases_of_views_that_it_names(night: Lake, tmp_path:
     assert len(fleet_sql(lake, "SELECT DISTINCT run FROM flow")) == 3
     with pytest.raises(DatabaseError, match="the database of the run is gone"):
         fleet_sql(lake, COUNT)
+
+
+def test_it_is_said_where_runs_have_no_views(night: Lake) -> None:
+    with pytest.raises(QueryError, match="Table with name topic does not exist") as raised:
+        fleet_sql(night, COUNT, where="name = 'copy'")
+    assert "these runs have no views" in (raised.value.hint or "")
 
 
 @pytest.mark.thorough
