@@ -1,6 +1,7 @@
 """Precision and recall of what msgflow finds in real ROS 2, recorded here and now.
 
     python benchmarks/real.py --python PYTHON [--system NAME]… [--seconds 5] [--to DIR]
+        [--python-nodes]
 
 Nodes of rclpy run in processes of their own, and LTTng records them. They write down what they send
 and in which callback. The trace is ingested and compared with that, as `truth.py` does. PYTHON has
@@ -35,13 +36,16 @@ def main() -> None:
         "--to", type=Path, default=Path("build/real"),
         help="directory for a folder of each system, which replaces that of an earlier run",
     )  # fmt: skip
+    parser.add_argument(
+        "--python-nodes", action="store_true", help="trace callbacks and executors of rclpy, too"
+    )
     arguments = parser.parse_args()
     judged: list[Judged] = []
     try:
         require(arguments.python)
         for system in arguments.system or systems(arguments.python):
             directory = arguments.to.resolve() / system
-            judged += show(_judged(arguments.python, system, arguments.seconds, directory))
+            judged += show(_judged(arguments, system, directory))
     except NotPossibleError as error:
         sys.exit(f"cannot record: {error}")
     bad = [one for one in judged if not one.is_good]
@@ -50,10 +54,16 @@ def main() -> None:
     sys.exit(1 if bad else 0)
 
 
-def _judged(python: Path, system: str, seconds: float, directory: Path) -> list[Judged]:
+def _judged(arguments: argparse.Namespace, system: str, directory: Path) -> list[Judged]:
     if directory.exists():
         shutil.rmtree(directory)
-    trace, truth = record(python, system, seconds, directory)
+    trace, truth = record(
+        arguments.python,
+        system,
+        arguments.seconds,
+        directory,
+        python_nodes=arguments.python_nodes,
+    )
     with tempfile.TemporaryDirectory() as temporary:
         database = Path(temporary) / "run.duckdb"
         ingest([trace], database)

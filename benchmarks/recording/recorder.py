@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from msgflow import trace
 from msgflow.record.daemon import session_daemon
+from msgflow.record.python_path import PYTHON_NODES
 from msgflow.record.session import Channel, recording_session
 from recording.tracetools import build_tracetools
 
@@ -60,7 +61,9 @@ def require(python: Path) -> None:
         raise NotPossibleError(f"no Python with rclpy and test_msgs — {python}")
 
 
-def record(python: Path, system: str, seconds: float, directory: Path) -> tuple[Path, Path]:
+def record(
+    python: Path, system: str, seconds: float, directory: Path, *, python_nodes: bool = False
+) -> tuple[Path, Path]:
     """Record a system for some seconds.
 
     Args:
@@ -68,6 +71,7 @@ def record(python: Path, system: str, seconds: float, directory: Path) -> tuple[
         system: one of `systems`.
         seconds: for how long it runs.
         directory: an empty directory to write to.
+        python_nodes: callbacks and executors of rclpy are traced, too.
 
     Returns:
         The directory of the trace, and the file of the truth.
@@ -80,6 +84,8 @@ def record(python: Path, system: str, seconds: float, directory: Path) -> tuple[
     require(python)
     library = build_tracetools(_made(directory / "library"))
     environment = ros_environment(python) | {"LD_PRELOAD": str(library)}
+    if python_nodes:
+        environment["PYTHONPATH"] = str(PYTHON_NODES)
     parts = _made(directory / "truth")
     recorded = directory / "trace"
     with session(recorded):

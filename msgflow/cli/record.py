@@ -34,6 +34,8 @@ def command(
     kernel: bool = False,
     dual: str | None = None,
     events: list[str] | None = None,
+    python: bool = True,
+    print_python_path: bool = False,
     subbuf_size: str = "1M",
     num_subbuf: Annotated[int, typer.Option(min=2)] = 4,
     links: Path | None = None,
@@ -54,6 +56,8 @@ def command(
         duration (SECONDS): How long to record.
         kernel: Also record the scheduler, with LTTng or perf: why a thread waits.
         dual (SESSION): Also write what this snapshot session has: how nodes that run already began.
+        python: Trace callbacks and executors of the Python nodes of COMMAND, without a rebuild.
+        print_python_path: Only print the folder that does so, in front of PYTHONPATH.
         subbuf_size (SIZE): Size of a sub-buffer of LTTng, per CPU.
         num_subbuf: Number of sub-buffers, per CPU.
         ingest: Read the recording into the database.
@@ -61,9 +65,12 @@ def command(
     from msgflow.cli.output import print_note, print_status
     from msgflow.clocks import read_clock_sync
     from msgflow.links import read_links
-    from msgflow.record import Channel, record
+    from msgflow.record import PYTHON_NODES, Channel, record
     from msgflow.run.choice import require_run_name
 
+    if print_python_path:
+        typer.echo(PYTHON_NODES)
+        return
     name = name or time.strftime("recording-%Y%m%d-%H%M%S")
     require_run_name(name)
     # What is wrong with the files is said now, and not when all is recorded.
@@ -82,6 +89,7 @@ def command(
             seconds=duration,
             kernel=kernel,
             snapshot=dual,
+            python=python,
             note=print_note,
             show=show,
         )

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from msgflow.record.lttng import sessions
+from msgflow.record.python_path import PYTHON_NODES
 from msgflow.record.recording import BYTES_OF_EVENT, Recorded, Status, record
 from msgflow.record.session import Channel, rotated, temporary_directory
 
 __all__ = [
     "BYTES_OF_EVENT",
+    "PYTHON_NODES",
     "Channel",
     "Recorded",
     "Status",

@@ -15,7 +15,7 @@ from typing import IO, TYPE_CHECKING
 from msgflow.errors import UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
 # Seconds after each signal; `ros2 launch` itself waits so long for its nodes.
 _PATIENCE = ((signal.SIGINT, 10.0), (signal.SIGTERM, 5.0), (signal.SIGKILL, 5.0))
@@ -28,8 +28,13 @@ class Program:
     The group is its own, so that Ctrl-C of the terminal reaches it after the recording has stopped.
     """
 
-    def __init__(self, words: Sequence[str], output: IO[bytes] | None) -> None:
-        """Start it.
+    def __init__(
+        self,
+        words: Sequence[str],
+        output: IO[bytes] | None,
+        environment: Mapping[str, str] | None = None,
+    ) -> None:
+        """Start it, with our environment if that is None.
 
         `output` gets what it prints. If that is None, our stderr does, since our stdout is for
         data.
@@ -42,7 +47,12 @@ class Program:
         keys = None if output is None else subprocess.DEVNULL
         try:
             self._process = subprocess.Popen(
-                list(words), stdin=keys, stdout=stream, stderr=stream, start_new_session=True
+                list(words),
+                stdin=keys,
+                stdout=stream,
+                stderr=stream,
+                start_new_session=True,
+                env=environment,
             )
         except OSError as error:
             raise UsageError(

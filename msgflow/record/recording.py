@@ -14,6 +14,7 @@ from msgflow.errors import RecordingError
 from msgflow.record.daemon import session_daemon
 from msgflow.record.lttng import losses, providers, sessions
 from msgflow.record.program import Program, require_program
+from msgflow.record.python_path import with_python_nodes
 from msgflow.record.scheduling import recorded_with_perf, why_perf_cannot_record
 from msgflow.record.session import (
     Channel,
@@ -87,6 +88,7 @@ def record(
     seconds: float | None = None,
     kernel: bool = False,
     snapshot: str | None = None,
+    python: bool = True,
     note: Callable[[str], None],
     show: Callable[[Status], None],
 ) -> Recorded:
@@ -102,6 +104,7 @@ def record(
         kernel: also record what the scheduler does.
         snapshot: a snapshot session that has the initialisation of nodes that run already; what it
             has is written too.
+        python: trace callbacks and executors of the program's nodes of rclpy, too.
         note: gets sentences about what is wrong with the recording.
         show: gets the status twice a second; what it raises ends the recording.
 
@@ -146,7 +149,8 @@ def record(
             with recording_session(name, directory, channel, with_kernel=by_lttng):
                 interrupts.check()
                 if program:
-                    started = Program(program, output)
+                    environment = with_python_nodes(note) if python else None
+                    started = Program(program, output, environment)
                     # Behind the session: what happens while nodes end is not recorded.
                     running.callback(started.end, note)
                 with until_interrupted():

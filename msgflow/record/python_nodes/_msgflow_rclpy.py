@@ -1,0 +1,537 @@
+"""Emits for nodes of rclpy what rclcpp emits for its own: callbacks, timers, executors.
+
+The tracepoints are functions of `libtracetools.so`, which rclpy has loaded. A robot runs this, with
+Python 3.8 to 3.14 and rclpy 3 to 10: only the standard library is imported, and what goes wrong in
+it turns it off for the process, in one line on stderr.
+
+Events and fields are those of rclcpp. A callback is known by the handle of its subscription, timer
+or service, or by a number of its own. Besides, `rclcpp_callback_register` says with symbols that
+begin with `#msgflow`:
+
+* `#msgflow python` of 0: this process is traced so, and by which versions.
+* `#msgflow executor KIND` of an executor: the thread works for it.
+* `#msgflow step` of a number: something goes on later, because of what runs here.
+* `#msgflow resume` of such a number: what goes on is the callback that begins next on the thread.
+"""
+
+import ctypes
+import functools
+import inspect
+import itertools
+import os
+import sys
+import threading
+import weakref
+
+# More functions than that are no callbacks of a node, but made by it: they share a number.
+_MOST_FUNCTIONS = 10000
+_LONGEST_SYMBOL = 500
+_KINDS = {"SingleThreadedExecutor": "single_threaded", "MultiThreadedExecutor": "multi_threaded"}
+
+_is_on = True
+# Whether a session records callbacks; asked for before each wait.
+_is_recorded = True
+_numbers = itertools.count(1)
+# By symbol, of functions that belong to no subscription, timer or service.
+_functions = {}
+# By the identity of their callback: subscriptions, timers and services.
+_owners = weakref.WeakValueDictionary()
+# Classes of actions, and of other things that take by themselves.
+_waitables = set()
+_originals = []
+
+
+class _Thread(threading.local):
+    """What a thread does."""
+
+    # The latest event of its executor.
+    state = None
+    # The executor that it was said to work for.
+    executor = None
+    # It waits for work itself, as threads of a pool do not.
+    is_spinning = False
+    is_waiting = False
+    # Tasks that run inside each other.
+    depth = 0
+    # What the running task takes from.
+    entity = None
+    # The number of the call that goes on here; 0: one that begins.
+    step = 0
+
+
+_thread = _Thread()
+
+
+class _Tracepoints:
+    """The functions of the library that this process has loaded."""
+
+    def __init__(self):
+        # Not released: no other thread gets to run because of an event.
+        library = ctypes.PyDLL("libtracetools.so", mode=os.RTLD_NOLOAD | os.RTLD_NOW)
+        pointer, text = ctypes.c_void_p, ctypes.c_char_p
+        for name, types in (
+            ("callback_start", (pointer, ctypes.c_bool)),
+            ("callback_end", (pointer,)),
+            ("rclcpp_subscription_init", (pointer, pointer)),
+            ("rclcpp_subscription_callback_added", (pointer, pointer)),
+            ("rclcpp_timer_callback_added", (pointer, pointer)),
+            ("rclcpp_timer_link_node", (pointer, pointer)),
+            ("rclcpp_service_callback_added", (pointer, pointer)),
+            ("rclcpp_callback_register", (pointer, text)),
+            ("rclcpp_executor_get_next_ready", ()),
+            ("rclcpp_executor_wait_for_work", (ctypes.c_int64,)),
+            ("rclcpp_executor_execute", (pointer,)),
+        ):
+            function = getattr(library, "ros_trace_" + name)
+            function.argtypes, function.restype = types, None
+            setattr(self, name, function)
+        try:
+            self.is_recorded = library.ros_trace_enabled_callback_start
+        except AttributeError:  # Humble
+            self.is_recorded = lambda: True
+        else:
+            self.is_recorded.argtypes, self.is_recorded.restype = (), ctypes.c_bool
+
+
+def wrap_executors(executors):
+    """Wrap what runs callbacks, and what callbacks belong to."""
+    global _tracepoints
+    try:
+        _tracepoints = _Tracepoints()
+        executor = executors.Executor
+        _require(executor._make_handler, "self", "entity", "node", "take_from_wait_list")
+        _require(executor.create_task, "self", "callback", "args")
+        _require(executors.await_or_execute, "callback", "args")
+        _require(executor.wait_for_ready_callbacks, "self", "args")
+        _require(executors.Task.__call__, "self")
+        _wrap(executors, "await_or_execute", _await_or_execute)
+        _wrap(executor, "_make_handler", _make_handler)
+        _wrap(executor, "create_task", _create_task)
+        _wrap(executor, "wait_for_ready_callbacks", _wait_for_ready_callbacks)
+        _wrap(executors.Task, "__call__", _run_task)
+        _wrap(executors._rclpy.WaitSet, "wait", _wait)
+        for name, announce in (
+            ("Subscription", _announce_subscription),
+            ("Timer", _announce_timer),
+            ("Service", _announce_service),
+        ):
+            module = sys.modules["rclpy." + name.lower()]
+            # Lyrical: asyncio has others of the same base.
+            owner = getattr(module, "Base" + name, None) or getattr(module, name)
+            _wrap(owner, "__init__", functools.partial(_made, announce))
+        _announce_process()
+    except Exception as error:
+        _turn_off(error)
+
+
+def wrap_node(node):
+    """Wrap what makes timers."""
+    if _is_on:
+        try:
+            _wrap(node.Node, "create_timer", _create_timer)
+        except Exception as error:
+            _turn_off(error)
+
+
+def _turn_off(error):
+    """Leave rclpy as it was, and say why."""
+    global _is_on, _is_recorded
+    if not _is_on:
+        return
+    _is_on = _is_recorded = False
+    for owner, name, original in reversed(_originals):
+        setattr(owner, name, original)
+    try:
+        reason = (str(error) or type(error).__name__).splitlines()[0]
+        sys.stderr.write("msgflow: this process runs without traced callbacks: %s\n" % reason)
+    except Exception:
+        pass
+
+
+def _require(function, *names):
+    if list(inspect.signature(function).parameters)[: len(names)] != list(names):
+        raise TypeError("another rclpy: " + getattr(function, "__qualname__", repr(function)))
+
+
+def _wrap(owner, name, make):
+    original = getattr(owner, name)
+    wrapper = make(original)
+    functools.update_wrapper(wrapper, original)
+    setattr(owner, name, wrapper)
+    _originals.append((owner, name, original))
+
+
+# What a process is made of.
+
+
+def _announce_process():
+    rclpy = sys.modules["rclpy.executors"].__file__
+    python = ".".join(map(str, sys.version_info[:3]))
+    _register(0, "#msgflow python %s, %s" % (python, rclpy))
+
+
+def _register(number, symbol):
+    text = symbol[:_LONGEST_SYMBOL].replace("\0", "\\0")
+    _tracepoints.rclcpp_callback_register(number, text.encode("utf-8", "backslashreplace"))
+
+
+def _announce_again():
+    """Tell a session that began just now what it has missed, as far as it is of Python."""
+    _announce_process()
+    _functions.clear()
+    _thread.executor = None
+    for owner in list(_owners.values()):
+        _register(owner._msgflow, _symbol(owner.callback))
+
+
+def _announce_subscription(handle):
+    _tracepoints.rclcpp_subscription_init(handle, handle)
+    _tracepoints.rclcpp_subscription_callback_added(handle, handle)
+
+
+def _announce_timer(handle):
+    _tracepoints.rclcpp_timer_callback_added(handle, handle)
+
+
+def _announce_service(handle):
+    _tracepoints.rclcpp_service_callback_added(handle, handle)
+
+
+def _made(announce, original):
+    def __init__(self, *args, **kwargs):
+        original(self, *args, **kwargs)
+        if _is_on:
+            try:
+                self._msgflow = self.handle.pointer
+                self._msgflow_announce = announce
+                _own(self)
+            except Exception as error:
+                _turn_off(error)
+
+    return __init__
+
+
+def _own(entity):
+    """Tell which callback an object has; it may get another one later."""
+    callback = entity.callback
+    if callback is not None:
+        entity._msgflow_announce(entity._msgflow)
+        _register(entity._msgflow, _symbol(callback))
+        _owners[id(callback)] = entity
+    entity._msgflow_callback = callback
+
+
+def _create_timer(original):
+    def create_timer(self, *args, **kwargs):
+        timer = original(self, *args, **kwargs)
+        if _is_on:
+            try:
+                _tracepoints.rclcpp_timer_link_node(timer.handle.pointer, self.handle.pointer)
+            except Exception as error:
+                _turn_off(error)
+        return timer
+
+    return create_timer
+
+
+# How callbacks run.
+
+
+def _await_or_execute(original):
+    async def await_or_execute(callback, *args):
+        number = _number_of(callback) if _is_recorded else None
+        if number is None:
+            return await original(callback, *args)
+        if inspect.iscoroutinefunction(callback):
+            return await _Steps(callback(*args), number, _thread.step)
+        step = _thread.step
+        _start(number, step)
+        try:
+            return callback(*args)
+        finally:
+            _end(number, step)
+
+    return await_or_execute
+
+
+def _number_of(callback):
+    """Return the number of a callback; None of one of rclpy itself that nothing has."""
+    try:
+        function = callback
+        while isinstance(function, functools.partial):
+            function = function.func
+        owner = _thread.entity
+        if getattr(owner, "_msgflow", None) is None or owner.callback is not function:
+            owner = _owners.get(id(function))
+        if owner is not None and owner.callback is function:
+            if owner._msgflow_callback is not function:
+                _own(owner)
+            return owner._msgflow
+        if (getattr(function, "__module__", None) or "").partition(".")[0] == "rclpy":
+            return None
+        symbol = _symbol(function)
+        number = _functions.get(symbol)
+        if number is None:
+            number = next(_numbers) if len(_functions) < _MOST_FUNCTIONS else 0
+            _functions[symbol if number else ""] = number
+            _register(number, symbol)
+        return number
+    except Exception as error:
+        _turn_off(error)
+        return None
+
+
+def _symbol(callback):
+    while isinstance(callback, functools.partial):
+        callback = callback.func
+    if not hasattr(callback, "__qualname__"):
+        callback = type(callback)
+    return "%s:%s" % (callback.__module__, callback.__qualname__)
+
+
+def _start(number, step):
+    if step:
+        if _thread.depth:
+            _ready()
+        _tracepoints.rclcpp_callback_register(step, b"#msgflow resume")
+    _tracepoints.callback_start(number, False)
+
+
+def _end(number, step):
+    # What an action does after its first callback goes on because of that.
+    if not step and _thread.entity is not None and not hasattr(_thread.entity, "_msgflow"):
+        _thread.step = _new_step()
+    _tracepoints.callback_end(number)
+
+
+def _new_step():
+    number = next(_numbers)
+    _tracepoints.rclcpp_callback_register(number, b"#msgflow step")
+    return number
+
+
+class _Steps:
+    """A coroutine of a callback, awaited: each of its steps is told apart."""
+
+    __slots__ = ("_awaited", "_coroutine", "_number", "_step")
+
+    def __init__(self, coroutine, number, step):
+        self._coroutine = coroutine
+        self._number = number
+        self._step = step
+        self._awaited = None
+
+    def __await__(self):
+        return self
+
+    def __iter__(self):
+        return self
+
+    def __next__(self):
+        return self.send(None)
+
+    def send(self, value):
+        # Executors before Lyrical ask again and again whether a future is done.
+        if not _is_recorded or (self._awaited is not None and _is_pending(self._awaited)):
+            return self._coroutine.send(value)
+        return self._run(self._coroutine.send, value)
+
+    def throw(self, *args):
+        return self._run(self._coroutine.throw, *args)
+
+    def close(self):
+        self._coroutine.close()
+
+    def _run(self, function, *args):
+        before = _thread.step
+        _start(self._number, self._step)
+        _thread.step = self._step
+        try:
+            result = function(*args)
+            if not self._step:
+                self._step = _thread.step = _new_step()
+            self._awaited = _awaited(self._coroutine)
+            return result
+        finally:
+            _end(self._number, self._step)
+            # A task of asyncio has the thread only for this step.
+            if not _thread.depth:
+                _thread.step = before
+
+
+def _awaited(coroutine):
+    """Return the future of rclpy that a coroutine waits for; None if it is not known."""
+    try:
+        while inspect.iscoroutine(coroutine):
+            coroutine = coroutine.cr_await
+        future = coroutine.gi_frame.f_locals.get("self")
+        return future if _is_pending(future) else None
+    except Exception:
+        return None
+
+
+def _is_pending(future):
+    return not (future.done() or future.cancelled())
+
+
+# What executors do.
+
+
+def _ready():
+    if _thread.state != "ready":
+        _thread.state = "ready"
+        _tracepoints.rclcpp_executor_get_next_ready()
+
+
+def _wait_for_ready_callbacks(original):
+    def wait_for_ready_callbacks(self, *args, **kwargs):
+        if not _is_on:
+            return original(self, *args, **kwargs)
+        global _is_recorded
+        was_recorded = _is_recorded
+        _is_recorded = _tracepoints.is_recorded()
+        if not _is_recorded:
+            return original(self, *args, **kwargs)
+        if not was_recorded:
+            _announce_again()
+        try:
+            # A callback that spins is in a thread of a pool all the same.
+            _thread.is_spinning = _thread.is_spinning or not _thread.depth
+            _work_for(self)
+            _ready()
+            _thread.is_waiting = True
+        except Exception as error:
+            _turn_off(error)
+        try:
+            return original(self, *args, **kwargs)
+        finally:
+            _thread.is_waiting = False
+
+    return wait_for_ready_callbacks
+
+
+def _wait(original):
+    def wait(self, timeout):
+        if not _thread.is_waiting:
+            return original(self, timeout)
+        _thread.state = "wait"
+        _tracepoints.rclcpp_executor_wait_for_work(timeout)
+        try:
+            return original(self, timeout)
+        finally:
+            _ready()
+
+    return wait
+
+
+def _work_for(executor):
+    if _thread.executor != id(executor):
+        _thread.executor = id(executor)
+        kind = _KINDS.get(type(executor).__name__, "unknown")
+        _register(id(executor), "#msgflow executor " + kind)
+
+
+def _make_handler(original):
+    def _make_handler(self, entity, node, take_from_wait_list, *args, **kwargs):
+        def take(entity):
+            if _is_recorded:
+                try:
+                    _turn_to(self, entity)
+                except Exception as error:
+                    _turn_off(error)
+            return take_from_wait_list(entity)
+
+        return original(self, entity, node, take, *args, **kwargs)
+
+    return _make_handler
+
+
+def _turn_to(executor, entity):
+    _work_for(executor)
+    _ready()
+    _thread.entity = entity
+    handle = getattr(entity, "_msgflow", None)
+    if handle is None:
+        _look_into(type(entity))
+    elif entity._msgflow_announce is not _announce_service:
+        _thread.state = "execute"
+        _tracepoints.rclcpp_executor_execute(handle)
+
+
+def _look_into(waitable):
+    """Have the executor say something where an action takes several things at once.
+
+    Else the first callback would seem to be for the last of them.
+    """
+    if waitable not in _waitables:
+        _waitables.add(waitable)
+        if hasattr(waitable, "take_data"):
+            _wrap(waitable, "take_data", _take_data)
+
+
+def _take_data(original):
+    def take_data(self):
+        data = original(self)
+        if _is_recorded and isinstance(data, dict) and len(data) > 1:
+            _tracepoints.rclcpp_executor_get_next_ready()
+        return data
+
+    return take_data
+
+
+def _create_task(original):
+    def create_task(self, callback, *args, **kwargs):
+        if _is_recorded:
+            try:
+                callback = _later(callback)
+            except Exception as error:
+                _turn_off(error)
+        return original(self, callback, *args, **kwargs)
+
+    return create_task
+
+
+def _later(callback):
+    """Return a callback that goes on because of what runs now."""
+    is_coroutine = inspect.iscoroutinefunction(callback)
+    number = _number_of(callback)
+    if not callable(callback) or (number is None and not is_coroutine):
+        return callback
+    step = _thread.step or _new_step()
+
+    async def run_steps(*args, **kwargs):
+        _thread.step = step
+        coroutine = callback(*args, **kwargs)
+        return await (coroutine if number is None else _Steps(coroutine, number, step))
+
+    def run(*args, **kwargs):
+        _thread.step = step
+        if not _is_recorded:
+            return callback(*args, **kwargs)
+        _start(number, step)
+        try:
+            return callback(*args, **kwargs)
+        finally:
+            _end(number, step)
+
+    return run_steps if is_coroutine else run
+
+
+def _run_task(original):
+    def __call__(self, *args):
+        if not _is_recorded:
+            return original(self, *args)
+        entity, step = _thread.entity, _thread.step
+        _thread.entity, _thread.step = None, 0
+        _thread.depth += 1
+        try:
+            return original(self, *args)
+        finally:
+            _thread.depth -= 1
+            _thread.entity, _thread.step = entity, step
+            # A thread of a pool: it waits for the next task.
+            if not _thread.is_spinning and _thread.state in ("ready", "execute"):
+                _thread.state = "wait"
+                _tracepoints.rclcpp_executor_wait_for_work(-1)
+
+    return __call__
