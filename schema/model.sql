@@ -64,6 +64,8 @@ CREATE TABLE staging.callback_schedule (callback_instance_id BIGINT, running_ns 
     migration_count BIGINT, is_loss_affected BOOLEAN);
 CREATE TABLE staging.callback_state (callback_instance_id BIGINT, state_number BIGINT,
     start_ns BIGINT, end_ns BIGINT, is_begin BOOLEAN);
+CREATE TABLE staging.callback_step (start_event_id BIGINT, call_event_id BIGINT,
+    response_event_id BIGINT, request_event_id BIGINT);
 CREATE TABLE staging.client (client_id BIGINT, process_id BIGINT, node_id BIGINT,
     service_name VARCHAR, client_handle UBIGINT, rmw_handle UBIGINT, gid BLOB, created_ns BIGINT,
     is_internal BOOLEAN, event_id BIGINT);
@@ -176,6 +178,9 @@ CREATE TABLE staging.publisher (publisher_id BIGINT, process_id BIGINT, node_id 
 CREATE TABLE staging.publisher_known (event_id BIGINT, process_id BIGINT, topic_name VARCHAR,
     publisher_handle UBIGINT, rmw_handle UBIGINT, writer UBIGINT, gid BLOB, queue_depth BIGINT,
     created_ns BIGINT, is_internal BOOLEAN);
+CREATE TABLE staging.python_mark (event_id BIGINT, ts_ns BIGINT, thread_id BIGINT,
+    process_id BIGINT, number UBIGINT, kind VARCHAR, text VARCHAR,
+    previous_callback_event_id BIGINT, previous_executor_event_id BIGINT);
 CREATE TABLE staging.request (request_id BIGINT, client_id BIGINT, service_id BIGINT,
     sequence_number BIGINT, sent_ns BIGINT, taken_ns BIGINT, sender_thread_id BIGINT,
     receiver_thread_id BIGINT, callback_instance_id BIGINT);
@@ -187,7 +192,7 @@ CREATE TABLE staging.request_pair (send_event_id BIGINT, take_event_id BIGINT);
 CREATE TABLE staging.response (response_id BIGINT, client_id BIGINT, service_id BIGINT,
     request_id BIGINT, sequence_number BIGINT, sent_ns BIGINT, taken_ns BIGINT,
     sender_thread_id BIGINT, receiver_thread_id BIGINT, callback_instance_id BIGINT,
-    send_event_id BIGINT);
+    send_event_id BIGINT, take_event_id BIGINT);
 CREATE TABLE staging.response_pair (send_event_id BIGINT, take_event_id BIGINT);
 CREATE TABLE staging.response_request (event_id BIGINT, request_event_id BIGINT);
 CREATE TABLE staging.ring_buffer_event (trace_id INTEGER, process_id BIGINT, kind VARCHAR,

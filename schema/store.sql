@@ -139,7 +139,8 @@ CREATE TABLE store.callback (
     run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
     process_id BIGINT NOT NULL,  -- Process it lives in {to process}
     node_id BIGINT,  -- Node it belongs to {to node}
-    kind VARCHAR NOT NULL,  -- 'subscription', 'timer', 'service' or 'unknown'
+    kind VARCHAR NOT NULL,  -- 'subscription', 'timer', 'service', 'function' (of Python: a task, of
+        -- an action or client) or 'unknown'
     subscription_id BIGINT,  -- Its subscription {to subscription}
     timer_id BIGINT,  -- Its timer {to timer}
     service_id BIGINT,  -- Its service {to service}
@@ -182,6 +183,9 @@ CREATE TABLE store.callback_instance (
         -- ns] {clock process_id}
     take_id BIGINT,  -- Message it was called with {to take}
     request_id BIGINT,  -- Request it was called with {to request}
+    response_id BIGINT,  -- Response that it follows from, in Python {to response}
+    continues_id BIGINT,  -- Callback instance that it is a later step of, in Python; NULL: it is
+        -- the first {to callback_instance}
     is_intra_process BOOLEAN DEFAULT false NOT NULL,  -- Called with an intra-process message
     parent_id BIGINT,  -- Callback instance that it is nested in {to callback_instance}
     depth INTEGER NOT NULL,  -- Nesting depth on its thread, from 1

@@ -1,5 +1,6 @@
 -- name: derive.certain_request
--- description: Requests that callback instances sent, as flows follow them. Where several
+-- description: Requests that callback instances sent, as flows follow them. What goes on for a
+--     response follows from that (derive.certain_call). Where several
 --     processes with equal ids cannot be told apart, a callback of another one may have sent them:
 --     these are left out.
 -- grain: one row per such request that is followed
@@ -12,4 +13,5 @@ ANTI JOIN (
     JOIN store.process AS p ON h.process_id = p.process_id
     WHERE p.is_ambiguous
 ) AS m ON l.request_id = m.request_id
+ANTI JOIN (FROM store.link_call WHERE request_id IS NOT NULL) AS c ON l.request_id = c.request_id
 WHERE l.callback_instance_id IS NOT NULL

@@ -37,7 +37,12 @@ Table(
     run_id(),
     process_id(),
     node_id(),
-    text("kind", "'subscription', 'timer', 'service' or 'unknown'", required=True),
+    text(
+        "kind",
+        "'subscription', 'timer', 'service', 'function' (of Python: a task, of an action or client) "
+        "or 'unknown'",
+        required=True,
+    ),
     reference("subscription_id", "Its subscription", to="subscription.subscription_id"),
     reference("timer_id", "Its timer", to="timer.timer_id"),
     reference("service_id", "Its service", to="service.service_id"),
@@ -99,6 +104,14 @@ Table(
     ),
     reference("take_id", "Message it was called with", to="take.take_id"),
     reference("request_id", "Request it was called with", to="request.request_id"),
+    reference(
+        "response_id", "Response that it follows from, in Python", to="response.response_id"
+    ),
+    reference(
+        "continues_id",
+        "Callback instance that it is a later step of, in Python; NULL: it is the first",
+        to="callback_instance.callback_instance_id",
+    ),
     flag("is_intra_process", "Called with an intra-process message"),
     reference(
         "parent_id",

@@ -10,6 +10,7 @@ begin with `#msgflow`:
 
 * `#msgflow python` of 0: this process is traced so, and by which versions.
 * `#msgflow executor KIND` of an executor: the thread works for it.
+* `#msgflow function NAME` of a number: a callback of no subscription, timer or service.
 * `#msgflow step` of a number: something goes on later, because of what runs here.
 * `#msgflow resume` of such a number: what goes on is the callback that begins next on the thread.
 """
@@ -243,7 +244,7 @@ def _await_or_execute(original):
         if number is None:
             return await original(callback, *args)
         if inspect.iscoroutinefunction(callback):
-            return await _Steps(callback(*args), number, _thread.step)
+            return await _Steps(callback, callback(*args), number, _thread.step)
         step = _thread.step
         _start(number, step)
         try:
@@ -269,16 +270,21 @@ def _number_of(callback):
             return owner._msgflow
         if (getattr(function, "__module__", None) or "").partition(".")[0] == "rclpy":
             return None
-        symbol = _symbol(function)
-        number = _functions.get(symbol)
-        if number is None:
-            number = next(_numbers) if len(_functions) < _MOST_FUNCTIONS else 0
-            _functions[symbol if number else ""] = number
-            _register(number, symbol)
-        return number
+        return _function(_symbol(function))
     except Exception as error:
         _turn_off(error)
         return None
+
+
+def _function(symbol):
+    """Return the number of a function that no subscription, timer or service has."""
+    number = _functions.get(symbol)
+    if number is None:
+        if len(_functions) >= _MOST_FUNCTIONS:
+            symbol = "(others)"
+        number = _functions.setdefault(symbol, next(_numbers))
+        _register(number, "#msgflow function " + symbol)
+    return number
 
 
 def _symbol(callback):
@@ -313,9 +319,10 @@ def _new_step():
 class _Steps:
     """A coroutine of a callback, awaited: each of its steps is told apart."""
 
-    __slots__ = ("_awaited", "_coroutine", "_number", "_step")
+    __slots__ = ("_awaited", "_callback", "_coroutine", "_number", "_step")
 
-    def __init__(self, coroutine, number, step):
+    def __init__(self, callback, coroutine, number, step):
+        self._callback = callback
         self._coroutine = coroutine
         self._number = number
         self._step = step
@@ -344,19 +351,30 @@ class _Steps:
 
     def _run(self, function, *args):
         before = _thread.step
-        _start(self._number, self._step)
+        number = self._number
+        _start(number, self._step)
         _thread.step = self._step
         try:
             result = function(*args)
-            if not self._step:
-                self._step = _thread.step = _new_step()
-            self._awaited = _awaited(self._coroutine)
+            self._rest()
             return result
         finally:
-            _end(self._number, self._step)
+            _end(number, self._step)
             # A task of asyncio has the thread only for this step.
             if not _thread.depth:
                 _thread.step = before
+
+    def _rest(self):
+        """Tell that there are more steps. They are no calls of the timer or subscription."""
+        try:
+            if not self._step:
+                self._step = _thread.step = _new_step()
+            if self._callback is not None:
+                self._number = _function(_symbol(self._callback) + " (goes on)")
+                self._callback = None
+            self._awaited = _awaited(self._coroutine)
+        except Exception as error:
+            _turn_off(error)
 
 
 def _awaited(coroutine):
@@ -502,7 +520,7 @@ def _later(callback):
     async def run_steps(*args, **kwargs):
         _thread.step = step
         coroutine = callback(*args, **kwargs)
-        return await (coroutine if number is None else _Steps(coroutine, number, step))
+        return await (coroutine if number is None else _Steps(callback, coroutine, number, step))
 
     def run(*args, **kwargs):
         _thread.step = step
@@ -529,8 +547,10 @@ def _run_task(original):
         finally:
             _thread.depth -= 1
             _thread.entity, _thread.step = entity, step
-            # A thread of a pool: it waits for the next task.
-            if not _thread.is_spinning and _thread.state in ("ready", "execute"):
+            if _thread.is_spinning:
+                _thread.state = None
+            elif _thread.state in ("ready", "execute"):
+                # A thread of a pool: it waits for the next task.
                 _thread.state = "wait"
                 _tracepoints.rclcpp_executor_wait_for_work(-1)
 

@@ -8,6 +8,7 @@
 --     the take of a request to the response that the same thread sends to it.
 --     A callback that spins may take a response, too. The node tells what follows: the client's
 --     node publishes with the response, the node of the callback around it does not.
+--     In Python it runs later, as a callback instance that names the response.
 --     Nothing is linked across a gap of the host. An object that the same thread also sends with
 --     where nothing was taken may do so here as well: then "nothing" is one more candidate. So is
 --     another process, where several with equal ids cannot be told apart.
@@ -141,3 +142,24 @@ JOIN store.process AS p ON h.process_id = p.process_id
 -- That a request leads to its own response goes without saying.
 WHERE l.taken_response_id IS NOT NULL
     OR l.taken_request_id IS NOT NULL AND l.taken_request_id IS DISTINCT FROM r.request_id
+UNION ALL
+SELECT
+    only_run, NULL, i.response_id, s.publication_id, s.publisher_id, s.request_id,
+    s.sent_response_id, 1 + p.is_ambiguous::BIGINT
+FROM store.callback_instance AS i
+JOIN (
+    SELECT
+        callback_instance_id, publication_id, publisher_id, NULL::BIGINT AS request_id,
+        NULL::BIGINT AS sent_response_id
+    FROM derive.link_causal_direct(only_run)
+    UNION ALL
+    SELECT callback_instance_id, NULL, NULL, request_id, NULL
+    FROM store.link_request
+    WHERE run_id = only_run
+    UNION ALL
+    SELECT callback_instance_id, NULL, NULL, NULL, response_id
+    FROM store.link_response
+    WHERE run_id = only_run
+) AS s ON i.callback_instance_id = s.callback_instance_id
+JOIN store.process AS p ON i.process_id = p.process_id
+WHERE i.run_id = only_run AND i.response_id IS NOT NULL

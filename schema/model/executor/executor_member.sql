@@ -5,7 +5,7 @@
 -- grain: one row per thread that runs callbacks or emits executor events
 -- when: staging.callback_number, staging.executor_first
 WITH RECURSIVE
--- Threads of the executors that name themselves. If a thread serves several of them, it belongs to
+-- Threads of the executors that are named. If a thread serves several of them, it belongs to
 -- the one whose callbacks it ran most.
 thread_executor AS MATERIALIZED (
     SELECT thread_id, executor_event_id
@@ -16,6 +16,13 @@ thread_executor AS MATERIALIZED (
         JOIN staging.callback_group_entry AS s ON n.callback_id = s.callback_id
         WHERE r.depth = 1 AND s.executor_event_id IS NOT NULL
         GROUP BY r.thread_id, s.executor_event_id
+        UNION ALL
+        SELECT m.thread_id, min(x.event_id), 0
+        FROM staging.python_mark AS m
+        JOIN staging.executor_named AS x
+            ON m.process_id = x.process_id AND m.number = x.executor_addr
+        WHERE m.kind = 'executor'
+        GROUP BY m.thread_id
     )
     QUALIFY row_number() OVER (
         PARTITION BY thread_id ORDER BY run_count DESC, executor_event_id

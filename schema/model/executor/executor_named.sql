@@ -1,9 +1,10 @@
 -- name: staging.executor_named
--- description: Executors that name themselves (CARET). Of some, only the address is known, since
---     their construction was not traced.
+-- description: Executors that name themselves (CARET), or are named by a thread that works for
+--     them (Python). Of some, only the address is known, since their construction was not traced.
 -- grain: one row per executor
 -- when: raw.ros2_caret_construct_executor, raw.ros2_caret_construct_static_executor,
---     raw.ros2_caret_add_callback_group, raw.ros2_caret_executor_entity_collector_to_executor
+--     raw.ros2_caret_add_callback_group, raw.ros2_caret_executor_entity_collector_to_executor,
+--     staging.python_mark WHERE kind = 'executor'
 WITH constructed AS (
     SELECT event_id, process_id, executor_addr, executor_type_name AS kind
     FROM staging.located('ros2_caret_construct_executor')
@@ -25,3 +26,8 @@ SELECT min(u.event_id), u.process_id, u.executor_addr, 'unknown'
 FROM used AS u
 ANTI JOIN constructed AS c ON u.process_id = c.process_id AND u.executor_addr = c.executor_addr
 GROUP BY u.process_id, u.executor_addr
+UNION ALL
+SELECT min(event_id), process_id, number, arg_min(text, event_id)
+FROM staging.python_mark
+WHERE kind = 'executor'
+GROUP BY process_id, number

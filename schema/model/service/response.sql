@@ -53,7 +53,8 @@ SELECT
     s.thread_id AS sender_thread_id,
     c.thread_id AS receiver_thread_id,
     i.callback_instance_id,
-    a.send_event_id
+    a.send_event_id,
+    a.take_event_id
 FROM answered AS a
 LEFT JOIN staging.service_event AS s ON a.send_event_id = s.event_id
 LEFT JOIN staging.client_event AS c ON a.take_event_id = c.event_id

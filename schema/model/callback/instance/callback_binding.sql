@@ -38,15 +38,16 @@ SELECT
     r.kind,
     t.start_event_id AS take_event_id,
     coalesce(r.subscription_event_id, t.subscription_event_id) AS subscription_event_id,
-    q.event_id AS request_event_id
+    coalesce(q.event_id, p.request_event_id) AS request_event_id
 FROM run AS r
 LEFT JOIN staging.take_chain AS t
     ON r.called_by_event_id = t.end_event_id
-    AND coalesce(r.kind IN ('subscription', 'unknown'), true)
+    AND coalesce(r.kind IN ('subscription', 'unknown', 'function'), true)
     AND r.is_intra_process = (t.method = 'ring_buffer')
     AND coalesce(r.subscription_event_id = t.subscription_event_id, true)
 LEFT JOIN (SELECT * FROM staging.service_event WHERE is_request) AS q
     ON r.called_by_event_id = q.event_id
-    AND coalesce(r.kind IN ('service', 'unknown'), true)
+    AND coalesce(r.kind IN ('service', 'unknown', 'function'), true)
     AND NOT r.is_intra_process
     AND coalesce(r.service_event_id = q.service_event_id, true)
+LEFT JOIN staging.callback_step AS p ON r.start_event_id = p.start_event_id

@@ -13,6 +13,8 @@ SELECT
     coalesce(r.end_ns, d.end_ns) AS end_ns,
     n.take_id,
     q.request_id,
+    y.response_id,
+    f.callback_instance_id AS continues_id,
     r.is_intra_process,
     p.parent_id,
     r.depth,
@@ -31,3 +33,6 @@ LEFT JOIN staging.deferred_end AS d ON r.start_event_id = d.start_event_id
 LEFT JOIN (SELECT * FROM staging.loss_affected WHERE kind = 'callback') AS g
     ON r.start_event_id = g.start_event_id
 LEFT JOIN staging.request_origin AS q ON r.start_event_id = q.callback_start_event_id
+LEFT JOIN staging.callback_step AS s ON r.start_event_id = s.start_event_id
+LEFT JOIN staging.callback_number AS f ON s.call_event_id = f.start_event_id
+LEFT JOIN staging.response AS y ON s.response_event_id = y.take_event_id

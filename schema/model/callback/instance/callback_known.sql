@@ -1,7 +1,8 @@
 -- name: staging.callback_known
 -- description: Callback objects whose creation was traced, with what they belong to, each by the
 --     event that initialised it. A callback that was only registered has a symbol but no owner; a
---     service that was not seen to be initialised is known by its handle.
+--     function of Python never has one. A service that was not seen to be initialised is known by
+--     its handle.
 -- grain: one row per callback object
 -- when: raw.ros2_rclcpp_subscription_callback_added, raw.ros2_rclcpp_timer_callback_added,
 --     raw.ros2_rclcpp_service_callback_added, raw.ros2_rclcpp_callback_register
@@ -33,14 +34,16 @@ registered AS (
         r.event_id, r.ts_ns, r.process_id, r.callback,
         CASE
             WHEN r.symbol NOT IN ('', 'UNKNOWN', 'UNKNOWN_demangling_failed', '(null)')
-                THEN r.symbol
+                THEN replace(r.symbol, '#msgflow function ', '')
         END AS symbol,
+        CASE WHEN r.symbol LIKE '#msgflow %' THEN 'function' ELSE 'unknown' END AS kind,
         a.event_id AS added_event_id
     FROM staging.located('ros2_rclcpp_callback_register') AS r
     ASOF LEFT JOIN added AS a
         ON r.process_id = a.process_id
         AND r.callback = a.callback
         AND r.event_id >= a.event_id
+    WHERE r.symbol NOT LIKE '#msgflow %' OR r.symbol LIKE '#msgflow function %'
 ),
 symbol_of AS (
     SELECT added_event_id, arg_min(symbol, event_id) AS symbol
@@ -55,6 +58,6 @@ FROM added AS a
 LEFT JOIN symbol_of AS s ON a.event_id = s.added_event_id
 UNION ALL
 SELECT
-    event_id, ts_ns, process_id, callback, 'unknown', NULL, NULL, NULL, NULL, symbol
+    event_id, ts_ns, process_id, callback, kind, NULL, NULL, NULL, NULL, symbol
 FROM registered
 WHERE added_event_id IS NULL

@@ -12,7 +12,7 @@ WITH learned AS (
         mode(t.subscription_id ORDER BY t.subscription_id) AS subscription_id
     FROM staging.callback_binding AS b
     JOIN staging.take_subscription AS t ON b.start_event_id = t.callback_start_event_id
-    WHERE b.kind IS NULL OR b.kind IN ('unknown', 'subscription')
+    WHERE coalesce(b.kind IN ('unknown', 'function', 'subscription'), true)
     GROUP BY b.process_id, b.callback_handle, b.callback_event_id
 ),
 asked AS (
@@ -50,7 +50,7 @@ complete AS (
         coalesce(s.subscription_id, l.subscription_id) AS subscription_id,
         coalesce(e.service_id, v.service_id) AS service_id,
         CASE
-            WHEN c.kind <> 'unknown' THEN c.kind
+            WHEN c.kind NOT IN ('unknown', 'function') THEN c.kind
             WHEN l.subscription_id IS NOT NULL THEN 'subscription'
             WHEN v.service_id IS NOT NULL THEN 'service'
             ELSE c.kind
@@ -62,13 +62,13 @@ complete AS (
     LEFT JOIN staging.service AS e ON c.service_event_id = e.event_id
     LEFT JOIN learned AS l
         ON s.subscription_id IS NULL
-        AND c.kind IN ('unknown', 'subscription')
+        AND c.kind IN ('unknown', 'function', 'subscription')
         AND c.process_id = l.process_id
         AND c.callback_handle = l.callback_handle
         AND c.callback_event_id IS NOT DISTINCT FROM l.callback_event_id
     LEFT JOIN asked AS v
         ON e.service_id IS NULL
-        AND c.kind IN ('unknown', 'service')
+        AND c.kind IN ('unknown', 'function', 'service')
         AND c.process_id = v.process_id
         AND c.callback_handle = v.callback_handle
         AND c.callback_event_id IS NOT DISTINCT FROM v.callback_event_id

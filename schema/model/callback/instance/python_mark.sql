@@ -1,0 +1,14 @@
+-- name: staging.python_mark
+-- description: What the tracer of Python nodes (msgflow record) says besides the events of rclcpp:
+--     which processes it traces (`python`), which executor a thread works for (`executor`), that
+--     something will go on later because of what runs (`step`), and that the next callback of the
+--     thread is what goes on (`resume`). Each is the symbol of a callback that is none.
+-- grain: one row per such event
+-- when: raw.ros2_rclcpp_callback_register WHERE symbol LIKE '#msgflow %'
+SELECT
+    event_id, ts_ns, thread_id, process_id, callback AS number,
+    split_part(symbol, ' ', 2) AS kind,
+    substr(symbol, 11 + length(split_part(symbol, ' ', 2))) AS text,
+    previous_callback_event_id, previous_executor_event_id
+FROM staging.located('ros2_rclcpp_callback_register')
+WHERE symbol LIKE '#msgflow %' AND symbol NOT LIKE '#msgflow function %'
