@@ -114,9 +114,13 @@ class Witness(Node):
     def act(self, action: str, work, messages: int) -> None:
         """Execute goals: do some work before each message of feedback. Each fifth is rejected."""
 
+        # What accepted a goal is the reason for all that its execution does.
+        accepted = {}
+
         def decide(goal: Fibonacci.Goal) -> GoalResponse:
             is_accepted = goal.order % 5 != 0
             with self._callback("service", f"{action}/_action/send_goal", goal.order, is_accepted):
+                accepted[goal.order] = self._running.number
                 return GoalResponse.ACCEPT if is_accepted else GoalResponse.REJECT
 
         def execute(goal) -> Fibonacci.Result:
@@ -127,7 +131,8 @@ class Witness(Node):
                     goal.canceled()
                     return Fibonacci.Result()
                 feedback = f"{action}/_action/feedback"
-                with self._sent("publication", feedback, next(self._ids), goal=number):
+                call = accepted[number]
+                with self._sent("publication", feedback, next(self._ids), goal=number, call=call):
                     goal.publish_feedback(Fibonacci.Feedback(sequence=[number]))
             goal.succeed()
             return Fibonacci.Result(sequence=[number])
@@ -177,11 +182,11 @@ class Witness(Node):
         )
 
     @contextmanager
-    def _sent(self, kind: str, topic: str, message: int, goal: int | None = None):
+    def _sent(self, kind: str, topic: str, message: int, **more: int):
         begin = time.monotonic_ns()
         yield
         number = getattr(self._running, "number", 0)
-        self._write(kind, begin, topic=topic, id=message, cb=number, goal=goal)
+        self._write(kind, begin, topic=topic, id=message, cb=number, **more)
 
     def _write(self, what: str, begin: int, **row: object) -> None:
         place = {

@@ -26,7 +26,8 @@ _RECORDED_COLUMNS = """{
 _REAL_COLUMNS = """{
     k: 'VARCHAR', clock_offset_ns: 'BIGINT', node: 'VARCHAR', kind: 'VARCHAR', name: 'VARCHAR',
     topic: 'VARCHAR', id: 'BIGINT', n: 'BIGINT', cb: 'BIGINT', pid: 'INTEGER', tid: 'INTEGER',
-    t0: 'BIGINT', t1: 'BIGINT', causes: 'JSON', accepted: 'BOOLEAN', goal: 'BIGINT'
+    t0: 'BIGINT', t1: 'BIGINT', causes: 'JSON', accepted: 'BOOLEAN', goal: 'BIGINT',
+    call: 'BIGINT'
 }"""
 
 _STEPS = {

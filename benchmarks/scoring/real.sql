@@ -26,7 +26,16 @@ WHERE k = 'callback';
 CREATE OR REPLACE TEMP TABLE truth_sent AS
 SELECT
     k, topic, id, id::VARCHAR AS message, pid, tid, t0, t1, causes, goal,
-    node || ' ' || cb AS callback, topic || ' ' || id AS sent
+    -- A task goes on for another callback, if callbacks are traced.
+    node || ' ' || CASE
+        WHEN pid IN (
+            SELECT p.pid
+            FROM analysed.store.callback_instance AS i
+            JOIN place AS p ON i.thread_id = p.thread_id
+        ) THEN coalesce(call, cb)
+        ELSE cb
+    END AS callback,
+    topic || ' ' || id AS sent
 FROM truth_row
 WHERE k IN ('publication', 'request', 'response')
     -- What a filter of messages publishes has no callback, and its causes are no triggers.

@@ -56,6 +56,8 @@ class _Thread(threading.local):
     depth = 0
     # What the running task takes from.
     entity = None
+    # The next callback is not for what was taken last.
+    is_unclear = False
     # The number of the call that goes on here; 0: one that begins.
     step = 0
 
@@ -300,6 +302,9 @@ def _start(number, step):
         if _thread.depth:
             _ready()
         _tracepoints.rclcpp_callback_register(step, b"#msgflow resume")
+    elif _thread.is_unclear:
+        _thread.is_unclear = False
+        _tracepoints.rclcpp_executor_get_next_ready()
     _tracepoints.callback_start(number, False)
 
 
@@ -477,10 +482,7 @@ def _turn_to(executor, entity):
 
 
 def _look_into(waitable):
-    """Have the executor say something where an action takes several things at once.
-
-    Else the first callback would seem to be for the last of them.
-    """
+    """Look what actions take at once: a callback would seem to be for the last of that."""
     if waitable not in _waitables:
         _waitables.add(waitable)
         if hasattr(waitable, "take_data"):
@@ -490,8 +492,10 @@ def _look_into(waitable):
 def _take_data(original):
     def take_data(self):
         data = original(self)
-        if _is_recorded and isinstance(data, dict) and len(data) > 1:
-            _tracepoints.rclcpp_executor_get_next_ready()
+        if _is_recorded and isinstance(data, dict):
+            if sum(key in data for key in ("goal", "cancel", "result")) > 1:
+                _tracepoints.rclcpp_executor_get_next_ready()
+            _thread.is_unclear = "feedback" in data and "status" in data
         return data
 
     return take_data
