@@ -160,8 +160,8 @@ CREATE TABLE staging.preemptor (thread_id BIGINT, state_start_ns BIGINT, wait_st
     start_ns BIGINT, end_ns BIGINT, state VARCHAR, cpu INTEGER, preemptor_thread_id BIGINT,
     preemptor_other_thread_id BIGINT, preemptor_priority INTEGER, thread_priority INTEGER);
 CREATE TABLE staging.process (process_id BIGINT, host_id BIGINT, pid INTEGER, name VARCHAR,
-    tracetools_version VARCHAR, first_seen_ns BIGINT, last_seen_ns BIGINT, pid_namespace BIGINT,
-    life INTEGER, is_ambiguous BOOLEAN);
+    tracetools_version VARCHAR, python_version VARCHAR, first_seen_ns BIGINT, last_seen_ns BIGINT,
+    pid_namespace BIGINT, life INTEGER, is_ambiguous BOOLEAN);
 CREATE TABLE staging.process_restart (host_id BIGINT, pid_ns BIGINT, vpid INTEGER, event_id BIGINT);
 CREATE TABLE staging.publication_call (start_event_id BIGINT, end_event_id BIGINT,
     trace_index INTEGER, thread_id BIGINT, process_id BIGINT, start_ns BIGINT, end_ns BIGINT,

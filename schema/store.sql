@@ -334,6 +334,8 @@ CREATE TABLE store.process (
     pid INTEGER NOT NULL,  -- Process id; the one inside its PID namespace if the trace has no other
     name VARCHAR,  -- Name of the process (its first thread)
     tracetools_version VARCHAR,  -- Version that rcl_init reported; for display only
+    python_version VARCHAR,  -- Version of Python, where callbacks of its nodes are traced (msgflow
+        -- record)
     first_seen_ns BIGINT,  -- First event [epoch ns] {clock process_id}
     last_seen_ns BIGINT,  -- Last event [epoch ns] {clock process_id}
     pid_namespace BIGINT,  -- PID namespace, where the trace has it; a negative number if msgflow

@@ -121,8 +121,9 @@ CREATE TABLE store.host (
 );
 CREATE TABLE store.process (
     process_id BIGINT NOT NULL, run_id BIGINT NOT NULL, host_id BIGINT NOT NULL,
-    pid INTEGER NOT NULL, name VARCHAR, tracetools_version VARCHAR, first_seen_ns BIGINT,
-    last_seen_ns BIGINT, pid_namespace BIGINT, life INTEGER NOT NULL, is_ambiguous BOOLEAN,
+    pid INTEGER NOT NULL, name VARCHAR, tracetools_version VARCHAR, python_version VARCHAR,
+    first_seen_ns BIGINT, last_seen_ns BIGINT, pid_namespace BIGINT, life INTEGER NOT NULL,
+    is_ambiguous BOOLEAN,
     PRIMARY KEY (process_id)
 );
 CREATE TABLE store.thread (

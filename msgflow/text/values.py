@@ -11,6 +11,8 @@ from typing import Any
 from msgflow.run.window import format_epoch
 from msgflow.text.json_value import json_value
 
+# `module:function`, as the tracer of Python nodes has it.
+_PYTHON = re.compile(r"[^\s:(<]+:[^:]")
 _BOUND = re.compile(r"std::_Bind<[^(]*\((?P<owner>[\w:]+)::\*")
 
 NULL = "-"
@@ -64,6 +66,8 @@ def short_symbol(symbol: str) -> str:
 
     For a bound method, C++ keeps only the class: `Camera::*`.
     """
+    if _PYTHON.match(symbol):
+        return symbol.replace(".<locals>", "")
     if bound := _BOUND.match(symbol):
         return f"{bound['owner']}::*"
     depth = 0

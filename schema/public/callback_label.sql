@@ -1,7 +1,7 @@
 -- name: main.callback_label
 -- description: What people call a callback: what triggers it, such as Timer(5 ms) or
 --     Subscription(/scan), and the node that it belongs to. Timers of unknown period are
---     distinguished by their handles.
+--     distinguished by their handles. Functions of Python have their names.
 -- grain: one row per callback object
 -- column: callback_id BIGINT  Identity of the callback
 -- column: run_id BIGINT  Run that the row belongs to
@@ -20,6 +20,7 @@ SELECT
         )
         WHEN 'subscription' THEN printf('Subscription(%s)', coalesce(s.topic_name, '?'))
         WHEN 'service' THEN printf('Service(%s)', coalesce(v.service_name, '?'))
+        WHEN 'function' THEN replace(regexp_replace(c.symbol, '^[^:]*:', ''), '.<locals>', '')
         ELSE printf('Callback(0x%x)', c.callback_handle)
     END AS label,
     coalesce(s.is_internal, v.is_internal, false) AS is_internal

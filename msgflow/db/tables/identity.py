@@ -45,6 +45,10 @@ Table(
     ),
     text("name", "Name of the process (its first thread)"),
     text("tracetools_version", "Version that rcl_init reported; for display only"),
+    text(
+        "python_version",
+        "Version of Python, where callbacks of its nodes are traced (msgflow record)",
+    ),
     moment("first_seen_ns", "First event", clock="process_id"),
     moment("last_seen_ns", "Last event", clock="process_id"),
     number(

@@ -8,7 +8,7 @@ Events and fields are those of rclcpp. A callback is known by the handle of its 
 or service, or by a number of its own. Besides, `rclcpp_callback_register` says with symbols that
 begin with `#msgflow`:
 
-* `#msgflow python` of 0: this process is traced so, and by which versions.
+* `#msgflow python VERSION` of 0: this process is traced so.
 * `#msgflow executor KIND` of an executor: the thread works for it.
 * `#msgflow function NAME` of a number: a callback of no subscription, timer or service.
 * `#msgflow step` of a number: something goes on later, because of what runs here.
@@ -32,6 +32,7 @@ _KINDS = {"SingleThreadedExecutor": "single_threaded", "MultiThreadedExecutor": 
 _is_on = True
 # Whether a session records callbacks; asked for before each wait.
 _is_recorded = True
+_is_announced = False
 _numbers = itertools.count(1)
 # By symbol, of functions that belong to no subscription, timer or service.
 _functions = {}
@@ -113,6 +114,9 @@ def wrap_executors(executors):
         _wrap(executor, "wait_for_ready_callbacks", _wait_for_ready_callbacks)
         _wrap(executors.Task, "__call__", _run_task)
         _wrap(executors._rclpy.WaitSet, "wait", _wait)
+        for kind in ("goal", "cancel", "result"):
+            take = functools.partial(_take_answer, "_pending_%s_requests" % kind)
+            _wrap(executors._rclpy.ActionClient, "take_%s_response" % kind, take)
         for name, announce in (
             ("Subscription", _announce_subscription),
             ("Timer", _announce_timer),
@@ -122,7 +126,6 @@ def wrap_executors(executors):
             # Lyrical: asyncio has others of the same base.
             owner = getattr(module, "Base" + name, None) or getattr(module, name)
             _wrap(owner, "__init__", functools.partial(_made, announce))
-        _announce_process()
     except Exception as error:
         _turn_off(error)
 
@@ -168,9 +171,9 @@ def _wrap(owner, name, make):
 
 
 def _announce_process():
-    rclpy = sys.modules["rclpy.executors"].__file__
-    python = ".".join(map(str, sys.version_info[:3]))
-    _register(0, "#msgflow python %s, %s" % (python, rclpy))
+    global _is_announced
+    _is_announced = True
+    _register(0, "#msgflow python " + ".".join(map(str, sys.version_info[:3])))
 
 
 def _register(number, symbol):
@@ -216,6 +219,9 @@ def _made(announce, original):
 
 def _own(entity):
     """Tell which callback an object has; it may get another one later."""
+    # Not before: rcl_init begins a process.
+    if not _is_announced:
+        _announce_process()
     callback = entity.callback
     if callback is not None:
         entity._msgflow_announce(entity._msgflow)
@@ -493,19 +499,34 @@ def _take_data(original):
     def take_data(self):
         data = original(self)
         if _is_recorded and isinstance(data, dict):
-            if sum(key in data for key in ("goal", "cancel", "result")) > 1:
-                _tracepoints.rclcpp_executor_get_next_ready()
-            _thread.is_unclear = "feedback" in data and "status" in data
+            # In this order they were taken, and callbacks run.
+            last = [key for key in ("goal", "cancel", "result", "feedback", "status") if key in data]
+            _thread.is_unclear = len(last) > 1 and last[-1] != "feedback"
         return data
 
     return take_data
+
+
+def _take_answer(pending, original):
+    def take(self, *args):
+        answer = original(self, *args)
+        try:
+            # Each has a future, and what waits for that goes on because of it.
+            future = getattr(_thread.entity, pending, {}).get(answer[0])
+            if _is_recorded and future is not None:
+                future._msgflow_step = _new_step()
+        except Exception as error:
+            _turn_off(error)
+        return answer
+
+    return take
 
 
 def _create_task(original):
     def create_task(self, callback, *args, **kwargs):
         if _is_recorded:
             try:
-                callback = _later(callback)
+                callback = _later(callback, *args[:1])
             except Exception as error:
                 _turn_off(error)
         return original(self, callback, *args, **kwargs)
@@ -513,13 +534,13 @@ def _create_task(original):
     return create_task
 
 
-def _later(callback):
-    """Return a callback that goes on because of what runs now."""
+def _later(callback, future=None):
+    """Return a callback that goes on because of what runs now, or because of an answer."""
     is_coroutine = inspect.iscoroutinefunction(callback)
     number = _number_of(callback)
     if not callable(callback) or (number is None and not is_coroutine):
         return callback
-    step = _thread.step or _new_step()
+    step = getattr(future, "_msgflow_step", 0) or _thread.step or _new_step()
 
     async def run_steps(*args, **kwargs):
         _thread.step = step
@@ -544,7 +565,7 @@ def _run_task(original):
         if not _is_recorded:
             return original(self, *args)
         entity, step = _thread.entity, _thread.step
-        _thread.entity, _thread.step = None, 0
+        _thread.entity, _thread.step, _thread.is_unclear = None, 0, False
         _thread.depth += 1
         try:
             return original(self, *args)

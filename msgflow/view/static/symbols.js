@@ -1,9 +1,11 @@
-// Symbols of C++ as people say them: without arguments of templates and functions.
+// Symbols of C++ as people say them: without arguments of templates and functions. Those of Python
+// are `module:function`.
 
 const LONGEST = 120;
 const BIND = /^std::_Bind<[^(]*\(([\w:]+)::\*/;
 
 export function shortSymbol(symbol) {
+  if (/^[^\s:(<]+:[^:]/.test(symbol)) return symbol.replaceAll(".<locals>", "").slice(0, LONGEST);
   const bound = BIND.exec(symbol);
   if (bound) return `bound method of ${bound[1]}`;
   let [short, depth] = ["", 0];

@@ -7,15 +7,24 @@
 --     include those that rclpy makes for waits with a timeout.
 -- cause: It is written in Python (rclpy) or uses another client library. These have no tracepoints
 --     of their own.
--- cure: None for this recording. Measure callbacks of such nodes in the nodes themselves.
+-- cure: Record Python nodes with msgflow record -- COMMAND, or start them with the folder that
+--     msgflow record --print-python-path prints in front of PYTHONPATH (no rebuild). An
+--     EventsExecutor of rclpy shows nothing all the same.
 -- grain: one row per process
 -- severity: warning
 -- when: staging.process WHERE process_id NOT IN (SELECT process_id FROM staging.callback)
+--     OR python_version IS NOT NULL
 WITH enabled AS (
     SELECT trace_index FROM staging.declared WHERE name = 'ros2:callback_start'
 ),
 rclcpp AS (
-    SELECT process_id FROM staging.callback
+    SELECT process_id
+    FROM staging.callback
+    WHERE process_id NOT IN (
+        SELECT process_id FROM staging.process WHERE python_version IS NOT NULL
+    )
+    UNION
+    SELECT process_id FROM staging.callback_pair
     UNION
     SELECT t.process_id
     FROM staging.thread AS t

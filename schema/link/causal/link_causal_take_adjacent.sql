@@ -3,7 +3,8 @@
 -- description: Publications that a thread makes after it took a message by hand (rclpy, rclc, wait
 --     sets), until its next take. A take of a request or a response counts, too. The link ends at
 --     the begin or end of a callback, at the next event of an executor, and at a gap. What is
---     published inside a callback instance is caused by that instance instead. What the middleware
+--     published inside a callback instance is caused by that instance instead. Where callbacks of
+--     Python are traced, no message causes anything else. What the middleware
 --     publishes by itself (it has no publisher, though nothing was lost) has no cause. Timers of
 --     rclpy do not show: what they publish is among the rows, and derive.answer_doubtful tells it
 --     apart.
@@ -12,7 +13,13 @@
 CREATE OR REPLACE MACRO derive.link_causal_take_adjacent(only_run) AS TABLE
 WITH by_hand AS (
     SELECT run_id, thread_id, start_event_id AS event_id, take_id, subscription_id, taken_ns
-    FROM derive.take_by_hand(only_run)
+    FROM derive.take_by_hand(only_run) AS t
+    ANTI JOIN (
+        SELECT p.process_id
+        FROM store.process AS p
+        JOIN store.executor AS x ON p.process_id = x.process_id
+        WHERE p.run_id = only_run AND p.python_version IS NOT NULL
+    ) AS p ON t.process_id = p.process_id
 ),
 busy AS (
     SELECT DISTINCT run_id, thread_id FROM by_hand
