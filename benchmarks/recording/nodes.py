@@ -29,6 +29,7 @@ from rclpy.exceptions import InvalidHandle
 from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
+from rclpy.task import Future
 from std_msgs.msg import UInt64
 from test_msgs.action import Fibonacci
 
@@ -67,6 +68,24 @@ class Witness(Node):
 
         return self.create_subscription(UInt64, topic, run, 10, callback_group=group)
 
+    def on_awaiting(self, topic: str, seconds: float, work, group=None) -> None:
+        """Do some work with each message of a topic, some time after it came.
+
+        The callback is a coroutine: it is written down when it begins, and what it sends names it.
+        """
+
+        async def run(message: UInt64) -> None:
+            with self._callback("sub", topic, message.data):
+                call = self._running.number
+                over = Future()
+                timer = self.create_timer(seconds, lambda: over.set_result(None))
+            await over
+            timer.cancel()
+            self.destroy_timer(timer)
+            work(call=call)
+
+        self.create_subscription(UInt64, topic, run, 10, callback_group=group)
+
     def after_turns(self, seconds: float, work) -> None:
         """Do some work at a period, between turns of the executor: no callback, no timer."""
         self.turn = (seconds, work)
@@ -86,9 +105,9 @@ class Witness(Node):
         """Return a function that publishes a message to a topic."""
         publisher = self.create_publisher(UInt64, topic, 10)
 
-        def send() -> None:
+        def send(**more: int) -> None:
             message = UInt64(data=next(self._ids))
-            with self._sent("publication", topic, message.data):
+            with self._sent("publication", topic, message.data, **more):
                 publisher.publish(message)
 
         return send
@@ -175,11 +194,13 @@ class Witness(Node):
     def _callback(self, kind: str, name: str, message: int, accepted: bool | None = None):
         number = self._running.number = next(self._numbers)
         begin = time.monotonic_ns()
-        yield
-        self._running.number = 0
-        self._write(
-            "callback", begin, kind=kind, name=name, id=message, n=number, accepted=accepted
-        )
+        try:
+            yield
+        finally:
+            self._running.number = 0
+            self._write(
+                "callback", begin, kind=kind, name=name, id=message, n=number, accepted=accepted
+            )
 
     @contextmanager
     def _sent(self, kind: str, topic: str, message: int, **more: int):
@@ -362,6 +383,45 @@ def resetting(truth: Truth) -> list[Node]:
     return [node]
 
 
+class PlannedError(Exception):
+    """What a callback raises on purpose."""
+
+
+def raising(truth: Truth) -> list[Node]:
+    """Answer each message; the callback of each fifth raises, and the node goes on."""
+    node = Witness("raising", truth)
+    send = node.sender("/filtered")
+    turns = itertools.count()
+
+    def work() -> None:
+        send()
+        if next(turns) % 5 == 0:
+            raise PlannedError
+
+    node.on("/scan", work)
+    return [node]
+
+
+def awaiting(truth: Truth) -> list[Node]:
+    """Answer each message of /scan after 40 ms, while those of /tick are answered at once.
+
+    Several callbacks of /scan go on at the same time.
+    """
+    node = Witness("awaiting", truth)
+    node.on_awaiting("/scan", 0.04, node.sender("/filtered"), ReentrantCallbackGroup())
+    result = node.sender("/result")
+    node.on("/tick", lambda: (busy(0.001), result()))
+    return [node]
+
+
+def ticking(truth: Truth) -> list[Node]:
+    """Publish /scan and, more often, /tick."""
+    node = Witness("ticking", truth)
+    node.every(0.05, node.sender("/scan"))
+    node.every(0.031, node.sender("/tick"))
+    return [node]
+
+
 SYSTEMS = {
     "pipeline": {"sink": (sink, SingleThreadedExecutor), "filter": (relay, SingleThreadedExecutor),
                  "source": (source, SingleThreadedExecutor)},
@@ -396,6 +456,15 @@ SYSTEMS = {
     "resetting": {"sink": (sink, SingleThreadedExecutor),
                   "resetting": (resetting, SingleThreadedExecutor),
                   "source": (source, SingleThreadedExecutor)},
+    "raising": {"sink": (sink, SingleThreadedExecutor),
+                "raising": (raising, SingleThreadedExecutor),
+                "source": (source, SingleThreadedExecutor)},
+    "awaiting": {"sink": (sink, SingleThreadedExecutor),
+                 "awaiting": (awaiting, SingleThreadedExecutor),
+                 "ticking": (ticking, SingleThreadedExecutor)},
+    "awaiting_threads": {"sink": (sink, SingleThreadedExecutor),
+                         "awaiting": (awaiting, MultiThreadedExecutor),
+                         "ticking": (ticking, SingleThreadedExecutor)},
 }  # fmt: skip
 # The domains of processes that do not hear the others.
 DOMAINS = {"other": 7}
@@ -427,7 +496,11 @@ def main() -> None:
             executor.spin_once(0.1)
         for seconds, work in filter(None, (node.turn for node in nodes)):
             take_turns(executor, seconds, work)
-        executor.spin()
+        while rclpy.ok():
+            try:
+                executor.spin()
+            except PlannedError:
+                pass
     except ExternalShutdownException:
         pass
     except InvalidHandle:
