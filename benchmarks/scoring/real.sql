@@ -95,7 +95,9 @@ UNION ALL
 SELECT 'callback_instance', c.callback, i.host, i.pid, i.tid, i.start_ns
 FROM truth_callback AS c
 ASOF JOIN placed_run AS i ON c.pid = i.pid AND c.tid = i.tid AND c.t0 >= i.start_ns
-WHERE c.kind <> 'client' AND coalesce(c.t0 <= i.end_ns, true);
+WHERE coalesce(c.t0 <= i.end_ns, true)
+    -- Before Kilted, of a response nothing is known but the callback of Python.
+    AND (c.kind <> 'client' OR NOT EXISTS (FROM analysed.store.response));
 
 -- Nothing says what of these recordings is missing or was torn.
 CREATE OR REPLACE TEMP TABLE truth_torn (kind VARCHAR, id VARCHAR);
@@ -134,7 +136,7 @@ link AS (
     FROM truth_sent AS s
     JOIN truth_callback AS c ON s.callback = c.callback
     JOIN traced AS t ON s.pid = t.pid
-    WHERE c.kind <> 'client'
+    WHERE c.kind <> 'client' OR NOT EXISTS (FROM analysed.store.response)
     UNION ALL
     SELECT
         'link_call', 'response_taken', s.callback,
