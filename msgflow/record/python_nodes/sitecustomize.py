@@ -46,6 +46,7 @@ class _Finder:
             try:
                 getattr(self._tracer(), wrapper)(module)
             except Exception as error:
+                self._wrappers.clear()
                 _say(error)
 
         loader.exec_module = load_and_wrap
@@ -88,7 +89,7 @@ def _run_other():
     from importlib.util import module_from_spec
 
     spec = PathFinder.find_spec("sitecustomize")
-    if spec is not None and spec.loader is not None:
+    if spec is not None and spec.loader is not None and spec.origin != __file__:
         module = module_from_spec(spec)
         sys.modules["sitecustomize"] = module
         spec.loader.exec_module(module)

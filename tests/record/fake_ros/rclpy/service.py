@@ -1,0 +1,9 @@
+"""What has callbacks."""
+
+from rclpy._core import Handle
+
+
+class Service:
+    def __init__(self, pointer, callback):
+        self.handle = Handle(pointer)
+        self.callback = callback

@@ -1,0 +1,400 @@
+"""What traces Python nodes, on an rclpy and a tracetools that are as small as can be."""
+
+from __future__ import annotations
+
+import ast
+import os
+import shutil
+import subprocess
+import sys
+import textwrap
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from msgflow.record import PYTHON_NODES
+from msgflow.record import python_path as module
+from msgflow.record.python_path import with_python_nodes
+
+FAKE = Path(__file__).with_name("fake_ros")
+# A node with a subscription (7) that spins; what a test does comes in between.
+NODE = """
+    from rclpy import executors, subscription, timer, service, node
+    executor = executors.SingleThreadedExecutor()
+
+    def heard(message):
+        print(message)
+
+    {code}
+    print("over")
+"""
+
+
+class Robot:
+    """A program of rclpy, and what it traces."""
+
+    def __init__(self, directory: Path, library: Path) -> None:
+        self.directory = directory
+        self.nodes = PYTHON_NODES
+        self.words = [sys.executable]
+        self.trace = directory / "trace.txt"
+        self.session = directory / "session"
+        self.session.touch()
+        self.environment = {
+            "PYTHONPATH": str(FAKE),
+            "FAKE_LIBRARY": str(library),
+            "FAKE_TRACE": str(self.trace),
+            "FAKE_SESSION": str(self.session),
+        }
+
+    def run(self, code: str, *, traced: bool = True) -> tuple[int, str, str]:
+        """Run a program, and return its exit code, its output and its errors."""
+        program = self.directory / "robot.py"
+        code = textwrap.indent(textwrap.dedent(code), "    ")
+        program.write_text(textwrap.dedent(NODE.format(code=code.strip())))
+        path = [str(self.nodes)] * traced + [self.environment["PYTHONPATH"]]
+        ended = subprocess.run(
+            [*self.words, program],
+            cwd=self.directory,
+            env=self.environment | {"PYTHONPATH": os.pathsep.join(path)},
+            capture_output=True,
+            text=True,
+            timeout=60,
+        )
+        return ended.returncode, ended.stdout, ended.stderr
+
+    def traced(self) -> list[str]:
+        """Return the events, without which Python it is, and which executor."""
+        lines = self.trace.read_text().splitlines() if self.trace.exists() else []
+        return [line for line in lines if "#msgflow python" not in line and "executor " not in line]
+
+
+@pytest.fixture(scope="session")
+def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    if shutil.which("gcc") is None:
+        pytest.skip("no gcc")
+    path = tmp_path_factory.mktemp("tracetools") / "libtracetools.so"
+    soname = f"-Wl,-soname,{path.name}"
+    subprocess.run(
+        ["gcc", "-shared", "-fPIC", soname, "-o", path, FAKE / "tracetools.c"], check=True
+    )
+    return path
+
+
+@pytest.fixture
+def robot(tmp_path: Path, library: Path) -> Robot:
+    return Robot(tmp_path, library)
+
+
+ONE_MESSAGE = """
+    executor.ready = [(subscription.Subscription(7, heard), ["hello"])]
+    executor.spin_once()
+"""
+
+
+def test_a_callback_and_its_executor(robot: Robot) -> None:
+    assert robot.run(ONE_MESSAGE) == (0, "hello\nover\n", "")
+    assert robot.traced() == [
+        "rclcpp_subscription_init 7 7",
+        "rclcpp_subscription_callback_added 7 7",
+        "register 7 __main__:heard",
+        "ready",
+        "rclcpp_executor_wait_for_work -1",
+        "ready",
+        "rclcpp_executor_execute 7",
+        "callback_start 7",
+        "callback_end 7",
+    ]
+    text = robot.trace.read_text()
+    assert f"#msgflow python {sys.version.split()[0]}" in text
+    assert "#msgflow executor single_threaded" in text
+
+
+def test_two_objects_with_one_function_are_told_apart(robot: Robot) -> None:
+    robot.run("""
+        executor.ready = [
+            (subscription.Subscription(7, heard), ["a"]), (subscription.Subscription(8, heard), ["b"])
+        ]
+        executor.spin_once(); executor.spin_once(); executor.spin_once()
+    """)
+    assert [line for line in robot.traced() if "start" in line] == [
+        "callback_start 7", "callback_start 8",
+    ]  # fmt: skip
+
+
+def test_timers_have_a_node_and_services_no_execution(robot: Robot) -> None:
+    robot.run("""
+        executor.ready = [
+            (node.Node().create_timer(5, lambda: None), []), (service.Service(6, heard), [1])
+        ]
+        executor.spin_once(); executor.spin_once(); executor.spin_once()
+    """)
+    traced = robot.traced()
+    assert "rclcpp_timer_link_node 5 900" in traced
+    assert "register 5 __main__:<lambda>" in traced
+    assert "rclcpp_service_callback_added 6 6" in traced
+    assert [line for line in traced if "execute" in line] == ["rclcpp_executor_execute 5"]
+
+
+def test_steps_of_coroutines_belong_together(robot: Robot) -> None:
+    """Another callback runs in between, and nothing while the future is not done."""
+    assert robot.run("""
+        future = executors.Future()
+
+        async def slowly(message):
+            await future
+            print("later")
+
+        executor.ready = [
+            (subscription.Subscription(7, slowly), [1]), (subscription.Subscription(8, heard), [2])
+        ]
+        executor.spin_once()
+        executor.spin_once()
+        executor.tasks.clear() if future.is_done else None
+        task = executor.tasks[0]
+        executor.tasks = []
+        executor.spin_once()
+        future.is_done = True
+        task()
+    """) == (0, "2\nlater\nover\n", "")
+    wanted = ("callback", "step", "resume")
+    assert [line for line in robot.traced() if any(word in line for word in wanted)][2:] == [
+        "callback_start 7",
+        "register 1 #msgflow step",
+        "callback_end 7",
+        "callback_start 8",
+        "callback_end 8",
+        "register 1 #msgflow resume",
+        "callback_start 2",
+        "callback_end 2",
+    ]
+    assert "register 2 #msgflow function __main__:slowly (goes on)" in robot.traced()
+
+
+def test_tasks_go_on_for_what_made_them(robot: Robot) -> None:
+    robot.run("""
+        def later():
+            print("later")
+
+        def asking(message):
+            executor.create_task(later)
+
+        executor.ready = [(subscription.Subscription(7, asking), [1])]
+        executor.spin_once(); executor.spin_once()
+    """)
+    traced = robot.traced()
+    assert traced[traced.index("callback_start 7") + 1 :] == [
+        "register 1 #msgflow function __main__:later",
+        "register 2 #msgflow step",
+        "callback_end 7",
+        "ready",
+        "register 2 #msgflow resume",
+        "callback_start 1",
+        "callback_end 1",
+    ]
+
+
+def test_an_exception_ends_the_callback(robot: Robot) -> None:
+    code, out, error = robot.run("""
+        def failing(message):
+            raise SystemExit(3)
+
+        executor.ready = [(subscription.Subscription(7, failing), [1])]
+        executor.spin_once()
+    """)
+    assert (code, out, error) == (3, "", "")
+    assert robot.traced()[-1] == "callback_end 7"
+
+
+def test_a_session_that_begins_later(robot: Robot) -> None:
+    """Without one nothing is traced but what is there; then names come again."""
+    robot.run("""
+        import os
+        session = os.environ["FAKE_SESSION"]
+        os.remove(session)
+        one = subscription.Subscription(7, heard)
+        executor.ready = [(one, ["a"]), (one, ["b"])]
+        executor.spin_once()
+        open(session, "w").close()
+        executor.spin_once(); executor.spin_once()
+    """)
+    traced = robot.traced()
+    assert traced.count("register 7 __main__:heard") == 2
+    assert traced.count("callback_start 7") == traced.count("callback_end 7") == 1
+
+
+@pytest.mark.parametrize(
+    "name", ["a\\0b", "\\ud800", "\\u00e4" * 1000, "%s%n", ""], ids=["nul", "lone", "long", "%", ""]
+)
+def test_hostile_names_change_nothing(robot: Robot, name: str) -> None:
+    code = f"    heard.__qualname__ = '{name}'" + ONE_MESSAGE
+    assert robot.run(code) == (0, "hello\nover\n", "")
+    (line,) = [line for line in robot.traced() if line.startswith("register 7")]
+    assert len(line) < 1100
+
+
+HARM = {
+    "no library": ("", {"FAKE_LIBRARY": "/nowhere"}, "libtracetools"),
+    "another rclpy": (
+        "",
+        {"FAKE_RENAME": "1"},
+        "this process runs without traced callbacks",
+    ),
+    "objects without handles": (
+        "    subscription.Subscription.handle = property(lambda self: 1 / 0, lambda self, to: None)\n",
+        {},
+        "division by zero",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", HARM)
+def test_a_robot_runs_without_what_is_missing(robot: Robot, what: str) -> None:
+    code, environment, reason = HARM[what]
+    robot.environment |= environment
+    if "FAKE_RENAME" in environment:
+        changed = robot.directory / "changed"
+        shutil.copytree(FAKE / "rclpy", changed / "rclpy")
+        executors = changed / "rclpy" / "executors.py"
+        executors.write_text(executors.read_text().replace("_make_handler", "_handle"))
+        robot.environment["PYTHONPATH"] = str(changed)
+    exit_code, out, error = robot.run(code + ONE_MESSAGE)
+    assert (exit_code, out) == robot.run(code + ONE_MESSAGE, traced=False)[:2]
+    assert (exit_code, out) == (0, "hello\nover\n")
+    assert error.startswith("msgflow: this process runs without traced callbacks: ")
+    assert reason in error
+    assert error.count("\n") == 1
+    assert "callback_start" not in "".join(robot.traced())
+
+
+@pytest.mark.parametrize("name", ["_msgflow_rclpy.py", "sitecustomize.py"])
+def test_a_robot_runs_although_the_tracer_raises(robot: Robot, name: str) -> None:
+    robot.nodes = robot.directory / "nodes"
+    shutil.copytree(PYTHON_NODES, robot.nodes, ignore=shutil.ignore_patterns("__pycache__"))
+    text = (robot.nodes / name).read_text()
+    place = "import ctypes" if name.startswith("_") else "    sys.path[:] ="
+    (robot.nodes / name).write_text(
+        text.replace(place, f"{place[: -len(place.lstrip())] or ''}1 / 0\n{place}")
+    )
+    assert robot.run(ONE_MESSAGE) == (
+        0,
+        "hello\nover\n",
+        "msgflow: this process runs without traced callbacks: division by zero\n",
+    )
+
+
+def test_another_sitecustomize_runs_as_ever(robot: Robot) -> None:
+    others = robot.directory / "others"
+    others.mkdir()
+    (others / "sitecustomize.py").write_text("import sys; sys.stdout.write('mine ')")
+    robot.environment["PYTHONPATH"] = f"{others}{os.pathsep}{FAKE}"
+    code = "import sys, sitecustomize; print(sitecustomize.__file__, *sys.path[1:4])"
+    traced = robot.run(code)
+    assert traced == robot.run(code, traced=False)
+    assert traced[1].startswith(f"mine {others}/sitecustomize.py {others} {FAKE}")
+
+
+@pytest.mark.parametrize("option", ["-S", "-I"])
+def test_python_may_be_told_not_to(robot: Robot, option: str) -> None:
+    """-I means that PYTHONPATH does not count: that robot finds its modules elsewhere."""
+    robot.words.append(option)
+    code = f"import sys; sys.path.insert(0, {str(FAKE)!r})"
+    program = robot.directory / "other.py"
+    program.write_text(f"{code}\nimport rclpy.executors\nprint(list(map(type, sys.meta_path)))\n")
+    environment = robot.environment | {"PYTHONPATH": str(PYTHON_NODES)}
+    ended = subprocess.run(
+        [*robot.words, program], env=environment, capture_output=True, text=True, timeout=60
+    )
+    assert ended.returncode == 0, ended.stderr
+    assert "_Finder" not in ended.stdout
+    assert robot.traced() == []
+
+
+def test_processes_that_fork_are_traced_both(robot: Robot) -> None:
+    robot.run("""
+        import os
+        executor.ready = [(subscription.Subscription(7, heard), ["a"])]
+        child = os.fork()
+        executor.spin_once()
+        if child:
+            os.waitpid(child, 0)
+    """)
+    assert robot.traced().count("callback_start 7") == 2
+
+
+def test_programs_without_rclpy_see_nothing(tmp_path: Path) -> None:
+    program = "import sys; print('ctypes' in sys.modules, [each for each in sys.path if 'msgflow' in each])"
+    ended = subprocess.run(
+        [sys.executable, "-c", program],
+        env={"PYTHONPATH": str(PYTHON_NODES)},
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+    )
+    assert (ended.returncode, ended.stderr) == (0, "")
+    assert ended.stdout.startswith("False")
+    assert str(PYTHON_NODES) not in ended.stdout
+
+
+def test_the_oldest_python_of_a_robot_reads_it() -> None:
+    for path in PYTHON_NODES.glob("*.py"):
+        ast.parse(path.read_text(), feature_version=(3, 8))
+
+
+Environment = Callable[[], tuple[dict[str, str], list[str]]]
+
+
+@pytest.fixture
+def environment() -> Environment:
+    def told() -> tuple[dict[str, str], list[str]]:
+        notes: list[str] = []
+        return with_python_nodes(notes.append), notes
+
+    return told
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with the tracer that only its owner may write to, and so up to the root."""
+    path = tmp_path / "with space" / "python_nodes"
+    shutil.copytree(PYTHON_NODES, path)
+    path.chmod(0o755)
+    monkeypatch.setattr(module, "PYTHON_NODES", path)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [(None, ""), ("", ""), ("/a b", ":/a b"), (":/a::/b:", "::/a::/b:")],
+)
+def test_python_path_gets_no_empty_entry(
+    environment: Environment,
+    folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    before: str | None,
+    after: str,
+) -> None:
+    """An empty one is the current directory: only what was there stays."""
+    monkeypatch.delenv("PYTHONPATH", raising=False)
+    if before is not None:
+        monkeypatch.setenv("PYTHONPATH", before)
+    told, notes = environment()
+    assert (told["PYTHONPATH"], notes) == (f"{folder}{after}", [])
+
+
+@pytest.mark.parametrize("what", ["folder", "file", "parent", "colon"])
+def test_what_others_may_write_is_not_run(
+    environment: Environment, folder: Path, monkeypatch: pytest.MonkeyPatch, what: str
+) -> None:
+    monkeypatch.delenv("PYTHONPATH", raising=False)
+    if what == "colon":
+        renamed = folder.with_name("a:b")
+        folder.rename(renamed)
+        monkeypatch.setattr(module, "PYTHON_NODES", renamed)
+    else:
+        file = folder / "sitecustomize.py"
+        {"folder": folder, "file": file, "parent": folder.parent}[what].chmod(0o777)
+    told, (note,) = environment()
+    assert "PYTHONPATH" not in told
+    assert note.startswith("callbacks of Python nodes are not traced: ")
