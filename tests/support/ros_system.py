@@ -339,6 +339,12 @@ class RosSystem(StagedEvents):
         """rclcpp_executor_execute."""
         return self.add("ros2:rclcpp_executor_execute", thread, handle=handle)
 
+    def python(self, thread: Thread, number: int, text: str) -> int:
+        """The tracer of Python nodes says something besides the events of rclcpp."""
+        return self.add(
+            "ros2:rclcpp_callback_register", thread, callback=number, symbol=f"#msgflow {text}"
+        )
+
     def annotate(self, thread: Thread, kind: str, inputs: list[int], outputs: list[int]) -> int:
         """message_link_periodic_async or message_link_partial_sync."""
         return self.add(

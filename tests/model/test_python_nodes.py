@@ -1,0 +1,182 @@
+"""Python nodes whose callbacks are traced (`msgflow record`): what goes on later, and for what."""
+
+from __future__ import annotations
+
+import pytest
+from analysis import Analyse
+from ros_system import RosSystem
+from staged_events import Thread
+
+MAIN = Thread(200)
+POOL = Thread(200, 201)
+OTHER = Thread(200, 202)
+# What was published, the message that it follows from, and how many others it may follow from.
+CAUSES = (
+    "SELECT b.source_timestamp_ns, t.source_timestamp_ns, l.kind, l.candidate_count "
+    "FROM link_causal AS l JOIN publication AS b USING (publication_id) "
+    "LEFT JOIN take AS t ON l.take_id = t.take_id ORDER BY b.publication_id"
+)
+
+
+@pytest.fixture
+def python(system: RosSystem) -> RosSystem:
+    """A node that hears /a and /b, and publishes /c."""
+    system.node(MAIN, 0x1, "python")
+    system.python(MAIN, 0, "python 3.12.3")
+    system.python(MAIN, 0xE, "executor multi_threaded")
+    system.publisher(MAIN, 0x10, "/c", node=0x1)
+    system.subscription(MAIN, 0x20, "/a", callback=0xCA, node=0x1)
+    system.subscription(MAIN, 0x21, "/b", callback=0xCB, node=0x1)
+    return system
+
+
+def hear(system: RosSystem, handle: int, callback: int, stamp: int, thread: Thread = MAIN) -> None:
+    system.ready(thread)
+    system.execute(thread, handle)
+    system.take(thread, handle, stamp, layers="rmw rcl")
+    system.start(thread, callback)
+
+
+def resume(system: RosSystem, number: int, callback: int, thread: Thread = MAIN) -> None:
+    system.ready(thread)
+    system.python(thread, number, "resume")
+    system.start(thread, callback)
+
+
+def test_later_steps_follow_from_the_first(python: RosSystem, analyse: Analyse) -> None:
+    """Two coroutines of one callback, another callback in between, on any thread."""
+    python.python(MAIN, 5, "function node:heard (goes on)")
+    for number, stamp in ((1, 11), (2, 12)):
+        hear(python, 0x20, 0xCA, stamp)
+        python.python(MAIN, number, "step")
+        python.end(MAIN, 0xCA)
+    hear(python, 0x21, 0xCB, 21)
+    python.publish(MAIN, 0x10, 1, layers="rcl rmw")
+    python.end(MAIN, 0xCB)
+    resume(python, 2, 5, POOL)
+    python.publish(POOL, 0x10, 2, layers="rcl rmw")
+    python.end(POOL, 5)
+    resume(python, 1, 5)
+    python.publish(MAIN, 0x10, 3, layers="rcl rmw")
+    python.end(MAIN, 5)
+    resume(python, 1, 5)
+    python.publish(MAIN, 0x10, 4, layers="rcl rmw")
+    python.end(MAIN, 5)
+    analysis = analyse(python)
+    assert analysis.rows(CAUSES) == [
+        (1, 21, "direct", 1),
+        (2, 12, "direct", 1),
+        (3, 11, "direct", 1),
+        (4, 11, "direct", 1),
+    ]
+    # A step is no call of the subscription.
+    assert analysis.rows(
+        "SELECT label, kind, count(*) FROM callback_instance JOIN callback USING (callback_id) "
+        "JOIN callback_label USING (callback_id) GROUP BY ALL ORDER BY label"
+    ) == [
+        ("Subscription(/a)", "subscription", 2),
+        ("Subscription(/b)", "subscription", 1),
+        ("heard (goes on)", "function", 3),
+    ]
+    assert analysis.rows("SELECT python_version FROM process") == [("3.12.3",)]
+
+
+def test_a_step_that_nothing_announced_follows_from_nothing(
+    python: RosSystem, analyse: Analyse
+) -> None:
+    """As where the session began in between; a number may have been another's before."""
+    hear(python, 0x20, 0xCA, 11)
+    python.end(MAIN, 0xCA)
+    resume(python, 1, 0xCA)
+    python.publish(MAIN, 0x10, 1, layers="rcl rmw")
+    python.end(MAIN, 0xCA)
+    python.python(MAIN, 1, "step")
+    assert analyse(python).rows(CAUSES) == [(1, None, "direct", 1)]
+
+
+@pytest.fixture
+def calls(python: RosSystem) -> RosSystem:
+    """It also calls a service, and has one."""
+    python.client(MAIN, 0x30, "/add", gid=7, node=0x1)
+    python.service(MAIN, 0x40, "/goal", callback=0xC9, node=0x1)
+    python.python(MAIN, 6, "function node:answered")
+    return python
+
+
+def test_what_is_done_with_a_response(calls: RosSystem, analyse: Analyse) -> None:
+    """In tasks of their own, in any order: each knows its response."""
+    taken = []
+    for number in (1, 2):
+        calls.ready(MAIN)
+        taken.append(calls.take_response(MAIN, 0x30, number, stamp=number))
+        calls.python(MAIN, number, "step")
+    for number in (2, 1):
+        resume(calls, number, 6)
+        calls.publish(MAIN, 0x10, number, layers="rcl rmw")
+        sent = calls.send_request(MAIN, 0x30, 10 + number)
+        calls.end(MAIN, 6)
+    analysis = analyse(calls)
+    links = analysis.rows(
+        "SELECT b.source_timestamp_ns, q.sent_ns, r.taken_ns, l.candidate_count FROM link_call AS l "
+        "LEFT JOIN publication AS b USING (publication_id) LEFT JOIN request AS q "
+        "ON l.request_id = q.request_id JOIN response AS r ON l.taken_response_id = r.response_id"
+    )
+    assert sorted((row[0], row[2], row[3]) for row in links if row[0]) == [
+        (1, taken[0], 1),
+        (2, taken[1], 1),
+    ]
+    assert (None, sent, taken[0], 1) in links
+    assert len(links) == 4
+    assert analysis.rows(CAUSES) == []
+
+
+def test_what_is_not_done_in_the_turn_of_a_response(calls: RosSystem, analyse: Analyse) -> None:
+    calls.take_response(MAIN, 0x30, 1, stamp=1)
+    calls.ready(MAIN)
+    calls.python(MAIN, 1, "step")
+    resume(calls, 1, 6)
+    calls.publish(MAIN, 0x10, 1, layers="rcl rmw")
+    calls.end(MAIN, 6)
+    analysis = analyse(calls)
+    assert analysis.rows("FROM link_call") == []
+    assert analysis.rows(CAUSES) == [(1, None, "direct", 1)]
+
+
+def test_tasks_for_a_request(calls: RosSystem, analyse: Analyse) -> None:
+    """As an action executes its goal: the first is the callback of the request, others go on."""
+    calls.ready(MAIN)
+    taken = calls.take_request(MAIN, 0x40, 1, gid=7)
+    calls.python(MAIN, 1, "step")
+    calls.python(MAIN, 2, "step")
+    for number in (1, 2):
+        resume(calls, number, 6, POOL)
+        calls.publish(POOL, 0x10, number, layers="rcl rmw")
+        calls.end(POOL, 6)
+    analysis = analyse(calls)
+    assert analysis.rows(
+        "SELECT q.taken_ns, count(*) FROM link_causal JOIN callback_instance AS i "
+        "USING (callback_instance_id) JOIN request AS q ON i.request_id = q.request_id GROUP BY ALL"
+    ) == [(taken, 2)]
+
+
+def test_threads_of_a_pool_are_of_one_executor(python: RosSystem, analyse: Analyse) -> None:
+    """All of them wait at once, and one runs no callback."""
+    for thread, handle, callback in ((POOL, 0x20, 0xCA), (OTHER, 0x21, 0xCB)):
+        python.python(thread, 0xE, "executor multi_threaded")
+        hear(python, handle, callback, callback, thread)
+        python.end(thread, callback)
+        python.idle(thread)
+    python.idle(MAIN)
+    rows = analyse(python).rows(
+        "SELECT e.kind, e.is_inferred, count(*) FROM executor AS e "
+        "JOIN executor_thread USING (executor_id) GROUP BY ALL"
+    )
+    assert rows == [("multi_threaded", False, 3)]
+
+
+def test_no_message_causes_what_no_callback_published(python: RosSystem, analyse: Analyse) -> None:
+    hear(python, 0x20, 0xCA, 11)
+    python.end(MAIN, 0xCA)
+    python.take(MAIN, 0x21, 21, layers="rmw rcl")
+    python.publish(MAIN, 0x10, 1, layers="rcl rmw")
+    assert analyse(python).rows(CAUSES) == []
