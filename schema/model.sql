@@ -2,6 +2,11 @@
 -- `schema/model` and `schema/kernel`; do not edit.
 -- An ingest makes those with it that cannot have a row in a recording.
 
+CREATE TABLE staging.agnocast_entry (publication_id BIGINT, take_id BIGINT, entry_id BIGINT,
+    event_id BIGINT);
+CREATE TABLE staging.agnocast_take (event_id BIGINT, ts_ns BIGINT, trace_index INTEGER,
+    thread_id BIGINT, process_id BIGINT, entry_id BIGINT, handle UBIGINT,
+    subscription_event_id BIGINT);
 CREATE TABLE staging.annotation (annotation_id BIGINT, kind VARCHAR, source VARCHAR,
     process_id BIGINT, event_id BIGINT);
 CREATE TABLE staging.annotation_event (event_id BIGINT, process_id BIGINT, kind VARCHAR,
@@ -174,10 +179,10 @@ CREATE TABLE staging.publication_number (start_event_id BIGINT, process_id BIGIN
 CREATE TABLE staging.publisher (publisher_id BIGINT, process_id BIGINT, node_id BIGINT,
     topic_name VARCHAR, publisher_handle UBIGINT, rmw_handle UBIGINT, gid BLOB, queue_depth BIGINT,
     created_ns BIGINT, is_internal BOOLEAN, is_inferred BOOLEAN, is_topic_learned BOOLEAN,
-    is_topic_declared BOOLEAN, event_id BIGINT);
+    is_topic_declared BOOLEAN, is_agnocast BOOLEAN, event_id BIGINT);
 CREATE TABLE staging.publisher_known (event_id BIGINT, process_id BIGINT, topic_name VARCHAR,
     publisher_handle UBIGINT, rmw_handle UBIGINT, writer UBIGINT, gid BLOB, queue_depth BIGINT,
-    created_ns BIGINT, is_internal BOOLEAN);
+    created_ns BIGINT, is_internal BOOLEAN, is_agnocast BOOLEAN);
 CREATE TABLE staging.python_mark (event_id BIGINT, ts_ns BIGINT, thread_id BIGINT,
     process_id BIGINT, number UBIGINT, kind VARCHAR, text VARCHAR,
     previous_callback_event_id BIGINT, previous_executor_event_id BIGINT);
@@ -225,10 +230,10 @@ CREATE TABLE staging.single_packet (event_id BIGINT, trace_id INTEGER, clock_id 
 CREATE TABLE staging.subscription (subscription_id BIGINT, process_id BIGINT, node_id BIGINT,
     topic_name VARCHAR, subscription_handle UBIGINT, rmw_handle UBIGINT, gid BLOB,
     queue_depth BIGINT, created_ns BIGINT, is_internal BOOLEAN, is_inferred BOOLEAN,
-    is_topic_learned BOOLEAN, is_topic_declared BOOLEAN, event_id BIGINT);
+    is_topic_learned BOOLEAN, is_topic_declared BOOLEAN, is_agnocast BOOLEAN, event_id BIGINT);
 CREATE TABLE staging.subscription_known (event_id BIGINT, process_id BIGINT, thread_id BIGINT,
     topic_name VARCHAR, subscription_handle UBIGINT, rmw_handle UBIGINT, gid BLOB,
-    queue_depth BIGINT, created_ns BIGINT, is_internal BOOLEAN);
+    queue_depth BIGINT, created_ns BIGINT, is_internal BOOLEAN, is_agnocast BOOLEAN);
 CREATE TABLE staging.subscription_object (event_id BIGINT, subscription_event_id BIGINT);
 CREATE TABLE staging.take_chain (start_event_id BIGINT, end_event_id BIGINT, trace_index INTEGER,
     thread_id BIGINT, process_id BIGINT, taken_ns BIGINT, method VARCHAR, rmw_handle UBIGINT,

@@ -39,7 +39,7 @@ CREATE TABLE store.publication (
     start_ns BIGINT NOT NULL,  -- First layer seen [epoch ns] {clock process_id}
     end_ns BIGINT NOT NULL,  -- Last layer seen [epoch ns] {clock process_id}
     intra_ns BIGINT,  -- rclcpp_intra_publish [epoch ns] {clock process_id}
-    rclcpp_ns BIGINT,  -- rclcpp_publish [epoch ns] {clock process_id}
+    rclcpp_ns BIGINT,  -- rclcpp_publish, or agnocast_publish [epoch ns] {clock process_id}
     rcl_ns BIGINT,  -- rcl_publish [epoch ns] {clock process_id}
     rmw_ns BIGINT,  -- rmw_publish [epoch ns] {clock process_id}
     dds_ns BIGINT,  -- dds:write [epoch ns] {clock process_id}
@@ -66,7 +66,7 @@ CREATE TABLE store.take (
     thread_id BIGINT NOT NULL,  -- Thread it happened on {to thread}
     taken_ns BIGINT NOT NULL,  -- Moment of the hand-over [epoch ns] {clock process_id}
     source_timestamp_ns BIGINT,  -- Stamp that came with the message, clock of ROS [epoch ns]
-    method VARCHAR NOT NULL,  -- 'rmw', 'ring_buffer', 'caret' or 'callback_only'
+    method VARCHAR NOT NULL,  -- 'rmw', 'ring_buffer', 'agnocast', 'caret' or 'callback_only'
     start_event_id BIGINT,  -- First layer seen [event order] {hidden}
     end_event_id BIGINT,  -- Last layer seen [event order] {hidden}
     is_loss_affected BOOLEAN DEFAULT false NOT NULL  -- A gap right before or after it on its thread
@@ -99,6 +99,15 @@ CREATE TABLE store.ring_buffer_event (
     take_id BIGINT,  -- Message taken out {to take}
     is_overwriting BOOLEAN DEFAULT false NOT NULL,  -- An older message was lost from the slot
     event_id BIGINT  -- The event [event order] {hidden}
+);
+
+-- One row per publication or take of Agnocast
+-- view: Numbers that Agnocast gave to messages.
+CREATE TABLE store.agnocast_entry (
+    run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
+    publication_id BIGINT,  -- Message put in; NULL: of a take {to publication}
+    take_id BIGINT,  -- Message handed over; NULL: of a publication {to take}
+    entry_id BIGINT NOT NULL  -- Number of the message on its topic and kernel
 );
 
 -- One row per service request
@@ -440,7 +449,7 @@ CREATE TABLE store.link_transport (
     take_id BIGINT NOT NULL,  -- Where it was received {to take}
     publisher_id BIGINT,  -- Publisher of the message {to publisher}
     subscription_id BIGINT,  -- Subscription that received it {to subscription}
-    method VARCHAR NOT NULL,  -- 'exact', 'exact_stamp', 'nearest' or 'ring_buffer'
+    method VARCHAR NOT NULL,  -- 'exact', 'exact_stamp', 'nearest', 'ring_buffer' or 'agnocast'
     candidate_count BIGINT,  -- Number of publications that are possible
     is_self_loop BOOLEAN DEFAULT false NOT NULL,  -- Received by the publishing node itself
     is_loss_affected BOOLEAN DEFAULT false NOT NULL,  -- A gap of the trace may hide a better
@@ -628,7 +637,9 @@ CREATE TABLE store.publisher (
         -- /parameter_events, ...)
     is_inferred BOOLEAN DEFAULT false NOT NULL,  -- Its initialisation was not traced
     is_topic_learned BOOLEAN DEFAULT false NOT NULL,  -- Its topic was deduced from a link {hidden}
-    is_topic_declared BOOLEAN DEFAULT false NOT NULL  -- Its topic was given by a file of links
+    is_topic_declared BOOLEAN DEFAULT false NOT NULL,  -- Its topic was given by a file of links
+    is_agnocast BOOLEAN DEFAULT false NOT NULL  -- Its messages pass through the shared memory of
+        -- Agnocast
 );
 
 -- One row per subscription
@@ -649,7 +660,9 @@ CREATE TABLE store.subscription (
         -- /clock, ...)
     is_inferred BOOLEAN DEFAULT false NOT NULL,  -- Its initialisation was not traced
     is_topic_learned BOOLEAN DEFAULT false NOT NULL,  -- Its topic was deduced from a link {hidden}
-    is_topic_declared BOOLEAN DEFAULT false NOT NULL  -- Its topic was given by a file of links
+    is_topic_declared BOOLEAN DEFAULT false NOT NULL,  -- Its topic was given by a file of links
+    is_agnocast BOOLEAN DEFAULT false NOT NULL  -- Its messages pass through the shared memory of
+        -- Agnocast
 );
 
 -- One row per timer

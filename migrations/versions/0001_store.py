@@ -42,6 +42,9 @@ CREATE TABLE store.ring_buffer_event (
     publication_id BIGINT, take_id BIGINT, is_overwriting BOOLEAN DEFAULT false NOT NULL,
     event_id BIGINT
 );
+CREATE TABLE store.agnocast_entry (
+    run_id BIGINT NOT NULL, publication_id BIGINT, take_id BIGINT, entry_id BIGINT NOT NULL
+);
 CREATE TABLE store.request (
     request_id BIGINT NOT NULL, run_id BIGINT NOT NULL, client_id BIGINT, service_id BIGINT,
     sequence_number BIGINT, sent_ns BIGINT, taken_ns BIGINT, sender_thread_id BIGINT,
@@ -227,14 +230,16 @@ CREATE TABLE store.publisher (
     node_id BIGINT, topic_name VARCHAR, publisher_handle UBIGINT, rmw_handle UBIGINT, gid BLOB,
     queue_depth BIGINT, created_ns BIGINT, is_internal BOOLEAN DEFAULT false NOT NULL,
     is_inferred BOOLEAN DEFAULT false NOT NULL, is_topic_learned BOOLEAN DEFAULT false NOT NULL,
-    is_topic_declared BOOLEAN DEFAULT false NOT NULL, PRIMARY KEY (publisher_id)
+    is_topic_declared BOOLEAN DEFAULT false NOT NULL,
+    is_agnocast BOOLEAN DEFAULT false NOT NULL, PRIMARY KEY (publisher_id)
 );
 CREATE TABLE store.subscription (
     subscription_id BIGINT NOT NULL, run_id BIGINT NOT NULL, process_id BIGINT NOT NULL,
     node_id BIGINT, topic_name VARCHAR, subscription_handle UBIGINT, rmw_handle UBIGINT, gid BLOB,
     queue_depth BIGINT, created_ns BIGINT, is_internal BOOLEAN DEFAULT false NOT NULL,
     is_inferred BOOLEAN DEFAULT false NOT NULL, is_topic_learned BOOLEAN DEFAULT false NOT NULL,
-    is_topic_declared BOOLEAN DEFAULT false NOT NULL, PRIMARY KEY (subscription_id)
+    is_topic_declared BOOLEAN DEFAULT false NOT NULL,
+    is_agnocast BOOLEAN DEFAULT false NOT NULL, PRIMARY KEY (subscription_id)
 );
 CREATE TABLE store.timer (
     timer_id BIGINT NOT NULL, run_id BIGINT NOT NULL, process_id BIGINT NOT NULL, node_id BIGINT,

@@ -109,6 +109,7 @@ class Tracepoint:
             it interrupted.
         is_lasting: what it says stays true: of objects, their names and states. Who reads a part of
             a recording needs it from all that came before.
+        is_translated: events of ROS 2 that are made of it have its id, and take its place.
         role: what it says of its CPU; the begin and end of interrupts have no staging table.
         interrupt: the kind of interrupt that begins or ends.
     """
@@ -125,6 +126,7 @@ class Tracepoint:
     where: str | None = None
     is_kernel: bool = False
     is_lasting: bool = False
+    is_translated: bool = False
     role: CpuRole | None = None
     interrupt: str | None = None
 

@@ -17,6 +17,7 @@ from msgflow.db.finding import kinds_of, statement
 from msgflow.db.store_table import store_tables
 from msgflow.files.resources import resource_directory
 from msgflow.ingest import staging
+from msgflow.ingest.agnocast import translate
 from msgflow.ingest.caret_initialisation import restore
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ def build(con: duckdb.DuckDBPyConnection, *, keep: bool = False, findings: bool 
     if not findings:
         headers = tuple(header for header in headers if header.name != _FINDING)
     empty = staging.empty_tables(con)
-    if restore(con, empty):
+    if any([restore(con, empty), translate(con, empty)]):
         empty = staging.empty_tables(con)
     staging.narrow(con, empty)
     last_uses = {} if keep else _last_uses(headers)

@@ -167,7 +167,7 @@ def empty_tables(con: duckdb.DuckDBPyConnection) -> set[str]:
 
 def narrow(con: duckdb.DuckDBPyConnection, empty: Collection[str]) -> None:
     """Create the views of all events over the tables that have rows: empty ones cost planning."""
-    known = load().of_threads
+    known = [each for each in load().of_threads if not each.is_translated]
     left = [each for each in known if f"raw.{each.table}" not in empty]
     con.execute(_event_view(left or known))
     con.execute(_predecessor_view([each for each in left if _event_predecessors(each)] or known))

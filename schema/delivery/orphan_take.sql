@@ -9,7 +9,8 @@
 --     the creation of the subscription, another subscription may have its handle by then. If a
 --     publisher whose topic is not known published at that moment, it means nothing that all known
 --     senders had ended. A publisher of the topic that was never seen to publish may have sent all
---     that no other one did: some ways to publish have no event.
+--     that no other one did: some ways to publish have no event. Agnocast's messages have no
+--     stamp, but a number, which only a publisher can have given to them.
 -- grain: one row per take whose publication is not known
 -- when: derive.unlinked_take
 CREATE OR REPLACE MACRO derive.orphan_take(only_run) AS TABLE
@@ -242,6 +243,11 @@ SELECT
         WHEN k.has_gap THEN 'publisher_gap'
         WHEN k.is_before_tracing THEN 'before_tracing'
         WHEN o.take_id IN (SELECT take_id FROM stampable) THEN 'receiver_gap'
+        WHEN o.method = 'agnocast' THEN CASE
+            WHEN o.topic_name IN (SELECT topic_name FROM sending)
+                OR EXISTS (SELECT 1 FROM incomplete) THEN 'unknown'
+            ELSE 'publisher_not_traced'
+        END
         WHEN o.stamp_ns IS NULL THEN 'no_stamp'
         WHEN n.is_clock_set THEN 'clock_set'
         WHEN coalesce(j.is_before_tracing, o.stamp_ns < (SELECT begin_ns FROM run_begin))

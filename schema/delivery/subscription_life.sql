@@ -40,7 +40,8 @@ showing AS (
 SELECT
     s.run_id,
     s.subscription_id,
-    s.topic_name,
+    derive.own_topic(s.topic_name, s.is_agnocast) AS topic_name,
+    s.is_agnocast,
     s.process_id,
     h.clock_id,
     nullif(s.queue_depth, 0) AS queue_depth,

@@ -12,7 +12,8 @@
 --     came before a later message was taken, or within ten times the usual time. Messages are in
 --     order only if one thread sends them with one publisher, and one thread takes them. A
 --     publisher may keep messages for subscriptions that come later. Those of its process take them
---     from a ring buffer, where nothing identifies them.
+--     from a ring buffer, where nothing identifies them. Agnocast loses nothing: what a reader
+--     passed over was overwritten.
 -- grain: one row per publication and subscription of its topic that is not known to have taken it
 CREATE OR REPLACE MACRO derive.undelivered(only_run) AS TABLE
 WITH arrival AS MATERIALIZED (
@@ -25,7 +26,7 @@ WITH arrival AS MATERIALIZED (
 life AS MATERIALIZED (
     SELECT
         subscription_id, topic_name, process_id, clock_id, queue_depth, created_ns, last_seen_ns,
-        replaced_ns, host_end_ns, only_thread_id, shows_takes
+        replaced_ns, host_end_ns, only_thread_id, shows_takes, is_agnocast
     FROM derive.subscription_life
     WHERE run_id = only_run AND topic_name IS NOT NULL
 ),
@@ -174,7 +175,7 @@ known AS (
     SELECT
         m.publication_id, m.publisher_id, m.subscription_id, m.topic_name, m.clock_id,
         m.arrival_ns, m.has_no_stamp, s.process_id, s.queue_depth, s.created_ns,
-        s.last_seen_ns, s.replaced_ns, s.host_end_ns, s.shows_takes,
+        s.last_seen_ns, s.replaced_ns, s.host_end_ns, s.shows_takes, s.is_agnocast,
         coalesce(c.longest_ns, derive.delivery_limit().longest_ns) AS longest_ns,
         coalesce(c.patience_ns, derive.delivery_limit().longest_ns) AS patience_ns,
         c.usual_ns,
@@ -387,6 +388,7 @@ SELECT
         WHEN arrival_ns > last_seen_ns AND host_end_ns - first_unseen_ns > longest_ns
             THEN CASE WHEN subscription_id IN (SELECT subscription_id FROM kept_waiting)
                 THEN 'reader_in_callback' ELSE 'subscription_ended' END
+        WHEN is_agnocast AND any_taken_ns IS NOT NULL THEN 'overwritten'
         WHEN has_unidentified_take THEN 'unknown'
         WHEN publication_id IN (SELECT publication_id FROM while_set) THEN 'unknown'
         WHEN NOT is_connected AND shows_none AND had_time THEN 'never_taken'

@@ -34,6 +34,7 @@ TRACEPOINT_KEYS = {
     "label",
     "sequences",
     "predecessors",
+    "is_translated",
 }
 FIELD_KEYS = {"name", "type", "aliases", "since", "until", "where"}
 VERSION = re.compile(r"\d+\.\d+\.\d+")

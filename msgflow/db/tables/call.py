@@ -34,7 +34,7 @@ Table(
     moment("start_ns", "First layer seen", required=True, clock="process_id"),
     moment("end_ns", "Last layer seen", required=True, clock="process_id"),
     moment("intra_ns", "rclcpp_intra_publish", clock="process_id"),
-    moment("rclcpp_ns", "rclcpp_publish", clock="process_id"),
+    moment("rclcpp_ns", "rclcpp_publish, or agnocast_publish", clock="process_id"),
     moment("rcl_ns", "rcl_publish", clock="process_id"),
     moment("rmw_ns", "rmw_publish", clock="process_id"),
     moment("dds_ns", "dds:write", clock="process_id"),
@@ -63,7 +63,7 @@ Table(
     thread_id(),
     moment("taken_ns", "Moment of the hand-over", required=True, clock="process_id"),
     moment("source_timestamp_ns", "Stamp that came with the message, clock of ROS"),
-    text("method", "'rmw', 'ring_buffer', 'caret' or 'callback_only'", required=True),
+    text("method", "'rmw', 'ring_buffer', 'agnocast', 'caret' or 'callback_only'", required=True),
     event_order("start_event_id", "First layer seen"),
     event_order("end_event_id", "Last layer seen"),
     flag(
@@ -106,6 +106,19 @@ Table(
     flag("is_overwriting", "An older message was lost from the slot"),
     event_order("event_id", "The event"),
     comment="One row per enqueue, dequeue or clearing of an intra-process ring buffer",
+)
+
+Table(
+    "agnocast_entry",
+    STORE,
+    run_id(),
+    reference(
+        "publication_id", "Message put in; NULL: of a take", to="publication.publication_id"
+    ),
+    reference("take_id", "Message handed over; NULL: of a publication", to="take.take_id"),
+    number("entry_id", "Number of the message on its topic and kernel", required=True),
+    comment="One row per publication or take of Agnocast",
+    info={"view": "Numbers that Agnocast gave to messages."},
 )
 
 Table(

@@ -85,7 +85,7 @@ Table(
     reference(
         "subscription_id", "Subscription that received it", to="subscription.subscription_id"
     ),
-    text("method", "'exact', 'exact_stamp', 'nearest' or 'ring_buffer'", required=True),
+    text("method", "'exact', 'exact_stamp', 'nearest', 'ring_buffer' or 'agnocast'", required=True),
     number("candidate_count", "Number of publications that are possible"),
     flag("is_self_loop", "Received by the publishing node itself"),
     flag("is_loss_affected", "A gap of the trace may hide a better partner"),

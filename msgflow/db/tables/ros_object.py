@@ -39,6 +39,7 @@ Table(
     flag("is_inferred", "Its initialisation was not traced"),
     flag("is_topic_learned", "Its topic was deduced from a link", hidden=True),
     flag("is_topic_declared", "Its topic was given by a file of links"),
+    flag("is_agnocast", "Its messages pass through the shared memory of Agnocast"),
     comment="One row per publisher",
     info={"view": "Publishers, those of ROS itself marked as internal."},
 )
@@ -60,6 +61,7 @@ Table(
     flag("is_inferred", "Its initialisation was not traced"),
     flag("is_topic_learned", "Its topic was deduced from a link", hidden=True),
     flag("is_topic_declared", "Its topic was given by a file of links"),
+    flag("is_agnocast", "Its messages pass through the shared memory of Agnocast"),
     comment="One row per subscription",
     info={"view": "Subscriptions, those of ROS itself marked as internal."},
 )

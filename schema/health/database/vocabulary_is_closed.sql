@@ -35,7 +35,7 @@ WITH foreign_word AS (
     UNION ALL
     SELECT DISTINCT run_id, 'take.method', method
     FROM store.take
-    WHERE method NOT IN ('rmw', 'ring_buffer', 'caret', 'callback_only')
+    WHERE method NOT IN ('rmw', 'ring_buffer', 'agnocast', 'caret', 'callback_only')
     UNION ALL
     SELECT DISTINCT run_id, 'executor_state.state', state
     FROM store.executor_state
@@ -57,7 +57,7 @@ WITH foreign_word AS (
     UNION ALL
     SELECT DISTINCT run_id, 'link_transport.method', method
     FROM store.link_transport
-    WHERE method NOT IN ('exact', 'exact_stamp', 'nearest', 'ring_buffer')
+    WHERE method NOT IN ('exact', 'exact_stamp', 'nearest', 'ring_buffer', 'agnocast')
     UNION ALL
     SELECT DISTINCT run_id, 'link_causal.kind', kind
     FROM store.link_causal

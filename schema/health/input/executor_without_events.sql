@@ -3,7 +3,7 @@
 -- description: Threads ran callbacks one after the other, and no event of an executor, although
 --     these events were enabled. What the threads did between callbacks is not known: they have no
 --     executor states, and how long a message waited for them is bounded by callbacks only. Direct
---     links are not affected.
+--     links are not affected. Callbacks of Agnocast do not count: its executors have no events.
 -- cause: The process uses an EventsExecutor, a StaticSingleThreadedExecutor, or a loop of its own
 --     that calls callbacks (wait sets). rclcpp has no tracepoints in these.
 -- cure: None needed. For executor states, use a SingleThreadedExecutor or MultiThreadedExecutor.
@@ -21,6 +21,7 @@ silent AS (
     SEMI JOIN enabled AS e ON p.trace_index = e.trace_index
     ANTI JOIN staging.executor_first AS x ON p.thread_id = x.thread_id
     ANTI JOIN staging.thread_break AS b ON p.thread_id = b.thread_id
+    ANTI JOIN raw.agnocast_agnocast_callable_start AS a ON p.start_event_id = a.event_id
     -- Of these the recording left the events out.
     ANTI JOIN (SELECT process_id FROM staging.executor_named WHERE kind IN (
         'single_threaded_executor', 'multi_threaded_executor'

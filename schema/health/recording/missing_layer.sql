@@ -25,7 +25,9 @@ WITH seen AS MATERIALIZED (
             FROM store.finding
             WHERE run_id = $run_id
                 AND name IN ('executor_without_events', 'executor_events_left_out')
-        ) AS is_without_executor
+        )
+        -- Its executors have none.
+        OR EXISTS (FROM store.agnocast_entry WHERE run_id = $run_id) AS is_without_executor
     FROM store.run
     WHERE run_id = $run_id
 )

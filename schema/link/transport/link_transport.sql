@@ -2,8 +2,8 @@
 -- kind: macro
 -- description: Messages from publication to take, by every method. A self loop is a transform
 --     that is taken by the node that sent it, or by the transform listener of its process: no
---     flow passes through it. Lost events cannot spoil a link by equal stamps and topics with one
---     candidate. They can spoil any other: where a gap of the sender's trace lies between the
+--     flow passes through it. Lost events cannot spoil a link by equal stamps and topics, or by the
+--     number of Agnocast, with one candidate. They can spoil any other: where a gap of the sender's trace lies between the
 --     publication and the take (on hosts with different clocks: within the publication), or a gap
 --     of the receiver's trace likewise, the better candidate may be in the gap. A reader of ring
 --     buffers may get a message through the middleware as well, without a callback: that take is
@@ -12,7 +12,7 @@
 --     it sent or got.
 -- grain: one row per take whose publication is known
 -- unites: derive.link_transport_exact, derive.link_transport_nearest,
---     derive.link_transport_ring_buffer
+--     derive.link_transport_ring_buffer, derive.link_transport_agnocast
 -- param: links VARCHAR  Name of the rows of all methods
 -- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.link_transport(links, only_run) AS TABLE
@@ -26,7 +26,7 @@ WITH link AS (
 doubtful AS MATERIALIZED (
     SELECT run_id, publication_id, take_id
     FROM link
-    WHERE method <> 'exact' OR candidate_count > 1
+    WHERE method NOT IN ('exact', 'agnocast') OR candidate_count > 1
 ),
 guess AS (
     SELECT

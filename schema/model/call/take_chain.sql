@@ -9,7 +9,8 @@
 --     keeps belongs to none.
 -- grain: one row per successful take, or dequeue
 -- when: raw.ros2_rmw_take, raw.ros2_rcl_take, raw.ros2_rclcpp_take,
---     raw.ros2_dispatch_subscription_callback, raw.ros2_rclcpp_ring_buffer_dequeue
+--     raw.ros2_dispatch_subscription_callback, raw.ros2_rclcpp_ring_buffer_dequeue,
+--     staging.agnocast_take
 WITH middleware AS (
     SELECT
         coalesce(d.event_id, m.event_id) AS start_event_id,
@@ -132,3 +133,8 @@ SELECT
 FROM staging.located('ros2_rclcpp_ring_buffer_dequeue') AS d
 ASOF LEFT JOIN buffer AS b
     ON d.process_id = b.process_id AND d.buffer = b.buffer AND d.event_id >= b.event_id
+UNION ALL
+SELECT
+    event_id, event_id, trace_index, thread_id, process_id, ts_ns, 'agnocast', handle, NULL, NULL,
+    subscription_event_id, subscription_event_id IS NOT NULL
+FROM staging.agnocast_take

@@ -6,7 +6,7 @@
 WITH every_publisher AS (
     SELECT
         event_id, process_id, topic_name, publisher_handle, rmw_handle, gid, queue_depth,
-        created_ns, is_internal, false AS is_inferred
+        created_ns, is_internal, false AS is_inferred, is_agnocast
     FROM staging.publisher_known
     UNION ALL
     SELECT
@@ -19,7 +19,8 @@ WITH every_publisher AS (
         NULL,
         NULL,
         bool_and(is_rosout),
-        true
+        true,
+        false
     FROM staging.publication_number
     WHERE unknown_handle IS NOT NULL
     GROUP BY process_id, unknown_handle
@@ -28,6 +29,6 @@ SELECT
     row_number() OVER (ORDER BY p.event_id) AS publisher_id,
     p.process_id, n.node_id, p.topic_name, p.publisher_handle, p.rmw_handle, p.gid, p.queue_depth,
     p.created_ns, p.is_internal, p.is_inferred, false AS is_topic_learned,
-    false AS is_topic_declared, p.event_id
+    false AS is_topic_declared, p.is_agnocast, p.event_id
 FROM every_publisher AS p
 LEFT JOIN staging.object_node AS n ON p.event_id = n.event_id

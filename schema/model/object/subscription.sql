@@ -6,11 +6,12 @@
 WITH every_subscription AS (
     SELECT
         event_id, process_id, topic_name, subscription_handle, rmw_handle, gid, queue_depth,
-        created_ns, is_internal, false AS is_inferred
+        created_ns, is_internal, false AS is_inferred, is_agnocast
     FROM staging.subscription_known
     UNION ALL
     SELECT
-        min(n.start_event_id), n.process_id, NULL, NULL, n.rmw_handle, NULL, NULL, NULL, false, true
+        min(n.start_event_id), n.process_id, NULL, NULL, n.rmw_handle, NULL, NULL, NULL, false,
+        true, false
     FROM staging.take_number AS n
     LEFT JOIN staging.take_inferred AS i ON n.start_event_id = i.start_event_id
     WHERE n.rmw_handle IS NOT NULL
@@ -21,7 +22,7 @@ WITH every_subscription AS (
     UNION ALL
     SELECT DISTINCT
         subscription_event_id, process_id, NULL, NULL, NULL::UBIGINT, NULL, NULL, NULL::BIGINT,
-        false, true
+        false, true, false
     FROM staging.take_inferred
     WHERE is_inferred
 )
@@ -29,6 +30,6 @@ SELECT
     row_number() OVER (ORDER BY s.event_id) AS subscription_id,
     s.process_id, n.node_id, s.topic_name, s.subscription_handle, s.rmw_handle, s.gid,
     s.queue_depth, s.created_ns, s.is_internal, s.is_inferred, false AS is_topic_learned,
-    false AS is_topic_declared, s.event_id
+    false AS is_topic_declared, s.is_agnocast, s.event_id
 FROM every_subscription AS s
 LEFT JOIN staging.object_node AS n ON s.event_id = n.event_id

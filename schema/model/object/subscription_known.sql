@@ -14,11 +14,12 @@ SELECT
     s.thread_id,
     s.topic_name,
     s.subscription_handle,
-    s.rmw_subscription_handle AS rmw_handle,
+    nullif(s.rmw_subscription_handle, 0) AS rmw_handle,
     r.gid,
     s.queue_depth,
     least(s.ts_ns, r.ts_ns) AS created_ns,
-    staging.is_internal_topic(s.topic_name) AS is_internal
+    staging.is_internal_topic(s.topic_name) AS is_internal,
+    coalesce(s.rmw_subscription_handle = 0, false) AS is_agnocast
 FROM staging.located('ros2_rcl_subscription_init') AS s
 ASOF LEFT JOIN rmw_init AS r
     ON s.process_id = r.process_id

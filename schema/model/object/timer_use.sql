@@ -6,7 +6,8 @@
 WITH use AS (
     SELECT event_id, process_id, timer_handle
     FROM staging.located('ros2_rclcpp_timer_callback_added')
-    UNION ALL
+    -- One event of Agnocast says both.
+    UNION
     SELECT event_id, process_id, timer_handle
     FROM staging.located('ros2_rclcpp_timer_link_node')
 ),

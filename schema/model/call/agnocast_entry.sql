@@ -1,0 +1,13 @@
+-- name: staging.agnocast_entry
+-- description: The numbers of messages that went through Agnocast. They count on one topic of one
+--     kernel; those of subscriptions are left out.
+-- grain: one row per publication or take of Agnocast
+-- when: raw.agnocast_agnocast_publish, staging.agnocast_take
+SELECT n.publication_id, NULL::BIGINT AS take_id, b.entry_id, b.event_id
+FROM raw.agnocast_agnocast_publish AS b
+JOIN staging.publication_number AS n ON b.event_id = n.start_event_id
+UNION ALL
+SELECT NULL, n.take_id, t.entry_id, t.event_id
+FROM staging.agnocast_take AS t
+JOIN staging.take_number AS n ON t.event_id = n.start_event_id
+ORDER BY event_id
