@@ -10,9 +10,9 @@
 --     and is part of the time up to the take. A trace does not say when a message arrived either,
 --     so that time is three parts, with the bounds of waits: network_or_idle, executor_busy (with
 --     other callbacks), and undecided (one or the other). Executors were busy at least for
---     executor_busy, at most for executor_busy and undecided together. Where a kernel trace shows
---     exactly when it arrived (main.arrival), the parts are until_arrival, run_queue (the thread
---     was woken, and waited for a CPU) and executor instead. A part is negative if the next one
+--     executor_busy, at most for executor_busy and undecided together. Where a kernel trace or
+--     CARET shows exactly when it arrived (main.arrival), the parts are until_arrival, run_queue
+--     (the thread was woken, and waited for a CPU; CARET does not tell) and executor instead. A part is negative if the next one
 --     began before it ended (overlaps), for example between hosts whose clocks are apart.
 -- grain: one row per path, hop, part, and callback that it belongs to
 -- param: from VARCHAR = NULL  Topics or nodes where flows start: globs, with commas between
@@ -110,7 +110,8 @@ WITH piece AS (
         -- The time up to a take is three parts, all others are one.
         unnest(
             CASE
-                WHEN a.executor_ns IS NOT NULL THEN ['until_arrival', 'run_queue', 'executor']
+                WHEN a.run_queue_ns IS NOT NULL THEN ['until_arrival', 'run_queue', 'executor']
+                WHEN a.executor_ns IS NOT NULL THEN ['until_arrival', 'executor']
                 WHEN p.part IN ('publish_to_take', 'request_to_take')
                     THEN ['network_or_idle', 'undecided', 'executor_busy']
                 ELSE [p.part]
@@ -130,7 +131,7 @@ part AS (
             WHEN 'network_or_idle' THEN duration_ns - greatest(busy_max_ns, busy_min_ns)
             WHEN 'undecided' THEN greatest(busy_max_ns - busy_min_ns, 0)
             WHEN 'executor_busy' THEN busy_min_ns
-            WHEN 'until_arrival' THEN duration_ns - run_queue_ns - executor_ns
+            WHEN 'until_arrival' THEN duration_ns - coalesce(run_queue_ns, 0) - executor_ns
             WHEN 'run_queue' THEN run_queue_ns
             WHEN 'executor' THEN executor_ns
             ELSE duration_ns

@@ -32,8 +32,8 @@
 -- column: rest_max_ns BIGINT [ns]   Network, idle or overhead, at most
 -- column: meanwhile VARCHAR         What ran meanwhile and for how long, the longest first, with
 --     its node if it is another one
--- column: until_arrival_ns BIGINT [ns]  Until the message arrived; empty: the kernel was not
---     traced, or does not show that exactly
+-- column: until_arrival_ns BIGINT [ns]  Until the message arrived; empty: neither the kernel nor
+--     CARET shows that exactly
 -- column: run_queue_ns BIGINT [ns]  From then on (else from when it can have been ready), its
 --     thread was woken and waited for a CPU, outside of callbacks; empty: not traced by the kernel
 -- column: preempted_ns BIGINT [ns]  Likewise, another thread had the CPU that its thread had lost

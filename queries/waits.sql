@@ -32,8 +32,8 @@
 -- column: rest_total_max_ns BIGINT [ns]  Network, idle or overhead, where known, at most
 -- column: meanwhile VARCHAR         What ran meanwhile: the three with the largest share, with
 --     their node if it is another one
--- column: arrived BIGINT            Waits whose message has an exact arrival; empty: the kernel was
---     not traced
+-- column: arrived BIGINT            Waits whose message has an exact arrival; empty: neither
+--     the kernel nor CARET tells
 -- column: until_arrival_total_ns BIGINT [ns]  Sum of the times until these messages arrived
 -- column: run_queue_worst_ns BIGINT [ns]  Longest time in one wait for which its thread was woken
 --     and waited for a CPU, outside of callbacks, since the message arrived (else since it can have
@@ -76,7 +76,8 @@ measured AS (
         sum(CASE WHEN wait_ns IS NOT NULL THEN held_max_ns END)::BIGINT AS held_total_max_ns,
         sum(wait_ns - busy_max_ns - coalesce(held_max_ns, 0))::BIGINT AS rest_total_min_ns,
         sum(wait_ns - busy_min_ns)::BIGINT AS rest_total_max_ns,
-        CASE WHEN count(run_queue_ns) > 0 THEN count(until_arrival_ns) END AS arrived,
+        CASE WHEN count(run_queue_ns) + count(until_arrival_ns) > 0 THEN count(until_arrival_ns) END
+            AS arrived,
         sum(until_arrival_ns)::BIGINT AS until_arrival_total_ns,
         max(run_queue_ns) AS run_queue_worst_ns,
         sum(run_queue_ns)::BIGINT AS run_queue_total_ns,

@@ -97,6 +97,7 @@ CREATE TABLE staging.cpu_usage (host_id BIGINT, cpu INTEGER, start_ns BIGINT, th
 CREATE TABLE staging.cpu_wait (number BIGINT, thread_id BIGINT, tid INTEGER, state_start_ns BIGINT,
     start_ns BIGINT, end_ns BIGINT, state VARCHAR, trace_index INTEGER, cpu INTEGER,
     priority INTEGER);
+CREATE TABLE staging.data_arrival (take_id BIGINT, waited_ns BIGINT, is_ambiguous BOOLEAN);
 CREATE TABLE staging.deferred_end (start_event_id BIGINT, end_ns BIGINT);
 CREATE TABLE staging.executor (executor_id BIGINT, process_id BIGINT, kind VARCHAR,
     is_inferred BOOLEAN, first_thread_id BIGINT, executor_event_id BIGINT);
@@ -267,7 +268,7 @@ CREATE TABLE staging.thread_waking (thread_id BIGINT, tid INTEGER, event_id BIGI
 CREATE TABLE staging.timer (timer_id BIGINT, process_id BIGINT, node_id BIGINT, period_ns BIGINT,
     timer_handle UBIGINT, created_ns BIGINT, event_id BIGINT);
 CREATE TABLE staging.timer_use (event_id BIGINT, process_id BIGINT, timer_handle UBIGINT,
-    timer_event_id BIGINT, is_inferred BOOLEAN);
+    timer_event_id BIGINT, is_inferred BOOLEAN, has_callback BOOLEAN);
 CREATE TABLE staging.trace (trace_id INTEGER, host_id BIGINT, path VARCHAR, uuid VARCHAR,
     tracer VARCHAR, domain VARCHAR, start_ns BIGINT, end_ns BIGINT, event_count BIGINT,
     discarded_event_count BIGINT, has_request_events BOOLEAN);

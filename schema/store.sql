@@ -101,6 +101,16 @@ CREATE TABLE store.ring_buffer_event (
     event_id BIGINT  -- The event [event order] {hidden}
 );
 
+-- One row per take of a message whose arrival the middleware told (CARET, Fast DDS)
+-- view: When messages were there before they were taken, as CARET's hook in Fast DDS says.
+CREATE TABLE store.data_arrival (
+    run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
+    take_id BIGINT NOT NULL,  -- Take of the message {to take}
+    waited_ns BIGINT NOT NULL,  -- From there until the take [ns]
+    is_ambiguous BOOLEAN DEFAULT false NOT NULL  -- Several readers of the process had a message of
+        -- that stamp
+);
+
 -- One row per publication or take of Agnocast
 -- view: Numbers that Agnocast gave to messages.
 CREATE TABLE store.agnocast_entry (

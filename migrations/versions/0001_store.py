@@ -42,6 +42,10 @@ CREATE TABLE store.ring_buffer_event (
     publication_id BIGINT, take_id BIGINT, is_overwriting BOOLEAN DEFAULT false NOT NULL,
     event_id BIGINT
 );
+CREATE TABLE store.data_arrival (
+    run_id BIGINT NOT NULL, take_id BIGINT NOT NULL, waited_ns BIGINT NOT NULL,
+    is_ambiguous BOOLEAN DEFAULT false NOT NULL
+);
 CREATE TABLE store.agnocast_entry (
     run_id BIGINT NOT NULL, publication_id BIGINT, take_id BIGINT, entry_id BIGINT NOT NULL
 );

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
     from msgflow.record import Status
 
-# Of ROS 2; of an instrumented DDS; of CARET.
-EVENTS = ("ros2:*", "dds:*", "ros2_caret:*")
+# Of ROS 2; of an instrumented DDS; of CARET; of Agnocast.
+EVENTS = ("ros2:*", "dds:*", "ros2_caret:*", "agnocast:*")
 """The events that a recording has."""
 _SECONDS_BETWEEN_LINES = 10.0
 

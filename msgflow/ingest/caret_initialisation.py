@@ -21,9 +21,6 @@ if TYPE_CHECKING:
 _AGAIN = "ros2_caret:"
 _FIRST = "ros2:"
 
-# A context that is reported again starts no new life of its process.
-_LEFT_OUT = {"ros2_caret:rcl_init"}
-
 # Ids of events from before the recording: below all ids that readers give.
 _BEFORE = -(1 << 61)
 
@@ -60,7 +57,6 @@ def _reported() -> list[tuple[Tracepoint, Tracepoint]]:
         (tracepoint, tracepoints[_FIRST + tracepoint.event])
         for name, tracepoint in tracepoints.items()
         if name.startswith(_AGAIN)
-        and name not in _LEFT_OUT
         and _FIRST + tracepoint.event in tracepoints
         and any(field.name == "init_timestamp" for field in tracepoint.fields)
     ]

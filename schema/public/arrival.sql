@@ -1,23 +1,27 @@
 -- name: main.arrival
--- description: When messages arrived, where a kernel trace tells: the last waking of the thread
---     before it took the message. Without one after the begin of the publication the thread was
+-- description: When messages arrived, where the trace tells. A kernel trace: the last waking of the
+--     thread before it took the message. Without one after the begin of the publication the thread was
 --     awake when the message came, and there is no row. It is exact where the take is the first
 --     thing that the thread did then, and a thread of the middleware (by its name), the publishing
 --     thread, another ROS process or an interrupt woke it. Else the waking may have been for
 --     something else: any other thread of its own process may hand over work, and the message wait
---     for that in the queue of its node.
--- grain: one row per take whose publication is known and before which its thread was woken
+--     for that in the queue of its node. Where it is not exact, or there is no kernel trace, the
+--     hook of CARET in the listener of Fast DDS tells when the reader had the message. It is exact
+--     unless several readers of the process had it.
+-- grain: one row per take whose publication is known, and before which its thread was woken or the
+--     message seen to arrive
 -- column: run_id BIGINT  Run that the row belongs to
 -- column: take_id BIGINT  The take
 -- column: publication_id BIGINT  The publication
--- column: arrived_ns BIGINT [epoch ns]  When the thread was woken
--- column: waker_kind VARCHAR  'thread', 'timer', 'interrupt' or 'softirq'
+-- column: arrived_ns BIGINT [epoch ns]  When the thread was woken, or the listener had the message
+-- column: waker_kind VARCHAR  'thread', 'timer', 'interrupt' or 'softirq'; 'listener': it tells of
+--     the message, not of the thread
 -- column: waker_thread_id BIGINT  Thread of a ROS process that woke it, or that was interrupted
 -- column: waker_name VARCHAR  Name of the thread that woke it, or that was interrupted
 -- column: is_exact BOOLEAN  Nothing else explains the waking
--- column: until_arrival_ns BIGINT [ns]  From the end of the publication until the waking; negative:
+-- column: until_arrival_ns BIGINT [ns]  From the end of the publication until then; negative:
 --     before publish() returned
--- column: run_queue_ns BIGINT [ns]  From the waking until the thread had a CPU
+-- column: run_queue_ns BIGINT [ns]  From the waking until the thread had a CPU; NULL: not known
 -- column: executor_ns BIGINT [ns]  From there until the take; with the two before it is the latency
 WITH waking AS (
     SELECT
@@ -61,29 +65,52 @@ on_cpu AS (
     ASOF JOIN (SELECT * FROM main.thread_state WHERE state IN ('running', 'unknown')) AS r
         ON w.thread_id = r.thread_id AND w.arrived_ns <= r.start_ns
     WHERE r.state = 'running'
+),
+by_waking AS MATERIALIZED (
+    SELECT
+        w.run_id,
+        w.take_id,
+        w.publication_id,
+        w.arrived_ns,
+        w.waker_kind,
+        w.waker_thread_id,
+        coalesce(x.name, o.name) AS waker_name,
+        coalesce(d.at_ns < w.arrived_ns, true) AND CASE w.waker_kind
+            WHEN 'thread' THEN coalesce(
+                w.waker_thread_id = w.publishing_thread_id OR x.process_id <> t.process_id
+                OR regexp_matches(coalesce(x.name, o.name), '^(dds\.|recv|dq\.)'),
+                false
+            )
+            ELSE w.waker_kind IN ('interrupt', 'softirq')
+        END AS is_exact,
+        w.arrived_ns - w.end_ns AS until_arrival_ns,
+        c.on_cpu_ns - w.arrived_ns AS run_queue_ns,
+        w.taken_ns - c.on_cpu_ns AS executor_ns
+    FROM woken AS w
+    JOIN main.thread AS t ON w.thread_id = t.thread_id
+    LEFT JOIN main.thread AS x ON w.waker_thread_id = x.thread_id
+    LEFT JOIN main.other_thread AS o ON w.waker_other_thread_id = o.other_thread_id
+    LEFT JOIN behind AS d ON w.take_id = d.take_id
+    LEFT JOIN on_cpu AS c ON w.take_id = c.take_id AND c.on_cpu_ns <= w.taken_ns
+),
+heard AS (
+    SELECT
+        l.run_id, l.take_id, l.publication_id, t.taken_ns - d.waited_ns AS arrived_ns, b.end_ns,
+        d.waited_ns, NOT d.is_ambiguous AS is_exact
+    FROM main.data_arrival AS d
+    JOIN main.link_transport AS l ON d.take_id = l.take_id
+    JOIN main.take AS t ON d.take_id = t.take_id
+    JOIN main.publication AS b ON l.publication_id = b.publication_id
+    ANTI JOIN (SELECT take_id FROM by_waking WHERE is_exact) AS w ON d.take_id = w.take_id
+    WHERE l.latency_ns IS NOT NULL
 )
 SELECT
-    w.run_id,
-    w.take_id,
-    w.publication_id,
-    w.arrived_ns,
-    w.waker_kind,
-    w.waker_thread_id,
-    coalesce(x.name, o.name) AS waker_name,
-    coalesce(d.at_ns < w.arrived_ns, true) AND CASE w.waker_kind
-        WHEN 'thread' THEN coalesce(
-            w.waker_thread_id = w.publishing_thread_id OR x.process_id <> t.process_id
-            OR regexp_matches(coalesce(x.name, o.name), '^(dds\.|recv|dq\.)'),
-            false
-        )
-        ELSE w.waker_kind IN ('interrupt', 'softirq')
-    END AS is_exact,
-    w.arrived_ns - w.end_ns AS until_arrival_ns,
-    c.on_cpu_ns - w.arrived_ns AS run_queue_ns,
-    w.taken_ns - c.on_cpu_ns AS executor_ns
-FROM woken AS w
-JOIN main.thread AS t ON w.thread_id = t.thread_id
-LEFT JOIN main.thread AS x ON w.waker_thread_id = x.thread_id
-LEFT JOIN main.other_thread AS o ON w.waker_other_thread_id = o.other_thread_id
-LEFT JOIN behind AS d ON w.take_id = d.take_id
-LEFT JOIN on_cpu AS c ON w.take_id = c.take_id AND c.on_cpu_ns <= w.taken_ns
+    run_id, take_id, publication_id, arrived_ns, waker_kind, waker_thread_id, waker_name, is_exact,
+    until_arrival_ns, run_queue_ns, executor_ns
+FROM by_waking
+WHERE take_id NOT IN (SELECT take_id FROM heard)
+UNION ALL
+SELECT
+    run_id, take_id, publication_id, arrived_ns, 'listener', NULL, NULL, is_exact,
+    arrived_ns - end_ns, NULL, waited_ns
+FROM heard

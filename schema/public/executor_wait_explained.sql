@@ -2,8 +2,8 @@
 -- kind: macro
 -- description: How long callback instances waited in their executor (main.executor_wait), and which
 --     callbacks its threads ran meanwhile (main.executor_interference, summed up by callback). Both
---     at once take hardly longer than one of them. Where a kernel trace shows exactly when a
---     message arrived (main.arrival), it was ready then: the bounds are one.
+--     at once take hardly longer than one of them. Where a kernel trace or CARET shows exactly
+--     when a message arrived (main.arrival), it was ready then: the bounds are one.
 -- grain: one row per callback instance that is not nested in another
 -- param: runs BIGINT[]  Runs to look at
 -- column: run_id BIGINT  Run that the row belongs to
@@ -39,7 +39,7 @@
 -- column: meanwhile_thread_ns BIGINT[] [ns]  The same as meanwhile_ns, of all threads added up
 -- column: meanwhile_instances BIGINT[]  How many callback instances of each that were
 -- column: until_arrival_ns BIGINT [ns]  From the end of the publication until its message arrived,
---     where a kernel trace shows that exactly; else NULL
+--     where a kernel trace or CARET shows that exactly; else NULL
 -- column: run_queue_ns BIGINT [ns]  From earliest_ns on (from latest_ns if that is unknown), its
 --     thread was woken and waited for a CPU, outside of callbacks; NULL: not traced by the kernel
 -- column: preempted_ns BIGINT [ns]  Likewise, another thread had the CPU that its thread had lost
@@ -54,7 +54,7 @@ WITH executor AS (
 arrived AS (
     SELECT
         i.callback_instance_id, a.until_arrival_ns,
-        t.taken_ns - a.run_queue_ns - a.executor_ns AS arrived_ns
+        t.taken_ns - coalesce(a.run_queue_ns, 0) - a.executor_ns AS arrived_ns
     FROM main.arrival AS a
     JOIN store.take AS t ON a.take_id = t.take_id
     JOIN store.callback_instance AS i ON a.take_id = i.take_id

@@ -239,14 +239,13 @@ def test_layers_of_caret(system: RosSystem, analyse: Analyse) -> None:
     for stamp, address in ((777, 0xA), (778, 0)):
         first.append(system.publish(MAIN, 0x10, layers="rclcpp rcl"))
         system.add("ros2_caret:dds_write", MAIN, message=0xA)
-        system.add("ros2_caret:dds_bind_addr_to_addr", MAIN, addr_from=0xA, addr_to=0xAA)
         system.add("ros2_caret:dds_bind_addr_to_stamp", MAIN, addr=address, source_stamp=stamp)
     model = analyse(system)
     assert model.rows(LAYERS) == [
         (None, *at(time, 0, 1, None, None), 777 + n) for n, time in enumerate(first)
     ]
     assert model.column("SELECT end_ns FROM publication ORDER BY 1") == [
-        time + 4 * STEP_NS for time in first
+        time + 3 * STEP_NS for time in first
     ]
 
 

@@ -109,12 +109,23 @@ Table(
 )
 
 Table(
+    "data_arrival",
+    STORE,
+    run_id(),
+    reference("take_id", "Take of the message", to="take.take_id", required=True),
+    number("waited_ns", "From there until the take", unit="ns", required=True),
+    flag("is_ambiguous", "Several readers of the process had a message of that stamp"),
+    comment="One row per take of a message whose arrival the middleware told (CARET, Fast DDS)",
+    info={
+        "view": "When messages were there before they were taken, as CARET's hook in Fast DDS says."
+    },
+)
+
+Table(
     "agnocast_entry",
     STORE,
     run_id(),
-    reference(
-        "publication_id", "Message put in; NULL: of a take", to="publication.publication_id"
-    ),
+    reference("publication_id", "Message put in; NULL: of a take", to="publication.publication_id"),
     reference("take_id", "Message handed over; NULL: of a publication", to="take.take_id"),
     number("entry_id", "Number of the message on its topic and kernel", required=True),
     comment="One row per publication or take of Agnocast",

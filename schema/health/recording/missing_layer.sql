@@ -24,10 +24,10 @@ WITH seen AS MATERIALIZED (
         EXISTS (
             FROM store.finding
             WHERE run_id = $run_id
-                AND name IN ('executor_without_events', 'executor_events_left_out')
-        )
-        -- Its executors have none.
-        OR EXISTS (FROM store.agnocast_entry WHERE run_id = $run_id) AS is_without_executor
+                AND name IN (
+                    'executor_without_events', 'executor_events_left_out', 'agnocast_callbacks'
+                )
+        ) AS is_without_executor
     FROM store.run
     WHERE run_id = $run_id
 )

@@ -17,7 +17,7 @@ WITH added AS (
     SELECT
         a.event_id, a.ts_ns, a.process_id, a.callback, 'timer', NULL, u.timer_event_id, NULL, NULL
     FROM staging.located('ros2_rclcpp_timer_callback_added') AS a
-    JOIN staging.timer_use AS u ON a.event_id = u.event_id
+    JOIN staging.timer_use AS u ON a.event_id = u.event_id AND u.has_callback
     UNION ALL
     SELECT
         a.event_id, a.ts_ns, a.process_id, a.callback, 'service', NULL, NULL,

@@ -1,0 +1,18 @@
+-- name: finding.agnocast_callbacks
+-- title: Callbacks of Agnocast, whose executors record no events
+-- description: Messages and timers of Agnocast led to callbacks. They are followed as those of ROS 2
+--     are. But what threads of Agnocast did between callbacks is not known: they have no executor
+--     states, and how long a message waited for them is bounded by callbacks only.
+-- cause: Executors of Agnocast have no tracepoints while they wait and select.
+-- cure: None needed.
+-- grain: one row per process with such callbacks
+-- severity: info
+-- when: raw.agnocast_agnocast_callable_start
+SELECT
+    l.label AS subject,
+    count(*) AS count,
+    printf('%d callbacks on %d threads', count(*), count(DISTINCT p.thread_id)) AS detail
+FROM staging.callback_pair AS p
+JOIN raw.agnocast_agnocast_callable_start AS a ON p.start_event_id = a.event_id
+JOIN process_label AS l ON p.process_id = l.process_id
+GROUP BY p.process_id, l.label
