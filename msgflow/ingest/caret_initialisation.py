@@ -2,7 +2,8 @@
 
 Such an event tells of an object that was initialised before the recording. Its own time is only
 that of the report. It replaces the event that was not recorded: it comes before all recorded
-events, in the order in which the objects were initialised.
+events, in the order in which the objects were initialised. Events of Agnocast keep their name when
+they are reported; that they have the time of initialisation shows it.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
 _AGAIN = "ros2_caret:"
 _FIRST = "ros2:"
+_UNDER_ITS_NAME = "agnocast:"
 
 # Ids of events from before the recording: below all ids that readers give.
 _BEFORE = -(1 << 61)
@@ -33,20 +35,21 @@ def restore(con: duckdb.DuckDBPyConnection, empty: Collection[str]) -> bool:
     Returns:
         Whether there were any.
     """
-    reported = _reported()
-    if all(f"raw.{again.table}" in empty for again, _ in reported):
+    reported, moved = _reported(), _moved()
+    tables = [f"raw.{each.table}" for each in (*(again for again, _ in reported), *moved)]
+    if all(table in empty for table in tables):
         return False
     con.execute(
         "CREATE TEMP TABLE reported AS SELECT event_id, "
         f"{_BEFORE} + row_number() OVER (ORDER BY init_timestamp NULLS FIRST, event_id) AS place "
         "FROM ("
-        + " UNION ALL ".join(
-            f"SELECT event_id, init_timestamp FROM raw.{again.table}" for again, _ in reported
-        )
+        + " UNION ALL ".join(f"SELECT event_id, init_timestamp FROM {table}" for table in tables)
         + ")"
     )
     for again, first in reported:
         con.execute(_insert(again, first))
+    for tracepoint in moved:
+        con.execute(_move(tracepoint))
     con.execute("DROP TABLE reported")
     return True
 
@@ -60,6 +63,36 @@ def _reported() -> list[tuple[Tracepoint, Tracepoint]]:
         and _FIRST + tracepoint.event in tracepoints
         and any(field.name == "init_timestamp" for field in tracepoint.fields)
     ]
+
+
+def _moved() -> list[Tracepoint]:
+    return [
+        tracepoint
+        for name, tracepoint in load().tracepoints.items()
+        if name.startswith(_UNDER_ITS_NAME)
+        and any(field.name == "init_timestamp" for field in tracepoint.fields)
+    ]
+
+
+def _move(tracepoint: Tracepoint) -> str:
+    payload = ", ".join(f'e."{field.name}"' for field in tracepoint.fields)
+    return f"""
+DELETE FROM raw.{tracepoint.table}
+WHERE event_id IN (
+    SELECT e.event_id
+    FROM raw.{tracepoint.table} AS e
+    JOIN raw.thread AS p ON e.thread_index = p.thread_index
+    WHERE e.init_timestamp IS NOT NULL
+    QUALIFY row_number() OVER (
+        PARTITION BY p.trace_index, p.pid_ns, p.vpid, {payload}
+        ORDER BY e.event_id
+    ) > 1
+);
+UPDATE raw.{tracepoint.table} AS e
+SET event_id = r.place
+FROM reported AS r
+WHERE e.event_id = r.event_id AND e.init_timestamp IS NOT NULL
+"""
 
 
 def _insert(again: Tracepoint, first: Tracepoint) -> str:

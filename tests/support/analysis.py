@@ -19,6 +19,7 @@ from msgflow.db.sandbox import open_memory
 from msgflow.db.store import store
 from msgflow.db.store_table import store_tables
 from msgflow.ingest import model, staging
+from msgflow.ingest.agnocast import translate
 from msgflow.ingest.caret_initialisation import restore
 
 _NAME = re.compile(r"(?:\b(staging|store|derive|main)\.)?\b([a-z_0-9]+)\b")
@@ -64,7 +65,8 @@ class Analysis:
         """Take these events in place of those before."""
         self._clear()
         events.write(self._connection)
-        restore(self._connection, staging.empty_tables(self._connection))
+        for step in (restore, translate):
+            step(self._connection, staging.empty_tables(self._connection))
         self._built, self._empty = set(), None
         self._derived = frozenset()
         return self
