@@ -4,6 +4,7 @@
 
 CREATE TABLE staging.agnocast_entry (publication_id BIGINT, take_id BIGINT, entry_id BIGINT,
     event_id BIGINT);
+CREATE TABLE staging.agnocast_run (start_event_id BIGINT);
 CREATE TABLE staging.agnocast_take (event_id BIGINT, ts_ns BIGINT, trace_index INTEGER,
     thread_id BIGINT, process_id BIGINT, entry_id BIGINT, handle UBIGINT,
     subscription_event_id BIGINT);

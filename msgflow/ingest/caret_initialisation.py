@@ -60,6 +60,7 @@ def _reported() -> list[tuple[Tracepoint, Tracepoint]]:
         (tracepoint, tracepoints[_FIRST + tracepoint.event])
         for name, tracepoint in tracepoints.items()
         if name.startswith(_AGAIN)
+        and tracepoint.is_staged
         and _FIRST + tracepoint.event in tracepoints
         and any(field.name == "init_timestamp" for field in tracepoint.fields)
     ]

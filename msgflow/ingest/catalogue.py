@@ -110,6 +110,7 @@ class Tracepoint:
         is_lasting: what it says stays true: of objects, their names and states. Who reads a part of
             a recording needs it from all that came before.
         is_translated: events of ROS 2 that are made of it have its id, and take its place.
+        is_staged: answers are made of it. Else it is known by its name, and left unread.
         role: what it says of its CPU; the begin and end of interrupts have no staging table.
         interrupt: the kind of interrupt that begins or ends.
     """
@@ -127,6 +128,7 @@ class Tracepoint:
     is_kernel: bool = False
     is_lasting: bool = False
     is_translated: bool = False
+    is_staged: bool = True
     role: CpuRole | None = None
     interrupt: str | None = None
 
@@ -219,7 +221,7 @@ class Catalogue:
     @cached_property
     def staged(self) -> Mapping[str, Tracepoint]:
         """What has a staging table, by name: tracepoints, and `USER_EVENT`."""
-        staged = {n: t for n, t in self.tracepoints.items() if t.interrupt is None}
+        staged = {n: t for n, t in self.tracepoints.items() if t.interrupt is None and t.is_staged}
         return {**staged, USER_EVENT.name: USER_EVENT}
 
     @property
@@ -253,8 +255,12 @@ class Catalogue:
         return tuple(sorted({t.label for t in self.tracepoints.values() if t.label is not None}))
 
     def arrow_schemas(self) -> dict[str, pa.Schema]:
-        """Return the payload columns of all, which is the `wanted` of `TraceSet.batches`."""
-        return {name: tracepoint.arrow_schema() for name, tracepoint in self.in_traces.items()}
+        """Return the payload columns of all to read: the `wanted` of `TraceSet.batches`."""
+        return {
+            name: tracepoint.arrow_schema()
+            for name, tracepoint in self.in_traces.items()
+            if tracepoint.is_staged
+        }
 
 
 @cache

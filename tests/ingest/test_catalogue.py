@@ -12,6 +12,7 @@ import pyarrow as pa
 import pytest
 
 import msgflow.trace
+from msgflow.files.resources import resource_directory
 from msgflow.ingest import catalogue
 from msgflow.ingest.cpus import Cpus
 from msgflow.ingest.load import without_thread
@@ -35,6 +36,7 @@ TRACEPOINT_KEYS = {
     "sequences",
     "predecessors",
     "is_translated",
+    "is_staged",
 }
 FIELD_KEYS = {"name", "type", "aliases", "since", "until", "where"}
 VERSION = re.compile(r"\d+\.\d+\.\d+")
@@ -166,3 +168,17 @@ def test_every_recorded_event_is_listed_whole(shared_traces: Path) -> None:
                 fields = known[batch.name].fields
                 names = {name for field in fields for name in (field.name, *field.aliases)}
                 assert set(declared) <= names, batch.name
+
+
+def test_everything_that_is_staged_is_read() -> None:
+    """By a step of the model or of what comes before it, or as initialisation reported again."""
+    known = catalogue.load()
+    # `caret_initialisation` puts these into the tables of those of ROS 2.
+    again = {f"ros2_caret_{t.event}" for t in known.staged.values() if t.provider == "ros2"}
+    text = "\n".join(
+        path.read_text(encoding="utf-8")
+        for path in resource_directory("schema").rglob("*.sql")
+        if path.name not in {"model.sql", "store.sql"}
+    )
+    words = set(re.findall(r"\w+", re.sub(r"--.*", "", text)))
+    assert {t.table for t in known.staged.values()} - words <= again

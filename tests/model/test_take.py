@@ -205,3 +205,19 @@ def test_the_time_between_layers_is_kept_out(listener: RosSystem, analyse: Analy
     taken = listener.take(MAIN, 0x10, 777)
     assert taken - read == 500 + STEP_NS
     assert analyse(listener).column("SELECT taken_ns FROM take") == [taken]
+
+
+def test_when_a_message_arrived(system: RosSystem, analyse: Analyse) -> None:
+    """CARET's hook, on a thread of the middleware, of the process that takes, before the take."""
+    listener = Thread(MAIN.pid, 109, "dds.udp")
+    system.subscription(MAIN, 0x10, "/a")
+    for stamp in (1, 2, 2, 3):
+        system.add("ros2_caret:on_data_available", listener, source_stamp=stamp)
+    system.add("ros2_caret:on_data_available", Thread(900), source_stamp=4)
+    for stamp in (1, 2, 4, 5):
+        system.take(MAIN, 0x10, stamp)
+    system.add("ros2_caret:on_data_available", listener, source_stamp=5)
+    assert analyse(system).rows(
+        "SELECT t.source_timestamp_ns, t.taken_ns - a.waited_ns, a.is_ambiguous "
+        "FROM data_arrival AS a JOIN take AS t USING (take_id) ORDER BY take_id"
+    ) == [(1, 1_030, False), (2, 1_040, True)]

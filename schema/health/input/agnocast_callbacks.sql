@@ -7,12 +7,12 @@
 -- cure: None needed.
 -- grain: one row per process with such callbacks
 -- severity: info
--- when: raw.agnocast_agnocast_callable_start
+-- when: staging.agnocast_run
 SELECT
     l.label AS subject,
     count(*) AS count,
     printf('%d callbacks on %d threads', count(*), count(DISTINCT p.thread_id)) AS detail
 FROM staging.callback_pair AS p
-JOIN raw.agnocast_agnocast_callable_start AS a ON p.start_event_id = a.event_id
+JOIN staging.agnocast_run AS a ON p.start_event_id = a.start_event_id
 JOIN process_label AS l ON p.process_id = l.process_id
 GROUP BY p.process_id, l.label

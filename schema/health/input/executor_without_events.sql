@@ -21,7 +21,7 @@ silent AS (
     SEMI JOIN enabled AS e ON p.trace_index = e.trace_index
     ANTI JOIN staging.executor_first AS x ON p.thread_id = x.thread_id
     ANTI JOIN staging.thread_break AS b ON p.thread_id = b.thread_id
-    ANTI JOIN raw.agnocast_agnocast_callable_start AS a ON p.start_event_id = a.event_id
+    ANTI JOIN staging.agnocast_run AS a ON p.start_event_id = a.start_event_id
     -- Of these the recording left the events out.
     ANTI JOIN (SELECT process_id FROM staging.executor_named WHERE kind IN (
         'single_threaded_executor', 'multi_threaded_executor'

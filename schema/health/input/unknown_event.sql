@@ -1,6 +1,6 @@
 -- name: finding.unknown_event
 -- title: Events that are not in the catalogue
--- description: Events of names that no answer is made of. They were not loaded.
+-- description: Events of names that say nothing about ROS 2. They were not loaded.
 -- cause: The session had events of other programs or of the kernel enabled, or those of another
 --     version of ROS 2.
 -- cure: None needed; msgflow events TRACE shows them, and msgflow ingest --events loads those of
