@@ -12,8 +12,9 @@
 --     other callbacks), and undecided (one or the other). Executors were busy at least for
 --     executor_busy, at most for executor_busy and undecided together. Where a kernel trace or
 --     CARET shows exactly when it arrived (main.arrival), the parts are until_arrival, run_queue
---     (the thread was woken, and waited for a CPU; CARET does not tell) and executor instead. A part is negative if the next one
---     began before it ended (overlaps), for example between hosts whose clocks are apart.
+--     (the thread was woken, and waited for a CPU; CARET does not tell) and executor instead. A
+--     part is negative if the next one began before it ended (overlaps), for example between hosts
+--     whose clocks are apart.
 -- grain: one row per path, hop, part, and callback that it belongs to
 -- param: from VARCHAR = NULL  Topics or nodes where flows start: globs, with commas between
 -- param: to VARCHAR = NULL  Topics or nodes where flows end, likewise

@@ -15,7 +15,8 @@ WITH audience AS (
 sent AS (
     SELECT
         b.run_id, b.publication_id, b.publisher_id,
-        derive.own_topic(p.topic_name, p.is_agnocast) AS topic_name, b.intra_ns, b.end_ns, b.source_timestamp_ns, f.clock_id AS from_clock_id, a.clock_id
+        derive.own_topic(p.topic_name, p.is_agnocast) AS topic_name, b.intra_ns, b.end_ns,
+        b.source_timestamp_ns, f.clock_id AS from_clock_id, a.clock_id
     FROM store.publication AS b
     JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
     JOIN derive.process_clock AS f ON p.process_id = f.process_id

@@ -1,7 +1,7 @@
 -- name: main.arrival
 -- description: When messages arrived, where the trace tells. A kernel trace: the last waking of the
---     thread before it took the message. Without one after the begin of the publication the thread was
---     awake when the message came, and there is no row. It is exact where the take is the first
+--     thread before it took the message. Without one after the begin of the publication the thread
+--     was awake when the message came, and there is no row. It is exact where the take is the first
 --     thing that the thread did then, and a thread of the middleware (by its name), the publishing
 --     thread, another ROS process or an interrupt woke it. Else the waking may have been for
 --     something else: any other thread of its own process may hand over work, and the message wait

@@ -1,7 +1,7 @@
 -- name: finding.agnocast_callbacks
 -- title: Callbacks of Agnocast, whose executors record no events
--- description: Messages and timers of Agnocast led to callbacks. They are followed as those of ROS 2
---     are. But what threads of Agnocast did between callbacks is not known: they have no executor
+-- description: Messages and timers of Agnocast led to callbacks. They are followed as those of ROS
+--     2 are. But what threads of Agnocast did between callbacks is not known: they have no executor
 --     states, and how long a message waited for them is bounded by callbacks only.
 -- cause: Executors of Agnocast have no tracepoints while they wait and select.
 -- cure: None needed.

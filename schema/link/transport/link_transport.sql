@@ -1,15 +1,15 @@
 -- name: derive.link_transport
 -- kind: macro
--- description: Messages from publication to take, by every method. A self loop is a transform
---     that is taken by the node that sent it, or by the transform listener of its process: no
---     flow passes through it. Lost events cannot spoil a link by equal stamps and topics, or by the
---     number of Agnocast, with one candidate. They can spoil any other: where a gap of the sender's trace lies between the
---     publication and the take (on hosts with different clocks: within the publication), or a gap
---     of the receiver's trace likewise, the better candidate may be in the gap. A reader of ring
---     buffers may get a message through the middleware as well, without a callback: that take is
---     a copy that no callback gets. So are the takes of a placeholder that nothing joins with the
---     reader of the buffer. Where a process is several with equal ids, nothing says whose messages
---     it sent or got.
+-- description: Messages from publication to take, by every method. A self loop is a transform that
+--     is taken by the node that sent it, or by the transform listener of its process: no flow
+--     passes through it. Lost events cannot spoil a link by equal stamps and topics, or by the
+--     number of Agnocast, with one candidate. They can spoil any other: where a gap of the sender's
+--     trace lies between the publication and the take (on hosts with different clocks: within the
+--     publication), or a gap of the receiver's trace likewise, the better candidate may be in the
+--     gap. A reader of ring buffers may get a message through the middleware as well, without a
+--     callback: that take is a copy that no callback gets. So are the takes of a placeholder that
+--     nothing joins with the reader of the buffer. Where a process is several with equal ids,
+--     nothing says whose messages it sent or got.
 -- grain: one row per take whose publication is known
 -- unites: derive.link_transport_exact, derive.link_transport_nearest,
 --     derive.link_transport_ring_buffer, derive.link_transport_agnocast

@@ -14,20 +14,22 @@ CREATE OR REPLACE MACRO derive.link_transport_agnocast(only_run) AS TABLE
 WITH published AS (
     SELECT
         e.entry_id, b.publication_id, b.publisher_id, b.end_ns AS at_ns, p.topic_name, p.created_ns,
-        c.clock_id
+        h.clock_id
     FROM store.agnocast_entry AS e
     JOIN store.publication AS b ON e.publication_id = b.publication_id
     JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
-    JOIN derive.process_clock AS c ON b.process_id = c.process_id
+    JOIN store.process AS o ON b.process_id = o.process_id
+    JOIN store.host AS h ON o.host_id = h.host_id
     WHERE e.run_id = only_run
 ),
 received AS (
     SELECT
-        e.entry_id, t.take_id, t.subscription_id, t.taken_ns AS at_ns, s.topic_name, c.clock_id
+        e.entry_id, t.take_id, t.subscription_id, t.taken_ns AS at_ns, s.topic_name, h.clock_id
     FROM store.agnocast_entry AS e
     JOIN store.take AS t ON e.take_id = t.take_id
     JOIN store.subscription AS s ON t.subscription_id = s.subscription_id
-    JOIN derive.process_clock AS c ON t.process_id = c.process_id
+    JOIN store.process AS o ON t.process_id = o.process_id
+    JOIN store.host AS h ON o.host_id = h.host_id
     WHERE e.run_id = only_run
 ),
 -- Publishers whose creation was not traced tell nothing.
