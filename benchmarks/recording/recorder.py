@@ -128,7 +128,7 @@ def session(directory: Path) -> Iterator[None]:
         RecordingError: LTTng fails.
     """
     directory.mkdir(parents=True)
-    channel = Channel(("ros2:*", "my_pkg:*"), "1M", 4)
+    channel = Channel(("ros2:*", "agnocast:*", "my_pkg:*"), "1M", 4)
     with (
         one_at_a_time(),
         session_daemon(with_kernel=False, note=print),
