@@ -7,6 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from msgflow_sim.callback_instance import CallbackInstance
+from msgflow_sim import agnocast
 from msgflow_sim.entity import Answer, Call, Poll, Publish, Record, SendGoal, Spin, Transition
 from msgflow_sim.publication import publish
 from msgflow_sim.services import ClientObject, ServiceObject, answer, call
@@ -118,7 +119,8 @@ def _poll(
     instance: CallbackInstance | None,
 ) -> Steps:
     subscription = objects.polled[action.topic]
-    taken, time = take(thread, middleware, subscription, time)
+    take_one = agnocast.get if subscription.description.is_agnocast else take
+    taken, time = take_one(thread, middleware, subscription, time)
     if taken is not None:
         taken.write(thread, subscription, None)
         if instance is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from msgflow_sim import agnocast
 from msgflow_sim.callback_instance import CallbackInstance, Root
 from msgflow_sim.machine import Run, settle
 from msgflow_sim.take import Taken, take
@@ -24,6 +25,8 @@ def run_timer(thread: Thread, middleware: Middleware, timer: TimerObject, time: 
     if timer.reset is not None and timer.due >= timer.reset:
         timer.due, timer.reset = timer.reset + timer.period, None
     start = time + 500 + int(thread.scheduler.random() * 2_500)
+    if timer.code.is_agnocast:
+        agnocast.make_timer_callable(thread, timer, start - 400)
     if not timer.code.is_callback:
         return execute(thread, middleware, timer.code, start, None)
     return run_callback(thread, middleware, timer.code, start, timer.callback, timer.node, "timer")
@@ -38,7 +41,8 @@ def run_subscription(
     through an intra-process buffer as well is taken, but is not handed to the callback again.
     """
     code = subscription.code
-    taken, time = take(thread, middleware, subscription, time)
+    take_one = agnocast.get if code.is_agnocast else take
+    taken, time = take_one(thread, middleware, subscription, time)
     if taken is None:
         return time
     if taken.is_copy:
@@ -119,19 +123,37 @@ def run_callback(
             header_ns=taken.message.header_ns,
         )  # fmt: skip
     facts = (instance_id, hostname, pid, tid, node, kind, callback, start_ns)
-    thread.emit(machine.tracepoints.callback_start, start, thread.context, callback, is_intra)
+    _begin(thread, code, start, callback, is_intra)
     outcome = execute(thread, middleware, code, start, instance)
     if not isinstance(outcome, int):
         return _in_steps(
             outcome, thread, facts, taken, subscription, is_intra, code, instance, has_end
         )
     if has_end:
-        thread.emit(machine.tracepoints.callback_end, outcome, thread.context, callback)
+        _end(thread, code, outcome, callback)
     if code.links is not None:
         code.links.end(outcome, instance)
     end = outcome if has_end else None
     _write(thread, facts, end, taken, subscription, is_intra, None)
     return outcome
+
+
+def _begin(thread: Thread, code: UserCode, time: int, callback: int, is_intra: int) -> None:
+    tracepoints = thread.machine.tracepoints
+    if code.is_agnocast:
+        made = agnocast.callable_of(thread)
+        thread.emit(tracepoints.agnocast_agnocast_callable_start, time, thread.context, made)
+    else:
+        thread.emit(tracepoints.callback_start, time, thread.context, callback, is_intra)
+
+
+def _end(thread: Thread, code: UserCode, time: int, callback: int) -> None:
+    tracepoints = thread.machine.tracepoints
+    if code.is_agnocast:
+        made = agnocast.callable_of(thread)
+        thread.emit(tracepoints.agnocast_agnocast_callable_end, time, thread.context, made)
+    else:
+        thread.emit(tracepoints.callback_end, time, thread.context, callback)
 
 
 def _in_steps(
@@ -153,7 +175,7 @@ def _in_steps(
     try:
         end = yield from steps
         if has_end:
-            thread.emit(thread.machine.tracepoints.callback_end, end, thread.context, callback)
+            _end(thread, code, end, callback)
         if code.links is not None:
             code.links.end(end, instance)
     finally:

@@ -141,6 +141,17 @@ class Creator:
         """A publisher; those that are not of rclcpp have a handle that is copied later."""
         self.work(250 * MICROSECOND)
         memory, topic = self._memory, description.topic
+        if description.is_agnocast:
+            handle = memory.allocate()
+            self.emit(
+                "agnocast_agnocast_publisher_init", handle, node.handle, topic, description.depth
+            )
+            shared = PublisherObject(
+                self._process, node.description.full_name, topic, handle, handle, 0,
+                memory.on_stack(), True, False, self.time, [], description,
+            )  # fmt: skip
+            self.middleware.add_publisher(shared)
+            return shared
         address: Callable[[], int] = memory.allocate if is_rclcpp else memory.on_stack
         rmw_handle, init_handle = memory.allocate(), address()
         self._writer(rmw_handle, f"rt{topic}")
@@ -177,12 +188,21 @@ class Creator:
         rmw_handle, handle = memory.allocate(), memory.allocate()
         subscription, callback = memory.allocate(), memory.allocate()
         group, executor = node.groups[description.group]
-        self._reader(rmw_handle, f"rt{topic}")
-        begin = self.time
-        self.announce()
-        self.emit(
-            "rcl_subscription_init", handle, node.handle, rmw_handle, topic, description.depth
-        )
+        if description.is_agnocast:
+            callback = 0 if description.polled else self._next_callback()
+            self.emit(
+                "agnocast_agnocast_subscription_init", handle, node.handle, memory.on_stack(),
+                group.handle, f"dummy_take{topic}" if description.polled else symbol, topic,
+                description.depth, callback, callback,
+            )  # fmt: skip
+            begin = self.time
+        else:
+            self._reader(rmw_handle, f"rt{topic}")
+            begin = self.time
+            self.announce()
+            self.emit(
+                "rcl_subscription_init", handle, node.handle, rmw_handle, topic, description.depth
+            )
         code = self._code(node, description, executor)
         publishes = description.publishes or any(
             isinstance(action, entity.Publish) for action in description.does
@@ -195,6 +215,9 @@ class Creator:
             topic in INTERNAL_TOPICS,
             not publishes and not (code.links and code.links.inputs), begin,
         )  # fmt: skip
+        if description.is_agnocast:
+            node.objects.polled[topic] = created
+            return created
         if description.intra_process:
             created.intra = self._buffer(created, symbol)
         self._emit_of_rclcpp("rclcpp_subscription_init", handle, subscription)
@@ -351,14 +374,22 @@ class Creator:
         self.work(20 * MICROSECOND)
         handle, callback = self._memory.allocate(), self._memory.allocate()
         period = description.period_ns
-        self.emit("rcl_timer_init", handle, period)
+        symbol = symbols.timer_callback(node.description.name)
+        group, executor = node.groups[description.group]
+        if node.description.is_agnocast:
+            callback = handle
+            self.emit(
+                "agnocast_agnocast_timer_init", handle, node.handle, self._memory.on_stack(),
+                group.handle, symbol, period // self.thread.machine.layout.timer_unit_ns,
+            )  # fmt: skip
+        else:
+            self.emit("rcl_timer_init", handle, period)
         period = int(period / description.rate)
         due = self.time + period
-        symbol = symbols.timer_callback(node.description.name)
-        self._emit_of_rclcpp("rclcpp_timer_callback_added", handle, callback)
-        self._emit_of_rclcpp("rclcpp_callback_register", callback, symbol)
-        self._emit_of_rclcpp("rclcpp_timer_link_node", handle, node.handle)
-        group, executor = node.groups[description.group]
+        if not node.description.is_agnocast:
+            self._emit_of_rclcpp("rclcpp_timer_callback_added", handle, callback)
+            self._emit_of_rclcpp("rclcpp_callback_register", callback, symbol)
+            self._emit_of_rclcpp("rclcpp_timer_link_node", handle, node.handle)
         code = self._code(node, description, executor)
         name = node.description.full_name
         executor.timers.append(
@@ -403,7 +434,15 @@ class Creator:
             deeds(description.first, node.objects)
             if isinstance(description, entity.Subscription)
             else (),
+            description.is_agnocast
+            if isinstance(description, entity.Subscription)
+            else node.description.is_agnocast,
         )
+
+    def _next_callback(self) -> int:
+        """What Agnocast calls a callback: pid and number."""
+        self._process.agnocast_callbacks += 1
+        return self._process.pid << 32 | self._process.agnocast_callbacks
 
     def _buffer(self, subscription: SubscriptionObject, symbol: str) -> IntraBuffer:
         """The intra-process object of a subscription, which has a callback of its own."""

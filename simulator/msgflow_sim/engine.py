@@ -255,7 +255,7 @@ def _subscriptions(scenario: Scenario) -> Counter[str]:
     expected: Counter[str] = Counter()
     for process in scenario.processes:
         for node in process.nodes:
-            expected.update(subscription.topic for subscription in node.subscriptions)
+            expected.update(subscription.route for subscription in node.subscriptions)
             expected[PARAMETER_EVENTS] += process.client_library == "rclcpp"
     return expected
 

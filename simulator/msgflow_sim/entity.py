@@ -125,6 +125,7 @@ class Publisher:
         intra_process: subscriptions of the process that want it get messages without DDS.
         transient_local: the last `depth` messages are kept for subscriptions that come late.
         lifespan_ns: a message that waits for longer cannot be taken any more.
+        is_agnocast: its messages go through the shared memory of Agnocast.
         is_buffer_aware: its messages go to the channels of its subscriptions, in releases that
             have these, unless one of them has no channel.
     """
@@ -137,6 +138,7 @@ class Publisher:
     transient_local: bool = False
     lifespan_ns: int | None = None
     is_buffer_aware: bool = False
+    is_agnocast: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,6 +164,7 @@ class Subscription:
         created_ns: when a thread of the user creates it, after the begin of tracing; None: with
             the other objects of the node.
         destroyed_ns: when that thread destroys it; its addresses are free then.
+        is_agnocast: see `Publisher`.
         channel: of publishers that are aware of buffers: 'own', 'shared' with the other
             subscriptions of the topic that say so, or none.
     """
@@ -184,6 +187,12 @@ class Subscription:
     destroyed_ns: int | None = None
     first: tuple[Action, ...] = ()
     channel: str = ""
+    is_agnocast: bool = False
+
+    @property
+    def route(self) -> str:
+        """What its messages go through: a topic, or one of Agnocast."""
+        return f"agnocast {self.topic}" if self.is_agnocast else self.topic
 
 
 @dataclass(frozen=True, slots=True)

@@ -124,6 +124,30 @@ SIGNATURES: Mapping[str, tuple[EventField, ...]] = MappingProxyType(
             "ros2:message_link_periodic_async": "subs sequence, pubs sequence",
             "ros2:message_link_partial_sync": "subs sequence, pubs sequence",
             "ros2:message_link_approximate_sync": "subs sequence, pubs sequence",
+            "agnocast:agnocast_init": "context_handle pointer",
+            "agnocast:agnocast_node_init": "node_handle pointer, node_name string, "
+            "namespace string",
+            "agnocast:agnocast_publisher_init": "publisher_handle pointer, node_handle pointer, "
+            "topic_name string, queue_depth unsigned",
+            "agnocast:agnocast_subscription_init": "subscription_handle pointer, "
+            "node_handle pointer, callback pointer, callback_group pointer, symbol string, "
+            "topic_name string, queue_depth unsigned, pid_callback_info_id unsigned, "
+            "pid_ciid unsigned",
+            "agnocast:agnocast_timer_init": "timer_handle pointer, node_handle pointer, "
+            "callback pointer, callback_group pointer, symbol string, period signed",
+            "agnocast:agnocast_construct_executor": "executor_addr pointer, "
+            "executor_type_name string",
+            "agnocast:agnocast_add_callback_group": "executor_addr pointer, node_handle pointer, "
+            "callback_group_addr pointer, group_type_name string",
+            "agnocast:agnocast_publish": "publisher_handle pointer, message pointer, "
+            "entry_id signed",
+            "agnocast:agnocast_create_callable": "callable pointer, message pointer, "
+            "entry_id signed, pid_callback_info_id unsigned, pid_ciid unsigned",
+            "agnocast:agnocast_create_timer_callable": "callable pointer, timer_handle pointer",
+            "agnocast:agnocast_callable_start": "callable pointer",
+            "agnocast:agnocast_callable_end": "callable pointer",
+            "agnocast:agnocast_take": "subscription_handle pointer, message pointer, "
+            "entry_id signed",
             "dds:create_writer": "writer pointer, topic_name string, gid_prefix bytes 12, "
             "gid_entity bytes 4, gid bytes 16",
             "dds:create_reader": "reader pointer, topic_name string, gid_prefix bytes 12, "

@@ -24,10 +24,14 @@ _WITHOUT_CALLBACKS = frozenset({"wait_set"})
 
 @dataclass(slots=True)
 class CallbackGroup:
-    """Callbacks that exclude each other, unless it is reentrant; `is_busy` while one runs."""
+    """Callbacks that exclude each other, unless it is reentrant; `is_busy` while one runs.
+
+    `handle`: its address, where an event names it.
+    """
 
     is_reentrant: bool = False
     is_busy: bool = False
+    handle: int = 0
 
 
 class Entity(Protocol):
@@ -67,6 +71,7 @@ class Executor:
     Attributes:
         timers: of its nodes; likewise `subscriptions` and `waitables` (services, clients, buffers).
         has_events: it emits executor events.
+        handle: its address, where an event names it.
         has_callbacks: it calls callbacks, which emit events.
         owner: the thread that looks for something ready, or waits; others are blocked meanwhile.
         sleeper: the thread that waits.
@@ -82,6 +87,7 @@ class Executor:
         self.waitables: list[Entity] = []
         self.has_events = is_rclcpp and description.kind in _HAVING_EVENTS
         self.has_callbacks = is_rclcpp and description.kind not in _WITHOUT_CALLBACKS
+        self.handle = 0
         self.owner: Spinner | None = None
         self.sleeper: Spinner | None = None
         self.thread_count = description.thread_count

@@ -48,6 +48,8 @@ class Layout:
         has_channels: the middleware layer (rmw_zenoh) writes a message with buffers to one channel
             after the other, each time with a stamp of its own, and emits no rmw_publish.
         dds_write: the `dds:*` events of a publication, in order.
+        is_callable_queued: Agnocast makes callables when it fetches messages (before 2.2).
+        timer_unit_ns: unit of the periods of Agnocast's timers.
         packet_bytes: size of a sub-buffer, hence of a packet.
         tracer_minor: of LTTng 2.x.
     """
@@ -61,6 +63,8 @@ class Layout:
     has_end_of_deferred: bool = False
     has_channels: bool = False
     dds_write: tuple[str, ...] = ()
+    is_callable_queued: bool = False
+    timer_unit_ns: int = 1
     packet_bytes: int = _LARGE_PACKET
     tracer_minor: int = 13
 
@@ -275,6 +279,58 @@ def _with_early_cyclone_dds(layout: Layout) -> Layout:
     )
 
 
+_OF_AGNOCAST = (
+    "init", "node_init", "construct_executor", "create_timer_callable", "callable_start",
+    "callable_end", "take",
+)  # fmt: skip
+
+
+def _with_agnocast(layout: Layout) -> Layout:
+    """Agnocast 2.3 beside ROS 2."""
+    subscription = (
+        "subscription_handle pointer, node_handle pointer, callback pointer, "
+        "callback_group pointer, symbol string, topic_name string, queue_depth unsigned, "
+        "pid_callback_info_id unsigned"
+    )
+    return replace(
+        layout,
+        name=f"{layout.name}-agnocast",
+        events=_events(
+            layout.having(
+                *(f"agnocast_{name}" for name in (*_OF_AGNOCAST, "publisher_init", "timer_init")),
+                "agnocast_add_callback_group",
+                provider="agnocast",
+                agnocast_subscription_init=subscription,
+                agnocast_publish="publisher_handle pointer, entry_id signed",
+                agnocast_create_callable="callable pointer, entry_id signed, "
+                "pid_callback_info_id unsigned",
+            )
+        ),
+    )
+
+
+def _with_early_agnocast(layout: Layout) -> Layout:
+    """Agnocast 2.1."""
+    return replace(
+        layout,
+        name=f"{layout.name}-agnocast",
+        events=_events(
+            layout.having(
+                *(f"agnocast_{name}" for name in (*_OF_AGNOCAST, "publisher_init", "timer_init")),
+                "agnocast_publish",
+                provider="agnocast",
+                agnocast_subscription_init="subscription_handle pointer, node_handle pointer, "
+                "callback pointer, callback_group pointer, symbol string, topic_name string, "
+                "queue_depth unsigned, pid_ciid unsigned",
+                agnocast_create_callable="callable pointer, message pointer, entry_id signed, "
+                "pid_ciid unsigned",
+            )
+        ),
+        is_callable_queued=True,
+        timer_unit_ns=1_000_000,
+    )
+
+
 def _with_message_links(layout: Layout) -> Layout:
     """The branch for annotations, which users of the instrumented DDS also use."""
     return replace(layout, events=_events(layout.having(*_MESSAGE_LINKS)))
@@ -295,8 +351,10 @@ def layouts() -> Mapping[str, Layout]:
         _with_cyclone_dds(annotated),
         _with_fast_dds(annotated, is_write_first=False),
         _with_fast_dds(annotated, suffix="fastdds-write-first", is_write_first=True),
+        _with_early_agnocast(_HUMBLE),
         _IRON,
         _JAZZY,
+        _with_agnocast(_JAZZY),
         _KILTED,
         _ROLLING,
     )

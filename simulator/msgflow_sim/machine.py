@@ -121,7 +121,7 @@ class RunningProcess:
         number: its number among all processes; `life` counts those of this id before it.
         memory: its addresses.
         threads: those that execute callbacks.
-        goal_threads: how many execute goals of actions.
+        goal_threads: how many execute goals of actions; `agnocast_callbacks` likewise.
         is_stopped: it has ended, or ends as soon as its threads have executed what they execute.
         is_stepwise: it may end in the middle of a callback.
     """
@@ -154,6 +154,7 @@ class RunningProcess:
             + bytes((1, 0, 0, 0))
         )
         self.goal_threads = 0
+        self.agnocast_callbacks = 0
         self._entities = 0
 
     def is_shut_down(self, time: int) -> bool:

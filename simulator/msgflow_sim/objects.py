@@ -32,11 +32,12 @@ class Message:
         rmw: time of rmw_publish, or of the last event without one; `intra` that of
             rclcpp_intra_publish.
         stamp_ns: its source stamp, the first one if it was written several times.
+        entry_id: number that Agnocast gave to it.
         stamps: source stamps by subscription if it was written to channels, else None.
     """
 
     __slots__ = (
-        "header_ns", "intra", "intra_ns", "origins", "publication_id", "publisher", "rcl_ns",
+        "entry_id", "header_ns", "intra", "intra_ns", "origins", "publication_id", "publisher", "rcl_ns",
         "rclcpp_ns", "rmw", "rmw_ns", "stamp_ns", "stamps", "tid",
     )  # fmt: skip
 
@@ -65,6 +66,7 @@ class Message:
         self.rmw: int | None = None
         self.rmw_ns: int | None = None
         self.stamp_ns: int | None = None
+        self.entry_id: int | None = None
         self.stamps: Mapping[SubscriptionObject, int] | None = None
 
     def stamp_for(self, subscription: SubscriptionObject) -> int | None:
@@ -134,6 +136,11 @@ class PublisherObject:
     is_silent: bool = False
     history: deque[Message] | None = None
     sent: list[Message] = field(default_factory=list)
+
+    @property
+    def route(self) -> str:
+        """See `Subscription.route`."""
+        return f"agnocast {self.topic}" if self.description.is_agnocast else self.topic
 
     def channels(self, time: int) -> list[list[SubscriptionObject]] | None:
         """The subscriptions of each channel that a message of `time` is written to, in order.
@@ -278,6 +285,7 @@ class UserCode:
         is_stepwise: other threads must be able to act between its publications.
         is_callback: it runs in a callback that is traced.
         links: what it has to do with caches of its node.
+        is_agnocast: a callable of Agnocast runs it.
         first: what it does before anything else, like `deeds`.
     """
 
@@ -289,6 +297,7 @@ class UserCode:
     is_callback: bool = True
     links: CallbackLinks | None = None
     first: tuple[Callable[..., Steps], ...] = ()
+    is_agnocast: bool = False
 
 
 @dataclass(slots=True, eq=False)

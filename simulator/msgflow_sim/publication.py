@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from msgflow_sim import agnocast
 from msgflow_sim.objects import Message
 from msgflow_sim.rmw import write, write_to_channels
 
@@ -38,6 +39,11 @@ def publish(
     if message is None:
         message = Message(next(scheduler.publication_ids), publisher, thread.tid, instance)
 
+    if publisher.description.is_agnocast:
+        end = agnocast.put(thread, middleware, publisher, message, time)
+        write_publication(thread, publisher, message, instance)
+        middleware.send(time, message)
+        return end + 1_000 + int(random() * 2_000)
     if thread.process.is_shut_down(time):
         # rcl refuses the message, so only the event of rclcpp is left.
         if publisher.is_rclcpp and not publisher.is_silent:

@@ -121,7 +121,9 @@ class Startup:
             time = yield from thread.spin(executor, time)
         else:
             time = yield from thread.poll(executor, time, description.polled_ns)
-        for _ in self._process.description.nodes:
+        for node in self._process.description.nodes:
+            if node.is_agnocast:
+                continue
             time = yield time
             while later := thread.take_cpu(time):
                 time = yield later
@@ -132,11 +134,23 @@ class Startup:
 
     def _sequence(self) -> Iterator[bool]:
         process, creator = self._process, self._creator
-        creator.emit("rcl_init", process.memory.allocate(), self._version)
-        creator.work(800 * MICROSECOND)
-        self._listener = DiscoveryListener(process)
-        creator.discovery(self._listener.rmw_handle)
-        self._discovery.join(self._listener)
+        if any(not node.is_agnocast for node in process.description.nodes):
+            creator.emit("rcl_init", process.memory.allocate(), self._version)
+            creator.work(800 * MICROSECOND)
+            self._listener = DiscoveryListener(process)
+            creator.discovery(self._listener.rmw_handle)
+            self._discovery.join(self._listener)
+            yield True
+        if any(node.is_agnocast for node in process.description.nodes):
+            creator.emit("agnocast_agnocast_init", process.memory.allocate())
+        for executor, described in zip(self._executors, process.description.executors, strict=True):
+            if described.kind == "agnocast":
+                executor.handle = process.memory.allocate()
+                kind = "single" if described.thread_count == 1 else "multi"
+                creator.emit(
+                    "agnocast_agnocast_construct_executor", executor.handle,
+                    f"agnocast_{kind}_threaded_executor",
+                )  # fmt: skip
         yield True
         for node in process.description.nodes:
             yield from self._create_node(node)
@@ -146,6 +160,13 @@ class Startup:
         context = NodeContext.of(node, memory.allocate(), self._executors, self._links)
         self._created[node.full_name] = context
         creator.work(300 * MICROSECOND)
+        for group, executor in context.groups.values():
+            if executor.handle:
+                group.handle = memory.allocate()
+        if node.is_agnocast:
+            creator.emit("agnocast_agnocast_node_init", context.handle, node.name, node.namespace)
+            yield from self._create_shared(context)
+            return
         creator.announce()
         described = (context.handle, memory.allocate(), node.name, node.namespace)
         is_rosout_first = self._process.machine.layout.is_rosout_first
@@ -161,8 +182,19 @@ class Startup:
             creator.emit("rcl_node_init", *described)
             yield True
         yield from self._create_parameters(context)
-        yield from self._create_objects(context)
+        yield from self._create_shared(context)
         self._publish(rosout)
+        yield True
+
+    def _create_shared(self, node: NodeContext) -> Iterator[bool]:
+        """The objects of a node, and then its callback groups join executors of Agnocast."""
+        yield from self._create_objects(node)
+        for group, executor in node.groups.values():
+            if executor.handle:
+                self._creator.emit(
+                    "agnocast_agnocast_add_callback_group", executor.handle, node.handle,
+                    group.handle, "reentrant" if group.is_reentrant else "mutually_exclusive",
+                )  # fmt: skip
         yield True
 
     def _create_parameters(self, node: NodeContext) -> Iterator[bool]:

@@ -52,7 +52,7 @@ class Executor:
 
     Attributes:
         kind: 'single_threaded', 'multi_threaded', 'static_single_threaded' (without executor
-            events), 'wait_set' (user code that waits and takes by itself: neither executor events
+            events), 'agnocast' (likewise, and names itself), 'wait_set' (user code that waits and takes by itself: neither executor events
             nor callbacks), 'nested' (only callbacks spin it, which wait for something).
         thread_count: its threads; the first one of the first executor is the main thread.
         polled_ns: the main thread executes what is ready, and then does something else for so long
@@ -84,6 +84,7 @@ class Node:
         executor: number of the executor that spins it.
         has_parameters: parameter services and events, which helper nodes do without.
         is_managed: it has a lifecycle (`Transition`).
+        is_agnocast: it is a node of Agnocast, not of rcl, and so are its timers.
     """
 
     name: str
@@ -100,6 +101,7 @@ class Node:
     executor: int = 0
     has_parameters: bool = True
     is_managed: bool = False
+    is_agnocast: bool = False
 
     @property
     def full_name(self) -> str:

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections import Counter, defaultdict, deque
 from typing import TYPE_CHECKING
 
-from msgflow_sim.latency import latency_between
+from msgflow_sim.latency import AGNOCAST, latency_between
 from msgflow_sim.objects import Match
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from msgflow_sim.machine import RunningProcess
+    from msgflow_sim.machine import Machine, RunningProcess
     from msgflow_sim.objects import Message, PublisherObject, RingBuffer, SubscriptionObject
     from msgflow_sim.scheduler import Scheduler
 
@@ -42,23 +42,26 @@ class Middleware:
         self.full_queues = 0
         self.failed_takes = 0
         self.undelivered: dict[str, int] = {}
+        self._numbers: Counter[tuple[Machine, str]] = Counter()
         self._publishers: dict[str, list[PublisherObject]] = defaultdict(list)
         self._subscriptions: dict[str, list[SubscriptionObject]] = defaultdict(list)
 
     def add_publisher(self, publisher: PublisherObject) -> None:
         """A publisher was created: match it with the subscriptions there are."""
-        self._publishers[publisher.topic].append(publisher)
+        self._publishers[publisher.route].append(publisher)
         if publisher.description.transient_local:
             publisher.history = deque(maxlen=publisher.description.depth)
-        for subscription in self._subscriptions[publisher.topic]:
+        for subscription in self._subscriptions[publisher.route]:
             self._match(publisher, subscription)
 
     def add_subscription(self, subscription: SubscriptionObject) -> None:
         """A subscription was created: match it with the publishers there are."""
-        topic = subscription.description.topic
-        self._subscriptions[topic].append(subscription)
-        self._expected[topic] -= 1
-        for publisher in self._publishers[topic]:
+        route = subscription.description.route
+        self._subscriptions[route].append(subscription)
+        self._expected[route] -= 1
+        if subscription.description.is_agnocast:
+            self.next_number(subscription.process, route)
+        for publisher in self._publishers[route]:
             self._match(publisher, subscription)
 
     def end_subscription(self, subscription: SubscriptionObject, time: int) -> None:
@@ -70,7 +73,7 @@ class Middleware:
             ring = subscription.intra.ring.messages
             while ring:
                 self.lose(ring.popleft(), subscription, "subscription_ended")
-            for publisher in self._publishers[subscription.description.topic]:
+            for publisher in self._publishers[subscription.description.route]:
                 if publisher.intra is not None and subscription.intra in publisher.intra.targets:
                     publisher.intra.targets.remove(subscription.intra)
 
@@ -91,6 +94,16 @@ class Middleware:
             for publisher in publishers:
                 if publisher.process is process:
                     publisher.history = None
+        for machine, route in [key for key in self._numbers if key[0] is process.machine]:
+            users = (*self._publishers[route], *self._subscriptions[route])
+            if all(user.process.is_stopped for user in users if user.process.machine is machine):
+                # The topic dies with its last user.
+                del self._numbers[machine, route]
+
+    def next_number(self, process: RunningProcess, route: str) -> int:
+        """The next number on a topic of Agnocast, which counts on one machine, from 0."""
+        self._numbers[process.machine, route] += 1
+        return self._numbers[process.machine, route] - 1
 
     def send(self, time: int, message: Message) -> None:
         """Send a message at `time` to the subscriptions that the publisher knows."""
@@ -114,7 +127,7 @@ class Middleware:
     def remember(self, message: Message) -> None:
         """Keep a message as long as there are subscriptions to come that have missed it."""
         publisher = message.publisher
-        if self._expected[publisher.topic]:
+        if self._expected[publisher.route]:
             publisher.sent.append(message)
 
     def miss(self, message: Message, match: Match, time: int) -> None:
@@ -136,7 +149,7 @@ class Middleware:
         queue = subscription.queue
         if len(queue) >= subscription.description.depth:
             self.full_queues += 1
-            if self._overwrites:
+            if self._overwrites or subscription.description.is_agnocast:
                 self.drop(queue.popleft(), subscription, "overwritten")
         queue.append(message)
         if subscription.process.machine.kernel is not None:
@@ -223,6 +236,10 @@ class Middleware:
 
     def _match(self, publisher: PublisherObject, subscription: SubscriptionObject) -> None:
         latency = latency_between(publisher.process, subscription.process)
+        if publisher.description.is_agnocast:
+            if publisher.process.machine is not subscription.process.machine:
+                return
+            latency = AGNOCAST
         since = max(publisher.created, subscription.created) + latency.discovery
         since += int(self._scheduler.random() * latency.discovery_spread)
         since += subscription.description.discovery_ns
@@ -245,7 +262,7 @@ class Middleware:
         else:
             for message in publisher.sent:
                 self.drop(message, subscription, _early(message, subscription))
-        if not self._expected[publisher.topic]:
+        if not self._expected[publisher.route]:
             publisher.sent.clear()
 
     def _replay(self, time: int, match: Match) -> None:

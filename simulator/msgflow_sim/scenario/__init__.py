@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from msgflow_sim.scenario import (
     actions,
+    agnocast,
     annotated,
     autoware,
     bursts,
@@ -93,5 +94,6 @@ def scenarios() -> Mapping[str, Scenario]:
         scheduling.shared_map(),
         scheduling.shared_memory(),
         scheduling.kernel_losses(),
+        agnocast.agnocast(),
     )
     return MappingProxyType({scenario.name: scenario for scenario in built_in})
