@@ -7,24 +7,23 @@
 --     the kernel.
 -- grain: one row per publication on a topic with a subscription, and clock of its subscriptions
 WITH audience AS (
-    SELECT DISTINCT s.run_id, s.topic_name, s.is_agnocast, c.clock_id
+    SELECT DISTINCT
+        s.run_id, derive.own_topic(s.topic_name, s.is_agnocast, c.clock_id) AS topic_name,
+        c.clock_id
     FROM store.subscription AS s
     JOIN derive.process_clock AS c ON s.process_id = c.process_id
     WHERE s.topic_name IS NOT NULL
 ),
 sent AS (
     SELECT
-        b.run_id, b.publication_id, b.publisher_id,
-        derive.own_topic(p.topic_name, p.is_agnocast) AS topic_name, b.intra_ns, b.end_ns,
+        b.run_id, b.publication_id, b.publisher_id, a.topic_name, b.intra_ns, b.end_ns,
         b.source_timestamp_ns, f.clock_id AS from_clock_id, a.clock_id
     FROM store.publication AS b
     JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
     JOIN derive.process_clock AS f ON p.process_id = f.process_id
     JOIN audience AS a
         ON p.run_id = a.run_id
-        AND p.topic_name = a.topic_name
-        AND p.is_agnocast = a.is_agnocast
-        AND (NOT p.is_agnocast OR f.clock_id = a.clock_id)
+        AND derive.own_topic(p.topic_name, p.is_agnocast, f.clock_id) = a.topic_name
 )
 SELECT
     run_id, publication_id, publisher_id, topic_name, source_timestamp_ns, clock_id,

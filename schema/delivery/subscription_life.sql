@@ -40,7 +40,7 @@ showing AS (
 SELECT
     s.run_id,
     s.subscription_id,
-    derive.own_topic(s.topic_name, s.is_agnocast) AS topic_name,
+    derive.own_topic(s.topic_name, s.is_agnocast, h.clock_id) AS topic_name,
     s.is_agnocast,
     s.process_id,
     h.clock_id,

@@ -24,7 +24,8 @@ publication — one row per publication:
     source_timestamp_ns, callback_instance_id (the callback that published, else NULL),
     is_internal, intra_ns (rclcpp_intra_publish; such a publication has the others only if a
     subscription needs DDS). node and publisher_handle are NULL for ros_discovery_info. After a
-    shutdown, only rclcpp_ns is there: nothing was sent.
+    shutdown, only rclcpp_ns is there: nothing was sent. Of Agnocast, rclcpp_ns is that of its
+    event, and the rmw handle 0.
 take — one row per message that was handed over to a subscription:
     take_id, host, pid, tid, node, topic_name, subscription_handle, rmw_ns, rcl_ns, rclcpp_ns,
     source_timestamp_ns, publication_id, callback_instance_id (NULL: taken without a callback),

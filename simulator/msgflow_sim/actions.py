@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING
 
-from msgflow_sim.callback_instance import CallbackInstance
 from msgflow_sim import agnocast
+from msgflow_sim.callback_instance import CallbackInstance
 from msgflow_sim.entity import Answer, Call, Poll, Publish, Record, SendGoal, Spin, Transition
 from msgflow_sim.publication import publish
 from msgflow_sim.services import ClientObject, ServiceObject, answer, call

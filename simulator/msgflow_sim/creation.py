@@ -189,6 +189,7 @@ class Creator:
         subscription, callback = memory.allocate(), memory.allocate()
         group, executor = node.groups[description.group]
         if description.is_agnocast:
+            rmw_handle = 0
             callback = 0 if description.polled else self._next_callback()
             self.emit(
                 "agnocast_agnocast_subscription_init", handle, node.handle, memory.on_stack(),
@@ -428,7 +429,7 @@ class Creator:
             actions,
             bool(actions)
             or self._process.is_stepwise
-            or any(publisher.intra is not None for publisher in publishers),
+            or any(each.intra is not None or each.description.is_agnocast for each in publishers),
             executor.has_callbacks,
             _links(node, description),
             deeds(description.first, node.objects)

@@ -37,8 +37,8 @@ class Message:
     """
 
     __slots__ = (
-        "entry_id", "header_ns", "intra", "intra_ns", "origins", "publication_id", "publisher", "rcl_ns",
-        "rclcpp_ns", "rmw", "rmw_ns", "stamp_ns", "stamps", "tid",
+        "entry_id", "header_ns", "intra", "intra_ns", "origins", "publication_id", "publisher",
+        "rcl_ns", "rclcpp_ns", "rmw", "rmw_ns", "stamp_ns", "stamps", "tid",
     )  # fmt: skip
 
     def __init__(

@@ -115,7 +115,7 @@ class Middleware:
             if match.subscription.ended is not None or match.since > time:
                 self.miss(message, match, time)
                 continue
-            if message.stamp_for(match.subscription) is None:
+            if message.entry_id is None and message.stamp_for(match.subscription) is None:
                 # Discovered while it was written to the channels of others.
                 self.drop(message, match.subscription, "before_discovery")
                 continue
@@ -274,10 +274,20 @@ class Middleware:
             kept = message.publisher.history
             if subscription.ended is not None:
                 self.drop(message, subscription, "subscription_ended")
-            elif kept is not None and message in kept:
+            elif kept is not None and message in _wanted(kept, subscription):
                 self._deliver(time, message, match)
             else:
                 self.drop(message, subscription, _early(message, subscription))
+
+
+def _wanted(kept: deque[Message], subscription: SubscriptionObject) -> list[Message]:
+    """What is kept for a subscription; Agnocast keeps no more than it wants."""
+    messages = list(kept)
+    return (
+        messages[-subscription.description.depth :]
+        if subscription.description.is_agnocast
+        else messages
+    )
 
 
 def _early(message: Message, subscription: SubscriptionObject) -> str:

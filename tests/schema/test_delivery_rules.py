@@ -23,7 +23,7 @@ CREATE TABLE derive.subscription_life (run_id BIGINT DEFAULT 1, subscription_id 
     queue_depth BIGINT DEFAULT 10, created_ns BIGINT DEFAULT 0,
     last_seen_ns BIGINT DEFAULT 10_000_000_000, replaced_ns BIGINT,
     host_end_ns BIGINT DEFAULT 10_000_000_000, only_thread_id BIGINT DEFAULT 1,
-    shows_takes BOOLEAN DEFAULT true);
+    shows_takes BOOLEAN DEFAULT true, is_agnocast BOOLEAN DEFAULT false);
 CREATE TABLE gap (process_id BIGINT DEFAULT 1, start_ns BIGINT, covered_until_ns BIGINT);
 CREATE MACRO derive.process_gap(only_run) AS TABLE FROM gap;
 CREATE TABLE store.publisher (publisher_id BIGINT, created_ns BIGINT,
@@ -924,3 +924,17 @@ def fill(con: duckdb.DuckDBPyConnection, chance: random.Random, grid: int, begin
                 "INSERT INTO store.link_transport VALUES (1, ?, ?, ?, ?, false)",
                 [publication, publisher, number, take],
             )
+
+
+def test_agnocast_loses_nothing(delivery: Delivery) -> None:
+    """What a reader passed over was overwritten, also before the first message that it took."""
+    delivery.lives(is_agnocast=True)
+    before = delivery.publish(1 * MS)
+    delivery.publish(2 * MS, 3 * MS)
+    passed = delivery.publish(300 * MS)
+    delivery.waits(301 * MS, 900 * MS)
+    delivery.publish(901 * MS, 902 * MS)
+    last = delivery.publish(9_999 * MS)
+    assert [delivery.reason(number) for number in (before, passed, last)] == [
+        "overwritten", "overwritten", "pending_at_end",
+    ]  # fmt: skip

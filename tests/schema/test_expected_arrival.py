@@ -22,15 +22,17 @@ CREATE TABLE derive.clock_shift AS FROM (
     (1, 3, 2, 150, 96), (1, 1, 3, 150, 97), (1, 2, 1, 150, 98), (2, 1, 2, 150, 99)
 ) AS s(run_id, from_clock_id, to_clock_id, from_ns, shift_ns);
 CREATE TABLE store.subscription AS FROM (
-    VALUES (1, '/a', 1), (1, '/a', 2), (1, '/a', 2), (1, '/b', 3), (2, '/a', 4)
-) AS s(run_id, topic_name, process_id);
+    VALUES (1, '/a', 1, false), (1, '/a', 2, false), (1, '/a', 2, false), (1, '/b', 3, false),
+        (2, '/a', 4, false), (1, '/a', 3, true)
+) AS s(run_id, topic_name, process_id, is_agnocast);
 CREATE TABLE store.publisher AS FROM (
-    VALUES (1, 1, '/a', 1), (1, 2, '/c', 1)
-) AS p(run_id, publisher_id, topic_name, process_id);
+    VALUES (1, 1, '/a', 1, false), (1, 2, '/c', 1, false), (1, 3, '/a', 1, true),
+        (1, 4, '/a', 3, true)
+) AS p(run_id, publisher_id, topic_name, process_id, is_agnocast);
 CREATE TABLE store.publication (run_id INTEGER, publication_id INTEGER, publisher_id INTEGER,
     intra_ns INTEGER, end_ns INTEGER, source_timestamp_ns INTEGER);
 """
-RULES = ("corrected_ns", "recorded_ns", "expected_arrival")
+RULES = ("corrected_ns", "recorded_ns", "own_topic", "expected_arrival")
 ARRIVALS = "SELECT clock_id, arrival_ns, has_one_clock FROM derive.expected_arrival ORDER BY ALL"
 
 
@@ -79,3 +81,11 @@ def test_nothing_arrives_without_a_subscription() -> None:
     with derived(STAGE, RULES) as con:
         con.execute("INSERT INTO store.publication VALUES (1, 1, 2, NULL, 203, 203)")
         assert con.execute(ARRIVALS).fetchall() == []
+
+
+@pytest.mark.parametrize(("publisher", "rows"), [(3, []), (4, [(3, 203, True)])])
+def test_agnocast_ends_at_the_kernel(publisher: int, rows: list[object]) -> None:
+    """Its topic is another one than that of ROS 2 with its name."""
+    with derived(STAGE, RULES) as con:
+        con.execute("INSERT INTO store.publication VALUES (1, 1, ?, NULL, 203, NULL)", [publisher])
+        assert con.execute(ARRIVALS).fetchall() == rows

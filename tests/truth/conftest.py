@@ -30,6 +30,7 @@ _LENGTHS = {
 _SHORT = 0.15
 # Flows in them pass ring buffers, messages taken without a callback, or calls of services.
 _WITH_GAPS = (
+    "agnocast",
     "intra_process",
     "mixed_intra_process",
     "overwritten_copies",

@@ -8,17 +8,27 @@
 -- cure: Report what msgflow check --detail prints, together with the trace.
 -- grain: one row per run and topic, or run, for which the sums differ
 -- severity: error
-WITH published AS (
+WITH publisher AS (
+    SELECT
+        p.run_id, p.publisher_id,
+        derive.own_topic(p.topic_name, p.is_agnocast, c.clock_id) AS topic_name
+    FROM store.publisher AS p
+    JOIN derive.process_clock AS c ON p.process_id = c.process_id
+),
+published AS (
     SELECT p.run_id, p.topic_name, count(*) AS number
     FROM store.publication AS b
-    JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
+    JOIN publisher AS p ON b.publisher_id = p.publisher_id
     WHERE p.topic_name IS NOT NULL
     GROUP BY p.run_id, p.topic_name
 ),
 subscription AS (
-    SELECT run_id, subscription_id, topic_name
-    FROM store.subscription
-    WHERE NOT coalesce(is_inferred AND rmw_handle IS NULL, false)
+    SELECT
+        s.run_id, s.subscription_id,
+        derive.own_topic(s.topic_name, s.is_agnocast, c.clock_id) AS topic_name
+    FROM store.subscription AS s
+    JOIN derive.process_clock AS c ON s.process_id = c.process_id
+    WHERE NOT coalesce(s.is_inferred AND s.rmw_handle IS NULL, false)
 ),
 subscribed AS (
     SELECT run_id, topic_name, count(*) AS number
@@ -33,7 +43,7 @@ delivered AS (
         FROM store.link_transport
         WHERE is_copy IS NOT TRUE
     ) AS l
-    JOIN store.publisher AS p ON l.publisher_id = p.publisher_id
+    JOIN publisher AS p ON l.publisher_id = p.publisher_id
     JOIN subscription AS s ON l.subscription_id = s.subscription_id
     WHERE p.topic_name = s.topic_name
     GROUP BY s.run_id, s.topic_name
@@ -41,7 +51,7 @@ delivered AS (
 not_judged AS (
     SELECT p.run_id, p.topic_name, count(*) AS number
     FROM derive.copied_pair AS c
-    JOIN store.publisher AS p ON c.publisher_id = p.publisher_id
+    JOIN publisher AS p ON c.publisher_id = p.publisher_id
     JOIN subscription AS s
         ON c.subscription_id = s.subscription_id AND p.topic_name = s.topic_name
     JOIN store.publication AS b ON c.publisher_id = b.publisher_id
