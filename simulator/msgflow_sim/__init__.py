@@ -24,13 +24,14 @@ publication — one row per publication:
     source_timestamp_ns, callback_instance_id (the callback that published, else NULL),
     is_internal, intra_ns (rclcpp_intra_publish; such a publication has the others only if a
     subscription needs DDS). node and publisher_handle are NULL for ros_discovery_info. After a
-    shutdown, only rclcpp_ns is there: nothing was sent. Of Agnocast, rclcpp_ns is that of its
-    event, and the rmw handle 0.
+    shutdown, only rclcpp_ns is there: nothing was sent. agnocast_ns: agnocast_publish; then
+    all others are NULL, and the rmw handle is 0.
 take — one row per message that was handed over to a subscription:
     take_id, host, pid, tid, node, topic_name, subscription_handle, rmw_ns, rcl_ns, rclcpp_ns,
     source_timestamp_ns, publication_id, callback_instance_id (NULL: taken without a callback),
-    is_internal, method ('rmw', 'ring_buffer', 'callback_only': without an event of its own),
-    dequeue_ns (from a ring buffer), subscription_id. A message that comes through a ring buffer
+    is_internal, method ('rmw', 'ring_buffer', 'agnocast', 'callback_only': without an event of its
+    own), dequeue_ns (from a ring buffer), subscription_id, agnocast_ns (when its callable was made,
+    or it was polled). A message that comes through a ring buffer
     and DDS is taken twice; the second one has no callback.
 callback_instance — one row per run of a callback that is traced:
     callback_instance_id, host, pid, tid, node, kind ('timer', 'subscription', 'service'),

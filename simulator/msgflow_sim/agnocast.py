@@ -27,7 +27,7 @@ def put(thread: Thread, middleware: Middleware, publisher: PublisherObject, mess
     if random() < _LATE:
         end += 40_000 + int(random() * 40_000)
     message.entry_id = middleware.next_number(publisher.process, publisher.route)
-    message.rmw, message.rclcpp_ns = end, end + thread.machine.epoch
+    message.rmw, message.agnocast_ns = end, end + thread.machine.epoch
     thread.emit(
         thread.machine.tracepoints.agnocast_agnocast_publish, end, thread.context,
         publisher.handle, publisher.message, message.entry_id,
@@ -52,7 +52,7 @@ def get(
         return None, reading
     taken = Taken(
         next(scheduler.take_ids), message, reading, "agnocast", None,
-        rclcpp_ns=reading + machine.epoch, is_replay=message.time < subscription.created,
+        agnocast_ns=reading + machine.epoch, is_replay=message.time < subscription.created,
     )  # fmt: skip
     if is_poll:
         thread.emit(

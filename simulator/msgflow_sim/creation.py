@@ -495,7 +495,7 @@ class Creator:
         publication_id = next(thread.scheduler.publication_ids)
         truth.publication.add(
             publication_id, *place, None, None, None, None, None, None, None, stamp_ns, None, True,
-            None,
+            None, None,
         )  # fmt: skip
         truth.dds_event.add(publication_id, *place, "dds:write", self.time + thread.machine.epoch)
 

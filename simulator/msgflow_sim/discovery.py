@@ -74,7 +74,7 @@ class Discovery:
         scheduler.truth.publication.add(
             publication_id, machine.hostname, thread.process.pid, thread.tid, None,
             _TOPIC, None, rmw_handle, None, None, written.rmw + machine.epoch, written.stamp_ns,
-            None, True, None,
+            None, True, None, None,
         )  # fmt: skip
         for listener in self._listeners:
             latency = latency_between(thread.process, listener.process)

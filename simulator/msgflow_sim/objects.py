@@ -32,13 +32,13 @@ class Message:
         rmw: time of rmw_publish, or of the last event without one; `intra` that of
             rclcpp_intra_publish.
         stamp_ns: its source stamp, the first one if it was written several times.
-        entry_id: number that Agnocast gave to it.
+        entry_id: number that Agnocast gave to it; `agnocast_ns` the time of its event.
         stamps: source stamps by subscription if it was written to channels, else None.
     """
 
     __slots__ = (
-        "entry_id", "header_ns", "intra", "intra_ns", "origins", "publication_id", "publisher",
-        "rcl_ns", "rclcpp_ns", "rmw", "rmw_ns", "stamp_ns", "stamps", "tid",
+        "agnocast_ns", "entry_id", "header_ns", "intra", "intra_ns", "origins", "publication_id",
+        "publisher", "rcl_ns", "rclcpp_ns", "rmw", "rmw_ns", "stamp_ns", "stamps", "tid",
     )  # fmt: skip
 
     def __init__(
@@ -67,6 +67,7 @@ class Message:
         self.rmw_ns: int | None = None
         self.stamp_ns: int | None = None
         self.entry_id: int | None = None
+        self.agnocast_ns: int | None = None
         self.stamps: Mapping[SubscriptionObject, int] | None = None
 
     def stamp_for(self, subscription: SubscriptionObject) -> int | None:

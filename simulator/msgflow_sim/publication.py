@@ -94,7 +94,7 @@ def write_publication(
         publisher.init_handle, publisher.rmw_handle, message.rclcpp_ns, message.rcl_ns,
         message.rmw_ns, message.stamp_ns,
         None if instance is None else instance.callback_instance_id, is_internal,
-        message.intra_ns,
+        message.intra_ns, message.agnocast_ns,
     )  # fmt: skip
     if instance is None:
         return

@@ -21,7 +21,8 @@ class Taken:
         take_id: of the truth.
         message: what was taken.
         time: when it was (rmw_take or dequeue, or when it would have been emitted).
-        rmw_ns: time of its event, None without one; likewise `rcl_ns`, `rclcpp_ns`, `dequeue_ns`.
+        rmw_ns: time of its event, None without one; likewise `rcl_ns`, `rclcpp_ns`,
+            `dequeue_ns`, `agnocast_ns`.
         is_copy: the same message comes through an intra-process buffer; this one is ignored.
         is_replay: kept by the publisher from before the subscription was there.
     """
@@ -34,6 +35,7 @@ class Taken:
     rcl_ns: int | None = None
     rclcpp_ns: int | None = None
     dequeue_ns: int | None = None
+    agnocast_ns: int | None = None
     is_copy: bool = False
     is_replay: bool = False
 
@@ -50,7 +52,7 @@ class Taken:
             self.take_id, hostname, pid, tid, subscription.node, publisher.topic,
             subscription.handle, self.rmw_ns, self.rcl_ns, self.rclcpp_ns, stamp_ns,
             message.publication_id, instance_id, is_internal, self.method, self.dequeue_ns,
-            subscription.subscription_id,
+            subscription.subscription_id, self.agnocast_ns,
         )  # fmt: skip
         arrived = subscription.arrivals.pop(message.publication_id, None)
         if arrived is not None:

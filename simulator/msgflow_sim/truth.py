@@ -30,13 +30,14 @@ _SCHEMAS: Mapping[str, pa.Schema] = {
         publication_id=_ID, host=_TEXT, pid=_NUMBER, tid=_NUMBER, node=_TEXT, topic_name=_TEXT,
         publisher_handle=_HANDLE, rmw_publisher_handle=_HANDLE, rclcpp_ns=_TIME, rcl_ns=_TIME,
         rmw_ns=_TIME, source_timestamp_ns=_TIME, callback_instance_id=_ID, is_internal=_FLAG,
-        intra_ns=_TIME,
+        intra_ns=_TIME, agnocast_ns=_TIME,
     ),
     "take": _schema(
         take_id=_ID, host=_TEXT, pid=_NUMBER, tid=_NUMBER, node=_TEXT, topic_name=_TEXT,
         subscription_handle=_HANDLE, rmw_ns=_TIME, rcl_ns=_TIME, rclcpp_ns=_TIME,
         source_timestamp_ns=_TIME, publication_id=_ID, callback_instance_id=_ID,
         is_internal=_FLAG, method=_TEXT, dequeue_ns=_TIME, subscription_id=_ID,
+        agnocast_ns=_TIME,
     ),
     "callback_instance": _schema(
         callback_instance_id=_ID, host=_TEXT, pid=_NUMBER, tid=_NUMBER, node=_TEXT, kind=_TEXT,

@@ -21,14 +21,16 @@ TRUTHS = {
         "SELECT pid, tid, start_ns, end_ns, kind FROM run",
     ),
     "messages": (
-        "SELECT publication_pid, coalesce(publication_rclcpp_ns, publication_rcl_ns), take_pid, "
-        "coalesce(take_rmw_ns, take_rclcpp_ns) FROM transport WHERE NOT is_internal",
+        "SELECT b.pid, coalesce(b.agnocast_ns, b.rclcpp_ns, b.rcl_ns), t.pid, "
+        "coalesce(t.agnocast_ns, t.rmw_ns) FROM take AS t "
+        "JOIN publication AS b USING (publication_id) WHERE NOT b.is_internal",
         "SELECT b.pid, coalesce(b.rclcpp_ns, b.rcl_ns), t.pid, t.taken_ns "
         "FROM store.link_transport AS l JOIN sent AS b USING (publication_id) "
         "JOIN got AS t USING (take_id) WHERE l.candidate_count = 1",
     ),
     "direct causes": (
-        "SELECT c.pid, c.tid, c.callback_start_ns, b.rclcpp_ns FROM causal AS c "
+        "SELECT c.pid, c.tid, c.callback_start_ns, coalesce(b.agnocast_ns, b.rclcpp_ns) "
+        "FROM causal AS c "
         "JOIN publication AS b USING (publication_id) "
         "WHERE c.kind = 'direct' AND NOT c.is_internal",
         "SELECT i.pid, i.tid, i.start_ns, b.rclcpp_ns FROM store.link_causal AS l "
@@ -36,7 +38,7 @@ TRUTHS = {
         "WHERE l.kind = 'direct'",
     ),
     "polls": (
-        "SELECT c.pid, b.rclcpp_ns, t.rclcpp_ns FROM causal AS c "
+        "SELECT c.pid, b.agnocast_ns, t.agnocast_ns FROM causal AS c "
         "JOIN publication AS b USING (publication_id) JOIN take AS t ON c.take_id = t.take_id "
         "WHERE c.kind = 'polled'",
         "SELECT b.pid, b.rclcpp_ns, t.taken_ns FROM store.link_causal AS l "
@@ -44,7 +46,8 @@ TRUTHS = {
         "WHERE l.kind = 'polled'",
     ),
     "missing messages": (
-        "SELECT u.publication_pid, b.rclcpp_ns, u.subscription_pid, u.reason FROM undelivered AS u "
+        "SELECT u.publication_pid, coalesce(b.agnocast_ns, b.rclcpp_ns), u.subscription_pid, "
+        "u.reason FROM undelivered AS u "
         "JOIN publication AS b USING (publication_id) "
         "WHERE NOT u.is_internal",
         "SELECT b.pid, b.rclcpp_ns, p.pid, u.reason FROM store.undelivered AS u "
