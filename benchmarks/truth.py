@@ -241,12 +241,14 @@ def cases(arguments: argparse.Namespace) -> Iterator[Case]:
     known = scenarios()
     names = [*known, LONG]
     part = names[names.index(arguments.first) : names.index(arguments.last) + 1]
-    for system in arguments.system or part:
+    # Agnocast has no events in these layouts: tests/truth/test_agnocast.py compares it in its own.
+    common = [layout for layout in layouts() if not layout.endswith("-agnocast")]
+    for system in arguments.system or [name for name in part if name != "agnocast"]:
         if system == LONG:
             if not arguments.quick:
                 yield Case(LONG, "humble", "drift", long_recording(), 1, arguments.seed)
             continue
-        for layout in arguments.layout or layouts():
+        for layout in arguments.layout or common:
             is_left_out = system in KERNEL_SYSTEMS and layout != EVERY_LAYOUT
             if is_left_out and not arguments.layout:
                 continue
