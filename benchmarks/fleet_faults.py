@@ -1,6 +1,6 @@
 """Many recordings go into a lake by a Ray cluster while much goes wrong: is anything lost or twice?
 
-    python benchmarks/fleet_faults.py [--recordings 200] [--factor 0.02] [--keep DIR]
+    python benchmarks/fleet_faults.py [--recordings 200] [--factor 0.02] [--keep DIR] [--shards N]
 
 Simulates recordings of 20 robots with three versions of their software, every tenth of them broken,
 in a bucket of an S3-compatible server (moto), which refuses every tenth request. Three nodes of a
@@ -10,6 +10,11 @@ taken away, and the driver is killed and started again. A reader polls all the t
 At the end every table of the lake has to have the rows that each recording gives alone, and every
 run has to have been whole at the moment when it was seen first. `--keep` keeps the recordings and a
 copy of the lake.
+
+With `--shards` there is no cluster and no bucket: so many processes fill a lake in a folder side by
+side (`fleet ingest --shard`), they and their children are killed at random moments and started
+again. Tables, views and failures have to be those of a lake that one process makes. It prints how
+many files a run has.
 """
 
 from __future__ import annotations
@@ -17,8 +22,10 @@ from __future__ import annotations
 import argparse
 import contextlib
 import os
+import random
 import resource
 import signal
+import subprocess
 import sys
 import tempfile
 import time
@@ -26,7 +33,6 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import duckdb
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "support"))
@@ -34,6 +40,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "support"))
 from fleet_cluster import (
     NODE,
     Watcher,
+    children,
     parent_of,
     ray_cluster,
     row_counts,
@@ -44,14 +51,14 @@ from fleet_robots import record, robot_of, write_broken
 from object_store import ObjectStore, object_store
 
 from msgflow import Database
-from msgflow.fleet.answers import answers
 from msgflow.fleet.failure import read_failures
 from msgflow.fleet.lake import Lake
+from msgflow.fleet.lake_connection import Reading, choose
+from msgflow.fleet.pack import pack
 from msgflow.fleet.part import Content, write_part
 from msgflow.ingest import ingest
 
 if TYPE_CHECKING:
-    import subprocess
     from collections.abc import Iterator
 
 VERSIONS = ("1.0", "1.1", "2.0")
@@ -67,17 +74,21 @@ def main() -> None:
     parser.add_argument("--recordings", type=int, default=200)
     parser.add_argument("--factor", type=float, default=0.02)
     parser.add_argument("--keep", type=Path)
+    parser.add_argument("--shards", type=int)
     given = parser.parse_args()
     with contextlib.ExitStack() as stack:
         folder = given.keep or Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        for line in measured(folder, given.recordings, given.factor):
+        good = simulated(folder / "recordings", given.recordings, given.factor)
+        print(f"{given.recordings} recordings, {given.recordings - len(good)} of them broken")
+        work = measured(folder, given.recordings, good)
+        if given.shards:
+            work = sharded(folder, given.shards, given.recordings, good)
+        for line in work:
             print(line, flush=True)
 
 
-def measured(folder: Path, count: int, factor: float) -> Iterator[str]:
+def measured(folder: Path, count: int, good: list[str]) -> Iterator[str]:
     """Yield what happened; raise where the lake is not what it has to be."""
-    good = simulated(folder / "recordings", count, factor)
-    yield f"{count} recordings, {count - len(good)} of them broken"
     with pytest.MonkeyPatch.context() as patch, object_store(patch) as bucket:
         upload(bucket, folder, count)
         bucket.refuse_every = REFUSED
@@ -116,6 +127,73 @@ def measured(folder: Path, count: int, factor: float) -> Iterator[str]:
         yield f"equal: {table}, {rows:,} rows"
 
 
+def sharded(folder: Path, shards: int, count: int, good: list[str]) -> Iterator[str]:
+    """Yield what happened to a lake of shards; raise where it is not that of one process."""
+    source, lakes = folder / "recordings" / "night.csv", (folder / "sharded", folder / "alone")
+    source.write_text(manifest(count))
+    begin = time.monotonic()
+    ingesting(source, lakes[1], folder / "scratch-alone").wait()
+    yield f"one process: {time.monotonic() - begin:.0f} s"
+    begin = time.monotonic()
+    with Watcher(str(lakes[0])) as watcher:
+        killed = kill_at_random(source, lakes[0], folder / "scratch", shards)
+    yield f"{shards} shards, {killed}: {time.monotonic() - begin:.0f} s"
+    assert not watcher.errors, watcher.errors
+    assert watcher.visible == sorted(watcher.visible), "a run was gone meanwhile"
+    lake = Lake.open(lakes[0])
+    runs = lake.runs().to_pylist()
+    assert sorted(run["name"] for run in runs) == sorted(good)
+    for run in runs:
+        key = (run["run"], run["part"])
+        assert watcher.seen[key] == row_counts(lake, *key), "somebody saw half a run"
+    for line in ("as written", "packed"):
+        files = [path for path in lakes[0].rglob("*.*") if path.is_file()]
+        named = [path for path in files if any(run["part"] in path.name for run in runs)]
+        for table, rows in equal(*lakes).items():
+            if line == "as written":
+                yield f"equal: {table}, {rows:,} rows"
+        yield f"{line}: {len(files)} files of {len(runs)} runs, {len(named)} of them with answers"
+        pack(lake)
+    with_views = folder / "views"
+    ingesting(source.parent / good[0], with_views, folder / "scratch", "--views").wait()
+    files = [path for path in with_views.rglob("*.*") if path.is_file()]
+    yield f"one run with --views: {len(files)} files"
+
+
+def ingesting(source: Path, lake: Path, scratch: Path, *more: str) -> subprocess.Popen[bytes]:
+    """Start to ingest recordings into a lake."""
+    command = [sys.executable, "-m", "msgflow", "fleet", "ingest", str(source), "--lake", str(lake)]
+    command += ["--scratch", str(scratch), "--tries", "20", "--quiet", *more]
+    return subprocess.Popen(command, stderr=subprocess.DEVNULL)
+
+
+def kill_at_random(source: Path, lake: Path, scratch: Path, shards: int) -> str:
+    """Fill a lake by shards; kill them, and what they do, some three times each."""
+    chance, kills = random.Random(), [0, 0]
+
+    def start(shard: int) -> subprocess.Popen[bytes]:
+        return ingesting(source, lake, scratch, "--shard", f"{shard}/{shards}")
+
+    running = [start(shard) for shard in range(shards)]
+    while sum(kills) < 3 * shards:
+        time.sleep(chance.uniform(0.2, 5))
+        found = sorted(children(scratch))
+        if found and chance.random() < 0.4:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(chance.choice(found), signal.SIGKILL)
+                kills[1] += 1
+            continue
+        shard = chance.randrange(shards)
+        if running[shard].poll() is None:
+            running[shard].kill()
+            kills[0] += 1
+        running[shard].wait()
+        running[shard] = start(shard)
+    for process in running:
+        assert process.wait() in (0, 1, 3)
+    return f"killed {kills[0]} times, their children {kills[1]} times"
+
+
 def simulated(folder: Path, count: int, factor: float) -> list[str]:
     """Write recordings, and return the names of those that are not broken."""
     good = []
@@ -136,12 +214,16 @@ def upload(bucket: ObjectStore, folder: Path, count: int) -> None:
         if file.is_file():
             path = file.relative_to(folder / "recordings").as_posix()
             bucket.put(f"fleet/night/{path}", file.read_bytes())
+    bucket.put("fleet/night/night.csv", manifest(count).encode())
+
+
+def manifest(count: int) -> str:
+    """Return the list of recordings, with their labels."""
     rows = [
         f"n{number:03},{robot_of(number)},{VERSIONS[number % len(VERSIONS)]}"
         for number in range(count)
     ]
-    text = "\n".join(["path,robot,software_version", *rows, ""])
-    bucket.put("fleet/night/night.csv", text.encode())
+    return "\n".join(["path,robot,software_version", *rows, ""])
 
 
 def go_wrong(cluster: Any, watcher: Watcher, scratch: Path, good: int) -> str:
@@ -201,25 +283,26 @@ def ingest_alone(job: tuple[Path, str, str]) -> dict[str, Any]:
 
 
 def equal(one: Path, other: Path) -> dict[str, int]:
-    """Return the rows of every answer; raise where two lakes differ in one."""
-    found = {}
-    with duckdb.connect() as con:
-        for side, folder in (("one", one), ("other", other)):
-            con.register(f"run_{side}", Lake.open(folder).runs())
-            for answer in answers():
-                con.execute(
-                    f"CREATE VIEW {answer.table}_{side} AS SELECT a.* EXCLUDE (part) FROM"
-                    f" read_parquet('{folder}/{answer.table}/*.parquet', union_by_name = true) AS a"
-                    f" JOIN run_{side} USING (run, part)"
-                )
-        for answer in answers():
-            name = answer.table
-            ((rows, others, missing),) = con.execute(
-                f"SELECT (SELECT count(*) FROM {name}_one), (SELECT count(*) FROM {name}_other),"
-                f" (SELECT count(*) FROM (FROM {name}_one EXCEPT ALL FROM {name}_other))"
-            ).fetchall()
-            assert (others, missing) == (rows, 0), name
-            found[name] = rows
+    """Return the rows of every table and view; raise where two lakes differ in one."""
+    found, lakes = {}, [Lake.open(one), Lake.open(other)]
+    left = {"part", "view_part", "database_part", "committed_ns", "failed_ns", "worker"}
+    left |= {"seconds", "tries"}
+    with contextlib.ExitStack() as stack:
+        both = [stack.enter_context(Reading(choose(lake))) for lake in lakes]
+        assert both[0].tables == both[1].tables
+        for table in sorted(both[0].tables):
+            name = ".".join(f'"{each}"' for each in table.split("/"))
+            sql = f"FROM {name} ORDER BY ALL"
+            rows = [each.connection.execute(sql).to_arrow_table() for each in both]
+            assert rows[0].equals(rows[1]), table
+            found[table] = len(rows[0])
+    for name, tables in (
+        ("run", [lake.runs() for lake in lakes]),
+        ("fleet_failure", [read_failures(lake) for lake in lakes]),
+    ):
+        same = [each for each in tables[0].column_names if each not in left]
+        assert tables[0].select(same).equals(tables[1].select(same)), name
+        found[name] = len(tables[0])
     return found
 
 

@@ -15,7 +15,7 @@ from typer.testing import CliRunner, Result
 
 from msgflow.cli.app import app
 from msgflow.errors import UsageError
-from msgflow.fleet.compare import LEAST_RUNS, compare
+from msgflow.fleet.compare import LEAST_RUNS, compare, compared
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.layout import part_path
 from msgflow.sql.statement import internal_sql
@@ -177,6 +177,90 @@ def test_paths_of_one_side_are_said(tmp_path: Path) -> None:
     assert "1 path with values only in A" in comparison.result.notes
     (failure,) = comparison.failures(["median>50%"])
     assert (failure.subject, failure.reason) == ("/only/1", "has no value in B")
+
+
+def of_flows(flows: Mapping[tuple[str, str, str], Sequence[int]]) -> list[dict[str, Any]]:
+    """Return the comparison of latencies by side, path and run."""
+    import duckdb
+
+    rows = [
+        {"side": side, "path": path, "run": f"{side}{run}", "latency_ns": latency}
+        for (side, path, run), latencies in flows.items()
+        for latency in latencies
+    ]
+    with duckdb.connect() as con:
+        con.register("given", pa.Table.from_pylist(rows))
+        con.execute(
+            "CREATE TABLE flow AS SELECT *, 'reached' AS status, false AS is_loss_affected,"
+            " false AS is_ambiguous, true AS is_first, true AS is_last, true AS is_newest"
+            " FROM given"
+        )
+        con.execute("CREATE TABLE e2e_latency AS SELECT DISTINCT run, false AS is_cut FROM given")
+        con.execute("CREATE TABLE sided AS SELECT DISTINCT run, side, run AS unit FROM given")
+        return compared(con).to_arrow().to_pylist()
+
+
+@pytest.mark.parametrize(
+    ("long", "short", "counted", "told_of"),
+    [
+        # Most runs are long enough for p95: the others say nothing of the median, either.
+        (10, 8, 10, ("median", "mean", "p95")),
+        (9, 9, 9, ("median", "mean", "p95")),
+        # Else they count, and nothing is said of p95.
+        (8, 9, 17, ("median", "mean")),
+        (5, 4, 9, ("median", "mean")),
+    ],
+)
+def test_all_statistics_are_of_the_same_runs(
+    long: int, short: int, counted: int, told_of: tuple[str, ...]
+) -> None:
+    """Short runs are five times as slow; p95 of the long ones alone was below their median."""
+    flows = {}
+    for side in "ab":
+        for run in range(long + short):
+            values = [round(1_000 * part * (1 + run / 1_000)) for part in SHAPE]
+            is_long = run < long
+            flows[side, PATH, str(run)] = values if is_long else [5 * v for v in values[35:65]]
+    rows = {row["statistic"]: row for row in of_flows(flows)}
+    assert {(row["a_count"], row["b_count"]) for row in rows.values()} == {(counted, counted)}
+    assert tuple(name for name, row in rows.items() if row["low_ns"] is not None) == told_of
+    assert rows["p95"]["verdict"] in ("no difference shown", "too few values")
+    assert rows["median"]["a_ns"] < rows["p95"]["a_ns"] < rows["max"]["a_ns"]
+    assert rows["p99"]["verdict"] == "too few values"
+
+
+def test_short_runs_count_where_a_side_has_no_others() -> None:
+    values = [round(1_000 * part) for part in SHAPE]
+    flows = {("a", PATH, str(run)): values[:3] for run in range(8)}
+    flows |= {("b", PATH, str(run)): values[: 25 if run < 6 else 3] for run in range(8)}
+    for row in of_flows(flows):
+        assert (row["a_count"], row["b_count"], row["low_ns"]) == (8, 6, None)
+
+
+def test_no_quantile_is_below_a_smaller_one() -> None:
+    """Whatever runs there are: short, slow, or with clocks apart."""
+    import random
+
+    source, flows = random.Random(1), {}
+    for path in range(60):
+        for side in "ab":
+            for run in range(source.randrange(1, 14)):
+                middle = source.choice([-500, 10, 1_000, 1_000, 1_100, 50_000])
+                spread = source.choice([1, 400, 5_000])
+                count = source.choice([3, 25, 120, 120, 600])
+                flows[side, f"/{path}", f"{run} {path}"] = [
+                    middle + round(source.gauss(0, spread)) for _ in range(count)
+                ]
+    found: dict[str, dict[str, Any]] = {}
+    for row in of_flows(flows):
+        found.setdefault(row["subject"], {})[row["statistic"]] = row
+    told = 0
+    for rows in found.values():
+        for side in ("a_ns", "b_ns"):
+            values = [rows[name][side] for name in ("median", "p95", "p99", "max")]
+            assert values == sorted(values)
+        told += sum(row["low_ns"] is not None for row in rows.values())
+    assert told > 20
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,9 @@
 --     between the sides is measured against the differences between runs of a side. Yuen's test
 --     compares the sides: trimmed means (without the lowest and the highest fifth of the runs), and
 --     Welch's t with winsorized variances. It takes logarithms, so that a difference is a share.
---     Where a value is not positive, it takes the values themselves.
+--     Where a value of a path is not positive, it takes the values themselves. All statistics of a
+--     path are of the same runs: those with flows enough for a quantile that at least half of the
+--     runs of either side allow. So none is below one that it cannot be below.
 -- grain: one row per path and statistic; paths that only one side has, too
 -- param: z DOUBLE  Quantile of the standard normal distribution for the confidence wanted
 -- param: least_units BIGINT  Fewest runs of either side for an interval
@@ -39,35 +41,76 @@
 -- column: b_ambiguous BIGINT  Flows of B that do
 -- column: is_cut BOOLEAN  Paths of a run were left out beyond the limits
 -- column: subject VARCHAR  Nodes and topics of the path
-WITH of_side AS (
-    SELECT
-        side,
-        subject,
-        statistic,
-        sum(number)::BIGINT AS flows,
-        sum(roots) AS roots,
-        sum(reached) AS reached,
-        sum(loss_affected)::BIGINT AS loss_affected,
-        sum(ambiguous)::BIGINT AS ambiguous,
-        bool_or(is_cut) AS is_cut,
-        count(DISTINCT unit) FILTER (value_ns IS NOT NULL) AS units,
-        -- Short runs count where there are no others, and then there is no interval.
-        coalesce(bool_or(is_enough), false) AS is_enough
+WITH of_run AS (
+    -- Statistics that a run has flows enough for; who has them for p99 has them for all others.
+    SELECT side, subject, unit, run, count(*) FILTER (is_enough) AS depth
     FROM measured
-    GROUP BY side, subject, statistic
+    WHERE value_ns IS NOT NULL
+    GROUP BY side, subject, unit, run
+),
+deepest AS (
+    SELECT side, subject, unit, max(depth) AS depth
+    FROM of_run
+    GROUP BY side, subject, unit
+),
+allowing AS (
+    SELECT
+        u.side,
+        u.subject,
+        w.depth,
+        count(*) FILTER (u.depth >= w.depth) AS units,
+        count(*) FILTER (u.depth > 0) AS whole
+    FROM deepest AS u
+    JOIN (SELECT DISTINCT subject, depth FROM deepest WHERE depth > 0) AS w
+        ON u.subject = w.subject
+    GROUP BY u.side, u.subject, w.depth
+),
+wanted AS (
+    SELECT subject, max(depth) AS depth
+    FROM (
+        SELECT subject, depth
+        FROM allowing
+        GROUP BY subject, depth
+        HAVING bool_and(units >= $least_units AND 2 * units >= whole)
+    )
+    GROUP BY subject
+),
+-- Short runs count where there are no others, and then there is no interval.
+counted AS (
+    SELECT r.side, r.subject, r.run
+    FROM of_run AS r
+    LEFT JOIN wanted AS w ON r.subject = w.subject
+    QUALIFY r.depth >= coalesce(
+        w.depth, least(1, max(r.depth) OVER (PARTITION BY r.side, r.subject))
+    )
+),
+of_side AS (
+    SELECT
+        m.side,
+        m.subject,
+        m.statistic,
+        sum(m.number)::BIGINT AS flows,
+        sum(m.roots) AS roots,
+        sum(m.reached) AS reached,
+        sum(m.loss_affected)::BIGINT AS loss_affected,
+        sum(m.ambiguous)::BIGINT AS ambiguous,
+        bool_or(m.is_cut) AS is_cut,
+        count(DISTINCT m.unit) FILTER (m.value_ns IS NOT NULL) AS units,
+        coalesce(bool_and(m.is_enough) FILTER (c.run IS NOT NULL), false) AS is_enough
+    FROM measured AS m
+    LEFT JOIN counted AS c ON m.side = c.side AND m.subject = c.subject AND m.run = c.run
+    GROUP BY m.side, m.subject, m.statistic
 ),
 unit AS (
     SELECT m.side, m.unit, m.subject, m.statistic, median(m.value_ns) AS value_ns
     FROM measured AS m
-    JOIN of_side AS s
-        ON m.side = s.side AND m.subject = s.subject AND m.statistic = s.statistic
-    WHERE m.value_ns IS NOT NULL AND m.is_enough = s.is_enough
+    JOIN counted AS c ON m.side = c.side AND m.subject = c.subject AND m.run = c.run
     GROUP BY m.side, m.unit, m.subject, m.statistic
 ),
 scaled AS (
     SELECT
         *,
-        min(value_ns) OVER whole > 0 AS is_log,
+        min(value_ns) OVER (PARTITION BY subject) > 0 AS is_log,
         -- Ties in the middle.
         rank() OVER (whole ORDER BY value_ns)
             + (count(*) OVER (PARTITION BY subject, statistic, value_ns) - 1) / 2 AS place
