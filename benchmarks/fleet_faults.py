@@ -146,6 +146,8 @@ def sharded(folder: Path, shards: int, count: int, good: list[str]) -> Iterator[
     for run in runs:
         key = (run["run"], run["part"])
         assert watcher.seen[key] == row_counts(lake, *key), "somebody saw half a run"
+    require_same_runs(lake, Lake.open(lakes[1]))
+    yield f"equal: run, {len(runs)} rows; fleet_failure, {count - len(good)} rows"
     for line in ("as written", "packed"):
         files = [path for path in lakes[0].rglob("*.*") if path.is_file()]
         named = [path for path in files if any(run["part"] in path.name for run in runs)]
@@ -282,13 +284,20 @@ def ingest_alone(job: tuple[Path, str, str]) -> dict[str, Any]:
     return {**part, "source": source}
 
 
-def equal(one: Path, other: Path) -> dict[str, int]:
-    """Return the rows of every table and view; raise where two lakes differ in one."""
-    found, lakes = {}, [Lake.open(one), Lake.open(other)]
+def require_same_runs(one: Lake, other: Lake) -> None:
+    """Raise where two lakes differ in their runs or failures."""
     left = {"part", "view_part", "database_part", "committed_ns", "failed_ns", "worker"}
     left |= {"seconds", "tries"}
+    for tables in ([one.runs(), other.runs()], [read_failures(one), read_failures(other)]):
+        same = [each for each in tables[0].column_names if each not in left]
+        assert tables[0].select(same).equals(tables[1].select(same)), tables[0].column_names
+
+
+def equal(one: Path, other: Path) -> dict[str, int]:
+    """Return the rows of every table and view; raise where two lakes differ in one."""
+    found = {}
     with contextlib.ExitStack() as stack:
-        both = [stack.enter_context(Reading(choose(lake))) for lake in lakes]
+        both = [stack.enter_context(Reading(choose(Lake.open(each)))) for each in (one, other)]
         assert both[0].tables == both[1].tables
         for table in sorted(both[0].tables):
             name = ".".join(f'"{each}"' for each in table.split("/"))
@@ -296,13 +305,6 @@ def equal(one: Path, other: Path) -> dict[str, int]:
             rows = [each.connection.execute(sql).to_arrow_table() for each in both]
             assert rows[0].equals(rows[1]), table
             found[table] = len(rows[0])
-    for name, tables in (
-        ("run", [lake.runs() for lake in lakes]),
-        ("fleet_failure", [read_failures(lake) for lake in lakes]),
-    ):
-        same = [each for each in tables[0].column_names if each not in left]
-        assert tables[0].select(same).equals(tables[1].select(same)), name
-        found[name] = len(tables[0])
     return found
 
 
