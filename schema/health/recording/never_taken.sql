@@ -1,8 +1,8 @@
 -- name: finding.never_taken
 -- title: A subscription that took no message of a publisher
--- description: Publisher and subscription of a topic were both recorded, and there was time, but
---     not one message was taken. These messages count as not connected (never_taken), not as lost.
---     Topics of ROS itself are not looked at.
+-- description: Publisher and subscription of a topic were both recorded, but not one message was
+--     taken. These messages count as not connected (never_taken), not as lost. Topics of ROS itself
+--     are not looked at.
 -- cause: The two are in different ROS domains (ROS_DOMAIN_ID is not in a trace), their QoS does not
 --     match (a best-effort publisher, a reliable subscription), they never discovered each other,
 --     or the node of the subscription does not spin.
