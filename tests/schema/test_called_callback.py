@@ -21,6 +21,7 @@ CREATE TABLE staging.callback_known AS
         1 AS service_event_id, NULL::INTEGER AS subscription_event_id;
 CREATE TABLE staging.take_chain (start_event_id INTEGER, end_event_id INTEGER, method VARCHAR,
     subscription_event_id INTEGER);
+CREATE TABLE staging.callback_step (start_event_id INTEGER, request_event_id INTEGER);
 CREATE MACRO staging.with_latest(uses, objects) AS TABLE
     SELECT u.*, o.event_id AS object_event_id
     FROM query_table(uses) AS u
