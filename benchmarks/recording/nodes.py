@@ -12,13 +12,13 @@ around the call.
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import json
 import os
 import sys
 import threading
 import time
-from contextlib import contextmanager
 from pathlib import Path
 
 import rclpy
@@ -194,7 +194,7 @@ class Witness(Node):
 
         return send
 
-    @contextmanager
+    @contextlib.contextmanager
     def _callback(self, kind: str, name: str, message: int, accepted: bool | None = None):
         number = self._running.number = next(self._numbers)
         begin = time.monotonic_ns()
@@ -206,7 +206,7 @@ class Witness(Node):
                 "callback", begin, kind=kind, name=name, id=message, n=number, accepted=accepted
             )
 
-    @contextmanager
+    @contextlib.contextmanager
     def _sent(self, kind: str, topic: str, message: int, **more: int):
         begin = time.monotonic_ns()
         yield
@@ -503,10 +503,8 @@ def main() -> None:
         for seconds, work in filter(None, (node.turn for node in nodes)):
             take_turns(executor, seconds, work)
         while rclpy.ok():
-            try:
+            with contextlib.suppress(PlannedError):
                 executor.spin()
-            except PlannedError:
-                pass
     except ExternalShutdownException:
         pass
     except InvalidHandle:

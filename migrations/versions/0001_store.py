@@ -75,7 +75,8 @@ CREATE TABLE store.callback_instance (
     callback_instance_id BIGINT NOT NULL, run_id BIGINT NOT NULL, trace_id BIGINT NOT NULL,
     callback_id BIGINT NOT NULL, process_id BIGINT NOT NULL, thread_id BIGINT NOT NULL,
     start_ns BIGINT NOT NULL, end_ns BIGINT, take_id BIGINT, request_id BIGINT,
-    response_id BIGINT, continues_id BIGINT, is_intra_process BOOLEAN DEFAULT false NOT NULL, parent_id BIGINT, depth INTEGER NOT NULL,
+    response_id BIGINT, continues_id BIGINT, is_intra_process BOOLEAN DEFAULT false NOT NULL,
+    parent_id BIGINT, depth INTEGER NOT NULL,
     start_event_id BIGINT, end_event_id BIGINT, effective_end_event_id BIGINT,
     is_loss_affected BOOLEAN DEFAULT false NOT NULL
 );

@@ -117,7 +117,8 @@ def test_what_is_done_with_a_response(calls: RosSystem, analyse: Analyse) -> Non
         calls.end(MAIN, 6)
     analysis = analyse(calls)
     links = analysis.rows(
-        "SELECT b.source_timestamp_ns, q.sent_ns, r.taken_ns, l.candidate_count FROM link_call AS l "
+        "SELECT b.source_timestamp_ns, q.sent_ns, r.taken_ns, l.candidate_count "
+        "FROM link_call AS l "
         "LEFT JOIN publication AS b USING (publication_id) LEFT JOIN request AS q "
         "ON l.request_id = q.request_id JOIN response AS r ON l.taken_response_id = r.response_id"
     )

@@ -114,7 +114,8 @@ def test_a_callback_and_its_executor(robot: Robot) -> None:
 def test_two_objects_with_one_function_are_told_apart(robot: Robot) -> None:
     robot.run("""
         executor.ready = [
-            (subscription.Subscription(7, heard), ["a"]), (subscription.Subscription(8, heard), ["b"])
+            (subscription.Subscription(7, heard), ["a"]),
+            (subscription.Subscription(8, heard), ["b"]),
         ]
         executor.spin_once(); executor.spin_once(); executor.spin_once()
     """)
@@ -242,7 +243,8 @@ HARM = {
         "this process runs without traced callbacks",
     ),
     "objects without handles": (
-        "    subscription.Subscription.handle = property(lambda self: 1 / 0, lambda self, to: None)\n",
+        "    subscription.Subscription.handle = property("
+        "lambda self: 1 / 0, lambda self, to: None)\n",
         {},
         "division by zero",
     ),
@@ -324,7 +326,10 @@ def test_processes_that_fork_are_traced_both(robot: Robot) -> None:
 
 
 def test_programs_without_rclpy_see_nothing(tmp_path: Path) -> None:
-    program = "import sys; print('ctypes' in sys.modules, [each for each in sys.path if 'msgflow' in each])"
+    program = (
+        "import sys; print('ctypes' in sys.modules, "
+        "[each for each in sys.path if 'msgflow' in each])"
+    )
     ended = subprocess.run(
         [sys.executable, "-c", program],
         env={"PYTHONPATH": str(PYTHON_NODES)},

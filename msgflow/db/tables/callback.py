@@ -39,8 +39,8 @@ Table(
     node_id(),
     text(
         "kind",
-        "'subscription', 'timer', 'service', 'function' (of Python: a task, of an action or client) "
-        "or 'unknown'",
+        "'subscription', 'timer', 'service', 'function' (of Python: a task, of an action or client)"
+        " or 'unknown'",
         required=True,
     ),
     reference("subscription_id", "Its subscription", to="subscription.subscription_id"),
@@ -104,9 +104,7 @@ Table(
     ),
     reference("take_id", "Message it was called with", to="take.take_id"),
     reference("request_id", "Request it was called with", to="request.request_id"),
-    reference(
-        "response_id", "Response that it follows from, in Python", to="response.response_id"
-    ),
+    reference("response_id", "Response that it follows from, in Python", to="response.response_id"),
     reference(
         "continues_id",
         "Callback instance that it is a later step of, in Python; NULL: it is the first",

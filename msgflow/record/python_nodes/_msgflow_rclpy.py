@@ -500,7 +500,9 @@ def _take_data(original):
         data = original(self)
         if _is_recorded and isinstance(data, dict):
             # In this order they were taken, and callbacks run.
-            last = [key for key in ("goal", "cancel", "result", "feedback", "status") if key in data]
+            last = [
+                key for key in ("goal", "cancel", "result", "feedback", "status") if key in data
+            ]
             _thread.is_unclear = len(last) > 1 and last[-1] != "feedback"
         return data
 

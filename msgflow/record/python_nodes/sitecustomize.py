@@ -77,9 +77,7 @@ def _say(error):
 def _begin():
     """Leave the search path as it would be without this folder, and wait for rclpy."""
     folder = os.path.dirname(os.path.abspath(__file__))
-    sys.path[:] = [
-        entry for entry in sys.path if not entry or os.path.abspath(entry) != folder
-    ]
+    sys.path[:] = [entry for entry in sys.path if not entry or os.path.abspath(entry) != folder]
     sys.meta_path.insert(0, _Finder(folder))
 
 

@@ -36,7 +36,8 @@ WITH RECURSIVE around AS (
 ),
 inside AS (
     SELECT
-        b.run_id, i.continues_id, i.callback_instance_id, b.publication_id, i.take_id, b.publisher_id,
+        b.run_id, i.continues_id, i.callback_instance_id, b.publication_id, i.take_id,
+        b.publisher_id,
         i.is_loss_affected OR b.is_loss_affected AS is_loss_affected, 1::BIGINT AS candidate_count
     FROM store.publication AS b
     JOIN store.callback_instance AS i ON b.callback_event_id = i.start_event_id
