@@ -46,7 +46,8 @@ inside AS (
         AND b.start_event_id < i.effective_end_event_id
     UNION ALL
     SELECT
-        a.run_id, i.continues_id, i.callback_instance_id, a.publication_id, i.take_id, a.publisher_id,
+        a.run_id, i.continues_id, i.callback_instance_id, a.publication_id, i.take_id,
+        a.publisher_id,
         i.is_loss_affected OR a.is_loss_affected, 1 + a.is_doubtful::BIGINT
     FROM around AS a
     JOIN store.callback_instance AS i ON a.parent_id = i.callback_instance_id
