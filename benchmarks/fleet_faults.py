@@ -61,6 +61,8 @@ from msgflow.ingest import ingest
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    import pyarrow as pa
+
 VERSIONS = ("1.0", "1.1", "2.0")
 SLOW = {"2.0": 0.05}
 BROKEN = 10
@@ -302,7 +304,7 @@ def equal(one: Path, other: Path) -> dict[str, int]:
         for table in sorted(both[0].tables):
             name = ".".join(f'"{each}"' for each in table.split("/"))
             sql = f"FROM {name} ORDER BY ALL"
-            rows = [each.connection.execute(sql).to_arrow_table() for each in both]
+            rows: list[pa.Table] = [each.connection.execute(sql).to_arrow_table() for each in both]
             assert rows[0].equals(rows[1]), table
             found[table] = len(rows[0])
     return found

@@ -160,7 +160,7 @@ class ExecutorThread(Thread):
         time += 800 + int(self.scheduler.random() * 3_500)
         entity.group.is_busy = True
         kind = type(entity)
-        if kind in _ANNOUNCED and not entity.code.is_agnocast:
+        if isinstance(entity, _ANNOUNCED) and not entity.code.is_agnocast:
             self._enter(executor, _EXECUTE, time, entity.handle)
         end = HANDLERS[kind](self, self._middleware, entity, time)
         if not isinstance(end, int):

@@ -95,8 +95,9 @@ class Middleware:
                 if publisher.process is process:
                     publisher.history = None
         for machine, route in [key for key in self._numbers if key[0] is process.machine]:
-            users = (*self._publishers[route], *self._subscriptions[route])
-            if all(user.process.is_stopped for user in users if user.process.machine is machine):
+            users = [each.process for each in self._publishers[route]]
+            users += [each.process for each in self._subscriptions[route]]
+            if all(user.is_stopped for user in users if user.machine is machine):
                 # The topic dies with its last user.
                 del self._numbers[machine, route]
 
