@@ -59,8 +59,7 @@ def ingest(
         sources (SOURCE...): Recordings: directories, archives, patterns ('s3://bucket/night/*'), or
             manifests (.csv, .jsonl, .parquet) with a column path and labels.
         label (KEY=VALUE): Say so of all; may be repeated.
-        shard (I/N): Do one part of N, from 0/N to N-1/N; other jobs do the others into the same
-            lake, in any order. A source's name alone tells its part.
+        shard (I/N): Do this part of N, 0/N is the first.
         ray (ADDRESS): Ray cluster that does the work: its address, auto, or local; by default this
             process.
         replace: Ingest again what the lake has already.
@@ -69,7 +68,7 @@ def ingest(
         timeout (TIME): What one recording may take: 90s, 2h.
         memory (SIZE): What one recording may take, such as 4GB; else no limit.
         scratch (DIR): Folder of each worker; by default that of the system.
-        views: Also write the public views, for other programs: msgflow finds them in databases.
+        views: Also write the public views.
         database: Also write the database of each run.
         clock_sync (none|messages): As msgflow ingest has it, for each.
     """

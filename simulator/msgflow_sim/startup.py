@@ -140,7 +140,6 @@ class Startup:
             self._listener = DiscoveryListener(process)
             creator.discovery(self._listener.rmw_handle)
             self._discovery.join(self._listener)
-            yield True
         if any(node.is_agnocast for node in process.description.nodes):
             creator.emit("agnocast_agnocast_init", process.memory.allocate())
         for executor, described in zip(self._executors, process.description.executors, strict=True):
@@ -166,6 +165,7 @@ class Startup:
         if node.is_agnocast:
             creator.emit("agnocast_agnocast_node_init", context.handle, node.name, node.namespace)
             yield from self._create_shared(context)
+            yield True
             return
         creator.announce()
         described = (context.handle, memory.allocate(), node.name, node.namespace)
@@ -195,7 +195,6 @@ class Startup:
                     "agnocast_agnocast_add_callback_group", executor.handle, node.handle,
                     group.handle, "reentrant" if group.is_reentrant else "mutually_exclusive",
                 )  # fmt: skip
-        yield True
 
     def _create_parameters(self, node: NodeContext) -> Iterator[bool]:
         """What every node has, but those that have said that they do without."""

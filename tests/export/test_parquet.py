@@ -274,7 +274,7 @@ def test_csv_tells_empty_and_missing_apart(recorded: Database, tmp_path: Path) -
     ]
     lines = (tmp_path / "out" / "publisher.csv").read_text().splitlines()
     assert lines[0].startswith('"publisher_id","run_id","process_id","node_id","topic_name",')
-    assert lines[1] == f'1,1,1,1,"/image",{LARGE},,"00ff10",,,false,false,false'
+    assert lines[1] == f'1,1,1,1,"/image",{LARGE},,"00ff10",,,false,false,false,false'
     nodes = (tmp_path / "out" / "node.csv").read_text().splitlines()
     assert nodes[1:3] == ['1,1,1,,"","/camera",,,false', '2,1,1,,,"/detector",,,false']
 

@@ -216,7 +216,7 @@ def test_the_editor_completes_views_and_columns(demo: Path, serve: Serve, page: 
     assert completions(page)[0] == "callback_instance"
     page.page.keyboard.press("Enter")
     page.page.keyboard.type(" AS c WHERE c.end")
-    assert completions(page) == ["end_ns", "is_end_inferred", "parent_id"]
+    assert completions(page) == ["end_ns", "is_end_inferred", "parent_id", "response_id"]
     assert "epoch ns" in page.page.locator(".editor .cm-completionInfo").inner_text()
     page.page.keyboard.press("Enter")
     # Of the views that are named, columns without a name in front as well.

@@ -14,6 +14,7 @@ from msgflow.links import read_links
 from msgflow.watch import Watcher, WindowDatabase, watch_finished
 from msgflow.watch.learned_answers import LearnedAnswers, with_learned
 
+NODE_NAME = Path(__file__).parents[2] / "schema" / "public" / "node_name.sql"
 SECOND = 1_000_000_000
 TABLES = """
 CREATE SCHEMA store;
@@ -36,6 +37,7 @@ def test_what_most_windows_have_shown_counts_where_one_doubts_it() -> None:
     def doubted(*candidates: int) -> str | None:
         with duckdb.connect() as con:
             con.execute(TABLES)
+            con.execute(NODE_NAME.read_text())
             rows = [("take_adjacent", 1, 1, count) for count in candidates]
             con.executemany("INSERT INTO store.link_causal VALUES (?, ?, ?, ?)", rows)
             return answers.doubted(con)
