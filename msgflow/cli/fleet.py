@@ -60,8 +60,8 @@ def ingest(
             manifests (.csv, .jsonl, .parquet) with a column path and labels.
         label (KEY=VALUE): Say so of all; may be repeated.
         shard (I/N): Do this part of N, 0/N is the first.
-        ray (ADDRESS): Ray cluster that does the work: its address, auto, or local; by default this
-            process.
+        ray (ADDRESS): Ray cluster that does the work: its address, auto, or local; by default
+            none.
         replace: Ingest again what the lake has already.
         retry_failed: Try again what failed before.
         tries: How often, where the next one may go better.
