@@ -154,7 +154,7 @@ SHARED: dict[str, Any] = {
     ),
     "reader": typer.Option(help="Decoder of the traces"),
     "strict": typer.Option(help="Refuse damaged traces instead of keeping what can be read"),
-    "quiet": typer.Option("--quiet", "-q", help="Print only errors, and work that was lost"),
+    "quiet": typer.Option("--quiet", "-q", help="Print only errors and lost work"),
     "lake": typer.Option(
         envvar="MSGFLOW_LAKE",
         metavar="PATH",
