@@ -608,9 +608,11 @@ class Database:
 
     def compare(
         self,
-        run_a: str | int,
-        run_b: str | int,
+        run_a: str | int | None = None,
+        run_b: str | int | None = None,
         *,
+        run: str | int | None = None,
+        window: Sequence[str] = (),
         what: str = "paths",
         from_: str | None = None,
         to: str | None = None,
@@ -623,7 +625,7 @@ class Database:
         max_depth: int = 32,
         max_paths: int = 1_000,
     ) -> Comparison:
-        """Compare run B with run A: medians, means, percentiles, and whether it may be chance.
+        """Compare run B with run A, or two times of one run: medians, means, percentiles, chance.
 
         low and high enclose the difference with the given confidence. If both have the same sign,
         the verdict is that B is longer or shorter. This concerns chance within these two recordings
@@ -632,8 +634,10 @@ class Database:
         Args:
             run_a: baseline run: name or id.
             run_b: run to compare with it: name or id.
-            what: 'paths' (end-to-end latency), 'callbacks' (duration) or 'topics' (time from
-                publication to take).
+            run: in place of both, the one run whose windows are compared.
+            window (START..END): what counts of each side, such as 0s..60s and 60s..120s.
+            what: 'paths' (end-to-end latency), 'ends' (the same between two topics, by any path),
+                'callbacks' (duration) or 'topics' (time from publication to take).
             from_: topics or nodes where paths start; globs.
             to: topics or nodes where paths end; globs.
             case: first or last arrival of each root, newest root of each arrival, or all pairs:
@@ -656,6 +660,8 @@ class Database:
             compare,
             run_a,
             run_b,
+            run=run,
+            window=window,
             what=what,
             from_=from_,
             to=to,

@@ -10,6 +10,8 @@
 -- variant: measure VARCHAR {latency|age|reaction|response} = 'latency'  What is measured: from
 --     the start of a flow to its end, how old the data behind an output are, how long at most
 --     until an event shows, or the response times of CARET
+-- variant: by VARCHAR {path|ends} = 'path'  A row for each path, or one for all paths between two
+--     topics
 -- param: from VARCHAR = NULL  Topics or nodes where flows start: globs, with commas between
 -- param: to VARCHAR = NULL  Topics or nodes where flows end, likewise
 -- param: from_event VARCHAR {callback_start|publish} = 'callback_start'  Event that starts

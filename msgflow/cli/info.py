@@ -20,7 +20,7 @@ from msgflow.files.default_files import DEFAULT_DATABASE
 from msgflow.query.catalogue import load_query
 
 SECTIONS = ("runs", "hosts", "processes", "nodes", "topics", "counts", "findings")
-_SECTION = load_query("info").variant
+_SECTION = load_query("info").variants
 
 
 def asked(words: list[str]) -> Any:

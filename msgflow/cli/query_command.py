@@ -69,10 +69,10 @@ _OF_EVERY_QUERY = frozenset(
 )
 
 
-def choice_of(variant: Param | None, words: list[str]) -> dict[str, Value]:
-    """Return the value of the option that chooses a variant: the command depends on it."""
+def choice_of(variants: Sequence[Param], words: list[str]) -> dict[str, Value]:
+    """Return the values of the options that choose a variant: the command depends on it."""
     found: dict[str, Value] = {}
-    if variant is not None:
+    for variant in variants:
         option = f"--{variant.name}"
         for word, following in pairwise([*words, ""]):
             if word == option:
@@ -84,7 +84,7 @@ def choice_of(variant: Param | None, words: list[str]) -> dict[str, Value]:
 
 def chosen_by(name: str, words: list[str]) -> Header:
     """Return the query, or the variant of it that the words behind its name choose."""
-    return choose_query(name, choice_of(load_query(name).variant, words))
+    return choose_query(name, choice_of(load_query(name).variants, words))
 
 
 def chosen_format(form: Format | None, path: Path | None) -> Format:

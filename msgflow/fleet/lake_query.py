@@ -85,10 +85,9 @@ def header_of(name: str, given: Mapping[str, Value] | None = None) -> Header:
         if meant:
             hint = " or ".join(there) or f"msgflow fleet open RUN, then {meant[0].command}"
         raise UsageError(f"there is no such query — {name}", hint) from None
-    variant = query.variant
-    if variant is not None and variant.name in given:
-        chosen = {variant.name: given[variant.name]}
-        bind(replace(query, params=(variant,)), chosen, f"msgflow fleet query {name}")
+    variants = query.variants
+    chosen = {each.name: given[each.name] for each in variants if each.name in given}
+    bind(replace(query, params=variants), chosen, f"msgflow fleet query {name}")
     if query.name not in names():
         raise UsageError(
             f"a lake does not hold what this query needs — {query.words}",
@@ -96,8 +95,9 @@ def header_of(name: str, given: Mapping[str, Value] | None = None) -> Header:
             f" {query.command}",
         )
     header = statements().header(query.name.replace("-", "_"))
-    params = header.params if variant is None else (variant, *header.params)
-    return replace(header, chosen=query.words, params=params, variant=variant)
+    return replace(
+        header, chosen=query.words, params=(*variants, *header.params), variants=variants
+    )
 
 
 def _words() -> list[str]:
@@ -117,9 +117,9 @@ def fleet_query(
     """Ask a named query of many runs."""
     header = header_of(name, parameters)
     own = bind(header, parameters, f"msgflow fleet query {header.words}")
-    if header.variant is not None:
+    for variant in header.variants:
         # It has chosen the statement, which does not take it.
-        del own[header.variant.name]
+        del own[variant.name]
     chosen = make_selection(dict(selection or {}))
     choice = choose(lake, where)
     with Reading(choice, _tables(header)) as reading:

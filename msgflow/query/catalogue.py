@@ -116,32 +116,44 @@ def choose_query(
         UsageError: there is no such query; the message names similar ones.
     """
     header = load_query(name, views)
-    variant = header.variant
-    if variant is None or (value := given.get(variant.name)) is None:
-        return header
     base = header.words.partition(" ")[0]
-    if variant.type == "BOOLEAN":
-        with suppress(ValueError):
-            value = variant.name if parse_text(str(value), variant.type) else variant.default
-    chosen = base if value == variant.default else f"{base}-{value}"
-    # The query refuses a value that it does not have.
-    return _header(chosen) if chosen in _files() else header
+    own = header.name.removeprefix(f"{base}-")
+    chosen: dict[str, str] = {}
+    for variant in header.variants:
+        if (value := given.get(variant.name)) is None:
+            continue
+        if variant.type == "BOOLEAN":
+            with suppress(ValueError):
+                value = variant.name if parse_text(str(value), variant.type) else variant.default
+        if value == variant.default and own in (*variant.choices, variant.name):
+            header = _header(base)
+        # The query refuses a value that it does not have.
+        elif f"{base}-{value}" in _files():
+            chosen[f"{base}-{value}"] = f"--{variant.name} {value}"
+    if len(chosen) > 1:
+        raise UsageError(
+            f"these do not go together — {' and '.join(chosen.values())}", "leave one of them out"
+        )
+    return _header(*chosen) if chosen else header
 
 
 @cache
 def _header(name: str) -> Header:
     header = read(resource_directory("queries") / f"{name}.sql")
     base = _base(name)
-    if base is None:
-        variant = header.variant
-    else:
-        variant = _header(base).variant
-        if variant is None:
-            raise HeaderError(f"{header.path}: {base} has no variants")
-        value = "" if variant.type == "BOOLEAN" else f" {name.removeprefix(f'{base}-')}"
-        header = replace(header, chosen=f"{base} --{variant.name}{value}", variant=variant)
-    header = replace(header, is_command=(base or name) in COMMANDS)
-    return header if variant is None else replace(header, params=(variant, *header.params))
+    if base is not None:
+        value = name.removeprefix(f"{base}-")
+        variants = _header(base).variants
+        own = [each for each in variants if value in (*each.choices, each.name)]
+        if not own:
+            raise HeaderError(f"{header.path}: {base} has no such variant")
+        words = f" {value}" if own[0].choices else ""
+        header = replace(header, chosen=f"{base} --{own[0].name}{words}", variants=variants)
+    return replace(
+        header,
+        is_command=(base or name) in COMMANDS,
+        params=(*header.variants, *header.params),
+    )
 
 
 def queries_meant(word: str) -> tuple[Header, ...]:

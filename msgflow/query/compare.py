@@ -19,13 +19,14 @@ from msgflow.query.schedule_notes import schedule_notes
 from msgflow.query.selection import CUT_COLUMN
 from msgflow.result.query_result import QueryResult
 from msgflow.run.choice import Run, choose_one, read_runs
+from msgflow.run.slice import Slice
 from msgflow.run.window import MAXIMUM_NS
 from msgflow.sql.failure import query_errors
 from msgflow.sql.header import Header, read
 from msgflow.sql.statement import internal_sql
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     import duckdb
 
@@ -39,7 +40,7 @@ _CONDITION = re.compile(
     rf"\s*(?P<unit>%|ns|us|µs|ms|s)|{SHARE}\s*<\s*-\s*(?P<points>\d+(?:\.\d+)?)\s*%)\s*"
 )
 _UNIT_NS = {"ns": 1, "us": 1_000, "µs": 1_000, "ms": 1_000_000, "s": 1_000_000_000}
-_UNITS = {"paths": "flows", "callbacks": "callback instances", "topics": "takes"}
+_UNITS = {"paths": "flows", "ends": "flows", "callbacks": "callback instances", "topics": "takes"}
 # What a verdict adds to a failure: the measured values decide, and these may be chance.
 _CHANCE = {
     "no difference shown": "; it may be chance",
@@ -238,23 +239,54 @@ def _ms(nanoseconds: float) -> str:
 
 
 def compare(
-    connection: duckdb.DuckDBPyConnection, /, run_a: str | int, run_b: str | int, **given: Value
+    connection: duckdb.DuckDBPyConnection,
+    /,
+    run_a: str | int | None,
+    run_b: str | int | None,
+    *,
+    run: str | int | None,
+    window: Sequence[str],
+    **given: Value,
 ) -> Comparison:
-    """Compare two runs of a database; see `Database.compare`."""
+    """Compare two runs of a database, or two times of one; see `Database.compare`."""
+    if (run_a is None) is not (run_b is None) or (run_a is None and not window):
+        raise UsageError(
+            "a comparison is of two runs, or of two times of one",
+            "msgflow compare before after, or --run drive --window 0s..60s --window 60s..120s",
+        )
     runs = read_runs(connection)
-    first, second = (
-        choose_one(runs, wanted, "each side of a comparison") for wanted in (run_a, run_b)
-    )
+    wanted = (run, run) if run_a is None else (run_a, run_b)
+    first, second = (choose_one(runs, each, "each side of a comparison") for each in wanted)
     both: dict[str, Value] = {"run_a": first.run_id, "run_b": second.run_id}
+    both |= _windows(window, (first, second))
     asked = bind(internal_sql().header("comparison"), given | both, "msgflow compare")
     _require_sense(asked)
     compared = _compared(connection, asked, first, second)
-    skip = _warm_up(compared)
+    for side, one, text in zip("AB", (first, second), window, strict=False):
+        compared.result.notes.append(f"{side} is {text} of run {one.title}")
+    skip = 0.0 if window else _warm_up(compared)
     if not skip or not asked["resamples"]:
         return compared
     without = _compared(connection, asked | {"skip_first": skip}, first, second, is_strict=False)
     compared.result.notes.append(_without(compared, without))
     return replace(compared, without_warm_up=without)
+
+
+def _windows(window: Sequence[str], runs: tuple[Run, Run]) -> dict[str, Value]:
+    """Return the time windows of both sides, as the statement takes them."""
+    if len(window) not in (0, 2):
+        raise UsageError(
+            f"there is one --window for each side — {len(window)}",
+            "--window 0s..60s --window 60s..120s",
+        )
+    found: dict[str, Value] = {}
+    for side, run, text in zip("ab", runs, window, strict=False):
+        start, dots, end = text.partition("..")
+        if not dots:
+            raise UsageError(f"a window has a begin and an end — {text}", "--window 0s..60s")
+        times = Slice(start=start or None, end=end or None).window([run])
+        found[f"{side}_window"] = [times.start_ns, times.end_ns]
+    return found
 
 
 def warm_up(connection: duckdb.DuckDBPyConnection, run: Run) -> float:
@@ -344,7 +376,9 @@ def _require_sense(asked: dict[str, Any]) -> None:
         )
     if not 0 <= asked["skip_first"] <= MAXIMUM_NS / 1_000_000_000:
         raise UsageError(f"seconds to leave out are not negative — {asked['skip_first']}")
-    if asked["what"] != "paths" and (asked["from"] is not None or asked["to"] is not None):
+    if asked["what"] not in ("paths", "ends") and (
+        asked["from"] is not None or asked["to"] is not None
+    ):
         raise UsageError(
             f"only paths start and end at topics, not {asked['what']}", "leave out the topics"
         )

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from msgflow.sql.value import Value
 
 _MOST = 3
+_ASKED = ("run_a", "run_b", "skip_first", "a_window", "b_window")
 _PARTS = {
     "running_ns": "CPU time",
     "queue_ns": "waiting for a CPU",
@@ -31,7 +32,7 @@ def schedule_notes(
     changed = {row["subject"] for row in rows if row["verdict"] in ("B is longer", "B is shorter")}
     if not changed:
         return
-    given = {name: asked[name] for name in ("run_a", "run_b", "skip_first")}
+    given = {name: asked[name] for name in _ASKED}
     found = internal_sql().run(connection, "callback_time", {**given, "subjects": sorted(changed)})
     for row in found.to_arrow_table().to_pylist()[:_MOST]:
         yield f"{row['subject']}, on average {_change(row, 'duration_ns')}: {_parts(row)}"

@@ -43,6 +43,7 @@ The header ends at the first line that is not a `--` comment. Two spaces end a p
 
 - `variant`: a parameter whose values are queries of their own. The default is this file, and `age`
   stands in the file of the same name with `-age` behind it; a BOOLEAN `each`, in that with `-each`.
+  A query may have several: each value of them is one file.
 
 The unit of a column may also say what the column names: 'node', 'topic', 'callback', 'host' or
 'path'. Options that choose rows by them use it. In a public view over the table of the same name, a
@@ -84,10 +85,10 @@ _OBJECT = re.compile(r"\b(?:raw|staging|store|derive|main)\.[a-z_0-9]+\b")
 _RELATION = re.compile(r"\b(?:FROM|JOIN) ([a-z_0-9]+)\b(?![.(])")
 _NEXT_SOURCE = re.compile(r", (?=[a-z]+\.)")
 _RANGE = re.compile(r"(-?\d+)\.\.(-?\d+)?")
-_REPEATABLE = ("param", "column")
+_REPEATABLE = ("param", "column", "variant")
 _SINGLE = (
     "name", "title", "description", "cause", "cure", "grain", "kind", "severity", "note", "when",
-    "also", "unites", "brief", "answer", "heading", "slowest", "zero", "variant",
+    "also", "unites", "brief", "answer", "heading", "slowest", "zero",
 )  # fmt: skip
 _KINDS = ("view", "inline", "macro")
 _NOTES = ("clocks", "callbacks", "kernel", "requests", "goals")
@@ -184,7 +185,7 @@ class Header:
             empty one; if none of them has such a row, this has none.
         also: objects whose rows are stored in the same table.
         unites: objects whose rows a macro takes together.
-        variant: parameter that chooses between this query and others; its default is this one.
+        variants: parameters that choose between this query and others; their default is this one.
         chosen: of a variant: the name of the query, and the option that chooses this one.
         is_command: whether a query has a command of its own name, in place of `msgflow query NAME`.
     """
@@ -211,7 +212,7 @@ class Header:
     sources: tuple[tuple[str, str], ...] = ()
     also: tuple[str, ...] = ()
     unites: tuple[str, ...] = ()
-    variant: Param | None = None
+    variants: tuple[Param, ...] = ()
     chosen: str | None = None
     is_command: bool = False
 
@@ -288,7 +289,7 @@ def parse(text: str, path: Path) -> Header:
     if note is not None and note not in _NOTES:
         raise _error(path, 1, f"note {note!r} is not one of {', '.join(_NOTES)}")
     params = tuple(_param(field, path) for field in fields if field.key == "param")
-    variants = [_param(field, path) for field in fields if field.key == "variant"]
+    variants = tuple(_param(field, path) for field in fields if field.key == "variant")
     columns = tuple(_column(field, path) for field in fields if field.key == "column")
     _check_names(params, path)
     _check_names(columns, path)
@@ -319,7 +320,7 @@ def parse(text: str, path: Path) -> Header:
         sources=_sources(single.get("when", "")),
         also=_names(single.get("also", "")),
         unites=_names(single.get("unites", "")),
-        variant=variants[0] if variants else None,
+        variants=variants,
     )
 
 

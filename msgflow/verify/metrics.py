@@ -69,6 +69,7 @@ _TOPICS = """
 SELECT topic_name FROM main.publisher WHERE run_id = $run_id
 UNION SELECT topic_name FROM main.subscription WHERE run_id = $run_id
 """
+_PLACES = f"{_TOPICS} UNION SELECT full_name FROM main.node WHERE run_id = $run_id"
 _SERVICES = """
 SELECT service_name FROM main.service WHERE run_id = $run_id
 UNION SELECT service_name FROM main.client WHERE run_id = $run_id
@@ -95,13 +96,18 @@ _NOT_DUE = "when it was due is not known: one call only, or its creation was not
 _ARRIVALS = "roots - not_connected - cut_by_recording"
 _CONNECTED = "published - not_connected - cut_by_recording"
 
+_BETWEEN = "e2e-latency-ends"
+_NO_FLOW = "no flow reached the end of the path in the time window"
+
 PATH = "path"
+# A way between two topics, whatever path messages took: this is the field of the first topic.
+ENDS = "from"
 SUBJECTS: dict[str, Subject] = {
     PATH: Subject(
         {
             "latency": Metric(
                 "e2e-latency", "{}_ns", Dimension.TIME, _ALL, "pairs", "flow",
-                "no flow reached the end of the path in the time window",
+                _NO_FLOW,
             ),
             "reaction_time": Metric(
                 "e2e-latency-reaction", "{}_ns", Dimension.TIME, _ALL, "intervals"
@@ -116,6 +122,29 @@ SUBJECTS: dict[str, Subject] = {
             ),
         },
         dict.fromkeys(("e2e-latency", "e2e-latency-reaction", "e2e-latency-age"), "path"),
+    ),
+    ENDS: Subject(
+        {
+            "latency": Metric(
+                _BETWEEN, "first_{}_ns", Dimension.TIME, _ALL, "pairs", "first_flow", _NO_FLOW
+            ),
+            "last": Metric(
+                _BETWEEN, "last_{}_ns", Dimension.TIME, _ALL, "pairs", "last_flow", _NO_FLOW
+            ),
+            "age": Metric(_BETWEEN, "newest_{}_ns", Dimension.TIME, _ALL, "messages"),
+            "completeness": Metric(
+                _BETWEEN, f"reached / nullif({_ARRIVALS}, 0)", Dimension.SHARE, (), _ARRIVALS
+            ),
+            "loss": Metric(
+                _BETWEEN, f"(dropped + lost) / nullif({_ARRIVALS}, 0)", Dimension.SHARE, (),
+                _ARRIVALS,
+            ),
+        },
+        {_BETWEEN: "concat_ws(' → ', coalesce(first_topic, '?'), coalesce(last_topic, '?'), node)"},
+        {
+            ENDS: Filter({}, _PLACES, "topic or node"),
+            "to": Filter({}, _PLACES, "topic or node"),
+        },
     ),
     "timer": Subject(
         {

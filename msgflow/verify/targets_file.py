@@ -6,6 +6,10 @@ targets:
     completeness: ">= 99 %"
   - path: camera-to-motors
     latency: max < 200 ms
+  - from: /camera/image
+    to: /base/motors
+    latency: p95 < 150 ms
+    last: max < 600 ms
   - timer: /planner
     rate: 100 Hz ± 5 %
     lateness: [p99 < 1 ms, max < 5 ms]
@@ -19,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 from msgflow.files.yaml_file import Text, YamlFile, is_null, line_of
 from msgflow.text.name_suggestions import meant_or, nearest
 from msgflow.verify.condition import Condition, ConditionError, parse_condition
-from msgflow.verify.metrics import PATH, SUBJECTS
+from msgflow.verify.metrics import ENDS, PATH, SUBJECTS
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -100,7 +104,8 @@ def _target(file: YamlFile, node: Any) -> Target:
     metrics = tuple(subject.metrics)
     for key, _ in node.value:
         _refuse_unknown(file, key, kind, (kind, _NAME, *choosing, *metrics))
-    fields = file.mapping(node, f"a {kind}", (kind,), (*choosing, *metrics, _NAME))
+    required = (kind, "to") if kind == ENDS else (kind,)
+    fields = file.mapping(node, f"a {_word(kind)}", required, (*choosing, *metrics, _NAME))
     path_name = _path_name(file, fields[kind]) if kind == PATH else None
     topics = _path(file, fields[kind]) if kind == PATH and path_name is None else ()
     chosen = {name: file.text(fields[name], name) for name in (kind, *choosing) if name in fields
@@ -113,11 +118,13 @@ def _target(file: YamlFile, node: Any) -> Target:
     )
     if not requirements:
         file.fail(
-            line_of(node), f"nothing is required of this {kind}", f"give {', '.join(metrics)}"
+            line_of(node),
+            f"nothing is required of this {_word(kind)}",
+            f"give {', '.join(metrics)}",
         )
     named = [path_name] if path_name else []
     words = [text.value for text in (*topics, *named)] or [text.value for text in chosen.values()]
-    separator = " → " if topics else " "
+    separator = " → " if topics or kind == ENDS else " "
     given = file.optional(fields, _NAME)
     return Target(
         kind,
@@ -127,6 +134,10 @@ def _target(file: YamlFile, node: Any) -> Target:
         requirements,
         path_name,
     )
+
+
+def _word(kind: str) -> str:
+    return "way" if kind == ENDS else kind
 
 
 def _kind(file: YamlFile, node: Any) -> str:
@@ -159,7 +170,7 @@ def _refuse_unknown(file: YamlFile, key: Any, kind: str, known: tuple[str, ...])
     name = str(key.value) if key.id == "scalar" else "…"
     if name not in known:
         hint = meant_or(nearest(name, known)[:1], f"it has {', '.join(known)}")
-        file.fail(line_of(key), f"a {kind} has no {name}", hint)
+        file.fail(line_of(key), f"a {_word(kind)} has no {name}", hint)
 
 
 def _path_name(file: YamlFile, node: Any) -> Text | None:
@@ -219,7 +230,7 @@ def _refuse_repeated(file: YamlFile, targets: tuple[Target, ...]) -> None:
                 if key in seen:
                     file.fail(
                         one.line,
-                        f"{one.metric} of this {target.kind} is required twice",
+                        f"{one.metric} of this {_word(target.kind)} is required twice",
                         f"line {seen[key]} has it, too: leave one of them out",
                     )
                 seen[key] = one.line

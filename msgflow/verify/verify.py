@@ -19,7 +19,7 @@ from msgflow.run.slice import Slice
 from msgflow.sql.header import Column, Header, Param
 from msgflow.text.name_suggestions import did_you_mean
 from msgflow.verify.condition import format_value
-from msgflow.verify.metrics import PATH, SUBJECTS
+from msgflow.verify.metrics import ENDS, PATH, SUBJECTS
 from msgflow.verify.worst_case import KEYS, LOST_FLOW, WorstCase, find_worst_case, worst_case_of
 
 if TYPE_CHECKING:
@@ -234,6 +234,9 @@ class _Work:
         elif target.kind == PATH:
             given["via"] = [topic.value for topic in target.topics]
             where = ["list_has_all(string_split(path, ' → '), $via)"]
+        elif target.kind == ENDS:
+            # The parameters of the query choose.
+            where = []
         else:
             where = [
                 self._matches(load_query(name), field, subject.filters[field].columns[name])
@@ -275,6 +278,8 @@ class _Work:
             own |= {word: [*places[word]] for word in ("from", "to") if word in places}
         elif target.kind == PATH:
             own |= {"from": [target.topics[0].value], "to": [target.topics[-1].value]}
+        elif target.kind == ENDS:
+            own = {field: text.value for field, text in target.chosen.items()}
         if any(param.name == "case" for param in header.params):
             own["case"] = self._case
         part = self._part if header.has_window else Slice(self._part.run)
@@ -313,6 +318,8 @@ class _Work:
             reason = "no message of the first topic led to the last one along this path"
             if target.path_name is not None:
                 reason = "no message led from the start of this path to its end"
+        elif target.kind == ENDS:
+            reason = "no message led from the one to the other"
         else:
             reason = f"nothing of this {target.kind} was measured in the time window"
         metric = SUBJECTS[target.kind].metrics[requirement.metric]
@@ -338,7 +345,7 @@ class _Work:
         }
 
     def _worst(self, target: Target, kind: str, subject: str, key: Any) -> WorstCase | None:
-        if kind == "flow":
+        if kind in ("flow", "first_flow", "last_flow"):
             return worst_case_of([*key, "take"])
         if kind == "lost_flow":
             rows = self._ask("flows", LOST_FLOW, target, {"subject": subject})

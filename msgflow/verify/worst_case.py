@@ -36,6 +36,8 @@ class WorstCase:
 # the one below does.
 KEYS = {
     "flow": "[max_ns, max_root_ns, max_take_id]",
+    "first_flow": "[first_max_ns, first_max_root_ns, first_max_take_id]",
+    "last_flow": "[last_max_ns, last_max_root_ns, last_max_take_id]",
     "lost_flow": "path",
     "callback": "callback_id",
     "late_call": "callback_id",

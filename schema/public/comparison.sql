@@ -1,6 +1,7 @@
 -- name: main.comparison
 -- kind: macro
--- description: How a run differs from another one, by path, callback or topic: what was measured in
+-- description: How a run differs from another one, or from itself at another time, by path, ends
+--     of paths, callback or topic: what was measured in
 --     each, the difference with a bootstrap confidence interval, and how well the values of the two
 --     can be told apart.
 --     Values that follow each other are alike, so blocks of neighbouring values are resampled
@@ -10,8 +11,8 @@
 --     surely these two recordings differ. It does not say how much a system differs from itself
 --     when it is started again.
 -- grain: one row per thing compared and statistic; things that only one run has, too
--- param: what VARCHAR  'paths' (end-to-end latency), 'callbacks' (duration) or 'topics' (from
---     publication to take)
+-- param: what VARCHAR  'paths' (end-to-end latency), 'ends' (the same between two topics, by any
+--     path), 'callbacks' (duration) or 'topics' (from publication to take)
 -- param: run_a BIGINT  Run that the other one is compared with
 -- param: run_b BIGINT  The other one
 -- param: from_topic VARCHAR = NULL  Topics or nodes where paths start: names or globs, separated
@@ -19,7 +20,10 @@
 -- param: to_topic VARCHAR = NULL  Topics or nodes where paths end, in the same form; NULL: any
 -- param: wanted_case VARCHAR = 'first'  Arrivals of paths: 'first' or 'last' of each root, 'newest'
 --     root of each arrival, or 'every_pair'
--- param: skip_ns BIGINT = 0  Time left out at the start of each run
+-- param: skip_ns BIGINT = 0  Time left out at the start of each run, or of its window
+-- param: a_window BIGINT[] = NULL  Begin and end of a time window of run A, epoch ns; NULL: all of
+--     it
+-- param: b_window BIGINT[] = NULL  The same for run B
 -- param: confidence DOUBLE = 0.95  Share of intervals that would contain the true difference
 -- param: resamples BIGINT = 1000  Number of resamples for the interval
 -- param: seed BIGINT = 0  Random seed
@@ -63,33 +67,18 @@
 --     else NULL
 -- column: b_warm_up_ns BIGINT [ns]  The same for run B
 -- column: is_cut BOOLEAN  Paths were left out beyond max_depth or max_paths
--- column: subject VARCHAR  Path, callback, or topic and receiving node
+-- column: subject VARCHAR  Path, its two topics and the node that it ends at, callback, or topic
+--     and receiving node
 CREATE OR REPLACE MACRO main.comparison(
     what, run_a, run_b, from_topic := NULL, to_topic := NULL, wanted_case := 'first',
-    skip_ns := 0, confidence := 0.95, resamples := 1000, seed := 0, internal := false,
-    max_depth := 32, max_paths := 1000
+    skip_ns := 0, a_window := NULL, b_window := NULL, confidence := 0.95, resamples := 1000,
+    seed := 0, internal := false, max_depth := 32, max_paths := 1000
 ) AS TABLE
-WITH thing AS (
-    -- A root counts once, however often it arrived; not those that could not arrive, or were cut.
+WITH flow AS (
     SELECT
-        e.run_id,
-        p.path AS subject,
-        false AS is_internal,
-        e.root_ns AS at_ns,
-        e.root_id AS id,
-        CASE
-            WHEN e.status <> 'reached' THEN NULL
-            WHEN wanted_case = 'first' AND NOT e.is_first THEN NULL
-            WHEN wanted_case = 'last' AND NOT e.is_last THEN NULL
-            WHEN wanted_case = 'newest' AND NOT e.is_newest THEN NULL
-            ELSE e.latency_ns
-        END AS value_ns,
-        e.is_first IS NOT false AND e.status NOT IN ('not_connected', 'cut_by_recording')
-            AS is_unit,
-        e.status = 'reached' AS is_complete,
-        e.is_loss_affected,
-        e.is_ambiguous,
-        p.is_cut
+        e.run_id, p.path, p.topics[1] AS first_topic, p.topics[-1] AS last_topic, e.root_kind,
+        e.root_id, e.root_ns, e.take_id, e.sink_ns, e.latency_ns, e.status, e.is_first, e.is_last,
+        e.is_newest, e.is_loss_affected, e.is_ambiguous, p.is_cut
     FROM main.end_to_end(
         [run_a, run_b], from_topic, to_topic, 'callback_start', 'callback_end',
         (-9223372036854775808)::BIGINT, 9223372036854775807,
@@ -99,7 +88,43 @@ WITH thing AS (
         [run_a, run_b], from_topic, to_topic, max_depth := max_depth, max_paths := max_paths
     ) AS p
         ON e.path_id = p.path_id
+    WHERE what IN ('paths', 'ends')
+),
+outcome AS (
+    SELECT
+        run_id, path AS subject, root_ns, root_id, latency_ns, status, is_first, is_last,
+        is_newest, is_loss_affected, is_ambiguous, is_cut
+    FROM flow
     WHERE what IS NOT DISTINCT FROM 'paths'
+    UNION ALL
+    SELECT
+        run_id, concat_ws(' → ', coalesce(first_topic, '?'), coalesce(last_topic, '?'), node),
+        root_ns, root_id, latency_ns, status, is_first, is_last, is_newest, is_loss_affected,
+        is_ambiguous, (SELECT bool_or(is_cut) FROM flow)
+    FROM main.end_to_end_between('flow')
+    WHERE what IS NOT DISTINCT FROM 'ends'
+),
+thing AS (
+    -- A root counts once, however often it arrived; not those that could not arrive, or were cut.
+    SELECT
+        run_id,
+        subject,
+        false AS is_internal,
+        root_ns AS at_ns,
+        root_id AS id,
+        CASE
+            WHEN status <> 'reached' THEN NULL
+            WHEN wanted_case = 'first' AND NOT is_first THEN NULL
+            WHEN wanted_case = 'last' AND NOT is_last THEN NULL
+            WHEN wanted_case = 'newest' AND NOT is_newest THEN NULL
+            ELSE latency_ns
+        END AS value_ns,
+        is_first IS NOT false AND status NOT IN ('not_connected', 'cut_by_recording') AS is_unit,
+        status = 'reached' AS is_complete,
+        is_loss_affected,
+        is_ambiguous,
+        is_cut
+    FROM outcome
     UNION ALL
     SELECT
         i.run_id,
@@ -140,9 +165,13 @@ WITH thing AS (
         AND t.method <> 'callback_only'
 ),
 side AS (
-    SELECT s.side, s.run_id
-    FROM (VALUES ('a', run_a), ('b', run_b)) AS s (side, run_id)
-    WHERE derive.known_word('what', what, ['paths', 'callbacks', 'topics'])
+    SELECT
+        s.side, s.run_id,
+        greatest(s.time_window[1], r.start_ns) + skip_ns AS start_ns,
+        coalesce(s.time_window[2], 9223372036854775807) AS end_ns
+    FROM (VALUES ('a', run_a, a_window), ('b', run_b, b_window)) AS s (side, run_id, time_window)
+    JOIN main.run AS r ON s.run_id = r.run_id
+    WHERE derive.known_word('what', what, ['paths', 'ends', 'callbacks', 'topics'])
         AND derive.known_word(
             'wanted_case', wanted_case, ['first', 'last', 'newest', 'every_pair']
         )
@@ -153,8 +182,7 @@ sided AS MATERIALIZED (
         t.is_loss_affected, t.is_ambiguous, t.is_cut
     FROM thing AS t
     JOIN side AS s ON t.run_id = s.run_id
-    JOIN main.run AS r ON t.run_id = r.run_id
-    WHERE t.at_ns >= r.start_ns + skip_ns AND (internal OR NOT t.is_internal)
+    WHERE t.at_ns >= s.start_ns AND t.at_ns < s.end_ns AND (internal OR NOT t.is_internal)
 ),
 measured AS MATERIALIZED (
     SELECT
@@ -199,7 +227,7 @@ centred AS MATERIALIZED (
 ),
 -- By chance, three values are the longest and all of the first quarter in 1 of 64 cases.
 warm_up AS (
-    SELECT e.side, e.subject, max(e.at_ns) - any_value(r.start_ns) AS warm_up_ns
+    SELECT e.side, e.subject, max(e.at_ns) - any_value(s.start_ns) + skip_ns AS warm_up_ns
     FROM centred AS e
     JOIN (
         SELECT side, subject, max(value_ns) AS longest_ns
@@ -209,7 +237,6 @@ warm_up AS (
     ) AS later
         ON e.side = later.side AND e.subject = later.subject
     JOIN side AS s ON e.side = s.side
-    JOIN main.run AS r ON s.run_id = r.run_id
     WHERE 4 * e.position < e.number AND e.value_ns > later.longest_ns
     GROUP BY e.side, e.subject
     HAVING count(*) >= 3

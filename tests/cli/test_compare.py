@@ -44,6 +44,16 @@ def test_json_is_exact(msgflow: Msgflow, database: Path) -> None:
     assert rows["mean"]["b_share"] == 0.6667
 
 
+def test_two_times_of_one_run(msgflow: Msgflow, database: Path) -> None:
+    windows = ("--window", "0..1500ns", "--window", "1500ns..")
+    result = msgflow("compare", "--run", "before", *windows, "--format", "json", "--db", database)
+    (median, *_) = json.loads(result.stdout)
+    assert (median["a_ns"], median["b_ns"], median["a_count"], median["b_count"]) == (300, 500, 1, 1)
+    assert "A is 0..1500ns of run before (1)" in result.stderr
+    for wrong in (("before",), ("--run", "before"), ("1", "2", *windows[:2]), windows[:2]):
+        assert msgflow("compare", *wrong, "--db", database).exit_code == 2
+
+
 def test_the_exit_code_tells_whether_a_condition_holds(msgflow: Msgflow, database: Path) -> None:
     assert msgflow("compare", 1, 2, "--fail-on", "p95>5%", "--db", database).exit_code == 0
     worse = msgflow("compare", 2, 1, "--fail-on", "median>1%,p95>5%", "--db", database)
@@ -71,7 +81,7 @@ def test_every_kind_of_thing(msgflow: Msgflow, database: Path) -> None:
         (("1", "3"), "there is no such run — 3"),
         (("1", "2", "--what", "callbacks"), "the runs have no callbacks with values in common"),
         (("1", "2", "--skip-first", "100"), "the runs have no paths with values in common"),
-        (("1",), "missing argument 'RUN_B'"),
+        (("1",), "a comparison is of two runs, or of two times of one"),
     ],
 )
 def test_what_makes_no_sense_is_a_usage_error(

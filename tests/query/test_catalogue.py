@@ -35,16 +35,17 @@ def test_a_newcomer_can_read_the_list() -> None:
 
 def test_every_variant_is_a_value_of_the_option_of_its_query() -> None:
     for name in query_names():
-        variant = load_query(name).variant
-        files = {header.name for header in load_queries() if header.name.startswith(f"{name}-")}
-        if variant is None:
-            assert not files
-        elif variant.type == "BOOLEAN":
-            assert (files, variant.default) == ({f"{name}-{variant.name}"}, False)
-        else:
-            chosen = {f"{name}-{value}" for value in variant.choices}
-            assert files == chosen - {f"{name}-{variant.default}"}
-            assert variant.default in variant.choices
+        files = [header.name for header in load_queries() if header.name.startswith(f"{name}-")]
+        chosen = []
+        for variant in load_query(name).variants:
+            if variant.type == "BOOLEAN":
+                assert variant.default is False
+                chosen.append(f"{name}-{variant.name}")
+            else:
+                assert variant.default in variant.choices
+                others = [value for value in variant.choices if value != variant.default]
+                chosen += [f"{name}-{value}" for value in others]
+        assert sorted(files) == sorted(chosen)
 
 
 @pytest.mark.parametrize(
@@ -61,10 +62,18 @@ def test_every_variant_is_a_value_of_the_option_of_its_query() -> None:
         ("callbacks-each", {"each": False}, "callbacks"),
         ("callbacks", {"each": "maybe"}, "callbacks"),
         ("flows", {"measure": "rate"}, "flows"),
+        ("e2e-latency", {"measure": "latency", "by": "ends"}, "e2e-latency --by ends"),
+        ("e2e-latency-ends", {"measure": "latency"}, "e2e-latency --by ends"),
+        ("e2e-latency", {"measure": "age", "by": "path"}, "e2e-latency --measure age"),
     ],
 )
 def test_an_option_chooses_a_variant(name: str, given: dict[str, Value], words: str) -> None:
     assert choose_query(name, given).words == words
+
+
+def test_two_variants_are_not_one_answer() -> None:
+    with pytest.raises(UsageError, match="do not go together — --measure age and --by ends"):
+        choose_query("e2e-latency", {"measure": "age", "by": "ends"})
 
 
 def test_a_value_that_no_variant_has_is_refused(small_database: Path) -> None:

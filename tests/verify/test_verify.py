@@ -26,6 +26,13 @@ targets:
     latency: [median < 609741 ns, p99 < 928.11 us]
     completeness: ">= 100 %"
     loss: "<= 0 %"
+  - from: /a
+    to: /b
+    latency: median < 609741 ns
+    last: p99 < 928.11 us
+    age: median < 609741 ns
+    completeness: ">= 100 %"
+    loss: "<= 0 %"
   - timer: /source
     callback: Timer(10 ms)
     rate: 100 Hz ± 5 %
@@ -47,6 +54,11 @@ EXPECTED = {
     ("/a → /b", "latency", "p99 < 928.11 us"): ("failed", 928_110),
     ("/a → /b", "completeness", ">= 100 %"): ("passed", 1),
     ("/a → /b", "loss", "<= 0 %"): ("passed", 0),
+    ("/a → /b → /sink", "latency", "median < 609741 ns"): ("passed", 609_740),
+    ("/a → /b → /sink", "last", "p99 < 928.11 us"): ("failed", 928_110),
+    ("/a → /b → /sink", "age", "median < 609741 ns"): ("passed", 609_740),
+    ("/a → /b → /sink", "completeness", ">= 100 %"): ("passed", 1),
+    ("/a → /b → /sink", "loss", "<= 0 %"): ("passed", 0),
     ("/source Timer(10 ms)", "lateness", "max < 305160 ns"): ("failed", 305_160),
     ("/source Timer(10 ms)", "jitter", "p95 < 250.002 us"): ("passed", 250_001),
     ("/source Timer(10 ms)", "missed", "< 1"): ("passed", 0),
@@ -73,8 +85,8 @@ def test_verdicts_are_on_the_values_of_the_queries(check: Check) -> None:
     assert found["/relay → /b", "rate", "< 50 Hz"][0] == "failed"
     assert found["/source Timer(10 ms)", "rate", "100 Hz ± 5 %"][0] == "passed"
     assert len(found) == len(EXPECTED) + 2
-    assert (verification.count("passed"), verification.count("failed")) == (10, 4)
-    assert [row["verdict"] for row in rows(verification)][:4] == ["failed"] * 4
+    assert (verification.count("passed"), verification.count("failed")) == (14, 5)
+    assert [row["verdict"] for row in rows(verification)][:5] == ["failed"] * 5
 
 
 def test_what_failed_names_its_worst_case(check: Check, system: Path) -> None:
@@ -82,6 +94,10 @@ def test_what_failed_names_its_worst_case(check: Check, system: Path) -> None:
 targets:
   - path: [/a, /b]
     latency: max < 1 us
+  - from: /a
+    to: /b
+    latency: max < 1 us
+    last: max < 2 us
   - timer: /source
     lateness: max < 1 us
   - callback: Timer(10 ms)
@@ -94,7 +110,7 @@ targets:
 """
     found = {(row["subject"], row["condition"]): row for row in rows(check(text))}
     assert found.pop(("/b → /sink", "min > 1 s"))["see"] is None
-    assert len(found) == 5
+    assert len(found) == 7
     kinds = set()
     with Database(system) as database:
         for row in found.values():
@@ -174,6 +190,7 @@ def test_every_metric_reads_columns_that_its_query_has(
     units = {"ns": "1 ns", "Hz": "1 Hz", "share": "1 %", "count": "1"}
     names = {"path": "[/a, /b]", "timer": "/source", "callback": "Sub*", "topic": "/a"}
     names |= {"service": "/add", "action": "/dock", "process": "process"}
+    names |= {"from": "/a\n    to: /b"}
     for kind, subject in SUBJECTS.items():
         text, required = f"targets:\n  - {kind}: {names[kind]}\n", set()
         for name, metric in subject.metrics.items():

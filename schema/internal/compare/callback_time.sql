@@ -8,9 +8,11 @@
 -- param: run_b BIGINT  The other one
 -- param: subjects VARCHAR[]  Callbacks, as main.comparison names them
 -- param: skip_first DOUBLE = 0.0  Skip the first seconds of each run
+-- param: a_window BIGINT[] = NULL  Begin and end of a time window of run A, epoch ns
+-- param: b_window BIGINT[] = NULL  The same for run B
 WITH mean AS (
     SELECT
-        i.run_id,
+        w.side,
         l.node || ' · ' || l.label AS subject,
         avg(i.end_ns - i.start_ns) AS duration_ns,
         avg(s.running_ns) AS running_ns,
@@ -20,8 +22,12 @@ WITH mean AS (
     JOIN main.callback_schedule AS s ON i.callback_instance_id = s.callback_instance_id
     JOIN main.callback_label AS l ON i.callback_id = l.callback_id
     JOIN main.run AS r ON i.run_id = r.run_id
-    WHERE list_contains([$run_a, $run_b], i.run_id)
-        AND i.start_ns >= r.start_ns + $skip_first * 1e9
+    JOIN (
+        VALUES ('a', $run_a, $a_window::BIGINT[]), ('b', $run_b, $b_window::BIGINT[])
+    ) AS w (side, run_id, time_window)
+        ON i.run_id = w.run_id
+    WHERE i.start_ns >= greatest(w.time_window[1], r.start_ns) + $skip_first * 1e9
+        AND i.start_ns < coalesce(w.time_window[2], 9223372036854775807)
         AND list_contains($subjects, l.node || ' · ' || l.label)
     GROUP BY ALL
 )
@@ -33,5 +39,5 @@ SELECT
     round(b.blocked_ns - a.blocked_ns)::BIGINT AS blocked_ns
 FROM mean AS a
 JOIN mean AS b ON a.subject = b.subject
-WHERE a.run_id = $run_a AND b.run_id = $run_b
+WHERE a.side = 'a' AND b.side = 'b'
 ORDER BY abs(b.duration_ns - a.duration_ns) DESC, a.subject

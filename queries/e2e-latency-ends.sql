@@ -1,0 +1,190 @@
+-- name: e2e-latency-ends
+-- title: End-to-end latency between two topics
+-- description: How long it took from the start of a flow (as for e2e-latency) to its end at a node,
+--     over all paths between the topic of its first message and that of its last one. A root that
+--     several messages reflect at the end arrives several times: its first arrival says how soon
+--     the end reacted to it, its last one how long it had an effect. The newest root that an
+--     arrival reflects says how old the data were. Give --from and --to: else there is a row for
+--     each two topics between which a path leads.
+-- grain: one row per topic where flows start, topic where they end, and node that takes it
+-- param: from VARCHAR = NULL  Topics or nodes where flows start: globs, with commas between
+-- param: to VARCHAR = NULL  Topics or nodes where flows end, likewise
+-- param: from_event VARCHAR {callback_start|publish} = 'callback_start'  Event that starts
+--     the clock
+-- param: to_event VARCHAR {take|callback_start|callback_end} = 'callback_end'  Event that
+--     stops it
+-- param: max_depth BIGINT {1..} = 32     Longest path
+-- param: max_paths BIGINT {1..} = 1000   Most paths, shortest first, and chains of a length
+-- column: run_id BIGINT            Run
+-- column: first_topic VARCHAR [topic]  Topic of the first message
+-- column: last_topic VARCHAR [topic]  Topic of the last message
+-- column: node VARCHAR [node]      Node that takes it
+-- column: paths BIGINT             Paths between them
+-- column: roots BIGINT             Flows that began in the time window
+-- column: reached BIGINT           Roots that arrived, by any path
+-- column: superseded BIGINT        Others, replaced by a newer input before they were used
+-- column: dropped BIGINT           Others, that ended in a full queue
+-- column: lost BIGINT              Others, that were lost on the way
+-- column: no_output BIGINT         Others, that ended at a node that did not publish
+-- column: not_connected BIGINT     Others, that ended before or after a publisher and a
+--     subscription were connected
+-- column: unknown BIGINT           Others, that end where the trace does not show
+-- column: cut_by_recording BIGINT  Others, too close to the start or end of the recording to know
+-- column: loss_affected BIGINT     Roots with a gap of a trace in their time: their status may be
+--     wrong
+-- column: ambiguous BIGINT         Pairs of root and arrival that no path leads to without a link
+--     that may be another one (a candidate_count above 1)
+-- column: messages BIGINT          Messages at the end that reflect a root
+-- column: pairs BIGINT             Pairs of root and arrival whose latency is known
+-- column: per_root DOUBLE         Messages that reflect a root which arrived, on average
+-- column: first_min_ns BIGINT [ns]     Latency of the first arrival of each root: the shortest
+-- column: first_median_ns BIGINT [ns]  Its median
+-- column: first_mean_ns BIGINT [ns]    Its mean
+-- column: first_p95_ns BIGINT [ns]     95 % are at most this
+-- column: first_p99_ns BIGINT [ns]     99 % are at most this
+-- column: first_max_ns BIGINT [ns]     The longest
+-- column: first_max_root_ns BIGINT [epoch ns]  When the flow with the longest one began
+-- column: first_max_take_id BIGINT     Take at its end: msgflow flow --take
+-- column: last_min_ns BIGINT [ns]      Latency of the last arrival of each root: the shortest
+-- column: last_median_ns BIGINT [ns]   Its median
+-- column: last_mean_ns BIGINT [ns]     Its mean
+-- column: last_p95_ns BIGINT [ns]      95 % are at most this
+-- column: last_p99_ns BIGINT [ns]      99 % are at most this
+-- column: last_max_ns BIGINT [ns]      The longest
+-- column: last_max_root_ns BIGINT [epoch ns]  When the flow with the longest one began
+-- column: last_max_take_id BIGINT      Take at its end: msgflow flow --take
+-- column: newest_min_ns BIGINT [ns]    Age of the newest root of each arrival: the lowest
+-- column: newest_median_ns BIGINT [ns]  Its median
+-- column: newest_mean_ns BIGINT [ns]   Its mean
+-- column: newest_p95_ns BIGINT [ns]    95 % are at most this
+-- column: newest_p99_ns BIGINT [ns]    99 % are at most this
+-- column: newest_max_ns BIGINT [ns]    The highest
+-- column: is_cut BOOLEAN           There may be more paths, beyond max_depth or max_paths
+-- brief: first_topic, last_topic, node, reached, roots, lost, per_root, first_median_ns,
+--     last_max_ns, newest_max_ns, ambiguous, loss_affected, dropped, first_max_ns, last_median_ns,
+--     newest_median_ns, first_p95_ns, last_p95_ns, newest_p95_ns, paths, superseded, no_output,
+--     not_connected, unknown, cut_by_recording
+-- answer: roots
+-- note: clocks
+CREATE OR REPLACE TEMP TABLE named_path AS
+SELECT run_id, path_id, path, topics[1] AS first_topic, topics[-1] AS last_topic, is_cut
+FROM main.flow_path(
+    $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths, only_paths := true
+);
+
+WITH flow AS (
+    SELECT
+        p.path, p.first_topic, p.last_topic, e.run_id, e.root_kind, e.root_id, e.root_ns,
+        e.take_id, e.sink_ns, e.latency_ns, e.status, e.is_loss_affected, e.is_ambiguous
+    FROM main.end_to_end(
+        $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns,
+        max_depth := $max_depth, max_paths := $max_paths
+    ) AS e
+    JOIN named_path AS p ON e.path_id = p.path_id
+),
+arrival AS MATERIALIZED (
+    SELECT
+        *,
+        CASE WHEN is_first THEN latency_ns END AS first_ns,
+        CASE WHEN is_last THEN latency_ns END AS last_ns,
+        CASE WHEN is_newest THEN latency_ns END AS newest_ns
+    FROM main.end_to_end_between('flow')
+),
+affected AS (
+    SELECT run_id, first_topic, last_topic, node, count(*) AS number
+    FROM (
+        SELECT DISTINCT run_id, first_topic, last_topic, node, root_kind, root_id
+        FROM arrival
+        WHERE is_loss_affected
+    )
+    GROUP BY run_id, first_topic, last_topic, node
+),
+measured AS (
+    SELECT
+        run_id, first_topic, last_topic, node,
+        histogram(CASE WHEN is_first IS NOT false THEN status END)::MAP(VARCHAR, BIGINT) AS number,
+        count(*) FILTER (WHERE is_first IS NOT false) AS roots,
+        count(DISTINCT take_id) AS messages,
+        count(latency_ns) AS pairs,
+        count(take_id) AS arrivals,
+        count(*) FILTER (WHERE is_ambiguous) AS ambiguous,
+        min(first_ns) AS first_min_ns,
+        quantile_disc(first_ns, [0.5, 0.95, 0.99]) AS firsts,
+        round(avg(first_ns))::BIGINT AS first_mean_ns,
+        -- Of equally long ones the first, and of its arrivals the first.
+        max(struct_pack(latency_ns := first_ns, before_ns := -root_ns, before_take := -take_id))
+            FILTER (WHERE first_ns IS NOT NULL) AS longest_first,
+        min(last_ns) AS last_min_ns,
+        quantile_disc(last_ns, [0.5, 0.95, 0.99]) AS lasts,
+        round(avg(last_ns))::BIGINT AS last_mean_ns,
+        max(struct_pack(latency_ns := last_ns, before_ns := -root_ns, before_take := -take_id))
+            FILTER (WHERE last_ns IS NOT NULL) AS longest_last,
+        min(newest_ns) AS newest_min_ns,
+        quantile_disc(newest_ns, [0.5, 0.95, 0.99]) AS newests,
+        round(avg(newest_ns))::BIGINT AS newest_mean_ns,
+        max(newest_ns) AS newest_max_ns
+    FROM arrival
+    GROUP BY run_id, first_topic, last_topic, node
+),
+ends AS (
+    SELECT
+        run_id, first_topic, last_topic, string_split(path, ' → ')[-1] AS node,
+        count(*) AS paths, bool_or(is_cut) AS is_cut
+    FROM named_path
+    GROUP BY ALL
+)
+SELECT
+    n.run_id,
+    n.first_topic,
+    n.last_topic,
+    n.node,
+    n.paths,
+    coalesce(m.roots, 0) AS roots,
+    coalesce(m.number['reached'], 0) AS reached,
+    coalesce(m.number['superseded'], 0) AS superseded,
+    coalesce(m.number['dropped'], 0) AS dropped,
+    coalesce(m.number['lost'], 0) AS lost,
+    coalesce(m.number['no_output'], 0) AS no_output,
+    coalesce(m.number['not_connected'], 0) AS not_connected,
+    coalesce(m.number['unknown'], 0) AS unknown,
+    coalesce(m.number['cut_by_recording'], 0) AS cut_by_recording,
+    coalesce(a.number, 0) AS loss_affected,
+    coalesce(m.ambiguous, 0) AS ambiguous,
+    coalesce(m.messages, 0) AS messages,
+    coalesce(m.pairs, 0) AS pairs,
+    round(m.arrivals / nullif(m.number['reached'], 0), 2) AS per_root,
+    m.first_min_ns,
+    m.firsts[1] AS first_median_ns,
+    m.first_mean_ns,
+    m.firsts[2] AS first_p95_ns,
+    m.firsts[3] AS first_p99_ns,
+    m.longest_first.latency_ns AS first_max_ns,
+    -m.longest_first.before_ns AS first_max_root_ns,
+    -m.longest_first.before_take AS first_max_take_id,
+    m.last_min_ns,
+    m.lasts[1] AS last_median_ns,
+    m.last_mean_ns,
+    m.lasts[2] AS last_p95_ns,
+    m.lasts[3] AS last_p99_ns,
+    m.longest_last.latency_ns AS last_max_ns,
+    -m.longest_last.before_ns AS last_max_root_ns,
+    -m.longest_last.before_take AS last_max_take_id,
+    m.newest_min_ns,
+    m.newests[1] AS newest_median_ns,
+    m.newest_mean_ns,
+    m.newests[2] AS newest_p95_ns,
+    m.newests[3] AS newest_p99_ns,
+    m.newest_max_ns,
+    n.is_cut
+FROM ends AS n
+LEFT JOIN measured AS m
+    ON n.run_id = m.run_id
+    AND n.first_topic IS NOT DISTINCT FROM m.first_topic
+    AND n.last_topic IS NOT DISTINCT FROM m.last_topic
+    AND n.node = m.node
+LEFT JOIN affected AS a
+    ON n.run_id = a.run_id
+    AND n.first_topic IS NOT DISTINCT FROM a.first_topic
+    AND n.last_topic IS NOT DISTINCT FROM a.last_topic
+    AND n.node = a.node
+ORDER BY n.run_id, n.first_topic, n.last_topic, n.node
