@@ -53,8 +53,7 @@
 -- column: last_max_ns BIGINT [ns]      The longest
 -- column: last_max_root_ns BIGINT [epoch ns]  When the flow with the longest one began
 -- column: last_max_take_id BIGINT      Take at its end: msgflow flow --take
--- column: newest_min_ns BIGINT [ns]    Age of the newest root of each arrival: the lowest
--- column: newest_median_ns BIGINT [ns]  Its median
+-- column: newest_median_ns BIGINT [ns]  Age of the newest root of each arrival: its median
 -- column: newest_mean_ns BIGINT [ns]   Its mean
 -- column: newest_p95_ns BIGINT [ns]    95 % are at most this
 -- column: newest_p99_ns BIGINT [ns]    99 % are at most this
@@ -119,7 +118,6 @@ measured AS (
         round(avg(last_ns))::BIGINT AS last_mean_ns,
         max(struct_pack(latency_ns := last_ns, before_ns := -root_ns, before_take := -take_id))
             FILTER (WHERE last_ns IS NOT NULL) AS longest_last,
-        min(newest_ns) AS newest_min_ns,
         quantile_disc(newest_ns, [0.5, 0.95, 0.99]) AS newests,
         round(avg(newest_ns))::BIGINT AS newest_mean_ns,
         max(newest_ns) AS newest_max_ns
@@ -169,7 +167,6 @@ SELECT
     m.longest_last.latency_ns AS last_max_ns,
     -m.longest_last.before_ns AS last_max_root_ns,
     -m.longest_last.before_take AS last_max_take_id,
-    m.newest_min_ns,
     m.newests[1] AS newest_median_ns,
     m.newest_mean_ns,
     m.newests[2] AS newest_p95_ns,

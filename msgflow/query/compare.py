@@ -279,7 +279,7 @@ def _windows(window: Sequence[str], runs: tuple[Run, Run]) -> dict[str, Value]:
             f"there is one --window for each side — {len(window)}",
             "--window 0s..60s --window 60s..120s",
         )
-    found: dict[str, Value] = {}
+    found: dict[str, Value] = {"a_window": None, "b_window": None}
     for side, run, text in zip("ab", runs, window, strict=False):
         start, dots, end = text.partition("..")
         if not dots:
@@ -295,6 +295,7 @@ def warm_up(connection: duckdb.DuckDBPyConnection, run: Run) -> float:
     0 means that it does not warm up.
     """
     both: dict[str, Value] = {"run_a": run.run_id, "run_b": run.run_id, "resamples": 0}
+    both |= _windows((), (run, run))
     asked = bind(internal_sql().header("comparison"), both, "msgflow compare")
     _require_sense(asked)
     return _warm_up(_compared(connection, asked, run, run, is_strict=False))

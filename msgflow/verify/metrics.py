@@ -131,7 +131,7 @@ SUBJECTS: dict[str, Subject] = {
             "last": Metric(
                 _BETWEEN, "last_{}_ns", Dimension.TIME, _ALL, "pairs", "last_flow", _NO_FLOW
             ),
-            "age": Metric(_BETWEEN, "newest_{}_ns", Dimension.TIME, _ALL, "messages"),
+            "age": Metric(_BETWEEN, "newest_{}_ns", Dimension.TIME, _ALL[1:], "messages"),
             "completeness": Metric(
                 _BETWEEN, f"reached / nullif({_ARRIVALS}, 0)", Dimension.SHARE, (), _ARRIVALS
             ),

@@ -8,7 +8,7 @@
 --     not ambiguous.
 -- grain: one row per pair of topics, receiving node, root and take there; one per pair of topics,
 --     receiving node and root that did not arrive
--- param: flows VARCHAR  Name of rows of run_id, path, first_topic, last_topic, and all columns of
+-- param: arrivals VARCHAR  Name of rows of run_id, path, first_topic, last_topic, and all columns of
 --     main.end_to_end but path_id: a table, or a part of the query
 -- column: run_id BIGINT  Run
 -- column: first_topic VARCHAR [topic]  Topic of the first message
@@ -27,9 +27,9 @@
 -- column: is_newest BOOLEAN  Newest root of the arrival; NULL: it did not arrive
 -- column: is_loss_affected BOOLEAN  A gap of a trace overlaps its time
 -- column: is_ambiguous BOOLEAN  All its paths pass a link that may be another one
-CREATE OR REPLACE MACRO main.end_to_end_between(flows) AS TABLE
+CREATE OR REPLACE MACRO main.end_to_end_between(arrivals) AS TABLE
 WITH flow AS (
-    SELECT *, string_split(path, ' → ')[-1] AS node FROM query_table(flows)
+    SELECT *, string_split(path, ' → ')[-1] AS node FROM query_table(arrivals)
 ),
 united AS (
     SELECT

@@ -29,6 +29,8 @@ MACROS = [file for file in FILES if file.layer == "public" and file.header.kind 
 # Parameters that name a table, and what the rows of it are.
 TABLES = {
     "outcomes": "main.end_to_end([1])",
+    "arrivals": "(SELECT *, '' AS path, '' AS first_topic, '' AS last_topic FROM"
+    " main.end_to_end([1]))",
     "flows": "main.end_to_end_flow([1])",
     "trail": "main.end_to_end_trail('flows', [1])",
     "callbacks": "(SELECT *, 1::BIGINT AS busy_min_ns, 1::BIGINT AS busy_max_ns"

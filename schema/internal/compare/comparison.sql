@@ -4,6 +4,8 @@
 -- grain: one row per thing compared and statistic
 -- param: run_a BIGINT  Run that the other one is compared with
 -- param: run_b BIGINT  The other one
+-- param: a_window BIGINT[]  Begin and end of a time window of run A, epoch ns; NULL: all of it
+-- param: b_window BIGINT[]  The same for run B
 -- param: what VARCHAR {paths|ends|callbacks|topics} = 'paths'  End-to-end latency of paths, or
 --     between two topics by any path, duration of callbacks, or time from publication to take of
 --     topics
@@ -12,8 +14,6 @@
 -- param: case VARCHAR {first|last|newest|every_pair} = 'first'  First or last arrival of each root,
 --     newest root of each arrival, or all pairs
 -- param: skip_first DOUBLE = 0.0  Skip the first seconds of each run (warm-up)
--- param: a_window BIGINT[] = NULL  Begin and end of a time window of run A, epoch ns
--- param: b_window BIGINT[] = NULL  The same for run B
 -- param: confidence DOUBLE = 0.95  Confidence level of the intervals
 -- param: resamples BIGINT = NULL  Number of resamples for the intervals: 1000, or
 --     20 / (1 - confidence) if that is more, where none is given; 0 for no intervals
