@@ -59,11 +59,11 @@
 -- column: newest_p99_ns BIGINT [ns]    99 % are at most this
 -- column: newest_max_ns BIGINT [ns]    The highest
 -- column: is_cut BOOLEAN           There may be more paths, beyond max_depth or max_paths
--- brief: first_topic, last_topic, node, reached, roots, lost, per_root, first_median_ns,
---     last_max_ns, newest_max_ns, ambiguous, loss_affected, dropped, first_max_ns, last_median_ns,
+-- brief: first_topic, last_topic, node, first_median_ns, last_max_ns, reached, lost, ambiguous,
+--     loss_affected, dropped, newest_max_ns, per_root, roots, first_max_ns, last_median_ns,
 --     newest_median_ns, first_p95_ns, last_p95_ns, newest_p95_ns, paths, superseded, no_output,
 --     not_connected, unknown, cut_by_recording
--- answer: roots
+-- answer: reached
 -- note: clocks
 CREATE OR REPLACE TEMP TABLE named_path AS
 SELECT run_id, path_id, path, topics[1] AS first_topic, topics[-1] AS last_topic, is_cut
