@@ -21,6 +21,7 @@ CREATE TABLE staging.buffer_owner (process_id BIGINT, buffer_handle UBIGINT,
 CREATE TABLE staging.callback (callback_id BIGINT, process_id BIGINT, node_id BIGINT, kind VARCHAR,
     subscription_id BIGINT, timer_id BIGINT, service_id BIGINT, callback_handle UBIGINT,
     symbol VARCHAR, created_ns BIGINT, event_id BIGINT);
+CREATE TABLE staging.callback_batch (start_event_id BIGINT, take_event_id BIGINT);
 CREATE TABLE staging.callback_binding (start_event_id BIGINT, process_id BIGINT,
     callback_handle UBIGINT, is_intra_process BOOLEAN, callback_event_id BIGINT, kind VARCHAR,
     take_event_id BIGINT, subscription_event_id BIGINT, request_event_id BIGINT);

@@ -68,6 +68,31 @@ def test_initialisation_between_them_does_not_matter(system: RosSystem, analyse:
     assert analyse(system).rows(STAMPS) == [(start, 777, "rmw")]
 
 
+def test_an_executor_may_take_a_batch_first(system: RosSystem, analyse: Analyse) -> None:
+    """As that of r2r does: each callback has the oldest message of its own subscription."""
+    for handle, topic, callback in ((0x10, "/a", 0xCA), (0x11, "/b", 0xCB)):
+        system.subscription(MAIN, handle, topic, callback=callback)
+    called = []
+    for handle, stamp in ((0x10, 1), (0x11, 2), (0x10, 3)):
+        system.take(MAIN, handle, stamp)
+    for callback in (0xCB, 0xCA, 0xCA, 0xCA):
+        called.append(system.start(MAIN, callback))
+        system.end(MAIN, callback)
+    system.take(MAIN, 0x10, 4)
+    system.take(MAIN, 0x11, 5)
+    called.append(system.start(MAIN, 0xCA))
+    system.end(MAIN, 0xCA)
+    system.take(MAIN, 0x10, 6)
+    # An executor that says what it does next does not keep messages for later.
+    system.ready(MAIN)
+    called.append(system.start(MAIN, 0xCB))
+    assert analyse(system).column(
+        "SELECT t.source_timestamp_ns FROM callback_instance AS i LEFT JOIN take AS t"
+        " USING (take_id) ORDER BY i.callback_instance_id"
+    ) == [2, 1, 3, None, 4, None]
+    assert len(called) == 6
+
+
 def test_a_take_is_not_for_the_callback_of_another_subscription(
     system: RosSystem, analyse: Analyse
 ) -> None:
