@@ -3,7 +3,7 @@
 -- description: The computation graph: nodes, and the topics, services and actions between them,
 --     with rates and latencies. The services of an action are no rows of their own. As dot,
 --     mermaid and json it is for programs that draw it: topics show their rate, nodes of one
---     executor stand together, and dashed (periodic_async) and dotted (partial_sync,
+--     executor stand together, and dashed (periodic_async, queue) and dotted (partial_sync,
 --     approximate_sync) arrows lead to what an indirect link causes.
 -- grain: one row per node, topic, service or action, and what the node does with it
 -- column: run_id BIGINT            Run
@@ -12,7 +12,7 @@
 -- column: node VARCHAR [node]  Node
 -- column: name VARCHAR [topic]  Topic, service or action
 -- column: indirect VARCHAR         How messages wait in the node for what is published:
---     'periodic_async', 'partial_sync', 'approximate_sync', or several; empty: no indirect link
+--     'periodic_async', 'partial_sync', 'approximate_sync', 'queue', or several; empty: no indirect link
 --     leads to it
 -- column: count BIGINT             Messages, requests or goals in the time window
 -- column: rate_hz DOUBLE [Hz]      Rate from the first to the last
@@ -31,7 +31,7 @@ WITH indirect AS (
     FROM main.link_causal AS l
     JOIN main.publication AS b ON l.publication_id = b.publication_id
     WHERE list_contains($runs, l.run_id)
-        AND l.kind IN ('periodic_async', 'partial_sync', 'approximate_sync')
+        AND l.kind IN ('periodic_async', 'partial_sync', 'approximate_sync', 'queue')
     GROUP BY b.publisher_id
 ),
 answer AS (

@@ -4,7 +4,8 @@
 --     lead to publications, while messages that the node receives lead nowhere (periodic_async), or
 --     callbacks of several of a node's subscriptions publish only once each of them has had a
 --     message (partial_sync), or later, when it is clear which messages are closest in time
---     (approximate_sync). And where a node without traced callbacks seems to publish by itself, not
+--     (approximate_sync), or the node publishes outside of callbacks, a message for each that came
+--     (queue). And where a node without traced callbacks seems to publish by itself, not
 --     because of the message before (independent). Only the author of the node knows whether that
 --     is so: review the candidates before you apply any.
 -- grain: one row per candidate
@@ -12,7 +13,7 @@
 --     topic, for it to count as an input of a partial_sync candidate; and of those that did not
 --     wait for longer
 -- column: run_id BIGINT             Run
--- column: kind VARCHAR              'periodic_async', 'partial_sync', 'approximate_sync' or
+-- column: kind VARCHAR              'periodic_async', 'queue', 'partial_sync', 'approximate_sync' or
 --     'independent'
 -- column: node VARCHAR [node]  Node
 -- column: inputs VARCHAR[] [topic]  Topics of the inputs
@@ -64,7 +65,30 @@ input AS (
 ),
 -- Messages lead nowhere, while timers or other messages lead to publications.
 dead_end AS MATERIALIZED (
-    SELECT *, timer_id IS NOT NULL AS is_timed FROM main.dead_end($runs)
+    SELECT
+        *, timer_id IS NOT NULL AS is_timed, coalesce(timer_id, trigger_id) IS NULL AS is_outside
+    FROM main.dead_end($runs)
+),
+queued AS (
+    SELECT
+        node_id,
+        'queue' AS kind,
+        [topic_name] AS inputs,
+        list(DISTINCT output_topic ORDER BY output_topic) AS outputs,
+        printf(
+            'it published %s outside of callbacks, as %d messages on %s came, each after the one of'
+            || ' its number',
+            string_agg(
+                printf('%d messages on %s', publication_count, output_topic), ' and '
+                ORDER BY output_topic, publisher_id
+            ),
+            message_count, topic_name
+        ) AS evidence,
+        CASE WHEN bool_or(is_loop) THEN
+            printf('messages on %s descend from what the node publishes', topic_name) END AS doubt
+    FROM dead_end
+    WHERE is_queue
+    GROUP BY node_id, subscription_id, topic_name, message_count
 ),
 declared AS (
     SELECT o.publisher_id
@@ -201,6 +225,7 @@ published AS (
             cause
         ) AS evidence
     FROM dead_end
+    WHERE NOT is_queue
     GROUP BY subscription_id, is_timed, timer_id, trigger_id, cause
 ),
 cause AS (
@@ -236,6 +261,8 @@ kept AS (
                 printf('messages on %s descend from what the node publishes', d.topic_name) END,
             CASE WHEN NOT d.is_timed AND count(a.publisher_id) > 0 THEN
                 'message_filters (ApproximateTime) may choose the messages' END,
+            CASE WHEN bool_or(d.is_outside) THEN
+                'a thread that publishes by itself may not use the messages at all' END,
             CASE WHEN NOT d.is_timed AND sum(d.early_count) > 0 THEN
                 printf(
                     '%d messages were published before the first one on %s came',
@@ -251,6 +278,7 @@ kept AS (
     FROM dead_end AS d
     LEFT JOIN undecided AS u ON d.subscription_id = u.subscription_id
     LEFT JOIN chosen_by_time AS a ON d.publisher_id = a.publisher_id
+    WHERE NOT d.is_queue
     GROUP BY d.node_id, d.subscription_id, d.is_timed, d.topic_name, d.message_count
 ),
 periodic AS (
@@ -315,6 +343,13 @@ independent AS (
     ) AS b ON d.publisher_id = b.publisher_id
     GROUP BY d.node_id, d.output_topic
 ),
+-- It may keep the messages for what it publishes by itself.
+kept_by_hand AS (
+    SELECT
+        node_id, 'periodic_async' AS kind, inputs, outputs, evidence,
+        'only if the node keeps these messages for what it publishes by itself' AS doubt
+    FROM independent
+),
 received AS (
     SELECT node_id, list(DISTINCT topic_name ORDER BY topic_name) AS topics
     FROM input
@@ -327,6 +362,10 @@ candidate AS (
     SELECT node_id, kind, inputs, outputs, evidence, doubt, true FROM partial
     UNION ALL
     SELECT node_id, kind, inputs, outputs, evidence, doubt, false FROM independent
+    UNION ALL
+    SELECT node_id, kind, inputs, outputs, evidence, doubt, false FROM kept_by_hand
+    UNION ALL
+    SELECT node_id, kind, inputs, outputs, evidence, doubt, false FROM queued
 )
 SELECT
     n.run_id,

@@ -9,7 +9,7 @@ CREATE TABLE staging.agnocast_take (event_id BIGINT, ts_ns BIGINT, trace_index I
     thread_id BIGINT, process_id BIGINT, entry_id BIGINT, handle UBIGINT,
     subscription_event_id BIGINT);
 CREATE TABLE staging.annotation (annotation_id BIGINT, kind VARCHAR, source VARCHAR,
-    process_id BIGINT, event_id BIGINT);
+    process_id BIGINT, queue_depth BIGINT, event_id BIGINT);
 CREATE TABLE staging.annotation_event (event_id BIGINT, process_id BIGINT, kind VARCHAR,
     inputs UBIGINT[], outputs UBIGINT[]);
 CREATE TABLE staging.annotation_input (annotation_id BIGINT, subscription_id BIGINT);

@@ -420,10 +420,11 @@ CREATE TABLE store.thread_break (
 CREATE TABLE store.annotation (
     annotation_id BIGINT PRIMARY KEY,  -- Identity of the annotation
     run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
-    kind VARCHAR NOT NULL,  -- 'periodic_async', 'partial_sync', 'approximate_sync', 'direct' or
-        -- 'independent'
+    kind VARCHAR NOT NULL,  -- 'periodic_async', 'partial_sync', 'approximate_sync', 'queue',
+        -- 'direct' or 'independent'
     source VARCHAR NOT NULL,  -- 'trace' or 'file'
-    process_id BIGINT NOT NULL  -- Process it lives in {to process}
+    process_id BIGINT NOT NULL,  -- Process it lives in {to process}
+    queue_depth BIGINT  -- Of a queue: most messages that wait in it; NULL: not limited
 );
 
 -- One row per subscription of an annotation
@@ -493,7 +494,7 @@ CREATE TABLE store.link_causal (
     subscription_id BIGINT,  -- Subscription of that message {to subscription}
     publisher_id BIGINT,  -- Publisher of the effect {to publisher}
     kind VARCHAR NOT NULL,  -- 'direct', 'periodic_async', 'partial_sync', 'approximate_sync',
-        -- 'take_adjacent' or 'polled'
+        -- 'queue', 'take_adjacent' or 'polled'
     annotation_id BIGINT,  -- Annotation that declares it; NULL for links that are not indirect {to
         -- annotation}
     candidate_count BIGINT,  -- Callback instances that it could have been; one more if the message

@@ -154,7 +154,8 @@ CREATE TABLE store.thread_break (
 );
 CREATE TABLE store.annotation (
     annotation_id BIGINT NOT NULL, run_id BIGINT NOT NULL, kind VARCHAR NOT NULL,
-    source VARCHAR NOT NULL, process_id BIGINT NOT NULL, PRIMARY KEY (annotation_id)
+    source VARCHAR NOT NULL, process_id BIGINT NOT NULL, queue_depth BIGINT,
+    PRIMARY KEY (annotation_id)
 );
 CREATE TABLE store.annotation_input (
     run_id BIGINT NOT NULL, annotation_id BIGINT NOT NULL, subscription_id BIGINT NOT NULL

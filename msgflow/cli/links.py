@@ -56,6 +56,8 @@ def print_applied(opened: Database, one: AppliedLinks) -> None:
         f" {count(one.link_count, 'indirect link')} between messages"
         f"{traced if one.traced_link_count else ''}"
     )
+    for sentence in one.without_effect:
+        print_note(sentence)
     findings = opened.query(
         "info-findings", run=one.run.run_id, where="name = 'contradictory_annotations'"
     )

@@ -19,6 +19,7 @@ _SHAPES = {
 }
 _STYLES = {
     "periodic_async": 'style=dashed, color="#aa4499"',
+    "queue": 'style=dashed, color="#aa4499"',
     "partial_sync": 'style=dotted, color="#aa4499"',
     "approximate_sync": 'style=dotted, color="#aa4499"',
 }

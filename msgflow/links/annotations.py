@@ -12,7 +12,7 @@ from msgflow.links.topics import declare_topics
 from msgflow.sql.statement import internal_sql
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
     from pathlib import Path
 
     import duckdb
@@ -34,6 +34,7 @@ class AppliedLinks:
         topic_count: topics that the file names.
         link_count: indirect links of messages that come from the file only.
         traced_link_count: indirect links of messages that come from the trace.
+        without_effect: a sentence for each declared link that no message took.
     """
 
     run: Run
@@ -42,6 +43,7 @@ class AppliedLinks:
     topic_count: int
     link_count: int
     traced_link_count: int
+    without_effect: tuple[str, ...]
 
 
 def apply_links(
@@ -68,7 +70,13 @@ def apply_links(
         for run in runs:
             derive(con, run.run_id)
         return tuple(
-            AppliedLinks(run, *counts[run.run_id], *_link_counts(con, run.run_id)) for run in runs
+            AppliedLinks(
+                run,
+                *counts[run.run_id],
+                *_link_counts(con, run.run_id),
+                tuple(_without_effect(con, run.run_id)),
+            )
+            for run in runs
         )
 
     return change_runs(path, run, apply, memory_limit=memory_limit)
@@ -128,9 +136,10 @@ def _insert(
     con: duckdb.DuckDBPyConnection, run_id: int, annotation_id: int, link: MatchedLink
 ) -> None:
     con.execute(
-        "INSERT INTO store.annotation (annotation_id, run_id, kind, source, process_id) "
-        "VALUES (?, ?, ?, 'file', ?)",
-        [annotation_id, run_id, link.kind, link.process_id],
+        "INSERT INTO store.annotation "
+        "(annotation_id, run_id, kind, source, process_id, queue_depth) "
+        "VALUES (?, ?, ?, 'file', ?, ?)",
+        [annotation_id, run_id, link.kind, link.process_id, link.depth],
     )
     for table, column, endpoints in (
         ("annotation_input", "subscription_id", link.inputs),
@@ -156,3 +165,9 @@ def _link_counts(con: duckdb.DuckDBPyConnection, run_id: int) -> tuple[int, int]
     """Return the number of indirect links from files, and from the trace."""
     ((of_file, of_trace),) = internal_sql().run(con, "link_source", {"run_id": run_id}).fetchall()
     return of_file, of_trace
+
+
+def _without_effect(con: duckdb.DuckDBPyConnection, run_id: int) -> Iterator[str]:
+    found = internal_sql().run(con, "link_without_effect", {"run_id": run_id}).fetchall()
+    for kind, inputs, outputs, reason in found:
+        yield f"no message took the link from {inputs} to {outputs} ({kind}): {reason}"

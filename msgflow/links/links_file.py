@@ -5,6 +5,11 @@ links:
     node: /fusion
     inputs: [/lidar, /camera]
     outputs: [/objects]
+  - kind: queue
+    node: /slam
+    inputs: [/image]
+    outputs: [/pose]
+    depth: 2
   - kind: independent
     node: /filter
     inputs: [/scan]
@@ -28,11 +33,12 @@ if TYPE_CHECKING:
 # Links to what a node publishes later, from messages that it keeps.
 # The synchronous ones need a message of every input.
 SYNCHRONOUS_KINDS = ("partial_sync", "approximate_sync")
-INDIRECT_KINDS = ("periodic_async", *SYNCHRONOUS_KINDS)
+QUEUE = "queue"
+INDIRECT_KINDS = ("periodic_async", QUEUE, *SYNCHRONOUS_KINDS)
 # Whether the publications that come after a message are its effects.
 KINDS = (*INDIRECT_KINDS, "direct", "independent")
 _REQUIRED = ("kind", "node", "inputs", "outputs")
-_OPTIONAL = ("inputs_of", "process", "host")
+_OPTIONAL = ("inputs_of", "process", "host", "depth")
 _ENDPOINTS = ("publisher", "subscription")
 _EXAMPLE = "links: [{kind: periodic_async, node: /fusion, inputs: [/lidar], outputs: [/objects]}]"
 _TOPIC_EXAMPLE = "topics: [{name: /scan, publisher: 0x55bb52684970}], as in msgflow check"
@@ -44,7 +50,7 @@ class DeclaredLink:
     """One entry of the file.
 
     Attributes:
-        kind: 'periodic_async', 'partial_sync' or 'approximate_sync'; 'direct': the node publishes
+        kind: one of INDIRECT_KINDS; 'direct': the node publishes
             on the outputs because of the message before; 'independent': not because of messages of
             the inputs.
         node: full name of a node, or a pattern.
@@ -54,6 +60,7 @@ class DeclaredLink:
         process: name or pid of its process, if several nodes have the name.
         host: its host, likewise.
         line: where the entry begins.
+        depth: of a queue, how many messages wait in it at most; any number when None.
     """
 
     kind: str
@@ -64,6 +71,7 @@ class DeclaredLink:
     process: Text | None
     host: Text | None
     line: int
+    depth: int | None = None
 
 
 @dataclass(frozen=True)
@@ -141,7 +149,18 @@ def _link(file: YamlFile, node: Any) -> DeclaredLink:
         file.optional(fields, "process"),
         file.optional(fields, "host"),
         line_of(node),
+        _depth(file, kind.value, file.optional(fields, "depth")),
     )
+
+
+def _depth(file: YamlFile, kind: str, given: Text | None) -> int | None:
+    if given is None:
+        return None
+    if kind != QUEUE:
+        file.fail(given.line, f"only a {QUEUE} has a depth — {kind}", "leave it out")
+    if not given.value.isdecimal() or int(given.value) < 1:
+        file.fail(given.line, f"a depth is a number from 1 — {given.value}", "leave it out")
+    return int(given.value)
 
 
 def _topic(file: YamlFile, node: Any) -> DeclaredTopic:

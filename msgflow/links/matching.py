@@ -64,11 +64,12 @@ class MatchedLink:
     """A declared link of one node, with its subscriptions and publishers.
 
     Attributes:
-        kind: 'periodic_async', 'partial_sync', 'approximate_sync', 'direct' or 'independent'.
+        kind: of links_file.KINDS.
         process_id: process of the node.
         inputs: subscriptions, in order of their ids.
         outputs: publishers, likewise.
         line: its line in the file.
+        depth: of a queue: most messages that wait in it.
     """
 
     kind: str
@@ -76,6 +77,7 @@ class MatchedLink:
     inputs: tuple[Endpoint, ...]
     outputs: tuple[Endpoint, ...]
     line: int
+    depth: int | None
 
 
 def match_links(
@@ -160,7 +162,7 @@ def _match(file: LinksFile, link: DeclaredLink, nodes: Sequence[Node]) -> Iterat
                 f"{link.kind} with one input waits for nothing — {inputs[0].topic} of {node.name}",
                 "name all inputs that it waits for, or leave it out",
             )
-        yield MatchedLink(link.kind, node.process_id, inputs, outputs, link.line)
+        yield MatchedLink(link.kind, node.process_id, inputs, outputs, link.line, link.depth)
 
 
 def _choose(file: LinksFile, link: DeclaredLink, nodes: Sequence[Node]) -> Sequence[Node]:

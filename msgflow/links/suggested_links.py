@@ -94,6 +94,8 @@ def _entry(row: Mapping[str, Any]) -> list[str]:
         lines.append(f"  inputs_of: {quoted(row['inputs_of'])}")
     for side in ("inputs", "outputs"):
         lines += list_lines(f"  {side}", [quoted(name) for name in row[side]], _WIDTH)
+    if row.get("queue_depth"):
+        lines.append(f"  depth: {row['queue_depth']}")
     return lines
 
 

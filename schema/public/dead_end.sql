@@ -2,14 +2,16 @@
 -- kind: macro
 -- description: Subscriptions at which flows end although their node publishes: at least three
 --     messages came, and none of their callbacks led to anything, while timers of the node or other
---     messages led to publications. Either the node only consumes these messages, or it keeps them,
+--     messages led to publications, or the node published outside of callbacks. Either the node only consumes these messages, or it keeps them,
 --     and what it publishes depends on them: then a link has to be declared. A link is not
 --     likely if the messages descend from what the node publishes itself, and end a loop. Nor is it
 --     if messages on another topic led to publications before the first one came, or in callbacks
 --     that run shorter: to keep a message takes less time than to use it. Topics of ROS itself,
---     topics that the node also publishes on, and inputs of annotations are left out.
+--     topics that the node also publishes on, and inputs of annotations are left out. A thread of
+--     the node may publish by itself, so what comes outside of callbacks makes a link likely only if
+--     it answers the messages one by one.
 -- grain: one row per such subscription, publisher of its node, and timer or subscription whose
---     callbacks published
+--     callbacks published; one row for what it published outside of callbacks
 -- param: runs BIGINT[]  Runs to look at
 -- column: run_id BIGINT  Run
 -- column: node_id BIGINT  Node
@@ -18,14 +20,17 @@
 -- column: message_count BIGINT  Messages that it got
 -- column: publisher_id BIGINT  Publisher of the node
 -- column: output_topic VARCHAR  Its topic
--- column: timer_id BIGINT  Timer whose callbacks published; NULL: a subscription
--- column: trigger_id BIGINT  Subscription whose callbacks published; NULL: a timer
--- column: cause VARCHAR  What led to publications, in words: 'by a timer of 50 ms', 'from /points'
--- column: publication_count BIGINT  Messages that these callbacks published
+-- column: timer_id BIGINT  Timer whose callbacks published; NULL: none
+-- column: trigger_id BIGINT  Subscription whose callbacks published; NULL: none
+-- column: cause VARCHAR  What led to publications, in words: 'by a timer of 50 ms', 'from /points',
+--     'outside of callbacks'
+-- column: publication_count BIGINT  Messages that were published so
 -- column: early_count BIGINT  Those before the first message of the subscription
 -- column: run_ns BIGINT [ns]  Median run of the callbacks of the subscription
 -- column: publishing_run_ns BIGINT [ns]  Median run of the callbacks that published
 -- column: is_loop BOOLEAN  The messages descend from what the node publishes
+-- column: is_queue BOOLEAN  Outside of callbacks as much was published as messages came, each after
+--     the message of its number: a queue fits (first in, first out)
 -- column: is_likely BOOLEAN  Nothing speaks against a link
 CREATE OR REPLACE MACRO main.dead_end(runs) AS TABLE
 -- Logging is no effect.
@@ -78,6 +83,13 @@ published AS MATERIALIZED (
     LEFT JOIN store.subscription AS s ON c.subscription_id = s.subscription_id
     WHERE l.kind = 'direct' AND l.topic_name IS NOT NULL
         AND l.node_id = coalesce(t.node_id, s.node_id)
+    UNION ALL
+    SELECT p.node_id, b.publisher_id, NULL, NULL, b.start_ns, NULL
+    FROM store.publication AS b
+    JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
+    SEMI JOIN idle AS d ON p.node_id = d.node_id
+    ANTI JOIN caused AS l ON b.publication_id = l.publication_id
+    WHERE list_contains(runs, b.run_id) AND NOT p.is_internal AND p.topic_name IS NOT NULL
 ),
 output AS (
     SELECT
@@ -89,6 +101,30 @@ output AS (
     FROM idle AS d
     JOIN published AS p ON d.node_id = p.node_id
     GROUP BY ALL
+),
+-- One after the other, and few that wait at the end.
+queue AS (
+    SELECT m.subscription_id, b.publisher_id
+    FROM (
+        SELECT
+            node_id, subscription_id, start_ns,
+            row_number() OVER (PARTITION BY subscription_id ORDER BY start_ns) AS number,
+            count(*) OVER (PARTITION BY subscription_id) AS number_of_all
+        FROM instance
+    ) AS m
+    JOIN (
+        SELECT
+            node_id, publisher_id, start_ns,
+            row_number() OVER (PARTITION BY publisher_id ORDER BY start_ns) AS number,
+            count(*) OVER (PARTITION BY publisher_id) AS number_of_all
+        FROM published
+        WHERE timer_id IS NULL AND trigger_id IS NULL
+    ) AS b
+        ON m.node_id = b.node_id AND m.number = b.number
+    GROUP BY m.subscription_id, b.publisher_id
+    HAVING bool_and(b.start_ns >= m.start_ns)
+        AND count(*) = any_value(b.number_of_all)
+        AND count(*) >= greatest(0.9 * any_value(m.number_of_all), any_value(m.number_of_all) - 10)
 ),
 descent (node_id, subscription_id) AS (
     SELECT o.node_id, h.subscription_id
@@ -139,7 +175,8 @@ SELECT
     o.timer_id,
     o.trigger_id,
     CASE
-        WHEN o.timer_id IS NULL THEN 'from ' || coalesce(g.topic_name, '?')
+        WHEN o.trigger_id IS NOT NULL THEN 'from ' || coalesce(g.topic_name, '?')
+        WHEN o.timer_id IS NULL THEN 'outside of callbacks'
         ELSE coalesce(printf('by a timer of %.10g ms', t.period_ns / 1e6), 'by a timer')
     END AS cause,
     o.publication_count,
@@ -147,14 +184,21 @@ SELECT
     o.run_ns,
     o.publishing_run_ns,
     l.subscription_id IS NOT NULL AS is_loop,
+    q.subscription_id IS NOT NULL AS is_queue,
     l.subscription_id IS NULL
     AND (
         o.timer_id IS NOT NULL
-        OR o.early_count = 0 AND coalesce(o.run_ns <= o.publishing_run_ns, true)
+        OR q.subscription_id IS NOT NULL
+        OR o.trigger_id IS NOT NULL
+        AND o.early_count = 0 AND coalesce(o.run_ns <= o.publishing_run_ns, true)
     ) AS is_likely
 FROM output AS o
 JOIN store.subscription AS s ON o.subscription_id = s.subscription_id
 JOIN store.publisher AS p ON o.publisher_id = p.publisher_id
 LEFT JOIN store.timer AS t ON o.timer_id = t.timer_id
 LEFT JOIN store.subscription AS g ON o.trigger_id = g.subscription_id
+LEFT JOIN queue AS q
+    ON o.subscription_id = q.subscription_id
+    AND o.publisher_id = q.publisher_id
+    AND coalesce(o.timer_id, o.trigger_id) IS NULL
 LEFT JOIN loop AS l ON o.node_id = l.node_id AND o.subscription_id = l.subscription_id

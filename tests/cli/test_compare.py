@@ -48,7 +48,8 @@ def test_two_times_of_one_run(msgflow: Msgflow, database: Path) -> None:
     windows = ("--window", "0..1500ns", "--window", "1500ns..")
     result = msgflow("compare", "--run", "before", *windows, "--format", "json", "--db", database)
     (median, *_) = json.loads(result.stdout)
-    assert (median["a_ns"], median["b_ns"], median["a_count"], median["b_count"]) == (300, 500, 1, 1)
+    names = ("a_ns", "b_ns", "a_count", "b_count")
+    assert tuple(median[name] for name in names) == (300, 500, 1, 1)
     assert "A is 0..1500ns of run before (1)" in result.stderr
     for wrong in (("before",), ("--run", "before"), ("1", "2", *windows[:2]), windows[:2]):
         assert msgflow("compare", *wrong, "--db", database).exit_code == 2

@@ -23,11 +23,12 @@ Table(
     run_id(),
     text(
         "kind",
-        "'periodic_async', 'partial_sync', 'approximate_sync', 'direct' or 'independent'",
+        "'periodic_async', 'partial_sync', 'approximate_sync', 'queue', 'direct' or 'independent'",
         required=True,
     ),
     text("source", "'trace' or 'file'", required=True),
     process_id(),
+    number("queue_depth", "Of a queue: most messages that wait in it; NULL: not limited"),
     comment="One row per declared link",
     info={"view": "Declared links: indirect ones, and whether publications answer messages."},
 )
@@ -130,8 +131,8 @@ Table(
     reference("publisher_id", "Publisher of the effect", to="publisher.publisher_id"),
     text(
         "kind",
-        "'direct', 'periodic_async', 'partial_sync', 'approximate_sync', 'take_adjacent' or "
-        "'polled'",
+        "'direct', 'periodic_async', 'partial_sync', 'approximate_sync', 'queue', 'take_adjacent' "
+        "or 'polled'",
         required=True,
     ),
     reference(

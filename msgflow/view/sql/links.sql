@@ -15,7 +15,7 @@
 -- param: last_instance BIGINT  As in window_ids.sql
 -- param: limit BIGINT {1..50000} = 50000  Most links
 -- column: link_kind UTINYINT  0 transport, 1 direct, 2 periodic_async, 3 partial_sync,
---     4 take_adjacent, 5 polled, 6 approximate_sync
+--     4 take_adjacent, 5 polled, 6 approximate_sync, 7 queue
 -- column: from_row BIGINT  Row of the timeline where the arrow begins
 -- column: to_row BIGINT  Row where it ends
 -- column: from_at BIGINT [ns since origin]  Begin
@@ -39,7 +39,8 @@ WITH message AS (
 cause AS (
     SELECT
         CASE l.kind WHEN 'direct' THEN 1 WHEN 'periodic_async' THEN 2 WHEN 'partial_sync' THEN 3
-            WHEN 'take_adjacent' THEN 4 WHEN 'polled' THEN 5 ELSE 6 END::UTINYINT AS link_kind,
+            WHEN 'take_adjacent' THEN 4 WHEN 'polled' THEN 5 WHEN 'queue' THEN 7 ELSE 6
+            END::UTINYINT AS link_kind,
         CASE c.kind
             WHEN 'timer' THEN coalesce(8 * c.timer_id, 8 * c.callback_id + 5)
             WHEN 'subscription' THEN coalesce(8 * c.subscription_id + 1, 8 * c.callback_id + 5)

@@ -68,6 +68,7 @@ export const LINKS = {
   periodic_async: "periodic (cached until the timer)",
   partial_sync: "synchronised (cached until the set was complete)",
   approximate_sync: "synchronised (cached until the closest set was known)",
+  queue: "queued (until a thread had worked it off)",
   take_adjacent: "published after the take",
   polled: "taken in the callback, then published",
   service: "service",
@@ -80,6 +81,7 @@ export const LINK_CODES = [
   "take_adjacent",
   "polled",
   "approximate_sync",
+  "queue",
 ];
 
 const TITLES = {

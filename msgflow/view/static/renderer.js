@@ -822,6 +822,7 @@ const LINK_STYLE = [
   { color: "direct", dash: [4, 2] },
   { color: "direct", dash: [4, 2] },
   { color: "indirect", dash: [2, 3] },
+  { color: "indirect", dash: [6, 3] },
 ];
 const EDGE_STYLE = {
   transport: { color: "transport" },
@@ -830,6 +831,7 @@ const EDGE_STYLE = {
   periodic_async: { color: "indirect", dash: [6, 3] },
   partial_sync: { color: "indirect", dash: [2, 3] },
   approximate_sync: { color: "indirect", dash: [2, 3] },
+  queue: { color: "indirect", dash: [6, 3] },
   take_adjacent: { color: "direct", dash: [4, 2] },
   polled: { color: "direct", dash: [4, 2] },
   service: { color: "direct", dash: [4, 2] },

@@ -26,7 +26,7 @@ WITH foreign_word AS (
     SELECT DISTINCT run_id, 'annotation.kind', kind
     FROM store.annotation
     WHERE kind NOT IN (
-        'periodic_async', 'partial_sync', 'approximate_sync', 'direct', 'independent'
+        'periodic_async', 'partial_sync', 'approximate_sync', 'queue', 'direct', 'independent'
     )
     UNION ALL
     SELECT DISTINCT run_id, 'annotation.source', source
@@ -62,7 +62,8 @@ WITH foreign_word AS (
     SELECT DISTINCT run_id, 'link_causal.kind', kind
     FROM store.link_causal
     WHERE kind NOT IN (
-        'direct', 'periodic_async', 'partial_sync', 'approximate_sync', 'take_adjacent', 'polled'
+        'direct', 'periodic_async', 'partial_sync', 'approximate_sync', 'queue', 'take_adjacent',
+        'polled'
     )
     UNION ALL
     SELECT DISTINCT run_id, 'undelivered.reason', reason

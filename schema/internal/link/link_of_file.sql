@@ -9,6 +9,7 @@
 -- column: inputs VARCHAR[]  Topics of its inputs
 -- column: outputs VARCHAR[]  Topics of its outputs
 -- column: inputs_of VARCHAR  Node that receives the inputs for it; NULL: itself
+-- column: queue_depth BIGINT  Of a queue: most messages that wait in it
 -- column: pid INTEGER  Process id of the node
 -- column: host VARCHAR  Its host
 -- column: is_name_repeated BOOLEAN  Several nodes of the run have this name
@@ -41,6 +42,7 @@ SELECT
     i.topics AS inputs,
     o.topics AS outputs,
     CASE WHEN i.node_id <> o.node_id THEN r.full_name END AS inputs_of,
+    a.queue_depth,
     p.pid,
     h.hostname AS host,
     n.is_name_repeated

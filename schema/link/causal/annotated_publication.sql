@@ -11,6 +11,7 @@ SELECT
     a.annotation_id,
     a.kind,
     b.publication_id,
+    b.publisher_id,
     b.trace_id,
     b.thread_id,
     b.start_ns,

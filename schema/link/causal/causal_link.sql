@@ -4,7 +4,8 @@
 --     cause may be one of another process, so there is one candidate more. Annotations take links
 --     away. `independent` says that a publisher does not answer a subscription: links of the kinds
 --     `direct` and `take_adjacent` go. `approximate_sync` says that it waits for the messages
---     closest in time: links of the kind `direct` go.
+--     closest in time: links of the kind `direct` go. Where messages are said to be kept,
+--     `take_adjacent` is no longer a guess worth making.
 -- grain: one row per link that is not declared away
 -- param: only_run BIGINT  Run to look at
 -- param: links VARCHAR  Name of rows of run_id, callback_instance_id, take_id, publication_id,
@@ -29,10 +30,15 @@ LEFT JOIN derive.mixed_publication(only_run) AS m ON l.publication_id = m.public
 ANTI JOIN (
     SELECT
         subscription_id, publisher_id,
-        unnest(CASE kind WHEN 'independent' THEN ['direct', 'take_adjacent'] ELSE ['direct'] END)
-            AS kind
+        unnest(
+            CASE kind
+                WHEN 'independent' THEN ['direct', 'take_adjacent']
+                WHEN 'approximate_sync' THEN ['direct']
+                ELSE ['take_adjacent']
+            END
+        ) AS kind
     FROM derive.declared_pair
-    WHERE run_id = only_run AND kind IN ('independent', 'approximate_sync')
+    WHERE run_id = only_run AND kind IN ('independent', 'approximate_sync', 'periodic_async', 'queue')
 ) AS d
     ON l.kind = d.kind
     AND t.subscription_id = d.subscription_id

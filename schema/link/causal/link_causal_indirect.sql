@@ -14,7 +14,8 @@
 --     candidates counts, and "no message" is one more candidate. On one thread the order of events
 --     decides: what ran nested in a firing, before it published last, was used by it and by no
 --     other; and what a firing is nested in has not ended. Nothing is linked across a gap in the
---     record of either thread.
+--     record of either thread. Messages of rclpy have no callback instance: derive.annotated_run
+--     says what stands for it.
 -- grain: one row per annotation, publication by one of its outputs, and other input with a message
 -- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.link_causal_indirect(only_run) AS TABLE
@@ -252,6 +253,11 @@ linked AS (
         run_id, annotation_id, kind, publication_id, callback_instance_id, candidate_count,
         trace_id, thread_id, start_ns, start_event_id, since_ns
     FROM derive.link_causal_approximate(only_run, 'annotated', 'input_run')
+    UNION ALL
+    SELECT
+        run_id, annotation_id, kind, publication_id, callback_instance_id, candidate_count,
+        trace_id, thread_id, start_ns, start_event_id, NULL
+    FROM derive.link_causal_queue(only_run, 'annotated', 'input_run')
 ),
 -- A message that is missing may have been the right one, since the first that was looked at.
 found AS MATERIALIZED (
@@ -264,8 +270,7 @@ found AS MATERIALIZED (
         least(c.since_ns, i.start_ns) AS since_ns,
         i.start_event_id AS input_start_event_id
     FROM linked AS c
-    JOIN store.callback_instance AS i
-        ON c.callback_instance_id = i.callback_instance_id AND i.run_id = only_run
+    JOIN input_run AS i ON c.callback_instance_id = i.callback_instance_id
 ),
 -- Only traces with gaps need a closer look.
 exposed AS MATERIALIZED (

@@ -19,6 +19,7 @@ SELECT
     kind,
     'trace' AS source,
     process_id,
+    NULL::BIGINT AS queue_depth,
     min(event_id) AS event_id
 FROM meant
 GROUP BY process_id, kind, objects
