@@ -12,8 +12,8 @@
 -- column: node VARCHAR [node]  Node
 -- column: name VARCHAR [topic]  Topic, service or action
 -- column: indirect VARCHAR         How messages wait in the node for what is published:
---     'periodic_async', 'partial_sync', 'approximate_sync', 'queue', or several; empty: no indirect link
---     leads to it
+--     'periodic_async', 'partial_sync', 'approximate_sync', 'queue', or several; empty: no indirect
+--     link leads to it
 -- column: count BIGINT             Messages, requests or goals in the time window
 -- column: rate_hz DOUBLE [Hz]      Rate from the first to the last
 -- column: median_ns BIGINT [ns]    Median latency: for 'receive' from publication to take, for

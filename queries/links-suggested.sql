@@ -13,8 +13,8 @@
 --     topic, for it to count as an input of a partial_sync candidate; and of those that did not
 --     wait for longer
 -- column: run_id BIGINT             Run
--- column: kind VARCHAR              'periodic_async', 'queue', 'partial_sync', 'approximate_sync' or
---     'independent'
+-- column: kind VARCHAR              'periodic_async', 'queue', 'partial_sync', 'approximate_sync'
+--     or 'independent'
 -- column: node VARCHAR [node]  Node
 -- column: inputs VARCHAR[] [topic]  Topics of the inputs
 -- column: outputs VARCHAR[] [topic]  Topics of the outputs

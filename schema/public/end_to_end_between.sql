@@ -8,8 +8,8 @@
 --     not ambiguous.
 -- grain: one row per pair of topics, receiving node, root and take there; one per pair of topics,
 --     receiving node and root that did not arrive
--- param: arrivals VARCHAR  Name of rows of run_id, path, first_topic, last_topic, and all columns of
---     main.end_to_end but path_id: a table, or a part of the query
+-- param: arrivals VARCHAR  Name of rows of run_id, path, first_topic, last_topic, and all columns
+--     of main.end_to_end but path_id: a table, or a part of the query
 -- column: run_id BIGINT  Run
 -- column: first_topic VARCHAR [topic]  Topic of the first message
 -- column: last_topic VARCHAR [topic]  Topic of the last message

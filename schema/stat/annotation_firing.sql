@@ -55,7 +55,8 @@ LEFT JOIN store.annotation_input AS i
     ON a.annotation_id = i.annotation_id AND d.subscription_id = i.subscription_id
 LEFT JOIN linked AS l
     ON a.annotation_id = l.annotation_id AND b.publication_id = l.publication_id
-WHERE a.kind IN ('periodic_async', 'queue') OR (a.kind = 'partial_sync' AND i.annotation_id IS NOT NULL)
+WHERE a.kind IN ('periodic_async', 'queue')
+    OR (a.kind = 'partial_sync' AND i.annotation_id IS NOT NULL)
 UNION ALL
 SELECT
     a.run_id, a.annotation_id, f.publication_id, f.callback_instance_id,

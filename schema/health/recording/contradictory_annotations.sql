@@ -1,8 +1,8 @@
 -- name: finding.contradictory_annotations
 -- title: Annotations that contradict each other
 -- description: Inputs and outputs that two annotations declare as links of different kinds:
---     periodic_async, partial_sync, approximate_sync or queue. They use the messages in different ways,
---     and both count. Or one declares them direct, and another independent, which counts.
+--     periodic_async, partial_sync, approximate_sync or queue. They use the messages in different
+--     ways, and both count. Or one declares them direct, and another independent, which counts.
 -- cause: A file of links declares one, the trace or another entry of the file the other.
 -- cure: Take the wrong one out of the file (msgflow links apply FILE), or out of the node.
 -- grain: one row per run

@@ -38,7 +38,8 @@ ANTI JOIN (
             END
         ) AS kind
     FROM derive.declared_pair
-    WHERE run_id = only_run AND kind IN ('independent', 'approximate_sync', 'periodic_async', 'queue')
+    WHERE run_id = only_run
+        AND kind IN ('independent', 'approximate_sync', 'periodic_async', 'queue')
 ) AS d
     ON l.kind = d.kind
     AND t.subscription_id = d.subscription_id

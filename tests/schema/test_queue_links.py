@@ -1,0 +1,121 @@
+"""Links by a queue against queues that really held messages: first in, first out, with a bound."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from random import Random
+
+import duckdb
+import pytest
+from rules import derived
+from thorough import few
+
+STAGE = """
+CREATE SCHEMA derive;
+CREATE SCHEMA store;
+CREATE TABLE annotated (run_id BIGINT DEFAULT 1, annotation_id BIGINT DEFAULT 1,
+    kind VARCHAR DEFAULT 'queue', publication_id BIGINT, publisher_id BIGINT DEFAULT 1,
+    trace_id BIGINT DEFAULT 1, thread_id BIGINT DEFAULT 2, start_ns BIGINT, start_event_id BIGINT,
+    subscription_id BIGINT);
+CREATE TABLE run (subscription_id BIGINT DEFAULT 1, callback_instance_id BIGINT,
+    thread_id BIGINT DEFAULT 1, start_event_id BIGINT);
+CREATE TABLE store.annotation (run_id BIGINT DEFAULT 1, annotation_id BIGINT DEFAULT 1,
+    kind VARCHAR DEFAULT 'queue', queue_depth BIGINT);
+CREATE TABLE store.annotation_input (annotation_id BIGINT DEFAULT 1,
+    subscription_id BIGINT DEFAULT 1);
+CREATE TABLE store.subscription (subscription_id BIGINT DEFAULT 1, created_ns BIGINT DEFAULT 0);
+CREATE TABLE store.thread_break (run_id BIGINT DEFAULT 1, thread_id BIGINT,
+    resumed_event_id BIGINT);
+INSERT INTO store.annotation_input DEFAULT VALUES;
+INSERT INTO store.subscription DEFAULT VALUES;
+"""
+LINKS = """
+SELECT publication_id, callback_instance_id, candidate_count
+FROM derive.link_causal_queue(1, 'annotated', 'run') ORDER BY ALL
+"""
+
+
+@pytest.fixture
+def rules() -> Iterator[duckdb.DuckDBPyConnection]:
+    with derived(STAGE, ("link_causal_queue",)) as con:
+        yield con
+
+
+def links(
+    con: duckdb.DuckDBPyConnection, come: list[int], published: list[int], depth: int | None = None
+) -> list[tuple[int, int, int]]:
+    """Return (publication, message, candidates), each numbered from 1; they have the given times."""
+    con.execute("TRUNCATE annotated; TRUNCATE run; TRUNCATE store.annotation")
+    con.execute("INSERT INTO store.annotation (queue_depth) VALUES (?)", [depth])
+    for number, at in enumerate(come, start=1):
+        con.execute(
+            "INSERT INTO run (callback_instance_id, start_event_id) VALUES (?, ?)", [number, at]
+        )
+    for number, at in enumerate(published, start=1):
+        con.execute(
+            "INSERT INTO annotated (publication_id, start_ns, start_event_id) VALUES (?, ?, ?)",
+            [number, at, at],
+        )
+    found: list[tuple[int, int, int]] = con.execute(LINKS).fetchall()
+    return found
+
+
+@pytest.mark.parametrize("seed", few(range(20)))
+def test_what_a_queue_held(rules: duckdb.DuckDBPyConnection, seed: int) -> None:
+    random = Random(seed)
+    depth = random.choice((None, 1, 2, 3))
+    come, at = [], 0
+    for _ in range(30):
+        at += random.randint(5, 20)
+        come.append(10 * at)
+    waiting: list[int] = []
+    truth, published = [], []
+    free, left = 0, list(enumerate(come, start=1))
+    while left or waiting:
+        if not waiting:
+            number, moment = left.pop(0)
+            waiting.append(number)
+            free = max(free, moment)
+        number = waiting.pop(0)
+        # Times of messages are whole tens: nothing happens at the same moment.
+        free = 10 * (free // 10 + random.randint(1, 25)) + 3
+        while left and left[0][1] < free:
+            waiting.append(left.pop(0)[0])
+        del waiting[: 0 if depth is None else -depth]
+        published.append(free)
+        truth.append((len(published), number, 1))
+    assert links(rules, come, published, depth) == truth
+
+
+def test_a_publication_too_many_answers_none(rules: duckdb.DuckDBPyConnection) -> None:
+    """It shows that a message before it was published for twice, or not at all."""
+    assert links(rules, [10, 20, 60], [15, 25, 35, 65]) == [(1, 1, 2), (2, 2, 2), (4, 3, 1)]
+    assert links(rules, [10, 20], [5, 15, 25]) == [(2, 1, 1), (3, 2, 1)]
+
+
+def test_a_depth_that_what_came_out_contradicts(rules: duckdb.DuckDBPyConnection) -> None:
+    """Four messages came and four were answered: none was lost, though two waited at once."""
+    assert links(rules, [10, 20, 30, 40], [35, 45, 55, 65], depth=1) == [
+        (1, 1, 1),
+        (2, 2, 2),
+        (3, 3, 2),
+        (4, 4, 2),
+    ]
+
+
+def test_what_may_be_missing_makes_the_count_doubtful(rules: duckdb.DuckDBPyConnection) -> None:
+    rules.execute("INSERT INTO store.thread_break (thread_id, resumed_event_id) VALUES (2, 30)")
+    assert links(rules, [10, 20], [15, 35]) == [(1, 1, 1), (2, 2, 2)]
+    rules.execute("UPDATE store.subscription SET created_ns = NULL")
+    assert links(rules, [10], [15]) == [(1, 1, 2)]
+
+
+def test_every_output_answers_every_message(rules: duckdb.DuckDBPyConnection) -> None:
+    """What an input publishes in its own callback is another link."""
+    rules.execute("INSERT INTO store.annotation (annotation_id) VALUES (1)")
+    rules.execute("INSERT INTO run (callback_instance_id, start_event_id) VALUES (1, 10), (2, 20)")
+    rules.execute(
+        "INSERT INTO annotated (publication_id, publisher_id, start_event_id, subscription_id)"
+        " VALUES (1, 1, 30, NULL), (2, 2, 31, NULL), (3, 1, 32, 1), (4, 1, 40, NULL)"
+    )
+    assert rules.execute(LINKS).fetchall() == [(1, 1, 1), (2, 1, 1), (4, 2, 1)]
