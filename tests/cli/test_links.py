@@ -35,6 +35,10 @@ def test_from_a_suggestion_to_links(msgflow: Msgflow, shared_traces: Path, tmp_p
     assert result.exit_code == 0
     assert result.stdout == ""
     assert "1 link declared: 0 indirect links between messages" in result.stderr
+    assert (
+        "note: no message took the link from /topic_a to /topic_b (periodic_async): callbacks of"
+        " /topic_a publish all of it" in " ".join(result.stderr.split())
+    )
     listed = msgflow("links", "--format", "csv")
     (row,) = csv.DictReader(listed.stdout.splitlines())
     assert (row["kind"], row["source"], row["inputs"]) == ("periodic_async", "file", "/topic_a")

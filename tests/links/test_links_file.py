@@ -21,6 +21,15 @@ links:
 """
 
 
+QUEUE = """links:
+  - kind: queue
+    node: /slam
+    inputs: [/image]
+    outputs: [/pose]
+    depth: 2
+"""
+
+
 def write(tmp_path: Path, text: str | bytes) -> Path:
     path = tmp_path / "links.yaml"
     path.write_bytes(text.encode() if isinstance(text, str) else text)
@@ -65,6 +74,8 @@ def test_no_links_at_all(tmp_path: Path) -> None:
         (GOOD.replace("- /a", "- {a: b}"), "line 6: inputs is not a name"),
         (GOOD.replace("partial_sync", "sync"), "line 3: no such kind of link — sync"),
         (GOOD.replace('"*_raw"', "*_raw"), "line 7: "),
+        (GOOD + "    depth: 2", "line 10: only a queue has a depth — partial_sync"),
+        (QUEUE.replace("2", "0"), "line 6: a depth is a number from 1 — 0"),
         ("links: [", "line 1: "),
         ("links: &all [*all]", "line 1: "),
         ("a: b: c", "line 1: "),
@@ -104,13 +115,15 @@ def test_suggestions_can_be_read_back(tmp_path: Path) -> None:
         "is_name_repeated": True,
     }
     certain = row | {"doubt": None}
+    queue = row | {"kind": "queue", "queue_depth": 2, "is_name_repeated": False}
     kept = row | {"kind": "independent", "inputs_of": "/tf_listener", "is_name_repeated": False}
-    suggestions = LinkSuggestions((), [row, certain], [kept])
+    suggestions = LinkSuggestions((), [row, certain], [kept, queue])
     assert (suggestions.certain, suggestions.doubtful) == ([certain], [row])
     text = suggestions.text("msgflow links apply FILE")
     assert "  # Doubtful: the node also receives - /x." in text.splitlines()
     assert max(map(len, text.splitlines())) <= 80
-    declared, link = read_links(write(tmp_path, text)).links
+    declared, bounded, link = read_links(write(tmp_path, text)).links
+    assert (bounded.kind, bounded.depth, link.depth) == ("queue", 2, None)
     assert (declared.kind, declared.process) == ("independent", None)
     assert declared.inputs_of is not None
     assert declared.inputs_of.value == "/tf_listener"
