@@ -44,7 +44,7 @@ def rules() -> Iterator[duckdb.DuckDBPyConnection]:
 def links(
     con: duckdb.DuckDBPyConnection, come: list[int], published: list[int], depth: int | None = None
 ) -> list[tuple[int, int, int]]:
-    """Return (publication, message, candidates), each numbered from 1; they have the given times."""
+    """Return (publication, message, candidates); both are numbered from 1 and have these times."""
     con.execute("TRUNCATE annotated; TRUNCATE run; TRUNCATE store.annotation")
     con.execute("INSERT INTO store.annotation (queue_depth) VALUES (?)", [depth])
     for number, at in enumerate(come, start=1):

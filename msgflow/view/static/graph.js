@@ -22,7 +22,12 @@ const GROUP_HEAD = 24;
 const WIDEST = 6;
 // Hosts have a colour each, as far as there are some in the style sheet.
 const HOSTS = 5;
-const INDIRECT = { periodic_async: "8 4", partial_sync: "2 4", approximate_sync: "2 4", queue: "8 4" };
+const INDIRECT = {
+  periodic_async: "8 4",
+  partial_sync: "2 4",
+  approximate_sync: "2 4",
+  queue: "8 4",
+};
 
 export class GraphPage {
   constructor(app, root) {
