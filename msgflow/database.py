@@ -512,7 +512,7 @@ class Database:
             callback_instance_id: id of a callback instance.
             request_id: id of a request to a service.
             response_id: id of a response of a service.
-            run: a name or an id, for `place` only; the latest run when None.
+            run: a name or an id; by default the latest one, or that of the id.
             direction: 'forward' (effects), 'backward' (causes) or 'both'.
             depth: most messages in a row, each way.
             limit: most publications, takes, callback instances, requests and responses.
@@ -1173,7 +1173,7 @@ def _start(
     run: str | int | None,
 ) -> Start:
     """Return the start of a flow: a place and a time, or one of the ids, in the order of KINDS."""
-    from msgflow.query.flow import KINDS, Start, find_start
+    from msgflow.query.flow import KINDS, Start, find_start, require_start
 
     starts = [
         Start(kind, number) for kind, number in zip(KINDS, ids, strict=True) if number is not None
@@ -1184,8 +1184,16 @@ def _start(
             "instance, a request or a response",
             "msgflow flow /chatter --at 2.5s, or msgflow flow --publication 1",
         )
-    if starts and not at is run is None:
-        raise UsageError(
-            "an identity tells run and time already", "leave out --run and --at, or name a topic"
+    if starts and at is not None:
+        raise UsageError("an identity has a time already", "leave out --at, or name a topic")
+    if starts and run is not None:
+        found, asked = (
+            require_start(connection, starts[0]),
+            Slice(run).one_run(connection, "a flow"),
         )
+        if found != asked:
+            raise UsageError(
+                f"{starts[0].kind} {starts[0].id} is not of run {asked.title}",
+                f"it is of run {found.title}: leave out --run",
+            )
     return starts[0] if place is None else find_start(connection, place, at, run)

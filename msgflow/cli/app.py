@@ -63,6 +63,8 @@ Each is a module of `msgflow.cli` with a function `command`, or a group `app`. I
 if it has one, reads the words of the function. Its function `asked` returns the command of a query
 if the words behind the name ask that.
 """
+_MORE = frozenset(("bag", "db", "events", "fleet", "mcp", "simulate"))
+"""What users of one robot rarely need: it has a panel of its own in the help."""
 _SIMULATOR = "in a checkout of msgflow: uv tool install . --with ./simulator"
 
 
@@ -71,15 +73,13 @@ class RootGroup(TyperGroup):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
-        self.commands = {
-            name: TyperCommand(name, help=summary) for name, summary in COMMANDS.items()
-        }
+        self.commands = {name: _listed(name, summary) for name, summary in COMMANDS.items()}
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of all commands, those of other distributions last."""
         for point in _added():
             summary = point.dist.metadata["Summary"] if point.dist else None
-            self.commands.setdefault(point.name, TyperCommand(point.name, help=summary))
+            self.commands.setdefault(point.name, _listed(point.name, summary))
         return super().list_commands(ctx)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
@@ -128,6 +128,10 @@ class RootGroup(TyperGroup):
             # Typer ends every KeyboardInterrupt with the exit code of Ctrl-C.
             raise typer.Exit(ExitCode.TERMINATED) from None
         return value
+
+
+def _listed(name: str, summary: str | None) -> TyperCommand:
+    return TyperCommand(name, help=summary, rich_help_panel="More" if name in _MORE else None)
 
 
 def _added() -> EntryPoints:

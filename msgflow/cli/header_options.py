@@ -9,7 +9,7 @@ import typer
 
 from msgflow.cli.completion import complete
 from msgflow.cli.operation import escape
-from msgflow.cli.options import one_text
+from msgflow.cli.options import ADVANCED, ADVANCED_NAMES, one_text
 from msgflow.query.names import PLACE_PARAMETERS
 
 if TYPE_CHECKING:
@@ -26,11 +26,11 @@ def header_option(param: Param, panel: str = PARAMETERS) -> Any:
     flag = f"--{param.name.replace('_', '-')}"
     return typer.Option(
         f"{flag}/--no-{flag[2:]}" if param.type == "BOOLEAN" else flag,
-        metavar=None if param.type == "BOOLEAN" else param.type,
+        metavar=_metavar(param),
         help=escape(_describe(param)),
         show_default=False,
         autocompletion=_completion(param),
-        rich_help_panel=panel,
+        rich_help_panel=ADVANCED if param.name in ADVANCED_NAMES else panel,
     )
 
 
@@ -53,6 +53,15 @@ def _completion(param: Param) -> Callable[..., list[str]] | None:
     if param.name in PLACE_PARAMETERS:
         return complete("place")
     return (lambda: list(param.choices)) if param.choices else None
+
+
+def _metavar(param: Param) -> str:
+    """Return what the help shows for the type of a parameter."""
+    if param.name in PLACE_PARAMETERS:
+        return "NAME"
+    if param.choices:
+        return "WORD"
+    return {"BOOLEAN": "", "VARCHAR": "TEXT"}.get(param.type, "NUMBER")
 
 
 def _describe(param: Param) -> str:

@@ -20,12 +20,12 @@ from msgflow.files.default_files import DEFAULT_DATABASE
 from msgflow.query.catalogue import load_query
 
 SECTIONS = ("runs", "hosts", "processes", "nodes", "topics", "counts", "findings")
-_SECTION = load_query("info").variants
+(_SECTION,) = load_query("info").variants
 
 
 def asked(words: list[str]) -> Any:
     """Return the command of the query, where a section is chosen."""
-    return build_command(chosen_by("info", words)) if choice_of(_SECTION, words) else None
+    return build_command(chosen_by("info", words)) if choice_of((_SECTION,), words) else None
 
 
 @operation

@@ -20,11 +20,13 @@ import docstring_parser
 import typer
 from typer.models import OptionInfo
 
-from msgflow.cli.options import SHARED, one_text, path_of
+from msgflow.cli.options import ADVANCED, ADVANCED_NAMES, SHARED, one_text, path_of
 from msgflow.files.default_files import DEFAULT_DATABASE
 
 Command = Callable[..., None]
 _PLACES = {"from_", "to", "via", "without"}
+_METAVARS = {bool: "", int: "NUMBER", float: "NUMBER", str: "TEXT"}
+"""What the help shows for a type. A switch takes nothing."""
 
 
 def operation(function: Command) -> Command:
@@ -59,7 +61,7 @@ def asks(method: Callable[..., Any]) -> Callable[[Command], Command]:
                 found = method(opened, **said)
             show(found, **{each.name: given[each.name] for each in shown})
 
-        set_parameters(command, sorted(parameters.values(), key=lambda each: each.kind))
+        set_parameters(command, list(parameters.values()))
         command.__doc__ = f"{_help(method)}\n\n{_help(show)}"
         return command
 
@@ -68,7 +70,8 @@ def asks(method: Callable[..., Any]) -> Callable[[Command], Command]:
 
 def set_parameters(command: Command, parameters: Sequence[Parameter]) -> None:
     """Give a command the parameters from which Typer makes its arguments and options."""
-    command.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
+    ordered = sorted(parameters, key=lambda each: (each.kind, _panel(each) == ADVANCED))
+    command.__signature__ = Signature(ordered)  # type: ignore[attr-defined]
     command.__annotations__ = {each.name: each.annotation for each in parameters}
 
 
@@ -103,6 +106,11 @@ def escape(text: str) -> str:
     return markup.escape(text)
 
 
+def _panel(parameter: Parameter) -> Any:
+    _, info = get_args(parameter.annotation)
+    return info.rich_help_panel
+
+
 def _database() -> Parameter:
     plain = Parameter("database", Parameter.KEYWORD_ONLY, default=DEFAULT_DATABASE)
     return plain.replace(annotation=_annotated(plain, Path, None))
@@ -128,6 +136,12 @@ def _annotated(
     kind = _plain(kind)
     if Path in (kind, *get_args(kind)):
         info.parser, info.metavar = path_of, info.metavar or "FILE"
+    if isinstance(info, OptionInfo):
+        types = (kind, *get_args(kind))
+        if info.metavar is None:
+            info.metavar = next((_METAVARS[each] for each in types if each in _METAVARS), None)
+        if parameter.name in ADVANCED_NAMES:
+            info.rich_help_panel = ADVANCED
     return Annotated[kind, info]
 
 

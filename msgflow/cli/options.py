@@ -17,6 +17,11 @@ from msgflow.query.selection import CASES, KINDS
 
 SELECTION = "Which part of the data"
 OUTPUT = "Output"
+ADVANCED = "Advanced"
+ADVANCED_NAMES = frozenset(
+    ("case", "from_event", "to_event", "max_depth", "max_paths", "confidence", "resamples", "seed")
+)
+"""Options that few need: their panel is the last one of a help."""
 _HELP = ("--help", "-h")
 _SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*(?:([kKMGT]?)B)?")
 _UNITS = {"": 1, "K": 1e3, "M": 1e6, "G": 1e9, "T": 1e12}
@@ -73,7 +78,7 @@ def _printed(*names: str, help: str, **more: Any) -> Any:
 def _words(*words: str) -> Any:
     """Return an option with one of a few words: `Database` refuses others."""
     return typer.Option(
-        metavar="|".join(words), autocompletion=lambda: list(words), rich_help_panel=SELECTION
+        metavar="WORD", autocompletion=lambda: list(words), rich_help_panel=SELECTION
     )
 
 

@@ -235,22 +235,19 @@ def _help(header: Header) -> str:
 
 
 def _print_columns(header: Header) -> None:
-    _print_panel(
-        "Columns (--show prints all that is said of them)",
-        [
-            (
-                column.name,
-                f"[{column.unit}] {column.description}" if column.unit else column.description,
-            )
-            for column in header.columns
-        ],
+    """Print the names of the columns: their meanings alone would fill a screen."""
+    _print_paragraph(
+        f"Columns: {', '.join(column.name for column in header.columns)}; --show explains them"
     )
 
 
 def _print_common(params: Sequence[TyperOption]) -> None:
     names = ", ".join(param.opts[0] for param in params if param.name != "help")
-    text = f"Every query also has {names}: msgflow query --help explains them"
-    typer.echo(textwrap.fill(text, 79, initial_indent=" ", subsequent_indent=" "))
+    _print_paragraph(f"Every query also has {names}: msgflow query --help explains them")
+
+
+def _print_paragraph(text: str) -> None:
+    typer.echo(textwrap.fill(text, 79, initial_indent=" ", subsequent_indent=" ") + "\n")
 
 
 def print_options_of_every_query() -> None:
@@ -259,12 +256,11 @@ def print_options_of_every_query() -> None:
     _print_panel(
         "Options of every query",
         [(", ".join(param.opts), param.help) for param in params if param.name in _OF_EVERY_QUERY],
-        is_brief=False,
     )
 
 
-def _print_panel(title: str, rows: Sequence[tuple[str, str]], *, is_brief: bool = True) -> None:
-    """Print names and what they mean in a frame, each in one line if brief."""
+def _print_panel(title: str, rows: Sequence[tuple[str, str]]) -> None:
+    """Print names and what they mean in a frame."""
     from rich.console import Console
     from rich.panel import Panel
     from rich.table import Table
@@ -272,7 +268,7 @@ def _print_panel(title: str, rows: Sequence[tuple[str, str]], *, is_brief: bool 
 
     grid = Table.grid(padding=(0, 2))
     grid.add_column(no_wrap=True, min_width=max(len(name) for name, _ in rows))
-    grid.add_column(no_wrap=is_brief, overflow="ellipsis" if is_brief else "fold")
+    grid.add_column(overflow="fold")
     for name, meaning in rows:
         grid.add_row(Text(name, style="bold cyan"), Text(meaning))
     Console().print(Panel(grid, title=title, title_align="left", border_style="dim"))

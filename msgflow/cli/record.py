@@ -34,6 +34,7 @@ def command(
     kernel: bool = False,
     dual: str | None = None,
     events: list[str] | None = None,
+    without: Annotated[list[str] | None, typer.Option()] = None,
     python: bool = True,
     print_python_path: bool = False,
     subbuf_size: str = "1M",
@@ -56,6 +57,8 @@ def command(
         duration (SECONDS): How long to record.
         kernel: Also record the scheduler, with LTTng or perf: why a thread waits.
         dual (SESSION): Also write what this snapshot session has: how nodes that run already began.
+        without (EVENT): Leave out events with these names, such as rclcpp_executor_wait_for_work:
+            of ROS 2 where no provider stands in front; repeatable.
         python: Trace callbacks and executors of the Python nodes of COMMAND, without a rebuild.
         print_python_path: Only print the folder that does so, in front of PYTHONPATH.
         subbuf_size (SIZE): Size of a sub-buffer of LTTng, per CPU.
@@ -84,7 +87,9 @@ def command(
         recorded = record(
             target.absolute(),
             name=name,
-            channel=Channel((*EVENTS, *(events or [])), subbuf_size, num_subbuf),
+            channel=Channel(
+                (*EVENTS, *(events or [])), subbuf_size, num_subbuf, without=_full_names(without)
+            ),
             program=program or (),
             seconds=duration,
             kernel=kernel,
@@ -99,6 +104,11 @@ def command(
     is_sound = not ingest or _answer(target, name, events or [], links, clock_sync, database)
     if recorded.exit_code or not is_sound:
         raise typer.Exit(ExitCode.FAILED)
+
+
+def _full_names(without: list[str] | None) -> tuple[str, ...]:
+    names = (name.strip() for text in without or () for name in text.split(","))
+    return tuple(name if ":" in name else f"ros2:{name}" for name in names if name)
 
 
 def _require_database(database: Path, name: str) -> None:

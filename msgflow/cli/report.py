@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Annotated, Unpack
 
 from msgflow.cli.operation import operation
@@ -36,13 +38,40 @@ def command(
     With --lake: a page of the paths of all its runs by label over time, outliers, failures.
 
     Args:
-        output (FILE.html|FILE.md): File to write or replace.
+        output (FILE.html|FILE.md): File to write or replace; - writes the page to stdout.
         through (TEXT): Only paths that contain this text: a topic, or a node.
         max_size (SIZE): Maximum size of the file; what does not fit is left out, and the page says
             so.
         targets: Requirements, as YAML: the summary has the verdicts on them.
     """
-    from msgflow.cli.output import print_note, print_runs, print_status
+    from msgflow.cli.output import print_status
+
+    with TemporaryDirectory() as directory:
+        to_stdout = str(output) == "-"
+        target = Path(directory) / "report.html" if to_stdout else output
+        status = _written(
+            target, compare, through, max_size, lake, where, targets, paths, database, part
+        )
+        if to_stdout:
+            sys.stdout.buffer.write(target.read_bytes())
+        else:
+            print_status(status)
+
+
+def _written(
+    output: Path,
+    compare: str | None,
+    through: str | None,
+    max_size: str,
+    lake: str | None,
+    where: str | None,
+    targets: Path | None,
+    paths: Path,
+    database: Path,
+    part: SliceWords,
+) -> str:
+    """Write the report; return what was done."""
+    from msgflow.cli.output import print_note, print_runs
     from msgflow.database import Database
     from msgflow.text.values import count
 
@@ -65,8 +94,7 @@ def command(
         page = write_lake_page(Lake.open(lake), output, where=where, max_size=size)
         for note in page.notes:
             print_note(note)
-        print_status(f"{count(page.runs, 'run')} of {lake} in {output}: open it in a browser")
-        return
+        return f"{count(page.runs, 'run')} of {lake} in {output}: open it in a browser"
     require_no_where(where)
     with Database(database) as opened:
         report = opened.report(
@@ -82,7 +110,7 @@ def command(
     for note in report.notes:
         print_note(note)
     what = ": open it in a browser" if is_page else ""
-    print_status(f"{report.size:,} bytes written to {report.path}{what}")
+    return f"{report.size:,} bytes written to {report.path}{what}"
 
 
 def read_size(text: str) -> int:

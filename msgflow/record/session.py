@@ -7,6 +7,7 @@ import shutil
 import tempfile
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -37,12 +38,14 @@ class Channel:
         sub_buffer_size: of each CPU, in the words of LTTng, such as `1M`.
         sub_buffers: their number.
         rotation_ns: length of the chunks that the recording is cut into; None: it is not.
+        without: names of events, or patterns of them, that are left out.
     """
 
     events: tuple[str, ...]
     sub_buffer_size: str
     sub_buffers: int
     rotation_ns: int | None = None
+    without: tuple[str, ...] = ()
 
 
 @contextmanager
@@ -181,7 +184,9 @@ def _set_up(name: str, channel: Channel) -> None:
     to_channel = ("--userspace", f"--session={name}", f"--channel={_CHANNEL}")
     _enable_channel("--userspace", name, channel)
     for event in channel.events:
-        lttng("enable-event", *to_channel, event)
+        # LTTng refuses what the event does not have.
+        out = [each for each in channel.without if fnmatchcase(each, event)]
+        lttng("enable-event", *to_channel, *([f"--exclude={','.join(out)}"] if out else []), event)
     lttng("add-context", *to_channel, *(f"--type={context}" for context in CONTEXTS))
 
 

@@ -68,7 +68,7 @@ _HEADER = Header(
     columns=_COLUMNS, severity=None, cause=None, cure=None, note=None, body="",
     path=Path(),
     brief=("verdict", "subject", "metric", "condition", "measured", "reason", "worst_ns", "see",
-           "worst_at_ns", "target"),
+           "worst_at_ns", "target", "samples", "line", "path", "value"),
 )  # fmt: skip
 _LOST = "SELECT sum(discarded_event_count)::BIGINT FROM main.trace WHERE run_id = $run_id"
 

@@ -295,3 +295,11 @@ def test_a_trace_that_is_not_there_has_code_3(msgflow: Msgflow) -> None:
     assert result.exit_code == 3
     assert "nowhere" in result.stderr
     assert not Path("msgflow.duckdb").exists()
+
+
+def test_a_report_goes_to_stdout(msgflow: Msgflow, small_database: Path) -> None:
+    result = msgflow("report", "-o", "-", "--db", small_database)
+    assert result.exit_code == 0, result.stderr
+    assert result.stdout.startswith("<!DOCTYPE html>")
+    assert result.stdout.rstrip().endswith("</html>")
+    assert "written" not in result.stderr

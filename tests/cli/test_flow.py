@@ -108,6 +108,18 @@ def test_the_slowest_flows_are_those_of_the_query(
     assert forward.stdout.splitlines()[1:] != result.stdout.splitlines()[1:]
 
 
+def test_an_identity_may_have_its_run(msgflow: Msgflow, small_database: Path) -> None:
+    words = ("flow", "--publication", 1, "--db", small_database)
+    plain = msgflow(*words)
+    of_run = {run: msgflow(*words, "--run", run) for run in ("morning", "noon")}
+    assert sorted(result.exit_code for result in of_run.values()) == [0, 2]
+    for result in of_run.values():
+        if result.exit_code:
+            assert "publication 1 is not of run " in result.stderr
+        else:
+            assert result.stdout == plain.stdout
+
+
 def test_a_page_is_written_in_place_of_the_tree(
     msgflow: Msgflow, small_database: Path, tmp_path: Path
 ) -> None:

@@ -69,8 +69,8 @@ def test_a_docstring_becomes_the_help(monkeypatch: pytest.MonkeyPatch) -> None:
         "Say what was given. All of [it].",
         "WHO <str> The one who says it [required]",
         "--file FILE Where [default: a]",
-        "--once <bool> Only once",
-        "--really --no-really <bool> Is it so [default: really]",
+        "--once Only once",
+        "--really --no-really Is it so [default: really]",
         "--from NAME Places",
         "--run NAME|ID|all Run to read [default: (the latest)]",
     ):

@@ -96,11 +96,11 @@ def test_help_shows_types_choices_defaults_columns_and_brackets(
     words = " ".join(msgflow("query", "example", "--help").stdout.replace("│", " ").split())
     for part in (
         "An example. What [it] means.",
-        "--from VARCHAR Where it starts",
-        "--max-depth BIGINT How deep [default: 32]",
-        "--case VARCHAR Which (first, last) [default: first]",
+        "--from NAME Where it starts",
+        "--max-depth NUMBER How deep [default: 32]",
+        "--case WORD Which (first, last) [default: first]",
         "Whether [default: false]",
-        "at_ns [epoch ns] When",
+        "Columns: at_ns; --show explains them",
     ):
         assert part in words
     assert calls == []

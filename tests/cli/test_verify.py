@@ -57,6 +57,18 @@ def test_exit_codes(
     assert demo("verify", file, "--allow-not-measured").exit_code == allowed
 
 
+def test_a_value_that_has_its_unit_has_no_column_of_it(
+    demo: Msgflow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    topic = json.loads(demo("query", "topics", "--format", "jsonl").stdout.splitlines()[0])
+    file = tmp_path / "targets.yaml"
+    file.write_text(f"targets:\n  - topic: {topic['topic_name']}\n    rate: < 1000 Hz\n")
+    monkeypatch.setenv("COLUMNS", "100")
+    shown = demo("verify", file).stdout
+    assert " Hz" in shown
+    assert "unit" not in shown.splitlines()[0].split()
+
+
 def test_a_file_that_ends_with_xml_is_junit(demo: Msgflow, tmp_path: Path) -> None:
     file, output = tmp_path / "targets.yaml", tmp_path / "verdicts.xml"
     file.write_text('targets:\n  - process: "*"\n    utilisation: < 0 %\n')

@@ -9,6 +9,7 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,12 @@ from thorough import few, thorough
 from msgflow.mcp import server as mcp_server
 
 Call = tuple[str, dict[str, Any]]
+
+
+@pytest.fixture
+def robot_database(simulated: Callable[..., Path]) -> Path:
+    """Return a database with three seconds of a robot."""
+    return simulated("demo", 0.3)
 
 
 def ask(database: Path, *calls: Call) -> list[tuple[bool, str]]:
@@ -90,6 +97,20 @@ def test_a_flow_is_a_tree(small_database: Path) -> None:
     ((failed, text),) = ask_here(small_database, ("flow", {"publication_id": number}))
     assert not failed
     assert text.startswith(f"publication {number}, /chatter")
+
+
+def test_why_compare_and_verify(robot_database: Path) -> None:
+    why = one(robot_database, "why")
+    assert {"paths", "nodes"} <= {row["section"] for row in why["rows"]}
+    compared = one(robot_database, "compare", window=["0s..1s", "1s..2s"], what="topics")
+    assert {"a_median_ns", "b_median_ns"} <= set(compared["rows"][0])
+    topic = one(robot_database, "run_query", name="topics")["rows"][0]["topic_name"]
+    requirements = f"targets:\n  - topic: {topic}\n    rate: '< 1000 Hz'\n"
+    verified = one(robot_database, "verify", requirements=requirements)
+    assert [row["verdict"] for row in verified["rows"]] == ["passed"]
+    ((failed, text),) = ask_here(robot_database, ("verify", {"requirements": "targets: 1"}))
+    assert failed
+    assert "hint: " in text
 
 
 def test_answers_are_capped_and_say_so(small_database: Path) -> None:
@@ -171,7 +192,7 @@ def test_the_schemas_say_that_nothing_else_is_taken(small_database: Path) -> Non
             return await client.list_tools()
 
     tools = asyncio.run(talk()).tools
-    assert len(tools) == 7
+    assert len(tools) == 10
     assert all(tool.input_schema["additionalProperties"] is False for tool in tools)
 
 

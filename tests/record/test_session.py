@@ -33,6 +33,22 @@ def test_a_context_that_an_old_lttng_lacks_is_left_out(
     assert [words[0] for words in said][-2:] == ["start", "destroy"]
 
 
+def test_events_are_left_out_of_the_patterns_that_have_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said: list[tuple[str, ...]] = []
+    monkeypatch.setattr(session, "lttng", lambda *words: said.append(words))
+    monkeypatch.setattr(session, "is_there", lambda name: True)
+    channel = Channel(("ros2:*", "dds:*"), "1M", 4, without=("ros2:a", "ros2:b"))
+    with recording_session("robot", tmp_path, channel, with_kernel=False):
+        pass
+    enabled = [words[3:] for words in said if words[0] == "enable-event"]
+    assert [words[1:] for words in enabled] == [
+        ("--exclude=ros2:a,ros2:b", "ros2:*"),
+        ("dds:*",),
+    ]
+
+
 def test_a_session_created_anew_rotates_again(monkeypatch: pytest.MonkeyPatch) -> None:
     """LTTng refuses only what is set already."""
     asked = 0

@@ -6,8 +6,8 @@
 -- cause: While a callback of a mutually exclusive group runs, other callbacks of the group that are
 --     ready wake the MultiThreadedExecutor of rclcpp again and again, and it may not run them.
 -- cure: Give callbacks that may run at once groups of their own or a reentrant group, or the nodes
---     single-threaded executors. Leave out the two events of looking for work
---     (rclcpp_executor_wait_for_work, rclcpp_executor_get_next_ready) where they fill the buffers.
+--     single-threaded executors. Where the events of looking for work fill the buffers, leave them
+--     out: msgflow record --without rclcpp_executor_wait_for_work,rclcpp_executor_get_next_ready
 -- grain: one row per executor
 -- severity: warning
 -- when: store.executor WHERE kind LIKE 'multi_threaded%'

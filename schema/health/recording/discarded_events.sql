@@ -7,9 +7,10 @@
 --     and these are not counted either.
 -- cause: The sub-buffers are too small or too few for bursts of events, or the disk is too slow to
 --     empty them.
--- cure: Record with larger sub-buffers: lttng enable-channel --userspace --subbuf-size=SIZE
---     --num-subbuf=4 CHANNEL before the events are enabled (ros2 trace: --subbuffer-size-ust), with
---     the size given above; or enable fewer events, or write to a faster disk.
+-- cure: Record with larger sub-buffers, of the size given above: msgflow record --subbuf-size SIZE,
+--     ros2 trace --subbuffer-size-ust, or lttng enable-channel --userspace --subbuf-size=SIZE
+--     --num-subbuf=4 CHANNEL before the events are enabled; or record fewer events (--without), or
+--     write to a faster disk.
 -- grain: one row per trace
 -- severity: error
 -- when: store.gap WHERE kind = 'loss'
