@@ -5,6 +5,8 @@ for every process. The clock itself is the same for all traces of a boot, as its
 offsets differ by is an error of measuring or, between sessions, what the time of day was set by
 meanwhile. An error of measuring is left alone, so that times are those that the trace says and that
 every other reader shows. That a clock was set is undone: times of one host have to fit together.
+
+Time namespaces and clones of a machine have the boot of another one, and a clock of their own.
 """
 
 from __future__ import annotations
@@ -32,7 +34,8 @@ def on_one_base(
 
     The first trace of programs decides, the kernel's only where there is no other: a kernel trace
     beside a recording moves no time of it. Only a clock that has a uuid and counts nanoseconds is
-    corrected: without a uuid it is a clock of its own.
+    corrected: without a uuid it is a clock of its own. So is the clock of a hostname that recorded
+    at the time of the first one, but on one base would not have: it loses its uuid.
 
     `offsets` are what traces opened before decided, in ns since the epoch. The function adds those
     of these traces.
@@ -41,7 +44,32 @@ def on_one_base(
         if trace.clock_uuid is not None and trace.clock_frequency == GIGA:
             clock = trace.clock_uuid, trace.clock_name
             offsets.setdefault(clock, trace.clock_offset_ns)
-    return tuple(_corrected(trace, offsets) for trace in traces)
+    corrected = [_corrected(trace, offsets) for trace in traces]
+    strangers = _at_one_time(traces) - _at_one_time(corrected)
+    return tuple(
+        replace(trace, clock_uuid=None)
+        if on_base.clock_correction_ns and _host(trace) in strangers
+        else on_base
+        for trace, on_base in zip(traces, corrected, strict=True)
+    )
+
+
+def _host(trace: TraceInfo) -> tuple[str | None, str | None]:
+    return trace.clock_uuid, trace.hostname
+
+
+def _at_one_time(traces: Sequence[TraceInfo]) -> set[tuple[str | None, str | None]]:
+    """Return the hosts that recorded while another one of their boot did."""
+    times: dict[tuple[str | None, str | None], list[int]] = {}
+    for trace in traces:
+        if trace.begin_ns is not None and trace.end_ns is not None:
+            times.setdefault(_host(trace), []).extend((trace.begin_ns, trace.end_ns))
+    return {
+        host
+        for host, own in times.items()
+        for other, its in times.items()
+        if host != other and host[0] == other[0] and min(own) <= max(its) and min(its) <= max(own)
+    }
 
 
 def _corrected(trace: TraceInfo, offsets: dict[ClockName, int]) -> TraceInfo:

@@ -4,7 +4,7 @@
 --     subscription decides, so a message that was only sent before the two were connected is not
 --     among them. Nor is one that was sent so shortly before that it may have been on its way: its
 --     publisher may be volatile, and the event of the creation comes behind it. Between clocks the
---     distance has to be more than the errors of both.
+--     distance has to be more than the errors of both. ROS publishes /parameter_events as volatile.
 -- grain: one row per such take
 WITH clock AS (
     SELECT
@@ -27,6 +27,7 @@ created AS (
         derive.corrected_ns(s.created_ns, p.offset_ns, p.drift_ppb, p.reference_ns) AS created_ns
     FROM store.subscription AS s
     JOIN place AS p ON s.process_id = p.process_id
+    WHERE s.topic_name IS DISTINCT FROM '/parameter_events'
 ),
 -- Most publications are later than all creations: only the others are looked up.
 latest AS (

@@ -86,6 +86,28 @@ def test_another_boot_keeps_its_offset(tmp_path: Path, open_traces: Open) -> Non
         assert read(traces)[0] == [(0, 1_010), (1, 4_015), (1, 4_016)]
 
 
+def test_a_clock_of_its_own_in_an_equal_boot_keeps_its_offset(
+    tmp_path: Path, open_traces: Open
+) -> None:
+    """A time namespace, or a clone: recorded at one time, as much later on the other's clock."""
+    write(tmp_path / "a", 1_000_000, [10, 30], environment={"hostname": "one"})
+    write(tmp_path / "b", 0, [1_000_015, 1_000_016, 1_000_017], environment={"hostname": "two"})
+    write(tmp_path / "c", 0, [1_000_040], environment={"hostname": "two"})
+    with open_traces(tmp_path) as traces:
+        assert [info.clock_correction_ns for info in traces.traces] == [0, 0, 0]
+        assert [info.clock_uuid is None for info in traces.traces] == [False, True, True]
+        assert [time for _, time in read(traces)[0]] == [
+            1_000_010, 1_000_015, 1_000_016, 1_000_017, 1_000_030, 1_000_040,
+        ]  # fmt: skip
+
+
+def test_hosts_of_one_clock_that_was_set_are_on_one_base(tmp_path: Path, open_traces: Open) -> None:
+    write(tmp_path / "a", 1_000_000, [10, 30], environment={"hostname": "one"})
+    write(tmp_path / "b", 0, [20, 25, 40], environment={"hostname": "two"})
+    with open_traces(tmp_path) as traces:
+        assert [info.clock_correction_ns for info in traces.traces] == [0, 1_000_000]
+
+
 def test_a_clock_that_counts_no_nanoseconds_is_left_alone(
     tmp_path: Path, open_traces: Open
 ) -> None:
