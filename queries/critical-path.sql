@@ -179,7 +179,7 @@ piece AS (
                 'cache', 'take_to_callback', 'service', 'executor_busy',
                 'all_threads_busy', 'blocked', 'timer'
             ) OR c.part = 'request_to_take' THEN l.label
-            ELSE coalesce(p.topic_name, '?')
+            ELSE coalesce(p.topic_name, s.topic_name, '?')
         END AS what,
         c.is_certain,
         c.from_ns,

@@ -14,7 +14,7 @@
 -- param: max_depth BIGINT {1..} = 32     Longest path, in topics
 -- param: max_paths BIGINT {1..} = 1000   Most paths, shortest first, and chains of a length
 -- column: run_id BIGINT            Run
--- column: root_kind VARCHAR        'callback_instance' or 'publication'
+-- column: root_kind VARCHAR        'callback_instance', 'publication' or 'take'
 -- column: root_id BIGINT           Identity of the root
 -- column: root_ns BIGINT [epoch ns]  Start of the root
 -- column: take_id BIGINT           Take at the end of the path; empty: not reached

@@ -310,16 +310,18 @@ CREATE TABLE store.flow_call (
     taken_response_id BIGINT  -- Response that the caller took {to response}
 );
 
--- One row per publication on a topic of the application
+-- One row per publication on a topic of the application, and per take of a message whose publisher
+-- is not traced
 CREATE TABLE store.flow_root (
     run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
-    publication_id BIGINT NOT NULL,  -- The message {to publication}
-    publisher_id BIGINT NOT NULL,  -- Its publisher {to publisher}
+    publication_id BIGINT NOT NULL,  -- The message; below 0: its publisher is not traced
+    publisher_id BIGINT NOT NULL,  -- Its publisher; below 0: not traced
     is_source BOOLEAN DEFAULT false NOT NULL,  -- Not caused by a taken message
-    root_kind VARCHAR NOT NULL,  -- 'callback_instance' or 'publication'
+    root_kind VARCHAR NOT NULL,  -- 'callback_instance', 'publication' or 'take'
     root_id BIGINT NOT NULL,  -- Row of that kind where its flow begins
-    route BIGINT[] NOT NULL  -- Node (or, negative, process) that called, then services; empty: by
+    route BIGINT[] NOT NULL,  -- Node (or, negative, process) that called, then services; empty: by
         -- no service
+    before_take_ns BIGINT  -- Of a take: how long before it the flow begins [ns]
 );
 
 -- One row per step of the graph: subscription before, route, publisher and subscription
@@ -328,7 +330,7 @@ CREATE TABLE store.flow_hop (
     from_subscription_id BIGINT,  -- Subscription whose message led on; NULL: none {to subscription}
     route BIGINT[] NOT NULL,  -- Node (or, negative, process) that called, then services; empty: by
         -- no service
-    publisher_id BIGINT NOT NULL,  -- Publisher {to publisher}
+    publisher_id BIGINT NOT NULL,  -- Publisher; below 0: not traced
     subscription_id BIGINT NOT NULL,  -- Subscription that took from it {to subscription}
     is_source BOOLEAN DEFAULT false NOT NULL,  -- At least one of its publications was not caused by
         -- a taken message

@@ -116,7 +116,7 @@ CREATE TABLE store.flow_call (
 CREATE TABLE store.flow_root (
     run_id BIGINT NOT NULL, publication_id BIGINT NOT NULL, publisher_id BIGINT NOT NULL,
     is_source BOOLEAN DEFAULT false NOT NULL, root_kind VARCHAR NOT NULL, root_id BIGINT NOT NULL,
-    route BIGINT[] NOT NULL
+    route BIGINT[] NOT NULL, before_take_ns BIGINT
 );
 CREATE TABLE store.flow_hop (
     run_id BIGINT NOT NULL, from_subscription_id BIGINT, route BIGINT[] NOT NULL,

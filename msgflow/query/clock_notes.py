@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import duckdb
+    import pyarrow as pa
 
     from msgflow.run.choice import Run
 
@@ -50,6 +51,22 @@ def clock_notes(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run]) -> l
         for run in runs
         for run_id, reference, hosts, least, greatest in corrections
         if run_id == run.run_id
+    ]
+
+
+def untraced_notes(
+    connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], table: pa.Table
+) -> list[str]:
+    """Return where flows begin whose first publisher is not traced, if paths have any."""
+    if "path" not in table.column_names:
+        return []
+    paths = [path for path in table["path"].unique().to_pylist() if path is not None]
+    begins = internal_sql().run(connection, "untraced_begin", {"runs": [run.run_id for run in runs]})
+    where = {True: "the stamp of each message", False: "its take: its clock may be another one"}
+    return [
+        f"what publishes {topic} is not traced: flows begin with {where[is_stamped]}"
+        for topic, is_stamped in begins.fetchall()
+        if any(path.startswith(f"(not traced) → {topic} → ") for path in paths)
     ]
 
 

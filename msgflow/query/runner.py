@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import duckdb
 
 from msgflow.errors import UsageError
-from msgflow.query.clock_notes import clock_notes
+from msgflow.query.clock_notes import clock_notes, untraced_notes
 from msgflow.query.doubt_notes import doubt_notes
 from msgflow.query.names import PLACE_PARAMETERS, require_ids, require_names, require_places
 from msgflow.query.selection import (
@@ -129,6 +129,7 @@ def run_query(
     notes += doubt_notes(connection, runs, table)
     if header.note in {"clocks", "requests"} and table.num_rows:
         notes += clock_notes(connection, runs)
+        notes += untraced_notes(connection, runs, table)
     if header.note == "callbacks":
         notes += _without_callbacks(connection, runs)
     return QueryResult(table, header, runs, notes, order=sorted_by(header, selection))

@@ -16,13 +16,13 @@ hop AS MATERIALIZED (
         CASE
             WHEN h.from_subscription_id IS NOT NULL THEN false
             WHEN from_topic IS NULL THEN h.is_source
-            ELSE (p.topic_name IN (SELECT topic_name FROM start_place)) IS true
+            ELSE (coalesce(p.topic_name, s.topic_name) IN (SELECT topic_name FROM start_place)) IS true
                 OR (p.node_id IN (SELECT node_id FROM start_place)) IS true
         END AS is_start,
-        (p.topic_name IN (SELECT topic_name FROM end_place)) IS true
+        (coalesce(p.topic_name, s.topic_name) IN (SELECT topic_name FROM end_place)) IS true
         OR (s.node_id IN (SELECT node_id FROM end_place)) IS true AS is_last
     FROM store.flow_hop AS h
-    JOIN store.publisher AS p ON h.publisher_id = p.publisher_id
+    LEFT JOIN store.publisher AS p ON h.publisher_id = p.publisher_id
     JOIN store.subscription AS s ON h.subscription_id = s.subscription_id
     WHERE list_contains(runs, h.run_id)
 ),

@@ -5,7 +5,13 @@
 --     called the service that did; else with the publication itself. It is a source if no taken
 --     message led to it. The route (derive.flow_caller) starts at the instance that called; if
 --     none did, it is empty.
--- grain: one row per publication on a topic of the application
+--     The flow of a message whose publisher is not traced begins with its take, or before that with
+--     its stamp, if the clock of the publisher is that of the reader: of all messages that the
+--     subscription took, the quickest came neither before its stamp nor later than a message needs.
+--     Its publication and its publisher have no rows: the ids of the take and of the subscription
+--     stand for them, below 0.
+-- grain: one row per publication on a topic of the application, and per take of a message whose
+--     publisher is not traced
 CREATE OR REPLACE MACRO derive.flow_root(only_run) AS TABLE
 WITH called AS (
     SELECT run_id, publication_id, publisher_id, caller_id, take_id, route
@@ -75,7 +81,29 @@ SELECT
     CASE WHEN r.callback_instance_id IS NULL THEN 'publication' ELSE 'callback_instance' END
         AS root_kind,
     coalesce(r.callback_instance_id, r.publication_id) AS root_id,
-    coalesce(w.route, []::BIGINT[]) AS route
+    coalesce(w.route, []::BIGINT[]) AS route,
+    NULL::BIGINT AS before_take_ns
 FROM root AS r
 LEFT JOIN way AS w
     ON r.publication_id = w.publication_id AND r.callback_instance_id = w.caller_id
+UNION ALL
+SELECT
+    o.run_id,
+    -o.take_id,
+    -o.subscription_id,
+    true,
+    'take',
+    o.take_id,
+    []::BIGINT[],
+    CASE
+        WHEN min(t.taken_ns - t.source_timestamp_ns) OVER (PARTITION BY o.subscription_id)
+            BETWEEN -derive.delivery_limit().stamp_slack_ns AND derive.delivery_limit().longest_ns
+            THEN t.taken_ns - t.source_timestamp_ns
+        ELSE 0
+    END
+FROM store.orphan_take AS o
+JOIN store.take AS t ON o.take_id = t.take_id
+JOIN store.subscription AS s ON o.subscription_id = s.subscription_id
+WHERE o.run_id = only_run
+    AND o.reason IN ('publisher_not_traced', 'publisher_without_events')
+    AND NOT s.is_internal

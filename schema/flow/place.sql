@@ -19,7 +19,11 @@ WITH wanted AS (
 topic AS MATERIALIZED (
     SELECT DISTINCT w.pattern, p.topic_name
     FROM wanted AS w
-    JOIN store.publisher AS p ON p.topic_name = w.pattern OR p.topic_name GLOB w.pattern
+    JOIN (
+        SELECT run_id, topic_name FROM store.publisher
+        UNION
+        SELECT run_id, topic_name FROM store.subscription
+    ) AS p ON p.topic_name = w.pattern OR p.topic_name GLOB w.pattern
     WHERE list_contains(runs, p.run_id)
 )
 SELECT DISTINCT topic_name, NULL::BIGINT AS node_id FROM topic

@@ -15,7 +15,7 @@
 -- column: flow_id BIGINT  Number of the flow in this result
 -- column: run_id BIGINT  Run
 -- column: path_id BIGINT  Path, as in these rows
--- column: root_kind VARCHAR  'callback_instance' or 'publication'
+-- column: root_kind VARCHAR  'callback_instance', 'publication' or 'take'
 -- column: root_id BIGINT  Identity of the root
 -- column: root_ns BIGINT [epoch ns]  Start of the root
 -- column: take_id BIGINT  Take at the end of the path

@@ -2,7 +2,9 @@
 -- kind: macro
 -- description: Roots of paths, and what became of them. A root that reached the sink has one row
 --     per take there. Any other root has a single row with the reason. Roots are callback instances
---     of timers that published, or publications (always with from_event 'publish'). The time window
+--     of timers that published, or publications (always with from_event 'publish'), or takes of
+--     messages whose publisher is not traced: these start with their stamp, if its clock is that of
+--     the reader, else with the take. The time window
 --     applies to roots. If a root ends at a message that was not taken, its status is that of the
 --     message in main.stat_delivery. If the message was taken, the node may have ended the flow; or
 --     the recording cut it: no later message passed the step, and the process was not recorded for
@@ -25,7 +27,7 @@
 --     chains of each length
 -- column: run_id BIGINT  Run
 -- column: path_id BIGINT  Path, as main.flow_path numbers it for the same arguments
--- column: root_kind VARCHAR  'callback_instance' or 'publication'
+-- column: root_kind VARCHAR  'callback_instance', 'publication' or 'take'
 -- column: root_id BIGINT  Identity of the root
 -- column: root_ns BIGINT [epoch ns]  Start of the root
 -- column: take_id BIGINT  Take at the end of the path; NULL: not reached
@@ -82,19 +84,23 @@ path AS MATERIALIZED (
 way AS MATERIALIZED (
     SELECT DISTINCT way_id, publisher_id, subscription_id, route FROM path
 ),
--- root_key: positive for a callback instance, negative for a publication.
+-- root_key: positive for a callback instance, negative for a publication and, odd, for a take.
 root AS MATERIALIZED (
     SELECT
         r.run_id,
         r.publication_id,
         r.publisher_id,
         r.route,
-        CASE WHEN i.callback_instance_id IS NULL THEN -r.publication_id
-            ELSE i.callback_instance_id END AS root_key,
-        coalesce(i.start_ns, b.start_ns) AS root_ns,
-        b.start_ns AS published_ns
+        CASE
+            WHEN r.root_kind = 'take' THEN 2 * r.publication_id - 1
+            WHEN i.callback_instance_id IS NULL THEN -2 * r.publication_id
+            ELSE i.callback_instance_id
+        END AS root_key,
+        coalesce(i.start_ns, b.start_ns, t.taken_ns - r.before_take_ns) AS root_ns,
+        coalesce(b.start_ns, root_ns) AS published_ns
     FROM store.flow_root AS r
-    JOIN main.publication AS b ON r.publication_id = b.publication_id
+    LEFT JOIN main.publication AS b ON r.publication_id = b.publication_id
+    LEFT JOIN main.take AS t ON r.root_kind = 'take' AND r.root_id = t.take_id
     LEFT JOIN main.callback_instance AS i
         ON from_event <> 'publish'
         AND r.root_kind = 'callback_instance'
@@ -102,8 +108,8 @@ root AS MATERIALIZED (
     WHERE list_contains(runs, r.run_id)
         AND CASE WHEN from_topic IS NULL THEN r.is_source
             ELSE r.publisher_id IN (SELECT publisher_id FROM chain WHERE depth = 1) END
-        AND coalesce(coalesce(i.start_ns, b.start_ns) >= window_start_ns, true)
-        AND coalesce(coalesce(i.start_ns, b.start_ns) < window_end_ns, true)
+        AND coalesce(root_ns >= window_start_ns, true)
+        AND coalesce(root_ns < window_end_ns, true)
 ),
 stored AS MATERIALIZED (
     SELECT take_id FROM derive.stored_take WHERE list_contains(runs, run_id)
@@ -244,8 +250,12 @@ ranked AS (
 SELECT
     r.run_id,
     r.path_id,
-    CASE WHEN r.root_key > 0 THEN 'callback_instance' ELSE 'publication' END AS root_kind,
-    abs(r.root_key) AS root_id,
+    CASE
+        WHEN r.root_key > 0 THEN 'callback_instance'
+        WHEN r.root_key % 2 = 0 THEN 'publication'
+        ELSE 'take'
+    END AS root_kind,
+    CASE WHEN r.root_key > 0 THEN r.root_key ELSE -r.root_key // 2 END AS root_id,
     r.root_ns,
     r.take_id,
     CASE WHEN r.take_id IS NOT NULL THEN k.sink_event END AS sink_event,

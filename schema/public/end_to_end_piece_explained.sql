@@ -13,7 +13,7 @@
 -- column: run_id BIGINT  Run
 -- column: path_id BIGINT  Path, as main.flow_path numbers it for the same arguments
 -- column: flow_id BIGINT  Number of the flow in this result
--- column: root_kind VARCHAR  'callback_instance' or 'publication'
+-- column: root_kind VARCHAR  'callback_instance', 'publication' or 'take'
 -- column: root_id BIGINT  Identity of the root
 -- column: take_id BIGINT  Take at the end of the path
 -- column: latency_ns BIGINT [ns]  From the start of the root to the end
@@ -230,9 +230,10 @@ turn AS MATERIALIZED (
 message AS (
     SELECT
         f.run_id, f.path_id, f.flow_id, f.root_kind, f.root_id, f.take_id, f.latency_ns, f.sink_ns,
-        h.hop, h.publication_id, t.taken_ns, i.start_ns AS called_ns, i.callback_instance_id,
+        h.hop, b.publication_id, t.taken_ns, i.start_ns AS called_ns, i.callback_instance_id,
         i.callback_id, i.busy_min_ns, i.busy_max_ns,
-        b.start_ns, b.intra_ns, b.rclcpp_ns, b.rcl_ns, b.rmw_ns, b.dds_ns, b.end_ns,
+        b.start_ns, b.intra_ns, b.rclcpp_ns, b.rcl_ns, b.rmw_ns, b.dds_ns,
+        coalesce(b.end_ns, f.root_ns) AS end_ns,
         least(b.intra_ns, b.rclcpp_ns, b.rcl_ns, b.rmw_ns, b.dds_ns) AS layer_ns,
         -- No event shows when the last layer ends, unless the publication has a later one: the
         -- message is written after it.
@@ -252,7 +253,7 @@ message AS (
         coalesce(w.moments, []) AS turn
     FROM passed AS h
     JOIN flow AS f ON h.flow_id = f.flow_id
-    JOIN main.publication AS b ON h.publication_id = b.publication_id
+    LEFT JOIN main.publication AS b ON h.publication_id = b.publication_id
     JOIN main.take AS t ON h.take_id = t.take_id
     LEFT JOIN callback AS i ON h.take_id = i.take_id
     LEFT JOIN main.take AS u ON h.previous_take_id = u.take_id

@@ -14,7 +14,7 @@
 -- column: flow_id BIGINT  Number of the flow
 -- column: hop BIGINT  Number of the message on the path
 -- column: take_id BIGINT  Take of the message
--- column: publication_id BIGINT  The message
+-- column: publication_id BIGINT  The message; below 0: its publisher is not traced
 -- column: previous_take_id BIGINT  Take of the message before it; NULL: none
 -- column: next_take_id BIGINT  Take of the message after it; NULL: none
 CREATE OR REPLACE MACRO main.end_to_end_trail(
@@ -109,6 +109,7 @@ whole AS (
     WHERE r.hop = 1
         AND CASE
             WHEN f.root_kind = 'publication' THEN f.root_id = r.publication_id
+            WHEN f.root_kind = 'take' THEN f.root_id = -r.publication_id
             ELSE o.root_kind = 'callback_instance' AND o.root_id = f.root_id
         END
     QUALIFY row_number() OVER (

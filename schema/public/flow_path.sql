@@ -2,7 +2,8 @@
 -- kind: macro
 -- description: Chains of publishers and subscriptions that flows can take, with all their
 --     beginnings (prefixes). No subscription comes twice in a chain. Where the call of a service
---     led to a publication, the chain has the node that called and the services in between. A chain
+--     led to a publication, the chain has the node that called and the services in between. The
+--     publisher of a message that nothing traced published is named '(not traced)'. A chain
 --     is a path if it ends at the topic asked for, or if nothing continues it. Chains longer than
 --     max_depth and beyond max_paths are cut. is_cut marks each chain that has more to it, or all
 --     chains of the run if it is not known which.
@@ -19,13 +20,13 @@
 -- column: path_id BIGINT  Number of the chain in this result
 -- column: parent_path_id BIGINT  The chain without its last step; NULL: it has one step
 -- column: depth BIGINT  Steps (topics) of the chain
--- column: publishers BIGINT[]  Publishers in order
+-- column: publishers BIGINT[]  Publishers in order; below 0: not traced
 -- column: subscriptions BIGINT[]  Subscriptions in order
 -- column: topics VARCHAR[]  Topics in order
 -- column: routes BIGINT[][]  For each topic, empty where no service led to it: the calling node
 --     (negative: its process; 0: not known), then the services in order (0: not known)
 -- column: path VARCHAR  Nodes and topics in order, services in brackets, for people
--- column: publisher_id BIGINT  Last publisher
+-- column: publisher_id BIGINT  Last publisher; below 0: not traced
 -- column: subscription_id BIGINT  Last subscription
 -- column: is_cached BOOLEAN  The last step may wait in its node for other messages
 -- column: is_path BOOLEAN  The chain is a path, not only the beginning of some
@@ -85,22 +86,24 @@ lineage (path_id, step_id, depth, parent_path_id) AS (
 ),
 step AS (
     SELECT
-        c.path_id, c.publisher_id, c.subscription_id, c.route, p.topic_name,
+        c.path_id, c.publisher_id, c.subscription_id, c.route,
+        CASE WHEN c.publisher_id < 0 THEN s.topic_name ELSE p.topic_name END AS topic_name,
         concat_ws(
             ' → ',
             CASE WHEN c.depth = 1
-                THEN coalesce(r.caller, main.node_label(pn.full_name, pp.name, pp.pid)) END,
+                THEN CASE WHEN c.publisher_id < 0 THEN '(not traced)'
+                    ELSE coalesce(r.caller, main.node_label(pn.full_name, pp.name, pp.pid)) END END,
             r.services,
             -- Who called publishes with the response that came back.
             CASE WHEN r.services IS NOT NULL AND r.last_node_id IS DISTINCT FROM p.node_id
                 THEN main.node_label(pn.full_name, pp.name, pp.pid) END,
-            coalesce(p.topic_name, '?'),
+            coalesce(CASE WHEN c.publisher_id < 0 THEN s.topic_name ELSE p.topic_name END, '?'),
             main.node_label(sn.full_name, sp.name, sp.pid)
         ) AS label
     FROM chain AS c
     LEFT JOIN route AS r ON c.route = r.route
-    JOIN store.publisher AS p ON c.publisher_id = p.publisher_id
-    JOIN store.process AS pp ON p.process_id = pp.process_id
+    LEFT JOIN store.publisher AS p ON c.publisher_id = p.publisher_id
+    LEFT JOIN store.process AS pp ON p.process_id = pp.process_id
     LEFT JOIN store.node AS pn ON p.node_id = pn.node_id
     JOIN store.subscription AS s ON c.subscription_id = s.subscription_id
     JOIN store.process AS sp ON s.process_id = sp.process_id

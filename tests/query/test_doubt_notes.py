@@ -75,3 +75,20 @@ def test_a_requirement_does_not_pass_in_silence(database: Path, tmp_path: Path) 
     ]
     assert CAUSE in " ".join(verification.result.notes)
     assert f"<system-out>{doubt}</system-out>" in verification.to_junit()
+
+
+def test_flows_say_where_they_begin_if_their_publisher_is_not_traced(fresh_database: Path) -> None:
+    """With the stamp of a message where its clock fits, else with the take; both topics do."""
+    with duckdb.connect(str(fresh_database)) as connection:
+        fill_case(connection, CASE.with_name("publisher_not_traced.case"))
+    with msgflow.open_db(fresh_database) as db:
+        scans = db.why("/planner")
+        wheels = db.query("e2e-latency", to="/driver")
+    said = "what publishes {} is not traced: flows begin with {}"
+    assert said.format("/scan", "the stamp of each message") in scans.notes
+    assert scans.paths.table["path"].to_pylist() == [
+        "(not traced) → /scan → /filter → /points → /planner"
+    ]
+    assert wheels.notes == [
+        said.format("/wheels", "its take: its clock may be another one"),
+    ]

@@ -41,13 +41,17 @@ Table(
     "flow_root",
     STORE,
     run_id(),
-    reference("publication_id", "The message", to="publication.publication_id", required=True),
-    reference("publisher_id", "Its publisher", to="publisher.publisher_id", required=True),
+    number("publication_id", "The message; below 0: its publisher is not traced", required=True),
+    number("publisher_id", "Its publisher; below 0: not traced", required=True),
     flag("is_source", "Not caused by a taken message"),
-    text("root_kind", "'callback_instance' or 'publication'", required=True),
+    text("root_kind", "'callback_instance', 'publication' or 'take'", required=True),
     number("root_id", "Row of that kind where its flow begins", required=True),
     route(),
-    comment="One row per publication on a topic of the application",
+    number("before_take_ns", "Of a take: how long before it the flow begins", unit="ns"),
+    comment=(
+        "One row per publication on a topic of the application, and per take of a message whose "
+        "publisher is not traced"
+    ),
 )
 
 Table(
@@ -60,7 +64,7 @@ Table(
         to="subscription.subscription_id",
     ),
     route(),
-    reference("publisher_id", "Publisher", to="publisher.publisher_id", required=True),
+    number("publisher_id", "Publisher; below 0: not traced", required=True),
     reference(
         "subscription_id",
         "Subscription that took from it",

@@ -7,7 +7,7 @@
 -- column: run VARCHAR             Key of the run
 -- column: latency_ns BIGINT [ns]  From the start of the root to the end
 -- column: at_ns BIGINT [ns]       Start of the root, since the start of the run
--- column: root_kind VARCHAR       'callback_instance' or 'publication'
+-- column: root_kind VARCHAR       'callback_instance', 'publication' or 'take'
 -- column: root_id BIGINT          Identity of the root in the database of the run
 SELECT
     f.path,

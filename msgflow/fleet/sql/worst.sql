@@ -12,7 +12,7 @@
 -- column: root_ns BIGINT [epoch ns]  Start of the root
 -- column: path VARCHAR [path]  Nodes and topics
 -- column: source VARCHAR      What it was read from
--- column: root_kind VARCHAR   'callback_instance' or 'publication'
+-- column: root_kind VARCHAR   'callback_instance', 'publication' or 'take'
 -- column: root_id BIGINT      Identity of the root in the database of the run
 -- column: has_database BOOLEAN  The lake has the database of the run
 -- brief: latency_ns, name, labels, run, root_ns, source

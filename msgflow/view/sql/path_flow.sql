@@ -8,7 +8,7 @@
 -- param: start_ns BIGINT  Begin of the window of roots, epoch ns
 -- param: end_ns BIGINT  Its end, epoch ns, exclusive
 -- column: path_id BIGINT  Number of the path
--- column: root_kind VARCHAR  'callback_instance' or 'publication'
+-- column: root_kind VARCHAR  'callback_instance', 'publication' or 'take'
 -- column: root_id BIGINT  Identity of the root
 -- column: root_at BIGINT [ns since origin]  Start of the root
 -- column: take_id BIGINT  Take at the end of the path; NULL: not reached

@@ -9,7 +9,7 @@
 -- param: begin_at BIGINT = NULL  Only flows that began at this time or later, ns since origin
 -- param: end_at BIGINT = NULL  Only flows that began before this time, ns since origin
 -- column: root_at BIGINT [ns since origin]  Start of the root
--- column: root_kind VARCHAR  'callback_instance' or 'publication'
+-- column: root_kind VARCHAR  'callback_instance', 'publication' or 'take'
 -- column: root_id BIGINT  Identity of the root
 -- column: take_id BIGINT  Take at the end; NULL: not reached
 -- column: latency BIGINT [ns]  Latency; of the slowest in the piece

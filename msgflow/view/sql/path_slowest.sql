@@ -9,7 +9,7 @@
 -- param: end_at BIGINT = NULL  Only flows that began before this time, ns since origin
 -- column: path_id BIGINT  Number of the path
 -- column: root_at BIGINT [ns since origin]  Start of the root
--- column: root_kind VARCHAR  'callback_instance' or 'publication'
+-- column: root_kind VARCHAR  'callback_instance', 'publication' or 'take'
 -- column: root_id BIGINT  Identity of the root
 -- column: take_id BIGINT  Take at the end
 -- column: latency BIGINT [ns]  Latency

@@ -8,7 +8,7 @@
 -- column: run_id BIGINT  Run
 -- column: path VARCHAR  Nodes and topics of the path
 -- column: path_id BIGINT  Number of the path in the run: several paths may have one text
--- column: root_kind VARCHAR  'callback_instance' or 'publication'
+-- column: root_kind VARCHAR  'callback_instance', 'publication' or 'take'
 -- column: root_id BIGINT  Identity of the root in the run
 -- column: root_ns BIGINT [epoch ns]  Start of the root
 -- column: take_id BIGINT  Take at the end of the path; NULL: not reached
