@@ -251,6 +251,7 @@ def test_a_table_fits_the_terminal(
     assert wide == piped(*arguments, "--wide", "--db", small_database)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("width", few([60, 80, 100], 60))
 @pytest.mark.parametrize(
     "arguments",

@@ -127,6 +127,7 @@ def test_pandas_keeps_integers_exact_beside_missing_values(
     assert set(instance["run_id"].astype(int)) == {1}
 
 
+@pytest.mark.thorough
 def test_polars_reads_it_too(recorded: Database, tmp_path: Path) -> None:
     recorded.export_parquet(tmp_path / "out", ["publication"])
     frame = polars.read_parquet(tmp_path / "out" / "publication")

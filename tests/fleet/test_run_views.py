@@ -41,6 +41,7 @@ def views_of(choice: Choice) -> dict[str, list[tuple[object, ...]]]:
     return found
 
 
+@pytest.mark.thorough
 def test_views_in_databases_are_those_in_files(
     night: Lake, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -66,6 +66,7 @@ def changed(system: RosSystem, change: Any) -> RosSystem:
     return copy
 
 
+@pytest.mark.thorough
 @FEW
 @given(seed=SEEDS, shift=st.sampled_from([-900, 1, 1_700_000_000_000_000_000]))
 def test_shifting_all_times_shifts_all_outputs(analysis: Analysis, seed: int, shift: int) -> None:

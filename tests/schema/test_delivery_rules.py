@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import duckdb
 import pytest
-from rules import derived
+from rules import derived, insert
 from thorough import few
 
 MS = 1_000_000
@@ -58,8 +58,27 @@ class Delivery:
     """One subscription, and what was published for it. Times in ns."""
 
     def __init__(self, con: duckdb.DuckDBPyConnection) -> None:
-        self.con = con
+        self._con = con
         self._count = 0
+        # (number, publisher, thread, arrival, taken) of what is not in the tables yet.
+        self._published: list[tuple[int, int, int, int, int | None]] = []
+
+    @property
+    def con(self) -> duckdb.DuckDBPyConnection:
+        """The tables, with all that was published."""
+        rows, self._published = self._published, []
+        for table, names, of in (
+            ("derive.expected_arrival", "publication_id, publisher_id, arrival_ns", (0, 1, 3)),
+            ("store.publication", "publication_id, publisher_id, thread_id, end_ns", (0, 1, 2, 3)),
+        ):
+            insert(self._con, table, names, [[row[n] for n in of] for row in rows])
+        taken = [row for row in rows if row[4] is not None]
+        for table, names, of in (
+            ("store.link_transport", "publication_id, publisher_id, take_id", (0, 1, 0)),
+            ("store.take", "take_id, taken_ns", (0, 4)),
+        ):
+            insert(self._con, table, names, [[row[n] for n in of] for row in taken])
+        return self._con
 
     def lives(self, **columns: int | None) -> None:
         names = "".join(f", {name}" for name in columns)
@@ -74,25 +93,7 @@ class Delivery:
     ) -> int:
         """Publish a message that arrives, and is taken, at these times; return its number."""
         self._count += 1
-        self.con.execute(
-            "INSERT INTO derive.expected_arrival (publication_id, publisher_id, arrival_ns) "
-            "VALUES (?, ?, ?)",
-            [self._count, publisher, arrival],
-        )
-        self.con.execute(
-            "INSERT INTO store.publication (publication_id, publisher_id, thread_id, end_ns) "
-            "VALUES (?, ?, ?, ?)",
-            [self._count, publisher, thread, arrival],
-        )
-        if taken is not None:
-            self.con.execute(
-                "INSERT INTO store.link_transport (publication_id, publisher_id, take_id) "
-                "VALUES (?, ?, ?)",
-                [self._count, publisher, self._count],
-            )
-            self.con.execute(
-                "INSERT INTO store.take (take_id, taken_ns) VALUES (?, ?)", [self._count, taken]
-            )
+        self._published.append((self._count, publisher, thread, arrival, taken))
         return self._count
 
     def miss(self) -> int:

@@ -7,6 +7,7 @@ from typing import Any
 
 import duckdb
 import pytest
+from rules import insert
 from thorough import few
 
 MICROSECOND = 1_000
@@ -40,11 +41,9 @@ def publish(
     thread: int = 1,
 ) -> None:
     """A publication and when its thread went on; one publisher for each topic, unless given."""
-    con.execute(
-        "INSERT INTO published (publication_id, written_ns, next_event_ns, topic_name, "
-        "publisher_id, thread_id) VALUES (?, ?, ?, ?, ?, ?)",
-        [identity, written, closes, topic, publisher or ord(topic[1]), thread],
-    )
+    names = "publication_id, written_ns, next_event_ns, topic_name, publisher_id, thread_id"
+    row = (identity, written, closes, topic, publisher or ord(topic[1]), thread)
+    insert(con, "published", names, [row])
 
 
 def of_another_host(con: duckdb.DuckDBPyConnection, topic: str) -> None:
@@ -58,22 +57,32 @@ def of_another_host(con: duckdb.DuckDBPyConnection, topic: str) -> None:
 def take(
     con: duckdb.DuckDBPyConnection, *stamps: int, topic: str = "/a", taken: int = 100 * SECOND
 ) -> None:
-    con.executemany(
-        "INSERT INTO message (source_timestamp_ns, topic_name, taken_ns) VALUES (?, ?, ?)",
-        [(stamp, topic, taken) for stamp in stamps],
-    )
+    names = "source_timestamp_ns, topic_name, taken_ns"
+    insert(con, "message", names, [(stamp, topic, taken) for stamp in stamps])
 
 
 def periodic(
-    con: duckdb.DuckDBPyConnection, delays: Iterable[int], width: int, since: int = 0
+    con: duckdb.DuckDBPyConnection,
+    delays: Iterable[int],
+    width: int,
+    since: int = 0,
+    topic: str = "/a",
+    first: int | None = None,
 ) -> int:
-    """Publications one period apart, each with a message; returns the time of the next one."""
-    time = since
-    for identity, delay in enumerate(delays, since // PERIOD):
-        publish(con, identity, time, time + width)
-        take(con, time + delay)
-        time += PERIOD
-    return time
+    """Publications one period apart, each with a message; returns the time of the next one.
+
+    They are numbered from `first` on, or by the periods before `since`.
+    """
+    begin = since // PERIOD if first is None else first
+    times = [(since + n * PERIOD, delay) for n, delay in enumerate(delays)]
+    insert(
+        con,
+        "published",
+        "publication_id, written_ns, next_event_ns, topic_name, publisher_id",
+        [(n, time, time + width, topic, ord(topic[1])) for n, (time, _) in enumerate(times, begin)],
+    )
+    take(con, *(time + delay for time, delay in times), topic=topic)
+    return since + len(times) * PERIOD
 
 
 def nearest(con: duckdb.DuckDBPyConnection) -> dict[int, tuple[int | None, int | None]]:
@@ -265,16 +274,10 @@ def test_or_for_twice_what_is_usual_on_its_host(
     A publication counts once. On another host other delays are usual.
     """
     clock(rules, (0, 100, 0))
-    time = 0
-    for identity, usual in enumerate(range(1, 201)):
-        publish(rules, identity, time, time + MILLISECOND, topic="/b")
-        take(rules, time + usual * MICROSECOND, topic="/b")
-        if identity % 10 == 0:
-            take(rules, time + 900_000, topic="/b")
-        time += PERIOD
-    for other in range(20):
-        publish(rules, 500 + other, other * PERIOD, other * PERIOD + MILLISECOND, topic="/c")
-        take(rules, other * PERIOD + 800_000, topic="/c")
+    usual = (n * MICROSECOND for n in range(1, 201))
+    time = periodic(rules, usual, MILLISECOND, topic="/b")
+    take(rules, *(n * PERIOD + 900_000 for n in range(0, 200, 10)), topic="/b")
+    periodic(rules, [800_000] * 20, MILLISECOND, topic="/c", first=500)
     of_another_host(rules, "/c")
     publish(rules, 999, time, None)
     take(rules, time + delay)
@@ -297,10 +300,8 @@ def test_a_hundred_messages_tell_what_is_usual_for_a_publisher(
     """Where it has fewer, its host tells, if that needs longer."""
     clock(rules, (0, 100, 0))
     time = periodic(rules, [MICROSECOND] * own, MILLISECOND)
-    for number in range(1, 201):
-        publish(rules, 500 + number, time, time + MILLISECOND, topic="/b")
-        take(rules, time + number * MICROSECOND, topic="/b")
-        time += PERIOD
+    usual = (n * MICROSECOND for n in range(1, 201))
+    time = periodic(rules, usual, MILLISECOND, since=time, topic="/b")
     publish(rules, 999, time, None)
     take(rules, time + delay)
     found = nearest(rules)
@@ -373,11 +374,8 @@ def test_a_publication_that_has_its_message_has_no_other(
 
 def take_alone(con: duckdb.DuckDBPyConnection, subscription: int, *stamps: int) -> None:
     """Messages that a subscription gets with stamps of its own."""
-    con.executemany(
-        "INSERT INTO message (source_timestamp_ns, only_subscription_id, taken_ns) "
-        "VALUES (?, ?, ?)",
-        [(stamp, subscription, 100 * SECOND) for stamp in stamps],
-    )
+    names = "source_timestamp_ns, only_subscription_id, taken_ns"
+    insert(con, "message", names, [(stamp, subscription, 100 * SECOND) for stamp in stamps])
 
 
 def test_a_publication_may_have_a_message_for_each_subscription(
@@ -630,10 +628,8 @@ def test_what_is_usual_for_small_messages_is_too_soon_for_a_large_one(
 ) -> None:
     clock(rules, (0, 100, 0))
     time = periodic(rules, [MILLISECOND] * 200, 2 * MILLISECOND)
-    for identity in range(1000, 1200):
-        moment = (identity - 1000) * PERIOD + 10 * MILLISECOND
-        publish(rules, identity, moment, moment + MILLISECOND, "/b")
-        take(rules, moment + 1_000, topic="/b")
+    since = 10 * MILLISECOND
+    periodic(rules, [1_000] * 200, MILLISECOND, since=since, topic="/b", first=1_000)
     publish(rules, 999, time, time + 2 * MILLISECOND)
     take(rules, time + delay)
     lose(rules, time - 1, time)

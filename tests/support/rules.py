@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from functools import cache
 
@@ -29,6 +29,18 @@ def modelled(stage: str, name: str, view: str) -> Rules:
     """A connection with what `stage` makes, and a relation of the model above it as `view`."""
     (rule,) = (each for each in objects.model() if each.name == f"staging.{name}")
     return _as_made(stage, f"CREATE VIEW {view} AS {rule.body}")
+
+
+def insert(
+    con: duckdb.DuckDBPyConnection,
+    table: str,
+    names: str,
+    rows: Iterable[Sequence[int | str | None]],
+) -> None:
+    """Insert rows by one statement: one for each would take longer than most rules."""
+    values = [", ".join("NULL" if value is None else repr(value) for value in row) for row in rows]
+    if values:
+        con.execute(f"INSERT INTO {table} ({names}) VALUES ({'), ('.join(values)})")
 
 
 @contextmanager

@@ -134,6 +134,7 @@ def test_pieces_of_the_critical_path_add_up(
             assert pieces[0][1] == longest
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "name", few(["tracecompass-ros2", "services", "periodic_async_jazzy24"], "services")
 )

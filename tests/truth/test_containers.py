@@ -14,6 +14,7 @@ from msgflow.ingest import ingest
 from msgflow_sim import scenarios, simulate
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "name", few(["containers_one_daemon", "containers_one_hostname"], "containers_one_hostname")
 )

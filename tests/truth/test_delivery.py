@@ -126,6 +126,7 @@ FAULTY = {
 }
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", few(FAULTY, "mixed_intra_process"))
 def test_no_reason_is_false(tmp_path: Path, name: str) -> None:
     """Also where readers get no CPU, processes leave one by one, and events are lost."""

@@ -11,6 +11,7 @@ from msgflow.ingest import ingest
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 
+@pytest.mark.thorough
 def test_every_link_is_found_and_right(tmp_path: Path) -> None:
     ingest([EXAMPLES / "pipeline.tar.xz"], tmp_path / "run.duckdb")
     scores = compare_real(tmp_path / "run.duckdb", EXAMPLES / "pipeline-truth.jsonl.gz")

@@ -37,6 +37,7 @@ RECORDINGS: dict[str, tuple[Recording, set[str], bool]] = {
 }
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", few(RECORDINGS, "brim"))
 def test_what_is_said_near_gaps_is_true(tmp_path: Path, name: str) -> None:
     recording, gaps, is_complete = RECORDINGS[name]

@@ -75,6 +75,7 @@ def unstamped(
     return get
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("change", few(CHANGES, "publications_missing"))
 @pytest.mark.parametrize(
     "name", few(["tracecompass-ros2", "sync_1_1", "partial_sync", "pingpong"], "sync_1_1")

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from ingested import Ingested
 
 
+@pytest.mark.thorough
 def test_nested_inputs_are_the_only_candidates(simulations: Callable[[str], Ingested]) -> None:
     expected = (
         "SELECT p.publication_rmw_ns, i.start_ns, 1 FROM truth_causal AS p "

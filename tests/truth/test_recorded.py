@@ -284,6 +284,7 @@ def test_scores_of_services(
     assert counts == [(386, 385)]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("name", "kind"), few(TRUE_TRACES.items(), ("services", "service")))
 def test_directions_agree(recordings: Callable[[str], Ingested], name: str, kind: str) -> None:
     """Forward from a reaches b exactly when backward from b reaches a.

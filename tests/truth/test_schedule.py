@@ -237,6 +237,7 @@ def test_who_waits_for_another_thread_waits_for_what_that_does(
     assert waits > 5
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("tracer", few(["lttng", "perf"], "lttng"))
 def test_what_losses_leave_open_is_not_guessed(tmp_path: Path, tracer: str) -> None:
     """Where a switch was lost, no other thread passes for the one that ran."""

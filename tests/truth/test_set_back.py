@@ -14,6 +14,7 @@ from msgflow_sim import Recording, simulate
 MILLISECOND = 1_000_000
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("system", "factor", "at_ms", "linked", "told"),
     [

@@ -34,6 +34,7 @@ def test_findings(simulations: Callable[[str], Ingested], name: str) -> None:
     assert simulations(name).rows(FINDINGS.format(ABOUT_PROCESSES)) == EXPECTED[name]
 
 
+@pytest.mark.thorough
 def test_which_process_fell_silent(simulations: Callable[[str], Ingested]) -> None:
     """The one that is killed after 2001 ms; what was sent to it later was not delivered."""
     recording = simulations("restarts")

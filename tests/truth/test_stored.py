@@ -58,6 +58,7 @@ def test_the_time_up_to_the_subscription_is_a_part_of_its_own(overload: Ingested
     assert max(part["publish_to_take"] for part in parts) < 0.02e9
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("query", ["path-breakdown", "critical-path"])
 def test_flows_of_stored_messages_are_left_out_everywhere(overload: Ingested, query: str) -> None:
     """As their times are by e2e-latency."""
