@@ -14,7 +14,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from golden import fill_case
-from thorough import few
+from thorough import few, thorough
 
 from msgflow import Database, UsageError, __version__
 from msgflow.db.connection import recorded_revision
@@ -312,7 +312,7 @@ def test_equal_results_are_equal_in_csv(recorded: Database, tmp_path: Path) -> N
     assert (tmp_path / "out" / "take.csv").read_bytes() == (tmp_path / "sql.csv").read_bytes()
 
 
-@pytest.mark.parametrize("write", [Database.export_parquet, Database.export_csv])
+@pytest.mark.parametrize("write", [Database.export_parquet, thorough(Database.export_csv)])
 def test_a_view_of_somebody_else_becomes_no_file(
     small_database: Path, tmp_path: Path, write: Callable[..., object]
 ) -> None:

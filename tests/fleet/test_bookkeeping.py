@@ -15,6 +15,7 @@ from typing import Any
 
 import pyarrow as pa
 import pytest
+from thorough import few
 from typer.testing import CliRunner
 
 from msgflow.cli.app import app
@@ -348,7 +349,9 @@ def test_shards_do_each_recording_once(place: Path) -> None:
         assert (wrong.exit_code, "--shard takes I/N" in wrong.stderr) == (2, True)
 
 
-@pytest.mark.parametrize("labels", [{"a": "A", "b": "B"}, {"a": "A", "b": "A"}, {"b": "B"}, {}])
+@pytest.mark.parametrize(
+    "labels", few([{"a": "A", "b": "B"}, {"a": "A", "b": "A"}, {"b": "B"}, {}], {"b": "B"})
+)
 def test_no_order_of_shards_matters(place: Path, labels: dict[str, str]) -> None:
     """Two have the same packets, in different shards: the first of the command becomes the run."""
     record("a", "first")

@@ -68,7 +68,6 @@ def test_names_are_those_of_the_queries_of_one_run() -> None:
     few(
         [name for name in names() if name not in ("info-findings", "info-quality")],
         "e2e-latency",
-        "callbacks",
         "timers",
     ),
 )

@@ -9,6 +9,7 @@ from random import Random
 import pyarrow as pa
 import pytest
 from rules import derived
+from thorough import few
 
 STAGE = """
 CREATE SCHEMA derive;
@@ -226,9 +227,9 @@ def test_answers_are_certain(subscriptions: list[Subscription], is_new: bool) ->
     assert run(subscriptions, is_new=is_new).doubtful() == []
 
 
-@pytest.mark.parametrize("period", [5, 20, 23, 49.9, 50, 51, 100, 700])
+@pytest.mark.parametrize("period", few([5, 20, 23, 49.9, 50, 51, 100, 700], 5, 49.9, 700))
 @pytest.mark.parametrize("subscription", [Subscription(50), NOISY])
-@pytest.mark.parametrize("threads", [1, 3])
+@pytest.mark.parametrize("threads", few([1, 3], 3))
 def test_a_timer_beside_answers(subscription: Subscription, period: float, threads: int) -> None:
     process = run([subscription], [Timer(period, 17)], threads=threads)
     assert process.doubtful_publishers() == {ANSWER: 0, TICK: 1}
@@ -239,7 +240,7 @@ def test_a_timer_of_the_period_of_noisy_messages() -> None:
     assert process.doubtful_publishers()[TICK] == 1
 
 
-@pytest.mark.parametrize("period", [5, 20, 23, 70, 100])
+@pytest.mark.parametrize("period", few([5, 20, 23, 70, 100], 5, 70))
 @pytest.mark.parametrize("subscription", [Subscription(50), NOISY])
 def test_a_timer_that_is_older_than_the_recording(
     subscription: Subscription, period: float
@@ -272,7 +273,7 @@ def test_answers_and_a_timer_on_one_publisher() -> None:
 
 
 @pytest.mark.parametrize("period", [31.5, 33, 35, 37])
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", few(range(5), 0))
 def test_answers_that_take_nearly_a_period_of_a_timer(period: float, seed: int) -> None:
     """Most come after a moment when it was due, but no more of them than by chance.
 

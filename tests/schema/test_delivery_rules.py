@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import duckdb
 import pytest
 from rules import derived, insert
-from thorough import few
+from thorough import examples, few
 
 MS = 1_000_000
 # The input of the rules, without the views and tables that it comes from.
@@ -844,12 +844,12 @@ def test_the_length_of_a_stretch_decides_nothing(delivery: Delivery, seed: int, 
     """Nor where messages arrive at the same moment, or before time begins."""
     fill(delivery.con, random.Random(seed), grid, begin=-300 * MS if grid > 1 else 0)
     found = []
-    for length in (1 << 62, 100 * MS, 30 * MS, 7 * MS):
+    for length in (1 << 62, 7 * MS, 100 * MS, 30 * MS)[: examples(2, 4)]:
         delivery.con.execute(f"CREATE OR REPLACE MACRO derive.stretch(at_ns) AS at_ns // {length}")
         rows = delivery.con.execute("FROM derive.undelivered(1) ORDER BY ALL").fetchall()
         found.append(rows)
     assert len({row[-1] for row in found[0]}) > 3
-    assert found[1:] == found[:1] * 3
+    assert found[1:] == found[:1] * (len(found) - 1)
 
 
 def fill(con: duckdb.DuckDBPyConnection, chance: random.Random, grid: int, begin: int) -> None:

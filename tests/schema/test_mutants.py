@@ -55,7 +55,7 @@ def test_what_is_changed() -> None:
         thorough(LIMIT, numbers_of(LIMIT, "'least_row'"), QUEUES, 2, 0),
         thorough(LIMIT, numbers_of(LIMIT, "'least_row'"), "tests/sql/test_value.py", 2, 2),
         (LIMIT, ["--replace", "'least_row'", "'most_row'"], "tests/sql/test_value.py", 1, 1),
-        (ENDS, DROPPED, "tests/schema/cases/finding.stream_ends_early", 1, 0),
+        thorough(ENDS, DROPPED, "tests/schema/cases/finding.stream_ends_early", 1, 0),
     ],
 )
 def test_a_change_is_noticed_by_the_tests_that_are_about_it(

@@ -45,7 +45,7 @@ def record(
     ).fetchall()
 
 
-@pytest.mark.parametrize("ppm", [0, 150, -150])
+@pytest.mark.parametrize("ppm", few([0, 150, -150], -150))
 def test_difference_and_drift_of_each_stretch(rules: duckdb.DuckDBPyConnection, ppm: int) -> None:
     """The messages of a stretch agree only once its drift is known."""
     rows = record(rules, width_ns=2_000, delay_ns=1_000, ppm=ppm)
@@ -195,7 +195,7 @@ def test_a_drift_takes_three_stretches(
     assert [row[7] for row in rows] == [is_sharp] * stretches
 
 
-@pytest.mark.parametrize("ppm", [0, 190, -190])
+@pytest.mark.parametrize("ppm", few([0, 190, -190], 190))
 def test_bursts_are_told_at_any_drift(rules: duckdb.DuckDBPyConnection, ppm: int) -> None:
     """A drift known to 2 ppm only moves a message to the next publication within a second."""
     rows = record(rules, width_ns=2_000, delay_ns=1_000, ppm=ppm, per_burst=6)
@@ -321,7 +321,7 @@ def test_a_step_is_no_drift(rules: duckdb.DuckDBPyConnection, by_ns: int, part: 
     assert (abs(before) < 1_000, abs(behind - by_ns) < 1_000) == (True, True)
 
 
-@pytest.mark.parametrize("by_ns", [50_000, -50_000])
+@pytest.mark.parametrize("by_ns", few([50_000, -50_000], -50_000))
 def test_a_step_in_a_stretch_that_a_drift_explains_better(
     rules: duckdb.DuckDBPyConnection, by_ns: int
 ) -> None:
@@ -562,7 +562,7 @@ def test_where_nothing_is_told_a_clock_that_stood_stands(
     assert len({(difference, segment) for _, difference, segment in rows}) == 1
 
 
-@pytest.mark.parametrize("count", [1, 2, 3])
+@pytest.mark.parametrize("count", few([1, 2, 3], 3))
 def test_stretches_that_tell_nothing_between_two_in_which_a_clock_stood_alike(
     rules: duckdb.DuckDBPyConnection, count: int
 ) -> None:
@@ -591,7 +591,7 @@ def test_stretches_that_tell_nothing_between_two_in_which_a_clock_stood_alike(
 HOURS_NS = 3 * 3_600 * SECOND
 
 
-@pytest.mark.parametrize("by_ns", [HOURS_NS, -HOURS_NS])
+@pytest.mark.parametrize("by_ns", few([HOURS_NS, -HOURS_NS], HOURS_NS))
 def test_a_clock_that_is_set_by_hours(rules: duckdb.DuckDBPyConnection, by_ns: int) -> None:
     """Its stamps are before and behind all that was published."""
     record(rules, width_ns=2_000, delay_ns=1_000, ppm=0)
@@ -615,7 +615,7 @@ def test_a_clock_that_is_set_by_hours_while_only_others_take_its_messages(
 
 
 @pytest.mark.parametrize("by_ns", few([3 * SECOND, -3 * SECOND], -3 * SECOND))
-@pytest.mark.parametrize("is_wrong", ["before", "behind"])
+@pytest.mark.parametrize("is_wrong", few(["before", "behind"], "before"))
 @pytest.mark.parametrize("apart_ns", few([0, HOURS_NS], HOURS_NS))
 def test_a_clock_that_is_right_in_the_beginning_or_in_the_end(
     rules: duckdb.DuckDBPyConnection, is_wrong: str, by_ns: int, apart_ns: int

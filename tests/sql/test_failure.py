@@ -11,6 +11,7 @@ from pathlib import Path
 
 import duckdb
 import pytest
+from thorough import few, thorough
 
 import msgflow
 from msgflow.db import migration
@@ -153,8 +154,8 @@ def test_damage_is_said_wherever_it_is_met(
     [
         "DELETE FROM store.alembic_version",
         "UPDATE store.alembic_version SET version_num = ''",
-        "UPDATE store.alembic_version SET version_num = '0000'",
-        "UPDATE store.alembic_version SET version_num = 'x' || repeat('y', 1000)",
+        thorough("UPDATE store.alembic_version SET version_num = '0000'"),
+        thorough("UPDATE store.alembic_version SET version_num = 'x' || repeat('y', 1000)"),
         "DROP TABLE store.alembic_version;"
         " CREATE TABLE store.alembic_version AS SELECT NULL::VARCHAR AS version_num",
         "DROP TABLE store.alembic_version; CREATE TABLE store.alembic_version (a INT)",
@@ -206,7 +207,7 @@ def test_a_full_disk_after_the_commit_is_a_warning(
     assert sorted(os.listdir(path.parent)) == ["a.duckdb", "a.duckdb.wal"]
 
 
-@pytest.mark.parametrize("megabytes", [1, 6])
+@pytest.mark.parametrize("megabytes", few([1, 6], 1))
 def test_a_full_disk_leaves_no_new_database(
     trace: Path, small_disk: Callable[[int], Path], megabytes: int
 ) -> None:

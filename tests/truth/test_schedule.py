@@ -103,7 +103,9 @@ def test_perf_gives_the_same_answers(traced: Traced, tmp_path: Path) -> None:
         thorough(
             "thread_state", "UPDATE thread_state SET end_ns = end_ns + 1 WHERE state = 'runnable'"
         ),
-        ("thread_state", "UPDATE thread_state SET state = 'sleeping' WHERE state = 'preempted'"),
+        thorough(
+            "thread_state", "UPDATE thread_state SET state = 'sleeping' WHERE state = 'preempted'"
+        ),
         thorough(
             "thread_state",
             "UPDATE thread_state SET waker_kind = 'thread' WHERE waker_kind = 'timer'",

@@ -29,7 +29,7 @@ EXPECTED = {
 }
 
 
-@pytest.mark.parametrize("name", few(EXPECTED, "polled", "services"))
+@pytest.mark.parametrize("name", few(EXPECTED, "services"))
 def test_findings(simulations: Callable[[str], Ingested], name: str) -> None:
     assert simulations(name).rows(FINDINGS.format(ABOUT_PROCESSES)) == EXPECTED[name]
 
