@@ -27,6 +27,7 @@ from rclpy.action import ActionClient, ActionServer, CancelResponse, GoalRespons
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.exceptions import InvalidHandle
 from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor, SingleThreadedExecutor
+from rclpy.lifecycle import LifecycleNodeMixin
 from rclpy.node import Node
 from rclpy.task import Future
 from std_msgs.msg import UInt64
@@ -47,8 +48,10 @@ class Witness(Node):
     def __init__(self, name: str, truth: Truth) -> None:
         super().__init__(name)
         self._truth = truth
+        self._name = self.get_fully_qualified_name()
         self._ids = itertools.count(os.getpid() << 32)
-        self._numbers = itertools.count(1)
+        # Also of one that comes again with its name.
+        self._numbers = itertools.count((os.getpid() << 32) + 1)
         self._running = threading.local()
         self._actions = []
         self.ending = threading.Event()
@@ -58,8 +61,10 @@ class Witness(Node):
         """Do some work at a period; return the timer."""
 
         def run() -> None:
-            with self._callback("timer", str(seconds), 0):
+            begin = time.monotonic_ns()
+            with self._callback(begin, "timer", str(seconds), 0) as row:
                 work()
+            row["t1"] = time.monotonic_ns()
 
         return self.create_timer(seconds, run, callback_group=group)
 
@@ -67,8 +72,10 @@ class Witness(Node):
         """Do some work with each message of a topic; return the subscription."""
 
         def run(message: UInt64) -> None:
-            with self._callback("sub", topic, message.data):
+            begin = time.monotonic_ns()
+            with self._callback(begin, "sub", topic, message.data) as row:
                 work()
+            row["t1"] = time.monotonic_ns()
 
         return self.create_subscription(UInt64, topic, run, 10, callback_group=group)
 
@@ -79,10 +86,12 @@ class Witness(Node):
         """
 
         async def run(message: UInt64) -> None:
-            with self._callback("sub", topic, message.data):
+            begin = time.monotonic_ns()
+            with self._callback(begin, "sub", topic, message.data) as row:
                 call = self._running.number
                 over = Future()
                 timer = self.create_timer(seconds, lambda: over.set_result(None))
+            row["t1"] = time.monotonic_ns()
             await over
             timer.cancel()
             self.destroy_timer(timer)
@@ -98,16 +107,56 @@ class Witness(Node):
         """Do some work for each request, and answer."""
 
         def run(request: ListParameters.Request, response: ListParameters.Response):
-            with self._callback("service", service, request.depth):
+            begin = time.monotonic_ns()
+            with self._callback(begin, "service", service, request.depth) as row:
                 work()
+            row["t1"] = time.monotonic_ns()
             response.result.names = [str(request.depth)]
             return response
 
         self.create_service(ListParameters, service, run)
 
+    def serve_by(self, service: str, other: str, work, group=None) -> None:
+        """Ask another service for each request, do some work when it has answered, and answer."""
+        client = self.create_client(ListParameters, other, callback_group=group)
+
+        async def run(request: ListParameters.Request, response: ListParameters.Response):
+            begin = time.monotonic_ns()
+            with self._callback(begin, "service", service, request.depth) as row:
+                call = self._running.number
+                asked = ListParameters.Request(depth=next(self._ids))
+                with self._sent("request", other, asked.depth):
+                    future = client.call_async(asked)
+            row["t1"] = time.monotonic_ns()
+            await future
+            work(call=call)
+            response.result.names = [str(request.depth)]
+            return response
+
+        self.create_service(ListParameters, service, run, callback_group=group)
+
+    def waiting_caller(self, service: str, group=None):
+        """Return a function that sends a request, and waits for its answer on its thread."""
+        client = self.create_client(ListParameters, service, callback_group=group)
+
+        def send() -> None:
+            if client.service_is_ready():
+                request = ListParameters.Request(depth=next(self._ids))
+                with self._sent("request", service, request.depth):
+                    future = client.call_async(request)
+                answered = threading.Event()
+                future.add_done_callback(lambda _: answered.set())
+                answered.wait(1.0)
+
+        return send
+
+    def publisher(self, topic: str):
+        """Return a new publisher."""
+        return self.create_publisher(UInt64, topic, 10)
+
     def sender(self, topic: str):
         """Return a function that publishes a message to a topic."""
-        publisher = self.create_publisher(UInt64, topic, 10)
+        publisher = self.publisher(topic)
 
         def send(**more: int) -> None:
             message = UInt64(data=next(self._ids))
@@ -122,7 +171,7 @@ class Witness(Node):
 
         def answered(future) -> None:
             (answer,) = future.result().result.names
-            with self._callback("client", service, int(answer)):
+            with self._callback(time.monotonic_ns(), "client", service, int(answer)):
                 work()
 
         def send() -> None:
@@ -142,7 +191,8 @@ class Witness(Node):
 
         def decide(goal: Fibonacci.Goal) -> GoalResponse:
             is_accepted = goal.order % 5 != 0
-            with self._callback("service", f"{action}/_action/send_goal", goal.order, is_accepted):
+            begin, name = time.monotonic_ns(), f"{action}/_action/send_goal"
+            with self._callback(begin, "service", name, goal.order, is_accepted):
                 accepted[goal.order] = self._running.number
                 return GoalResponse.ACCEPT if is_accepted else GoalResponse.REJECT
 
@@ -180,7 +230,9 @@ class Witness(Node):
                 future.add_done_callback(lambda future: answered(number, future.result()))
 
         def answered(number: int, goal) -> None:
-            with self._callback("client", f"{action}/_action/send_goal", number):
+            with self._callback(
+                time.monotonic_ns(), "client", f"{action}/_action/send_goal", number
+            ):
                 if goal.accepted:
                     with self._sent("request", f"{action}/_action/get_result", number):
                         future = goal.get_result_async()
@@ -189,38 +241,36 @@ class Witness(Node):
                         goal.cancel_goal_async()
 
         def finished(number: int) -> None:
-            with self._callback("client", f"{action}/_action/get_result", number):
+            with self._callback(
+                time.monotonic_ns(), "client", f"{action}/_action/get_result", number
+            ):
                 pass
 
         return send
 
     @contextlib.contextmanager
-    def _callback(self, kind: str, name: str, message: int, accepted: bool | None = None):
+    def _callback(self, begin: int, kind: str, name: str, message: int, accepted=None):
+        """Write down a callback, whose row it yields: a caller who is nearer knows its end."""
         number = self._running.number = next(self._numbers)
-        begin = time.monotonic_ns()
+        row = {"kind": kind, "name": name, "id": message, "n": number, "accepted": accepted}
         try:
-            yield
+            yield row
         finally:
             self._running.number = 0
-            self._write(
-                "callback", begin, kind=kind, name=name, id=message, n=number, accepted=accepted
-            )
+            self._write("callback", begin, row)
 
     @contextlib.contextmanager
     def _sent(self, kind: str, topic: str, message: int, **more: int):
         begin = time.monotonic_ns()
         yield
         number = getattr(self._running, "number", 0)
-        self._write(kind, begin, topic=topic, id=message, cb=number, **more)
+        self._write(kind, begin, {"topic": topic, "id": message, "cb": number, **more})
 
-    def _write(self, what: str, begin: int, **row: object) -> None:
-        place = {
-            "node": self.get_fully_qualified_name(),
-            "pid": os.getpid(),
-            "tid": threading.get_native_id(),
-        }
-        times = {"t0": begin, "t1": time.monotonic_ns()}
-        self._truth.write({"k": what, **row, **place, **times})
+    def _write(self, what: str, begin: int, row: dict[str, object]) -> None:
+        end = time.monotonic_ns()
+        place = {"node": self._name, "pid": os.getpid(), "tid": threading.get_native_id()}
+        row.update(k=what, t0=begin, t1=end, **place)
+        self._truth.write(row)
 
 
 class Truth:
@@ -230,12 +280,13 @@ class Truth:
         self._rows = []
 
     def write(self, row: dict[str, object]) -> None:
-        """Add a row."""
-        self._rows.append(json.dumps(row))
+        """Add a row: what takes time comes later, since a callback waits."""
+        self._rows.append(row)
 
     def save(self, path: Path) -> None:
-        """Write all rows, a line each."""
-        path.write_text("".join(f"{row}\n" for row in self._rows))
+        """Write all rows, a line each, after what an earlier life of the process wrote."""
+        with path.open("a") as file:
+            file.writelines(f"{json.dumps(row)}\n" for row in self._rows)
 
 
 def busy(seconds: float) -> None:
@@ -426,6 +477,57 @@ def ticking(truth: Truth) -> list[Node]:
     return [node]
 
 
+class Managed(LifecycleNodeMixin, Witness):
+    """A managed node."""
+
+    def __init__(self, name: str, truth: Truth) -> None:
+        Witness.__init__(self, name, truth)
+        LifecycleNodeMixin.__init__(self)
+
+    def publisher(self, topic: str):
+        """Return one that publishes while the node is active."""
+        return self.create_lifecycle_publisher(UInt64, topic, 10)
+
+
+def managed(truth: Truth) -> list[Node]:
+    """Answer each message while active: a timer activates the node, and deactivates it."""
+    node = Managed("managed", truth)
+    send = node.sender("/filtered")
+    is_active = [False]
+
+    def turn() -> None:
+        (node.trigger_deactivate if is_active[0] else node.trigger_activate)()
+        is_active[0] = not is_active[0]
+
+    node.trigger_configure()
+    node.on("/scan", lambda: send() if is_active[0] else None)
+    node.every(0.3, turn)
+    return [node]
+
+
+def between(truth: Truth) -> list[Node]:
+    """Answer requests with the answer of another service, and publish a message before that."""
+    node = Witness("between", truth)
+    node.serve_by("/answer", "/other", node.sender("/filtered"), ReentrantCallbackGroup())
+    return [node]
+
+
+def other(truth: Truth) -> list[Node]:
+    """Answer requests."""
+    node = Witness("other", truth)
+    node.serve("/other", lambda: busy(0.001))
+    return [node]
+
+
+def waiting(truth: Truth) -> list[Node]:
+    """Send a request for each message, wait for its answer, and publish a message."""
+    node = Witness("waiting", truth)
+    group = ReentrantCallbackGroup()
+    ask, send = node.waiting_caller("/other", group), node.sender("/tick")
+    node.on("/scan", lambda: (ask(), send()), group)
+    return [node]
+
+
 SYSTEMS = {
     "pipeline": {"sink": (sink, SingleThreadedExecutor), "filter": (relay, SingleThreadedExecutor),
                  "source": (source, SingleThreadedExecutor)},
@@ -463,6 +565,22 @@ SYSTEMS = {
     "raising": {"sink": (sink, SingleThreadedExecutor),
                 "raising": (raising, SingleThreadedExecutor),
                 "source": (source, SingleThreadedExecutor)},
+    "managed": {"sink": (sink, SingleThreadedExecutor),
+                "managed": (managed, SingleThreadedExecutor),
+                "source": (source, SingleThreadedExecutor)},
+    "calling": {"sink": (sink, SingleThreadedExecutor), "other": (other, SingleThreadedExecutor),
+                "between": (between, SingleThreadedExecutor),
+                "waiting": (waiting, MultiThreadedExecutor),
+                "client": (client, SingleThreadedExecutor),
+                "source": (source, SingleThreadedExecutor)},
+    "restarts": {"sink": (sink, SingleThreadedExecutor), "filter": (relay, SingleThreadedExecutor),
+                 "source": (source, SingleThreadedExecutor)},
+    "late": {"sink": (sink, SingleThreadedExecutor),
+             "several": (several, MultiThreadedExecutor),
+             "source": (source, SingleThreadedExecutor)},
+    "mixed": {"sink": (sink, SingleThreadedExecutor),
+              "filter": (relay_with_timer, SingleThreadedExecutor),
+              "source": (source, SingleThreadedExecutor)},
     "awaiting": {"sink": (sink, SingleThreadedExecutor),
                  "awaiting": (awaiting, SingleThreadedExecutor),
                  "ticking": (ticking, SingleThreadedExecutor)},

@@ -26,6 +26,12 @@ _NODES = Path(__file__).with_name("nodes.py")
 # Those who hear go last. Seconds.
 _APART = 0.2
 _LONGEST = 60
+# Systems whose process ends half-way and begins anew, that run before their session begins, and
+# with processes whose callbacks are not traced in any case.
+_RESTARTED = {"restarts": "filter"}
+_LATE = {"late"}
+_UNTRACED = {"mixed": {"filter"}}
+_UNTIL_LATE = 2.0
 
 
 class NotPossibleError(Exception):
@@ -84,32 +90,40 @@ def record(
     require(python)
     library = build_tracetools(_made(directory / "library"))
     environment = ros_environment(python) | {"LD_PRELOAD": str(library)}
-    if python_nodes:
-        environment["PYTHONPATH"] = str(PYTHON_NODES)
     parts = _made(directory / "truth")
     recorded = directory / "trace"
-    with session(recorded):
-        running = []
+
+    def start(process: str) -> subprocess.Popen[bytes]:
+        traced = python_nodes and process not in _UNTRACED.get(system, ())
+        return subprocess.Popen(
+            [str(word) for word in (python, _NODES, system, process, parts / process)],
+            env=environment | ({"PYTHONPATH": str(PYTHON_NODES)} if traced else {}),
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+        )
+
+    with contextlib.ExitStack() as stack:
+        if system not in _LATE:
+            stack.enter_context(session(recorded))
+        running: dict[str, subprocess.Popen[bytes]] = {}
         try:
             for process in systems(python)[system]:
-                command = [str(word) for word in (python, _NODES, system, process, parts / process)]
-                running.append(
-                    subprocess.Popen(
-                        command, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE
-                    )
-                )
-            for one in running:
-                assert one.stdout is not None
-                one.stdout.readline()
-            time.sleep(seconds)
-            for one in reversed(running):
-                assert one.stdin is not None
-                one.stdin.close()
-                time.sleep(_APART)
-                if one.wait(_LONGEST):
-                    raise subprocess.CalledProcessError(one.returncode, one.args)
+                running[process] = start(process)
+            for one in running.values():
+                _wait_until_ready(one)
+            if system in _LATE:
+                time.sleep(_UNTIL_LATE)
+                stack.enter_context(session(recorded))
+            time.sleep(seconds / 2)
+            if (restarted := _RESTARTED.get(system)) is not None:
+                _end(running[restarted])
+                running[restarted] = start(restarted)
+                _wait_until_ready(running[restarted])
+            time.sleep(seconds / 2)
+            for one in reversed(running.values()):
+                _end(one)
         finally:
-            for one in running:
+            for one in running.values():
                 one.kill()
     with trace.open([recorded]) as traces:
         (offset,) = {one.clock_offset_ns for one in traces.traces}
@@ -154,6 +168,19 @@ def ros_environment(python: Path) -> dict[str, str]:
         # Processes wait for the first answer of the session daemon: no event is missed.
         "LTTNG_UST_REGISTER_TIMEOUT": "-1",
     }
+
+
+def _wait_until_ready(process: subprocess.Popen[bytes]) -> None:
+    assert process.stdout is not None
+    process.stdout.readline()
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    assert process.stdin is not None
+    process.stdin.close()
+    time.sleep(_APART)
+    if process.wait(_LONGEST):
+        raise subprocess.CalledProcessError(process.returncode, process.args)
 
 
 def _made(directory: Path) -> Path:

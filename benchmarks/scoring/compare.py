@@ -137,7 +137,9 @@ def compare_real(database: Path, truth: Path) -> list[Score]:
             f"CREATE TEMP VIEW real AS FROM read_json('{truth}', "
             f"format = 'newline_delimited', columns = {_REAL_COLUMNS})"
         )
-        return [*_score(connection, "real"), _lost(connection)]
+        scores = [*_score(connection, "real"), _lost(connection)]
+        connection.execute((_SQL / "traced.sql").read_text())
+        return scores + [Score(*row) for row in connection.execute("FROM traced_score").fetchall()]
 
 
 def _open(database: Path) -> duckdb.DuckDBPyConnection:

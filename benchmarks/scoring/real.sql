@@ -124,6 +124,11 @@ link AS (
     JOIN truth_sent AS s ON s.k = 'publication' AND c.name || ' ' || c.id = s.sent
     WHERE c.kind = 'sub'
     UNION ALL
+    SELECT 'called_with', 'take', c.callback, 'callback_instance', c.callback
+    FROM truth_callback AS c
+    JOIN traced AS t ON c.pid = t.pid
+    WHERE c.kind = 'sub'
+    UNION ALL
     SELECT s.k, s.k || '_sent', s.sent, s.k || '_taken', c.callback
     FROM truth_callback AS c
     JOIN truth_sent AS s
@@ -234,7 +239,7 @@ obscured AS (
 SELECT
     l.*,
     r.is_whole AND (
-        l.kind IN ('transport', 'direct', 'take_adjacent')
+        l.kind IN ('transport', 'called_with', 'direct', 'take_adjacent')
         OR EXISTS (FROM analysed.store.request)
     ) AND (
         l.kind <> 'goal_message' OR l.to_id IN (FROM first_and_last)
