@@ -192,9 +192,10 @@ class Witness(Node):
         def decide(goal: Fibonacci.Goal) -> GoalResponse:
             is_accepted = goal.order % 5 != 0
             begin, name = time.monotonic_ns(), f"{action}/_action/send_goal"
-            with self._callback(begin, "service", name, goal.order, is_accepted):
+            with self._callback(begin, "service", name, goal.order, is_accepted) as row:
                 accepted[goal.order] = self._running.number
-                return GoalResponse.ACCEPT if is_accepted else GoalResponse.REJECT
+            row["t1"] = time.monotonic_ns()
+            return GoalResponse.ACCEPT if is_accepted else GoalResponse.REJECT
 
         def execute(goal) -> Fibonacci.Result:
             number = goal.request.order

@@ -46,6 +46,7 @@ def command(
             share of the answers each defect affects.
     """
     from msgflow.cli.output import print_next
+    from msgflow.cli.tracing_cost import part_of_latencies, share_of_cpu
     from msgflow.database import Database
     from msgflow.db.finding import commands_after
     from msgflow.run.choice import choose_runs
@@ -58,9 +59,14 @@ def command(
         every = opened.runs()
         chosen = choose_runs(every, run)
         runs = every if detail else chosen
-        verdicts = opened.clock_verdicts(run=run, only_several=True)
+        notes = [
+            *opened.clock_verdicts(run=run, only_several=True),
+            *share_of_cpu(opened, [one.run_id for one in chosen]),
+        ]
+        if detail:
+            notes += part_of_latencies(opened, opened.query("e2e-latency", run=run))
     labels = {one.run_id: one.title for one in runs} if len(runs) > 1 else {}
-    _report(findings, form, output, run_labels=labels, notes=verdicts, table=quality)
+    _report(findings, form, output, run_labels=labels, notes=notes, table=quality)
     if not runs:
         print_next(["msgflow", "ingest", "TRACE"], database)
     else:

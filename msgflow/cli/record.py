@@ -182,6 +182,7 @@ def _answer(
     """
     from msgflow.cli import check, ingest
     from msgflow.cli.output import print_result, print_status
+    from msgflow.cli.tracing_cost import part_of_latencies
     from msgflow.database import Database
 
     # What is wrong is printed by check.
@@ -202,5 +203,8 @@ def _answer(
     except typer.Exit:  # of errors in the recording, which it has printed
         is_sound = False
     with Database(database) as opened:
-        print_result(opened.query("e2e-latency"), None, None)
+        latencies = opened.query("e2e-latency")
+        print_result(latencies, None, None)
+        for sentence in part_of_latencies(opened, latencies):
+            print_status(sentence)
     return is_sound

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from msgflow.record.event_cost import USUAL_NS, event_cost_ns
 from msgflow.record.lttng import sessions
 from msgflow.record.python_path import PYTHON_NODES
 from msgflow.record.recording import BYTES_OF_EVENT, Recorded, Status, record
@@ -10,9 +11,11 @@ from msgflow.record.session import Channel, rotated, temporary_directory
 __all__ = [
     "BYTES_OF_EVENT",
     "PYTHON_NODES",
+    "USUAL_NS",
     "Channel",
     "Recorded",
     "Status",
+    "event_cost_ns",
     "record",
     "rotated",
     "sessions",

@@ -12,6 +12,7 @@ from typing import IO, TYPE_CHECKING
 
 from msgflow.errors import RecordingError
 from msgflow.record.daemon import session_daemon
+from msgflow.record.event_cost import measure_event_cost
 from msgflow.record.lttng import losses, providers, sessions
 from msgflow.record.program import Program, require_program
 from msgflow.record.python_path import with_python_nodes
@@ -128,6 +129,7 @@ def record(
         else:
             require_snapshot(snapshot)
         directory.mkdir(parents=True, exist_ok=True)
+        measure_event_cost(directory, channel)
         if snapshot is not None:
             record_snapshot(snapshot, directory / "snapshot")
         by_lttng = kernel and can_trace_kernel()

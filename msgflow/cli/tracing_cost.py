@@ -1,0 +1,65 @@
+"""What a recording cost the robot, in words: events times what one costs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from msgflow.text.values import format_duration
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from msgflow.database import Database
+    from msgflow.result.query_result import QueryResult
+
+_ARROW = " → "
+# What a message makes from one callback to the next: ten in the layers of ROS, two of the executor.
+_EVENTS_OF_HOP = 12
+_MOST_PATHS = 3
+_TRACED = """
+SELECT
+    list(path) AS paths, sum(event_count)::BIGINT AS events, max(end_ns) - min(start_ns) AS took_ns
+FROM main.trace
+WHERE run_id = ? AND domain = 'ust'
+"""
+
+
+def share_of_cpu(database: Database, runs: Iterable[int]) -> Iterator[str]:
+    """Yield a sentence for each run: what share of a CPU its events took."""
+    from msgflow.record import USUAL_NS
+
+    for run in runs:
+        events, took_ns, measured = _traced(database, run)
+        if events and took_ns:
+            each = USUAL_NS if measured is None else measured
+            where = "elsewhere" if measured is None else "on this machine, before the recording"
+            yield (
+                f"tracing took about {100 * events * each / took_ns:.2g} % of a CPU: {events:,}"
+                f" events, {each:.0f} ns each (measured {where})"
+            )
+
+
+def part_of_latencies(database: Database, latencies: QueryResult) -> Iterator[str]:
+    """Yield a sentence about the paths with the longest latencies, of rows of e2e-latency."""
+    from msgflow.record import USUAL_NS
+
+    columns = ["run_id", "path", "median_ns"]
+    rows = [row for row in latencies.to_arrow().select(columns).to_pylist() if row["median_ns"]]
+    parts = []
+    for row in sorted(rows, key=lambda row: -row["median_ns"])[:_MOST_PATHS]:
+        *_, measured = _traced(database, row["run_id"])
+        hops = row["path"].count(_ARROW) // 2
+        tracing = format_duration(
+            hops * _EVENTS_OF_HOP * (USUAL_NS if measured is None else measured)
+        )
+        topic = row["path"].split(_ARROW)[-2]
+        parts.append(f"{tracing} of {topic}'s {format_duration(row['median_ns'])}")
+    if parts:
+        yield f"of the latencies, tracing is about {', '.join(parts)}"
+
+
+def _traced(database: Database, run: int) -> tuple[int | None, int | None, float | None]:
+    from msgflow.record import event_cost_ns
+
+    ((paths, events, took_ns),) = database.connection.execute(_TRACED, [run]).fetchall()
+    return events, took_ns, event_cost_ns(paths or [])
