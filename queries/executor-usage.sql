@@ -6,8 +6,10 @@
 --     gets the lock of the executor and may look for work again. Meanwhile another thread may hold
 --     the lock and wait for work: then the executor has nothing to do. These times add up to the
 --     time for which the thread was seen. Only takes and callbacks are known of an executor without
---     events of its own (events executor, static executor, rclpy), or whose events the recording
---     leaves out (finding executor_events_left_out).
+--     events of its own (static executor, rclpy), or whose events the recording leaves out (finding
+--     executor_events_left_out). A thread of an events executor waits while it sleeps, where the
+--     kernel was traced; else at least until the next message was published, or the next timer due,
+--     and perhaps in the time that is not known.
 -- grain: one row per executor thread
 -- column: run_id BIGINT             Run
 -- column: host VARCHAR [host]  Host
@@ -18,7 +20,8 @@
 -- column: tid INTEGER               Thread id
 -- column: executor_kind VARCHAR     Kind of executor
 -- column: seen_ns BIGINT [ns]       Time for which the thread was seen in the time window
--- column: wait_ns BIGINT [ns]       Waiting for work
+-- column: wait_ns BIGINT [ns]       Waiting for work; in an events executor without a kernel trace:
+--     for certain
 -- column: select_ns BIGINT [ns]     Looking for what is ready; where a loop polls the executor
 --     (spin_some; finding polled_executor), also what the loop does between two polls
 -- column: take_ns BIGINT [ns]       Taking messages, up to the callback
@@ -119,8 +122,9 @@ SELECT
     m.tid,
     m.kind AS executor_kind,
     greatest(m.last_ns - m.first_ns, 0) AS seen_ns,
-    CASE WHEN m.has_states THEN coalesce(s.wait_ns, 0) END AS wait_ns,
-    CASE WHEN m.has_states THEN coalesce(s.select_ns, 0) END AS select_ns,
+    CASE WHEN m.has_states OR m.kind = 'events' THEN coalesce(s.wait_ns, 0) END AS wait_ns,
+    CASE WHEN m.has_states THEN coalesce(s.select_ns, 0) ELSE nullif(s.select_ns, 0) END
+        AS select_ns,
     coalesce(s.take_ns, 0) AS take_ns,
     coalesce(s.callback_ns, 0) AS callback_ns,
     CASE WHEN m.has_states THEN coalesce(s.blocked_ns, 0) END AS blocked_ns,

@@ -106,6 +106,7 @@ CREATE TABLE staging.executor (executor_id BIGINT, process_id BIGINT, kind VARCH
 CREATE TABLE staging.executor_alternating (thread_id BIGINT, first_event_id BIGINT);
 CREATE TABLE staging.executor_callback (executor_event_id BIGINT, callback_instance_id BIGINT);
 CREATE TABLE staging.executor_first (thread_id BIGINT, event_id BIGINT);
+CREATE TABLE staging.executor_in_order (thread_id BIGINT);
 CREATE TABLE staging.executor_member (thread_id BIGINT, process_id BIGINT, first_thread_id BIGINT,
     is_spinning BOOLEAN, executor_event_id BIGINT);
 CREATE TABLE staging.executor_named (event_id BIGINT, process_id BIGINT, executor_addr UBIGINT,
@@ -134,6 +135,7 @@ CREATE TABLE staging.link_packet (sent_trace_id INTEGER, received_trace_id INTEG
 CREATE TABLE staging.link_request (request_id BIGINT, callback_instance_id BIGINT);
 CREATE TABLE staging.link_response (response_id BIGINT, callback_instance_id BIGINT);
 CREATE TABLE staging.loss_affected (kind VARCHAR, start_event_id BIGINT);
+CREATE TABLE staging.middleware_waking (process_id BIGINT, waker_thread_id BIGINT, at_ns BIGINT);
 CREATE TABLE staging.middleware_write (start_event_id BIGINT, end_event_id BIGINT, start_ns BIGINT,
     end_ns BIGINT, trace_index INTEGER, thread_index INTEGER, previous_event_id BIGINT,
     callback_event_id BIGINT, writer UBIGINT, message UBIGINT, dds_ns BIGINT, stamp BIGINT);
@@ -189,6 +191,9 @@ CREATE TABLE staging.publisher_known (event_id BIGINT, process_id BIGINT, topic_
 CREATE TABLE staging.python_mark (event_id BIGINT, ts_ns BIGINT, thread_id BIGINT,
     process_id BIGINT, number UBIGINT, kind VARCHAR, text VARCHAR,
     previous_callback_event_id BIGINT, previous_executor_event_id BIGINT);
+CREATE TABLE staging.queued_message (start_event_id BIGINT, take_id BIGINT, subscription_id BIGINT,
+    thread_id BIGINT, process_id BIGINT, taken_ns BIGINT, publishing_thread_id BIGINT,
+    published_ns BIGINT, end_ns BIGINT, next_ns BIGINT);
 CREATE TABLE staging.request (request_id BIGINT, client_id BIGINT, service_id BIGINT,
     sequence_number BIGINT, sent_ns BIGINT, taken_ns BIGINT, sender_thread_id BIGINT,
     receiver_thread_id BIGINT, callback_instance_id BIGINT);

@@ -101,8 +101,10 @@ CREATE TABLE store.ring_buffer_event (
     event_id BIGINT  -- The event [event order] {hidden}
 );
 
--- One row per take of a message whose arrival the middleware told (CARET, Fast DDS)
--- view: When messages were there before they were taken, as CARET's hook in Fast DDS says.
+-- One row per take of a message whose arrival is known but by the waking of its thread
+-- view: When messages were there before they were taken, as CARET's hook in Fast DDS says. In
+-- events executors also: those that their own thread published, and those for which, as a kernel
+-- trace shows, the publishing thread woke one of the middleware.
 CREATE TABLE store.data_arrival (
     run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
     take_id BIGINT NOT NULL,  -- Take of the message {to take}
@@ -268,7 +270,8 @@ CREATE TABLE store.executor (
     executor_id BIGINT PRIMARY KEY,  -- Identity of the executor
     run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
     process_id BIGINT NOT NULL,  -- Process it lives in {to process}
-    kind VARCHAR NOT NULL,  -- 'single_threaded', 'multi_threaded', 'unknown', or as CARET names it
+    kind VARCHAR NOT NULL,  -- 'single_threaded', 'multi_threaded', 'events' (without events of its
+        -- own, but seen to serve what came first first), 'unknown', or as CARET names it
     is_inferred BOOLEAN DEFAULT false NOT NULL  -- Deduced from the threads that run the same
         -- callbacks
 );

@@ -7,7 +7,9 @@
 --     something else: any other thread of its own process may hand over work, and the message wait
 --     for that in the queue of its node. Where it is not exact, or there is no kernel trace, the
 --     hook of CARET in the listener of Fast DDS tells when the reader had the message. It is exact
---     unless several readers of the process had it.
+--     unless several readers of the process had it. The queue of an events executor has what its
+--     own thread published when publish() returns; other messages came to its process when the
+--     publishing thread woke the middleware's (some 10 to 100 us before they were in the queue).
 -- grain: one row per take whose publication is known, and before which its thread was woken or the
 --     message seen to arrive
 -- column: run_id BIGINT  Run that the row belongs to
@@ -15,7 +17,7 @@
 -- column: publication_id BIGINT  The publication
 -- column: arrived_ns BIGINT [epoch ns]  When the thread was woken, or the listener had the message
 -- column: waker_kind VARCHAR  'thread', 'timer', 'interrupt' or 'softirq'; 'listener': it tells of
---     the message, not of the thread
+--     the message, not of the thread, which may have been busy (main.data_arrival)
 -- column: waker_thread_id BIGINT  Thread of a ROS process that woke it, or that was interrupted
 -- column: waker_name VARCHAR  Name of the thread that woke it, or that was interrupted
 -- column: is_exact BOOLEAN  Nothing else explains the waking

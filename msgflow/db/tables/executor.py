@@ -25,7 +25,8 @@ Table(
     process_id(),
     text(
         "kind",
-        "'single_threaded', 'multi_threaded', 'unknown', or as CARET names it",
+        "'single_threaded', 'multi_threaded', 'events' (without events of its own, but seen to "
+        "serve what came first first), 'unknown', or as CARET names it",
         required=True,
     ),
     flag("is_inferred", "Deduced from the threads that run the same callbacks"),

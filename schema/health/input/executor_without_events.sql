@@ -4,8 +4,11 @@
 --     these events were enabled. What the threads did between callbacks is not known: they have no
 --     executor states, and how long a message waited for them is bounded by callbacks only. Direct
 --     links are not affected. Callbacks of Agnocast do not count: its executors have no events.
--- cause: The process uses an EventsExecutor, a StaticSingleThreadedExecutor, or a loop of its own
---     that calls callbacks (wait sets). rclcpp has no tracepoints in these.
+--     Nor do those of a thread that was seen to serve what came first first, as an events executor
+--     does: when it waited is known, at least in part.
+-- cause: The process uses a StaticSingleThreadedExecutor, a loop of its own that calls callbacks
+--     (wait sets), or an EventsExecutor of which the recording shows too little, or which has
+--     several threads. rclcpp has no tracepoints in these.
 -- cure: None needed. For executor states, use a SingleThreadedExecutor or MultiThreadedExecutor.
 -- grain: one row per process with such threads
 -- severity: warning
@@ -21,6 +24,7 @@ silent AS (
     SEMI JOIN enabled AS e ON p.trace_index = e.trace_index
     ANTI JOIN staging.executor_first AS x ON p.thread_id = x.thread_id
     ANTI JOIN staging.thread_break AS b ON p.thread_id = b.thread_id
+    ANTI JOIN staging.executor_in_order AS o ON p.thread_id = o.thread_id
     ANTI JOIN staging.agnocast_run AS a ON p.start_event_id = a.start_event_id
     -- Of these the recording left the events out.
     ANTI JOIN (SELECT process_id FROM staging.executor_named WHERE kind IN (

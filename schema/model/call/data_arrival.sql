@@ -1,16 +1,43 @@
 -- name: staging.data_arrival
--- description: When messages arrived before they were taken, as the listener of the middleware says
+-- description: When messages arrived before they were taken. The listener of the middleware says so
 --     (CARET, with Fast DDS): the first time that its process had one of that stamp. With several
---     readers in the process it is not known which of them had it then.
--- grain: one row per take that such an event came before
--- when: raw.ros2_caret_on_data_available
-SELECT
-    n.take_id,
-    t.taken_ns - min(a.ts_ns) AS waited_ns,
-    count(*) > 1 AS is_ambiguous
-FROM staging.located('ros2_caret_on_data_available') AS a
-JOIN staging.take_chain AS t
-    ON a.process_id = t.process_id AND a.source_stamp = t.source_timestamp_ns
-JOIN staging.take_number AS n ON t.start_event_id = n.start_event_id
-WHERE a.event_id < t.start_event_id
-GROUP BY n.take_id, t.taken_ns
+--     readers in the process it is not known which of them had it then. In an events executor, the
+--     queue has what its own thread publishes when publish() returns; of other messages, a kernel
+--     trace shows how the publishing thread woke the middleware's (staging.middleware_waking).
+-- grain: one row per take of which this is known
+-- when: raw.ros2_caret_on_data_available, staging.executor WHERE kind = 'events'
+WITH heard AS (
+    SELECT
+        n.take_id, t.taken_ns - min(a.ts_ns) AS waited_ns, count(*) > 1 AS is_ambiguous
+    FROM staging.located('ros2_caret_on_data_available') AS a
+    JOIN staging.take_chain AS t
+        ON a.process_id = t.process_id AND a.source_stamp = t.source_timestamp_ns
+    JOIN staging.take_number AS n ON t.start_event_id = n.start_event_id
+    WHERE a.event_id < t.start_event_id
+    GROUP BY n.take_id, t.taken_ns
+),
+queued AS (
+    SELECT m.*
+    FROM staging.queued_message AS m
+    JOIN staging.executor_thread AS x ON m.thread_id = x.thread_id
+    JOIN staging.executor AS e ON x.executor_id = e.executor_id
+    ANTI JOIN heard AS h ON m.take_id = h.take_id
+    WHERE e.kind = 'events'
+)
+SELECT take_id, waited_ns, is_ambiguous
+FROM heard
+UNION ALL
+SELECT take_id, taken_ns - end_ns, false
+FROM queued
+WHERE publishing_thread_id = thread_id
+UNION ALL
+-- The last one: before, it may wait for what the publishing thread still holds.
+SELECT m.take_id, m.taken_ns - max(w.at_ns), false
+FROM queued AS m
+JOIN staging.middleware_waking AS w
+    ON m.process_id = w.process_id
+    AND m.publishing_thread_id = w.waker_thread_id
+    AND w.at_ns >= m.published_ns
+    AND w.at_ns < coalesce(least(m.next_ns, m.taken_ns), m.taken_ns)
+WHERE m.publishing_thread_id <> m.thread_id
+GROUP BY m.take_id, m.taken_ns

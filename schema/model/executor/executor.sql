@@ -1,20 +1,23 @@
 -- name: staging.executor
 -- description: Executors. Stock traces do not name them: there they are deduced from their threads.
---     One thread with executor events is a single-threaded executor, one without may be any.
+--     One thread with executor events is a single-threaded executor. One without is an events
+--     executor if it was seen to serve what came first first, else it may be any.
 -- grain: one row per executor
 -- when: staging.executor_member, staging.executor_named
 WITH deduced AS (
     SELECT
-        first_thread_id,
-        any_value(process_id) AS process_id,
-        min(executor_event_id) AS executor_event_id,
+        m.first_thread_id,
+        any_value(m.process_id) AS process_id,
+        min(m.executor_event_id) AS executor_event_id,
         CASE
             WHEN count(*) > 1 THEN 'multi_threaded'
-            WHEN bool_or(is_spinning) THEN 'single_threaded'
+            WHEN bool_or(m.is_spinning) THEN 'single_threaded'
+            WHEN bool_or(o.thread_id IS NOT NULL) THEN 'events'
             ELSE 'unknown'
         END AS kind
-    FROM staging.executor_member
-    GROUP BY first_thread_id
+    FROM staging.executor_member AS m
+    LEFT JOIN staging.executor_in_order AS o ON m.thread_id = o.thread_id
+    GROUP BY m.first_thread_id
 ),
 every_executor AS (
     SELECT

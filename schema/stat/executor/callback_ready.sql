@@ -5,7 +5,8 @@
 --     not before it last went to sleep, nor before the last polling point but one, which would
 --     have found it (unless that callback ran in between: then more of its input may have
 --     waited). At the latest when the executor last learned what is ready, before it picked this
---     callback. With that wait of the executor, the end of the wait before it, the time spent
+--     callback. In an events executor, which serves what came first first, also not after what its
+--     own thread published and it ran then or later. With that wait of the executor, the end of the wait before it, the time spent
 --     waiting before, and the moment at which its thread began to look for work and picked it
 --     (the start, with one thread or where that does not show).
 -- grain: one row per callback instance that is not nested in another
@@ -13,14 +14,19 @@
 --     instances that began after the last of these moments are left out (where all are NULL: none)
 CREATE OR REPLACE MACRO derive.callback_ready(executors) AS TABLE
 WITH sized AS (
-    SELECT e.executor_id, e.until_ns, s.thread_count
+    SELECT e.executor_id, e.until_ns, s.thread_count, x.kind = 'events' AS is_in_order
     FROM query_table(executors) AS e
     JOIN derive.executor_size AS s ON e.executor_id = s.executor_id
+    JOIN store.executor AS x ON e.executor_id = x.executor_id
 ),
 release AS (
     SELECT
         r.run_id, r.executor_id, r.thread_id, r.callback_id, r.callback_instance_id, r.start_ns,
-        r.previous_start_ns, r.since, r.origin_ns, r.subscribed_ns, r.latest_ns, s.thread_count
+        r.previous_start_ns, r.since, r.origin_ns, r.subscribed_ns, s.thread_count,
+        least(r.latest_ns, min(CASE WHEN s.is_in_order AND r.is_own THEN r.origin_ns END) OVER (
+            PARTITION BY r.thread_id ORDER BY r.start_ns, r.callback_instance_id
+            ROWS BETWEEN CURRENT ROW AND UNBOUNDED FOLLOWING
+        )) AS latest_ns
     FROM derive.callback_release('sized') AS r
     JOIN sized AS s ON r.executor_id = s.executor_id
 ),

@@ -191,3 +191,6 @@ classified AS (
 SELECT run_id, executor_id, thread_id, activity, start_ns, end_ns, callback_instance_id
 FROM classified
 WHERE activity IS NOT NULL AND (end_ns > start_ns OR end_ns IS NULL)
+UNION ALL
+SELECT run_id, executor_id, thread_id, activity, start_ns, end_ns, NULL
+FROM derive.queue_activity(runs)
