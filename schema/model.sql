@@ -211,6 +211,8 @@ CREATE TABLE staging.response_request (event_id BIGINT, request_event_id BIGINT)
 CREATE TABLE staging.ring_buffer_event (trace_id INTEGER, process_id BIGINT, kind VARCHAR,
     buffer_handle UBIGINT, slot BIGINT, at_ns BIGINT, publication_id BIGINT, take_id BIGINT,
     is_overwriting BOOLEAN, event_id BIGINT);
+CREATE TABLE staging.sample_text (pid INTEGER, tid INTEGER, cpu INTEGER, clock_key VARCHAR,
+    at_ns BIGINT, cpu_ns BIGINT, stack VARCHAR);
 CREATE TABLE staging.schedule (candidate_number BIGINT, trace_index INTEGER, clock_key VARCHAR,
     shift_ns BIGINT, event_count BIGINT, agreeing_count BIGINT, unknown_count BIGINT,
     is_joined BOOLEAN, has_cpus BOOLEAN);
@@ -235,6 +237,15 @@ CREATE TABLE staging.service_known (event_id BIGINT, process_id BIGINT, service_
 CREATE TABLE staging.service_use (client_event_id BIGINT, service_event_id BIGINT);
 CREATE TABLE staging.single_packet (event_id BIGINT, trace_id INTEGER, clock_id BIGINT,
     ts_ns BIGINT, is_sent BOOLEAN, key UBIGINT);
+CREATE TABLE staging.stack (stack_id BIGINT, stack_frame_id BIGINT, depth INTEGER,
+    calls STRUCT("function" VARCHAR, file VARCHAR)[]);
+CREATE TABLE staging.stack_call (stack_id BIGINT, position INTEGER, stack_frame_id BIGINT);
+CREATE TABLE staging.stack_frame (stack_frame_id BIGINT, function VARCHAR, file VARCHAR,
+    call STRUCT("function" VARCHAR, file VARCHAR));
+CREATE TABLE staging.stack_sample (process_id BIGINT, thread_id BIGINT, tid INTEGER, at_ns BIGINT,
+    cpu INTEGER, callback_instance_id BIGINT, stack_id BIGINT, cpu_ns BIGINT);
+CREATE TABLE staging.stack_text (stack VARCHAR, calls STRUCT("function" VARCHAR, file VARCHAR)[],
+    is_cut BOOLEAN);
 CREATE TABLE staging.subscription (subscription_id BIGINT, process_id BIGINT, node_id BIGINT,
     topic_name VARCHAR, subscription_handle UBIGINT, rmw_handle UBIGINT, gid BLOB,
     queue_depth BIGINT, created_ns BIGINT, is_internal BOOLEAN, is_inferred BOOLEAN,

@@ -556,6 +556,48 @@ CREATE TABLE store.orphan_take (
     reason VARCHAR NOT NULL  -- Why; a closed vocabulary
 );
 
+-- One row per function and file
+-- view: Functions that samples of stacks saw.
+CREATE TABLE store.stack_frame (
+    stack_frame_id BIGINT PRIMARY KEY,  -- Identity of the function
+    run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
+    function VARCHAR NOT NULL,  -- Its name; '[unknown]': the file has no symbol for it
+    file VARCHAR NOT NULL  -- Library or program that has it, of Python the source file
+);
+
+-- One row per different stack
+-- view: Stacks of calls that samples saw, each once, with the function that ran.
+CREATE TABLE store.stack (
+    stack_id BIGINT PRIMARY KEY,  -- Identity of the stack
+    run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
+    stack_frame_id BIGINT NOT NULL,  -- The function that ran: the innermost one {to stack_frame}
+    depth INTEGER NOT NULL  -- How many calls it has
+);
+
+-- One row per stack and call in it
+-- view: The calls of each stack.
+CREATE TABLE store.stack_call (
+    run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
+    stack_id BIGINT NOT NULL,  -- The stack {to stack}
+    position INTEGER NOT NULL,  -- Place of the call, 1: the outermost
+    stack_frame_id BIGINT NOT NULL  -- The function that was called {to stack_frame}
+);
+
+-- One row per sample of a process with ROS events
+-- view: Samples of what threads of ROS processes ran, by perf.
+CREATE TABLE store.stack_sample (
+    run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
+    process_id BIGINT NOT NULL,  -- Process it lives in {to process}
+    thread_id BIGINT,  -- Thread that ran; NULL: one that recorded no event {to thread}
+    tid INTEGER NOT NULL,  -- Thread that ran, as perf numbers it
+    at_ns BIGINT NOT NULL,  -- When [epoch ns] {clock process_id}
+    cpu INTEGER,  -- CPU it ran on
+    callback_instance_id BIGINT,  -- Innermost callback instance that ran on its thread; NULL:
+        -- outside of callbacks {to callback_instance}
+    stack_id BIGINT NOT NULL,  -- The stack {to stack}
+    cpu_ns BIGINT  -- CPU time that it stands for; NULL: perf counted cycles [ns]
+);
+
 -- One row per part of the schema that is re-applied rather than migrated
 CREATE TABLE store.definition (
     name VARCHAR PRIMARY KEY,  -- 'views': the SQL of all views and macros

@@ -300,6 +300,23 @@ CREATE TABLE store.user_event (
     name VARCHAR NOT NULL, callback_instance_id BIGINT, fields VARCHAR NOT NULL,
     is_loss_affected BOOLEAN DEFAULT false NOT NULL
 );
+CREATE TABLE store.stack_frame (
+    stack_frame_id BIGINT NOT NULL, run_id BIGINT NOT NULL, function VARCHAR NOT NULL,
+    file VARCHAR NOT NULL, PRIMARY KEY (stack_frame_id)
+);
+CREATE TABLE store.stack (
+    stack_id BIGINT NOT NULL, run_id BIGINT NOT NULL, stack_frame_id BIGINT NOT NULL,
+    depth INTEGER NOT NULL, PRIMARY KEY (stack_id)
+);
+CREATE TABLE store.stack_call (
+    run_id BIGINT NOT NULL, stack_id BIGINT NOT NULL, position INTEGER NOT NULL,
+    stack_frame_id BIGINT NOT NULL
+);
+CREATE TABLE store.stack_sample (
+    run_id BIGINT NOT NULL, process_id BIGINT NOT NULL, thread_id BIGINT, tid INTEGER NOT NULL,
+    at_ns BIGINT NOT NULL, cpu INTEGER, callback_instance_id BIGINT, stack_id BIGINT NOT NULL,
+    cpu_ns BIGINT
+);
 """
 
 

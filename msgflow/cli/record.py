@@ -32,6 +32,7 @@ def command(
     name: str | None = None,
     duration: Annotated[float | None, typer.Option(min=0.1)] = None,
     kernel: bool = False,
+    profile: str | None = None,
     dual: str | None = None,
     events: list[str] | None = None,
     without: Annotated[list[str] | None, typer.Option()] = None,
@@ -51,12 +52,13 @@ def command(
 
     Args:
         program ([-- COMMAND...]): What to start and record, such as `-- ros2 launch …`; it ends
-            with the recording. Without it, Ctrl-C ends the recording.
+            with the recording.
         output (DIR): Directory to record into; by default the name, here.
         name (NAME): Name of the LTTng session, and of the run; by default recording-DATE-TIME.
         duration (SECONDS): How long to record.
         kernel: Also record the scheduler, with LTTng or perf: why a thread waits.
-        dual (SESSION): Also write what this snapshot session has: how nodes that run already began.
+        profile (HZ): Also sample functions, with perf: 99 is usual; 99:dwarf without frame pointers.
+        dual (SESSION): Also write what this snapshot session has of nodes that run already.
         without (EVENT): Leave out events with these names, such as rclcpp_executor_wait_for_work:
             of ROS 2 where no provider stands in front; repeatable.
         python: Trace callbacks and executors of the Python nodes of COMMAND, without a rebuild.
@@ -68,7 +70,7 @@ def command(
     from msgflow.cli.output import print_note, print_status
     from msgflow.clocks import read_clock_sync
     from msgflow.links import read_links
-    from msgflow.record import PYTHON_NODES, Channel, record
+    from msgflow.record import PYTHON_NODES, Channel, read_rate, record
     from msgflow.run.choice import require_run_name
 
     if print_python_path:
@@ -95,6 +97,7 @@ def command(
             kernel=kernel,
             snapshot=dual,
             python=python,
+            profile=None if profile is None else read_rate(profile),
             note=print_note,
             show=show,
         )

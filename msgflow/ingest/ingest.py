@@ -30,6 +30,7 @@ from msgflow.errors import DatabaseError, UsageError
 from msgflow.ingest import model, refusals, staging
 from msgflow.ingest.hostnames import hostnames_of
 from msgflow.ingest.load import Loaded, load_traces
+from msgflow.ingest.samples import load_samples
 from msgflow.ingest.stored_run import fallback_name, require_free_name, store_run
 from msgflow.links import declare_links, read_links
 from msgflow.run.choice import require_run_name
@@ -73,7 +74,7 @@ class IngestReport:
         findings: what is worth knowing about the input and the recording.
         event_count: events read.
         stage_seconds: wall time by stage [s], in the order of the stages.
-        warnings: what went wrong after the run was stored, for people.
+        warnings: what went wrong though the run was stored, for people.
     """
 
     run_id: int
@@ -156,6 +157,8 @@ def ingest(
     ):
         watch = _Watch(progress, interrupts)
         watch.enter("opening the traces")
+        # Traces that were opened before are a part of a recording that still grows.
+        beside = paths if traces is None else ()
         with traces or trace_package.open(paths, reader=reader, strict=strict) as traces:
             refusals.require_ros_traces(traces.traces)
             hostnames = hostnames_of(traces.traces, hosts or {})
@@ -191,6 +194,9 @@ def ingest(
                         interrupts=interrupts,
                         progress=watch.reading,
                     )
+                    unread = load_samples(
+                        con, beside, workspace=directory, interrupts=interrupts
+                    )
                 refusals.require_ros_events(traces.traces, loaded.event_counts, traces.damages)
                 names = (name, fallback_name(paths))
                 event_count = sum(loaded.event_counts.values())
@@ -209,7 +215,7 @@ def ingest(
                 )
                 watch.enter("closing the database")
                 staging.leave(con)
-                warnings = _finished(con, database, target)
+                warnings = (*unread, *_finished(con, database, target))
         return IngestReport(*run, event_count, watch.finish(), warnings)
 
 

@@ -5,7 +5,8 @@ it spills, and keep the beginning of each column of each row group. `raw` has on
 tracepoint, the packets, and the threads, all as read (`raw.cpu_return`: events of threads that
 changed their CPU twice faster than a thread can; `raw.interrupt`: interrupts, each with the thread
 that it interrupted; `raw.kernel_thread`: ids of threads to the kernel and in their PID namespace,
-as contexts of switches have them; `raw.user_event`: the user's events of all names).
+as contexts of switches have them; `raw.user_event`: the user's events of all names;
+`raw.stack_sample`: lines of `perf script`).
 `staging` has `staging.source` (one row per trace), `staging.event_count`, `staging.declared`
 (tracepoints that were enabled in a trace, also if they never occurred), `staging.left_out` (events
 that another trace holds as well),
@@ -69,6 +70,12 @@ _KERNEL_THREAD_TABLE = """
 CREATE TABLE raw.kernel_thread (
     trace_index INTEGER, tid INTEGER, vpid INTEGER, vtid INTEGER, pid_ns BIGINT, first_ns BIGINT,
     last_ns BIGINT
+)
+"""
+
+_STACK_SAMPLE_TABLE = """
+CREATE TABLE raw.stack_sample (
+    hostname VARCHAR, is_monotonic BOOLEAN, head VARCHAR, stack VARCHAR
 )
 """
 
@@ -144,6 +151,7 @@ def _tables() -> tuple[str, ...]:
         _THREAD_TABLES,
         _INTERRUPT_TABLE.format(kind=enum_type(interrupts)),
         _KERNEL_THREAD_TABLE,
+        _STACK_SAMPLE_TABLE,
         _SOURCE_TABLE,
         _EVENT_COUNT_TABLE,
         _DECLARED_TABLE,

@@ -14,6 +14,7 @@ from msgflow.errors import RecordingError
 from msgflow.record.daemon import session_daemon
 from msgflow.record.event_cost import measure_event_cost
 from msgflow.record.lttng import losses, providers, sessions
+from msgflow.record.profile import recorded_samples, with_python_functions
 from msgflow.record.program import Program, require_program
 from msgflow.record.python_path import with_python_nodes
 from msgflow.record.scheduling import recorded_with_perf, why_perf_cannot_record
@@ -34,6 +35,8 @@ from msgflow.sql.interrupt import noted_interrupts, until_interrupted
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
     from pathlib import Path
+
+    from msgflow.record.profile import Rate
 
 BYTES_OF_EVENT = 45
 """The usual size of an event of ROS 2 with its contexts."""
@@ -90,6 +93,7 @@ def record(
     kernel: bool = False,
     snapshot: str | None = None,
     python: bool = True,
+    profile: Rate | None = None,
     note: Callable[[str], None],
     show: Callable[[Status], None],
 ) -> Recorded:
@@ -106,6 +110,7 @@ def record(
         snapshot: a snapshot session that has the initialisation of nodes that run already; what it
             has is written too.
         python: trace callbacks and executors of the program's nodes of rclpy, too.
+        profile: how to sample which functions run; None: not at all.
         note: gets sentences about what is wrong with the recording.
         show: gets the status twice a second; what it raises ends the recording.
 
@@ -141,6 +146,9 @@ def record(
                     f"the scheduler is not recorded: LTTng cannot trace this kernel (it"
                     f" needs its modules, and root or the group tracing), and {reason}"
                 )
+        if profile is not None:
+            samples = recorded_samples(directory, profile, is_ours=bool(program), note=note)
+            stack.enter_context(samples)
         output = None
         if log is not None:
             output = stack.enter_context(_written(log))
@@ -151,7 +159,9 @@ def record(
             with recording_session(name, directory, channel, with_kernel=by_lttng):
                 interrupts.check()
                 if program:
-                    environment = with_python_nodes(note) if python else None
+                    environment = with_python_nodes(note) if python else dict(os.environ)
+                    if profile is not None:
+                        environment = with_python_functions(environment, note)
                     started = Program(program, output, environment)
                     # Behind the session: what happens while nodes end is not recorded.
                     running.callback(started.end, note)

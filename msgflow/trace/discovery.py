@@ -74,7 +74,7 @@ def archives_below(paths: Sequence[str | Path]) -> list[Path]:
         directory / name
         for path in map(Path, paths)
         if path.is_dir()
-        for directory, files in _directories(path)
+        for directory, files in directories(path)
         for name in files
         if is_archive(directory / name)
     }
@@ -127,14 +127,14 @@ def _check_exists(path: Path) -> None:
 
 def _directories_with_metadata(root: Path, strays: list[Path]) -> Iterator[Path]:
     """Yield the traces below a directory; add streams that have no metadata to `strays`."""
-    for directory, files in _directories(root):
+    for directory, files in directories(root):
         if metadata_frame.FILE_NAME in files:
             yield directory
         else:
             strays += _first_stream(directory, files)
 
 
-def _directories(root: Path) -> Iterator[tuple[Path, list[str]]]:
+def directories(root: Path) -> Iterator[tuple[Path, list[str]]]:
     """Yield a directory and all below it, each once, with the names of their files."""
     visited: set[Path] = set()
 

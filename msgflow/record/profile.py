@@ -1,0 +1,92 @@
+"""Which functions run, sampled by `perf` beside the events."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from msgflow.errors import TraceError, UsageError
+from msgflow.record import perf
+from msgflow.trace.perf_script import DATA, TEXT, write_script
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+# A clock of each CPU is there in virtual machines, too. Symbols are resolved at once: what perf
+# keeps for later is not needed.
+_OPTIONS = ("--event=cpu-clock", "--sample-cpu", "--no-buildid", "--no-buildid-cache")
+_MOST_HZ = 10_000
+_PYTHON_NAMES = "import sys; sys.exit(not hasattr(sys, 'activate_stack_trampoline'))"
+
+
+@dataclass(frozen=True, slots=True)
+class Rate:
+    """How to sample.
+
+    Attributes:
+        hz: samples of each CPU per second.
+        graph: how perf finds callers: 'fp' by frame pointers, 'dwarf' by what debuggers read.
+    """
+
+    hz: int
+    graph: str
+
+
+def read_rate(text: str) -> Rate:
+    """Return what `99` or `99:dwarf` means."""
+    hz, _, graph = text.partition(":")
+    if not (hz.isdecimal() and 1 <= int(hz) <= _MOST_HZ and graph in ("", "fp", "dwarf")):
+        raise UsageError(
+            f"no rate of samples — {text}", f"--profile 99, or 99:dwarf; at most {_MOST_HZ}"
+        )
+    return Rate(int(hz), graph or "fp")
+
+
+@contextmanager
+def recorded_samples(
+    directory: Path, rate: Rate, *, is_ours: bool, note: Callable[[str], None]
+) -> Iterator[None]:
+    """Sample stacks during the block, as a text of perf in the directory.
+
+    `is_ours` samples only what this process starts meanwhile, else all processes are sampled.
+    `note` gets sentences about what is missing.
+    """
+    options = [*_OPTIONS, f"--freq={rate.hz}", f"--call-graph={rate.graph}"]
+    # Processes inherit it from the one that starts them.
+    place = f"--pid={os.getpid()}" if is_ours else "--all-cpus"
+    if (reason := perf.why_not([*options, *([] if is_ours else [place])])) is not None:
+        note(
+            f"functions are not sampled: {reason}; it needs root, CAP_PERFMON, or"
+            f" sysctl kernel.perf_event_paranoid={1 if is_ours else 0}"
+        )
+        yield
+        return
+    data = directory / DATA
+    with perf.recorded(data, [*options, place], note):
+        yield
+    text = directory / TEXT
+    try:
+        write_script(data, text)
+    except TraceError as error:
+        text.unlink(missing_ok=True)
+        note(error.message)
+    else:
+        data.unlink()
+
+
+def with_python_functions(
+    environment: dict[str, str], note: Callable[[str], None]
+) -> dict[str, str]:
+    """Return an environment in which perf sees the functions of Python, from 3.12 on."""
+    python = shutil.which("python3")
+    if python is not None and subprocess.run([python, "-c", _PYTHON_NAMES]).returncode:
+        note(
+            f"functions of Python have no names in the samples: {python} is older than 3.12; those"
+            " of C and C++ have"
+        )
+    return {**environment, "PYTHONPERFSUPPORT": "1"}
