@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from msgflow.db.finding import Finding
     from msgflow.export.flow import Flow
+    from msgflow.export.folded import FoldedStacks
     from msgflow.export.graph import Graph
     from msgflow.export.mcap import ExportedMcap
     from msgflow.export.otlp import ExportedTraces
@@ -937,8 +938,8 @@ class Database:
         """Write a run as a trace for the Perfetto UI (ui.perfetto.dev, in the browser).
 
         Each thread is a track with its callbacks, publications, takes, requests and responses.
-        Also: executor states, arrows for all links, gaps, events of your own tracepoints, and
-        counters for rates and for messages not yet taken.
+        Also: executor states, arrows for all links, gaps, events of your own tracepoints, samples
+        of functions, and counters for rates and for messages not yet taken.
 
         Args:
             output: the file; one that exists is replaced.
@@ -951,6 +952,26 @@ class Database:
         from msgflow.export.perfetto import write_perfetto
 
         return self._ask(write_perfetto, Path(output), Slice(**part))
+
+    def export_folded(
+        self, output: str | Path = "msgflow.folded", **part: Unpack[SliceWords]
+    ) -> FoldedStacks:
+        """Write which functions a run was in, as folded stacks: a flame graph of each callback.
+
+        A line has node, callback and functions from the outermost on, with semicolons between, and
+        how many samples saw that stack. What ran outside of callbacks stands below its process.
+
+        Args:
+            output: the file; one that exists is replaced.
+            **part: what to read, see `msgflow.Slice`; one run.
+
+        Raises:
+            UsageError: not exactly one run, none with samples, a time that cannot be read, or a
+                file that cannot be written.
+        """
+        from msgflow.export.folded import write_folded
+
+        return self._ask(write_folded, Path(output), Slice(**part))
 
     def export_mcap(
         self,

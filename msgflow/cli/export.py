@@ -13,6 +13,7 @@ from msgflow.database import Database
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from msgflow.export.folded import FoldedStacks
     from msgflow.export.mcap import ExportedMcap
     from msgflow.export.otlp import ExportedTraces
     from msgflow.export.perfetto import PerfettoTrace
@@ -48,10 +49,24 @@ def perfetto(trace: PerfettoTrace, output: Path) -> None:
     print_runs([trace.run])
     own = f", {count(trace.events, 'event')} of your own" if trace.events else ""
     own += f", {count(trace.states, 'state')} of threads and cores" if trace.states else ""
+    own += f", {count(trace.samples, 'sample')} of stacks" if trace.samples else ""
     print_status(
         f"{count(trace.slices, 'slice')}, {count(trace.arrows, 'arrow')},"
         f" {count(trace.values, 'value')} of counters{own} written to {output}:"
         " open it at ui.perfetto.dev"
+    )
+
+
+@app.command("folded")
+@asks(Database.export_folded)
+def folded(stacks: FoldedStacks, output: Path) -> None:
+    """speedscope.app opens the file, and so does flamegraph.pl."""
+    from msgflow.cli.output import print_runs, print_status
+    from msgflow.text.values import count
+
+    print_runs([stacks.run])
+    print_status(
+        f"{count(stacks.stacks, 'stack')} of {count(stacks.samples, 'sample')} written to {output}"
     )
 
 

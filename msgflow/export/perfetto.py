@@ -52,6 +52,7 @@ class PerfettoTrace:
         gaps: stretches of a host in which something was not recorded.
         events: events of the user's own tracepoints.
         states: states of threads to the kernel, and stretches in which a core ran one of them.
+        samples: samples of stacks.
     """
 
     path: Path
@@ -62,6 +63,7 @@ class PerfettoTrace:
     gaps: int
     events: int
     states: int
+    samples: int
 
 
 def write_perfetto(connection: duckdb.DuckDBPyConnection, path: Path, part: Slice) -> PerfettoTrace:
@@ -93,7 +95,8 @@ def write_perfetto(connection: duckdb.DuckDBPyConnection, path: Path, part: Slic
         gaps = writer.gaps()
         events = writer.user_events()
         states = writer.states()
-    return PerfettoTrace(path, run, slices, arrows, values, gaps, events, states)
+        samples = writer.samples()
+    return PerfettoTrace(path, run, slices, arrows, values, gaps, events, states, samples)
 
 
 class _Writer:
@@ -266,6 +269,40 @@ class _Writer:
             event.debug_annotations.add(name="user_event_id", int_value=row["id"])
             for name, value in json.loads(row["fields"]).items():
                 _add_argument(event, name, value)
+            self.builder.write_packet(packet)
+            count += 1
+        return count
+
+    def samples(self) -> int:
+        """Write samples of stacks, each stack and function once; return how many samples."""
+        packet = self.builder.create_packet()
+        packet.trusted_packet_sequence_id = _SEQUENCE
+        counter = self.packets.PerfEvents.Counter
+        timebase = packet.trace_packet_defaults.perf_sample_defaults.timebase
+        timebase.counter = counter.SW_CPU_CLOCK
+        interned = packet.interned_data
+        for row in self.rows("perfetto_frame"):
+            if row["id"] == row["file_id"]:
+                interned.mapping_paths.add(iid=row["id"], str=row["file"].encode())
+                interned.mappings.add(iid=row["id"], path_string_ids=[row["id"]])
+            interned.function_names.add(iid=row["id"], str=row["name"].encode())
+            interned.frames.add(
+                iid=row["id"], function_name_id=row["id"], mapping_id=row["file_id"]
+            )
+        if not interned.frames:
+            return 0
+        for row in self.rows("perfetto_stack"):
+            interned.callstacks.add(iid=row["stack_id"], frame_ids=row["frames"])
+        self.builder.write_packet(packet)
+        count = 0
+        for row in self.rows("perfetto_sample"):
+            packet = self.builder.create_packet()
+            packet.timestamp = row["at_ns"]
+            packet.trusted_packet_sequence_id = _SEQUENCE
+            packet.sequence_flags = self.packets.TracePacket.SEQ_NEEDS_INCREMENTAL_STATE
+            sample = packet.perf_sample
+            sample.cpu, sample.pid, sample.tid = row["cpu"], row["pid"], row["tid"]
+            sample.callstack_iid = row["stack_id"]
             self.builder.write_packet(packet)
             count += 1
         return count

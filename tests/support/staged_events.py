@@ -74,6 +74,7 @@ class StagedEvents:
         self.sources: dict[int, Source] = {0: Source()}
         self.events: list[tuple[str, dict[str, Any]]] = []
         self._packets: dict[int, list[dict[str, Any]]] = defaultdict(list)
+        self.samples: list[tuple[str, bool, str, str]] = []
         self.now = 1_000
 
     def add(self, name: str, thread: Thread, /, *, ts: int | None = None, **fields: Any) -> int:
@@ -120,6 +121,12 @@ class StagedEvents:
     ) -> None:
         """Add a trace, or change the one there is."""
         self.sources[trace] = Source(hostname, clock, recording, path, tracer, origin_ns)
+
+    def add_sample(
+        self, head: str, *stack: str, hostname: str = "alpha", is_monotonic: bool = True
+    ) -> None:
+        """Add a sample as perf writes it: its line, and those of its calls, the innermost first."""
+        self.samples.append((hostname, is_monotonic, head, "\n".join(stack)))
 
     def add_packet(
         self,
@@ -231,6 +238,8 @@ class StagedEvents:
             for name, batch in placed.batches:
                 _insert(con, f"raw.{load().staged[name].table}", batch)
         _insert(con, "raw.packet", packets)
+        for sample in self.samples:
+            con.execute("INSERT INTO raw.stack_sample VALUES (?, ?, ?, ?)", sample)
 
     def _all_packets(self) -> list[dict[str, Any]]:
         whole = StagedEvents()

@@ -1,5 +1,6 @@
 -- name: internal.perfetto_thread
 -- title: Threads in Perfetto
+-- kind: inline
 -- description: The tracks of threads, and of what their executors did on them.
 -- grain: one row per thread
 -- param: run_id BIGINT  Run

@@ -1,5 +1,6 @@
 -- name: staging.sample_text
--- description: Samples as perf wrote them, each with the clock that its host has here. Times of
+-- description: Samples as perf wrote them, each with the clock that its host has here. The host
+--     is NULL where no trace has that name: a container may have another than the machine. Times of
 --     another clock than LTTng's are of none. Only samples of time count: those of a CPU's clock or
 --     of cycles, and not of cache misses or tracepoints.
 -- grain: one row per sample
@@ -27,6 +28,7 @@ clock AS (
 host AS (
     SELECT
         s.hostname,
+        bool_or(s.hostname = c.hostname) AS is_known,
         CASE WHEN count(DISTINCT c.clock_key) = 1 THEN any_value(c.clock_key) END AS clock_key,
         min(c.origin_ns) AS origin_ns
     FROM (SELECT DISTINCT hostname FROM raw.stack_sample) AS s
@@ -39,6 +41,7 @@ SELECT
     try_cast(p.tid AS INTEGER) AS tid,
     try_cast(p.cpu AS INTEGER) AS cpu,
     CASE WHEN p.is_monotonic THEN h.clock_key END AS clock_key,
+    CASE WHEN h.is_known THEN h.hostname END AS hostname,
     try_cast(p.second || rpad(p.fraction, 9, '0') AS BIGINT) + h.origin_ns AS at_ns,
     CASE
         WHEN p.event LIKE '%-clock%' THEN try_cast(p.period AS BIGINT)

@@ -11,14 +11,14 @@ WITH RECURSIVE sample AS MATERIALIZED (
         t.thread_id
     FROM staging.sample_text AS s
     JOIN staging.clock AS c ON s.clock_key = c.clock_key
-    JOIN staging.host AS h ON c.clock_id = h.clock_id
+    JOIN staging.host AS h ON c.clock_id = h.clock_id AND coalesce(s.hostname = h.hostname, true)
     JOIN staging.process AS p
         ON h.host_id = p.host_id
         AND s.pid = p.pid
         AND s.at_ns BETWEEN p.first_seen_ns AND p.last_seen_ns
     LEFT JOIN staging.thread AS t ON p.process_id = t.process_id AND s.tid = t.tid
     -- Processes of several containers may have the same pid.
-    QUALIFY count(*) OVER (PARTITION BY s.clock_key, s.pid, s.tid, s.at_ns, s.cpu) = 1
+    QUALIFY count(*) OVER (PARTITION BY s.rowid) = 1
 ),
 run AS MATERIALIZED (
     SELECT

@@ -1,0 +1,73 @@
+-- name: functions
+-- title: Functions that the CPU time of callbacks goes to
+-- description: Which functions ran inside each callback, as samples of perf tell (docs/functions.md,
+--     record --profile), and outside of callbacks, such as in the executor and the middleware. Rows
+--     of one callback overlap: a function has the time of what it calls, too. Few samples say
+--     little: of 100, a share is right within 10 points.
+-- grain: one row per callback, or process outside of callbacks, and function
+-- variant: flows BOOLEAN = false  Only callbacks on the way of flows along paths
+-- param: slowest BIGINT {1..} = NULL  Only so many instances of each callback, the longest
+-- column: run_id BIGINT            Run
+-- column: node VARCHAR [node]      Node of the callback, or the process in brackets
+-- column: callback VARCHAR [callback]  What triggers it, or 'outside of callbacks'
+-- column: function VARCHAR         Function; '[unknown]': its file has no symbol for it
+-- column: self_share DOUBLE [share]  Part of the samples of the callback in which it ran
+-- column: total_share DOUBLE [share]  Part in which it ran, or what it called
+-- column: self_ns BIGINT [ns]      CPU time in it; empty: perf counted cycles
+-- column: total_ns BIGINT [ns]     CPU time in it, and in what it called
+-- column: per_call_ns BIGINT [ns]  total_ns for each instance of the callback
+-- column: calls BIGINT             Instances of the callback; empty outside
+-- column: self_samples BIGINT      Samples in which it ran
+-- column: samples BIGINT           Samples in which it ran, or what it called
+-- column: file VARCHAR             Library or program that has it, of Python the source file
+-- column: callback_id BIGINT       Identity of the callback, of the first of several
+-- column: is_internal BOOLEAN      Infrastructure of ROS
+-- brief: callback, function, self_share, total_share, per_call_ns, node, self_ns, samples, file
+WITH instance AS (
+    SELECT i.callback_instance_id, k.alike_id AS callback_id
+    FROM main.callback_instance AS i
+    JOIN main.callback_alike AS k ON i.callback_id = k.callback_id
+    WHERE list_contains($runs, i.run_id) AND i.start_ns >= $start_ns AND i.start_ns < $end_ns
+    QUALIFY $slowest IS NULL OR row_number() OVER (
+        PARTITION BY k.alike_id ORDER BY i.end_ns - i.start_ns DESC NULLS LAST, i.start_ns
+    ) <= $slowest
+),
+counted AS (
+    SELECT callback_id AS group_id, count(*) AS calls FROM instance GROUP BY callback_id
+),
+-- Outside of callbacks, a group is a process: the negative of its id.
+sample AS (
+    SELECT coalesce(i.callback_id, -s.process_id) AS group_id, s.stack_id, s.cpu_ns
+    FROM main.stack_sample AS s
+    LEFT JOIN instance AS i ON s.callback_instance_id = i.callback_instance_id
+    WHERE list_contains($runs, s.run_id)
+        AND CASE
+            WHEN s.callback_instance_id IS NOT NULL THEN i.callback_id IS NOT NULL
+            ELSE $slowest IS NULL AND s.at_ns >= $start_ns AND s.at_ns < $end_ns
+        END
+),
+found AS (SELECT * FROM main.function_time('sample'))
+SELECT
+    f.run_id,
+    coalesce(l.node, main.node_label(NULL, p.name, p.pid)) AS node,
+    coalesce(l.label, 'outside of callbacks') AS callback,
+    f.function,
+    t.self_share,
+    t.total_share,
+    t.self_ns,
+    t.total_ns,
+    t.total_ns // c.calls AS per_call_ns,
+    c.calls,
+    t.self_samples,
+    t.samples,
+    f.file,
+    l.callback_id AS callback_id,
+    coalesce(l.is_internal, false) AS is_internal
+FROM found AS t
+JOIN main.stack_frame AS f ON t.stack_frame_id = f.stack_frame_id
+LEFT JOIN main.callback_label AS l ON t.group_id = l.callback_id
+LEFT JOIN main.process AS p ON t.group_id = -p.process_id
+LEFT JOIN counted AS c ON t.group_id = c.group_id
+ORDER BY
+    f.run_id, sum(t.self_samples) OVER (PARTITION BY t.group_id) DESC, t.group_id,
+    t.self_samples DESC, t.samples DESC, f.function, f.file

@@ -1,0 +1,12 @@
+-- name: internal.perfetto_stack
+-- title: Stacks in Perfetto
+-- description: The stacks of samples, the outermost call first.
+-- grain: one row per stack
+-- param: run_id BIGINT  Run
+-- column: stack_id BIGINT  The stack
+-- column: frames BIGINT[]  Its functions
+SELECT stack_id, list(stack_frame_id ORDER BY position) AS frames
+FROM main.stack_call
+WHERE run_id = $run_id
+GROUP BY stack_id
+ORDER BY stack_id

@@ -1,0 +1,48 @@
+-- name: internal.folded_stack
+-- title: Stacks of a flame graph
+-- description: Stacks that samples saw, below their node and callback, with how often: as tools for
+--     flame graphs read them, the outermost call first.
+-- grain: one row per node, callback and stack
+-- param: run_id BIGINT  Run
+-- param: start_ns BIGINT  Begin of the window, epoch ns
+-- param: end_ns BIGINT  End of the window, epoch ns
+-- column: stack VARCHAR  Node, callback and functions, with semicolons between
+-- column: samples BIGINT  How many samples
+WITH sample AS (
+    SELECT
+        s.stack_id, i.callback_id, CASE WHEN i.callback_id IS NULL THEN s.process_id END
+            AS process_id, count(*) AS samples
+    FROM main.stack_sample AS s
+    LEFT JOIN main.callback_instance AS i ON s.callback_instance_id = i.callback_instance_id
+    WHERE s.run_id = $run_id AND s.at_ns >= $start_ns AND s.at_ns < $end_ns
+    GROUP BY ALL
+),
+stack AS (
+    SELECT c.stack_id, list(f.function ORDER BY c.position) AS functions
+    FROM main.stack_call AS c
+    JOIN main.stack_frame AS f ON c.stack_frame_id = f.stack_frame_id
+    WHERE c.run_id = $run_id
+    GROUP BY c.stack_id
+),
+named AS (
+    SELECT
+        [
+            coalesce(l.node, main.node_label(NULL, p.name, p.pid)),
+            coalesce(l.label, 'outside of callbacks')
+        ] || k.functions AS steps,
+        s.samples
+    FROM sample AS s
+    JOIN stack AS k ON s.stack_id = k.stack_id
+    LEFT JOIN main.callback_label AS l ON s.callback_id = l.callback_id
+    LEFT JOIN main.process AS p ON s.process_id = p.process_id
+)
+SELECT
+    -- A semicolon or the end of a line in a name would divide it.
+    array_to_string(
+        list_transform(steps, lambda step: regexp_replace(replace(step, ';', ':'), '\s', ' ', 'g')),
+        ';'
+    ) AS stack,
+    sum(samples)::BIGINT AS samples
+FROM named
+GROUP BY stack
+ORDER BY stack
