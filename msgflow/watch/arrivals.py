@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable
     from pathlib import Path
 
     from msgflow.watch.chunk import Chunk
@@ -76,17 +77,18 @@ class Arrivals:
             source.live_chunks += 1
             source.ahead_ns = max(ahead_ns, source.ahead_ns or ahead_ns)
 
-    def vanished(self, looked_s: float) -> list[Path]:
+    def vanished(self, looked_s: float, waiting: Collection[Path] = ()) -> list[Path]:
         """Return the sources whose next chunk is overdue, each once until a chunk comes again.
 
         We looked for chunks at `looked_s`, in seconds of the monotonic clock: reading them takes
-        time.
+        time. Those of `waiting` have come, and are not read.
         """
         found = []
         for path, source in self._sources.items():
             usual_s = max(self._step_ns / _SECOND_NS, source.length_s)
             is_late = looked_s - source.came_s > PATIENCE * usual_s
-            if is_late and not (source.has_vanished or source.is_left_out):
+            is_silent = is_late and path not in waiting
+            if is_silent and not (source.has_vanished or source.is_left_out):
                 source.has_vanished = True
                 found.append(path)
         return found
@@ -114,6 +116,17 @@ class Arrivals:
     def leave_out(self, path: Path) -> None:
         """Leave out a source from now on."""
         self._sources[path].is_left_out = True
+
+
+def by_arrival(chunks: Iterable[Chunk]) -> list[Chunk]:
+    """Return chunks of several sources as they came; those of one source in their order."""
+    ages_s: dict[Path, float] = {}
+    keyed = []
+    for chunk in chunks:
+        age_s = _age_s(chunk.path)
+        ages_s[chunk.source] = min(age_s, ages_s.get(chunk.source, age_s))
+        keyed.append((-ages_s[chunk.source], chunk))
+    return [chunk for _, chunk in sorted(keyed, key=lambda pair: pair[0])]
 
 
 def _age_s(path: Path) -> float:

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
-from msgflow.watch.arrivals import PATIENCE, Arrivals
+from msgflow.watch.arrivals import PATIENCE, Arrivals, by_arrival
 from msgflow.watch.chunk import ChunkFinder, finished_chunks
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from pathlib import Path
 
+    from msgflow.watch.chunk import Chunk
     from msgflow.watch.watcher import Watcher
     from msgflow.watch.window_report import WindowReport
 
@@ -61,7 +63,8 @@ def watch_live(
 ) -> Iterator[WindowReport]:
     """Watch a recording while it grows; where there is no chunk yet, wait for one.
 
-    If chunks come faster than they can be read, several of them become one step.
+    If chunks come faster than they can be read, several of them become one step, and others wait on
+    the disk: a step must not take any memory.
 
     Args:
         directory: of a session, or above several.
@@ -73,23 +76,40 @@ def watch_live(
     begin = time.monotonic()
     finder = ChunkFinder(directory, lambda error: note(f"{error.message}: {error.hint}"))
     arrivals = Arrivals(step_ns)
+    # Those that have come and are not read, in this order.
+    waiting: deque[Chunk] = deque()
     is_first = True
-    are_apart = lags = False
+    is_last = are_apart = lags = False
+
+    def known_ns() -> int:
+        """Return up to when all is known: windows wait for sources that have more on the disk."""
+        # A clock that is ahead must not make all that others record late.
+        ahead = {
+            source
+            for source, seconds in arrivals.clocks_ahead_s().items()
+            if seconds * _SECOND_NS > step_ns
+        }
+        history = watcher.history
+        behind = {chunk.source for chunk in waiting}.difference(ahead) & history.ends_ns.keys()
+        ends = [history.ends_ns[source] for source in behind]
+        return min([history.newest_without(ahead), *ends])
+
     while True:
         # Asked first: what came until then is read.
-        is_last = is_over()
+        is_last = is_over() or is_last
         looked_s = time.monotonic()
-        for chunk in finder.further():
+        waiting.extend(by_arrival(finder.further()))
+        while waiting and not watcher.history.is_full(known_ns()):
+            chunk = waiting.popleft()
             if not arrivals.is_left_out(chunk):
                 watcher.read(chunk)
                 end_ns = watcher.history.ends_ns.get(chunk.source)
                 arrivals.add(chunk, end_ns, is_live=not is_first)
                 watcher.skip_old()
         is_first = False
-        for source in arrivals.vanished(looked_s):
+        for source in arrivals.vanished(looked_s, {chunk.source for chunk in waiting}):
             note(f"no chunk comes any more from {source}")
-        ahead_s = arrivals.clocks_ahead_s()
-        for source, seconds in ahead_s.items():
+        for source, seconds in arrivals.clocks_ahead_s().items():
             if abs(seconds) * _SECOND_NS > PATIENCE * step_ns:
                 arrivals.leave_out(source)
                 watcher.history.leave_out(source)
@@ -97,12 +117,10 @@ def watch_live(
             elif abs(seconds) * _SECOND_NS > step_ns and not are_apart:
                 are_apart = True
                 note(f"{_wrong(source, seconds)}: windows wait as long as --late, until {_REMEDY}")
-        if is_last:
+        if is_last and not waiting:
             yield from _last(watcher)
             return
-        # A clock that is ahead must not make all that others record late.
-        ahead = {source for source, seconds in ahead_s.items() if seconds * _SECOND_NS > step_ns}
-        report = watcher.report(watcher.history.newest_without(ahead), is_live=True)
+        report = watcher.report(known_ns(), is_live=True)
         if report is None:
             time.sleep(_BETWEEN_LOOKS)
             continue

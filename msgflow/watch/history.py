@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 
     from msgflow.watch.kept_chunk import KeptChunk
 
+# One takes half a kilobyte of memory while it is analysed.
+_MOST_EVENTS = 500_000
+
 
 class History:
     """What is kept of a recording: the last chunks, and what lasts of those before.
@@ -38,6 +41,8 @@ class History:
         self._ends: dict[Path, int] = {}
         self._begin_ns = self.closed_ns = 0
         self._has_closed = False
+        # Events that have come since the last window.
+        self._further = 0
 
     @property
     def ends_ns(self) -> Mapping[Path, int]:
@@ -65,6 +70,7 @@ class History:
         Returns:
             How many of its events came too late: after their window was closed.
         """
+        self._further += chunk.times_ns.size
         self._chunks.append(chunk)
         self._chunks.sort(key=lambda each: each.end_ns)
         self._ends[chunk.source] = max(chunk.end_ns, self._ends.get(chunk.source, chunk.end_ns))
@@ -113,6 +119,20 @@ class History:
         start_ns = min(end_ns - self._window_ns, self.closed_ns)
         return Window(max(start_ns, self._begin_ns), min(end_ns, newest_ns + 1))
 
+    def is_full(self, newest_ns: int) -> bool:
+        """Tell whether the next window has to be closed before more is added.
+
+        Many chunks may wait. Together they would take any memory, so a window is longer than others
+        only up to so many events.
+        """
+        window = self.next_window(newest_ns)
+        return (
+            self._has_closed
+            and self._further >= _MOST_EVENTS
+            and window is not None
+            and window.end_ns - self.closed_ns >= self._window_ns
+        )
+
     def close(self, window: Window, *, earlier_ns: int = 0) -> list[Path]:
         """Close a window: what comes of it from now on is late.
 
@@ -121,6 +141,7 @@ class History:
         """
         self.closed_ns = window.end_ns
         self._has_closed = True
+        self._further = 0
         return self.forget(window, earlier_ns=earlier_ns)
 
     def traces(self, window: Window, *, earlier_ns: int = 0) -> KeptTraces:
