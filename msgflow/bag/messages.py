@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import contextlib
-from typing import TYPE_CHECKING, Any
+import io
+import os
+import struct
+from typing import IO, TYPE_CHECKING, Any
 
 import pyarrow as pa
 
@@ -13,7 +16,7 @@ from msgflow.trace.extraction import LIMIT_VARIABLE, limit_of
 from msgflow.trace.regular_file import irregular
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
     from pathlib import Path
 
 _HEADER = "std_msgs/msg/Header"
@@ -30,6 +33,11 @@ _SCHEMA = pa.schema(
 )
 _ROWS_AT_ONCE = 50_000
 _BYTES_AT_ONCE = 1 << 20
+_MCAP_MAGIC_SIZE = 8
+# Of each record of MCAP: its kind and its length.
+_RECORD = struct.Struct("<BQ")
+_CHUNK = 6
+_BEFORE_COMPRESSION = 28
 
 
 def read_bag(bag: Path) -> Iterator[pa.Table]:
@@ -53,7 +61,11 @@ def read_bag(bag: Path) -> Iterator[pa.Table]:
     try:
         # Bags from before Iron do not hold their types. The reader knows those of ROS itself.
         with AnyReader([bag], default_typestore=get_typestore(Stores.LATEST)) as reader:
+            if any(getattr(each, "compression_mode", None) == "message" for each in reader.readers):
+                _require_sizes_of_messages(bag)
             yield from _tables(reader)
+    except TraceError:
+        raise
     except Exception as error:  # what its parsers raise in a damaged file has no common class
         said = str(error).strip().splitlines()
         raise TraceError(
@@ -63,21 +75,59 @@ def read_bag(bag: Path) -> Iterator[pa.Table]:
 
 
 def _require_safe(bag: Path) -> None:
-    """Raise where a bag would hang its reader, or fill the disk that it is unpacked to."""
+    """Raise where a bag would hang its reader, or fill the disk or the memory that unpacks it."""
     files = [bag, *(bag.rglob("*") if bag.is_dir() else ())]
     for file in files:
         if kind := irregular(file):
             raise TraceError(f"{kind}, no file — {file}", "copy the bag again, with cp -rL")
-        if file.suffix == ".zstd" and file.is_file():
-            with file.open("rb") as packed, contextlib.suppress(*CORRUPT):
-                content, left = open_plain(packed), limit_of(file)
-                while left >= 0 and (chunk := content.read(_BYTES_AT_ONCE)):
-                    left -= len(chunk)
-                if left < 0:
-                    raise TraceError(
-                        f"the file has more than {limit_of(file):,} bytes unpacked — {file}",
-                        f"{LIMIT_VARIABLE}=100GB msgflow … reads it, if you know who made it",
-                    )
+        if not file.is_file():
+            continue
+        with file.open("rb") as opened, contextlib.suppress(*CORRUPT):
+            if file.suffix == ".zstd":
+                _require_size(file, [opened])
+            elif file.suffix == ".mcap":
+                _require_size(file, _chunks(opened))
+
+
+def _require_sizes_of_messages(bag: Path) -> None:
+    """Raise where messages that were compressed one by one are larger than the limit."""
+    from rosbags.rosbag2 import Reader
+
+    for file in sorted(bag.rglob("*")):
+        if file.suffix in (".db3", ".mcap"):
+            # The file alone does not say that its messages are compressed: they come as they are.
+            with Reader(file) as reader, contextlib.suppress(*CORRUPT):
+                _require_size(file, (io.BytesIO(data) for _, _, data in reader.messages()))
+
+
+def _require_size(file: Path, parts: Iterable[IO[bytes]]) -> None:
+    """Raise where compressed parts of a file have more bytes than the limit of archives."""
+    left = limit_of(file)
+    for part in parts:
+        content = open_plain(part)
+        while chunk := content.read(_BYTES_AT_ONCE):
+            left -= len(chunk)
+            if left < 0:
+                raise TraceError(
+                    f"the file has more than {limit_of(file):,} bytes unpacked — {file}",
+                    f"{LIMIT_VARIABLE}=100GB msgflow … reads it, if you know who made it",
+                )
+
+
+def _chunks(file: IO[bytes]) -> Iterator[IO[bytes]]:
+    """Yield the chunks of an MCAP file as they stand there: see its specification, Records."""
+    size = os.fstat(file.fileno()).st_size
+    file.seek(_MCAP_MAGIC_SIZE)
+    while len(head := file.read(_RECORD.size)) == _RECORD.size:
+        kind, length = _RECORD.unpack(head)
+        end = file.tell() + length
+        if kind == _CHUNK:
+            # Times, size, and checksum; then the name of the compression, and the size of the rest.
+            file.seek(_BEFORE_COMPRESSION, os.SEEK_CUR)
+            (name_size,) = struct.unpack("<I", file.read(4))
+            file.seek(name_size + 8, os.SEEK_CUR)
+            yield io.BytesIO(file.read(max(0, min(end, size) - file.tell())))
+        file.seek(min(end, size))
 
 
 def _tables(reader: Any) -> Iterator[pa.Table]:

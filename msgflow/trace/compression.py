@@ -1,4 +1,4 @@
-"""Compressed files: gzip, xz and Zstandard, recognised by their first bytes."""
+"""Compressed files: gzip, xz, Zstandard and LZ4, recognised by their first bytes."""
 
 from __future__ import annotations
 
@@ -14,11 +14,12 @@ from typing import IO, Any
 _MAGIC_SIZE = 6
 _GZIP = b"\x1f\x8b"
 _XZ = b"\xfd7zXZ\x00"
-_ZSTD = b"\x28\xb5\x2f\xfd"
+# What Arrow unpacks: the standard library learned Zstandard only in Python 3.14, and LZ4 never.
+_OF_ARROW = {b"\x28\xb5\x2f\xfd": "zstd", b"\x04\x22\x4d\x18": "lz4"}
 
 
-class _ZstdError(Exception):
-    """Zstandard data are damaged."""
+class _ArrowError(Exception):
+    """Data that Arrow unpacks are damaged."""
 
 
 CORRUPT = (
@@ -28,7 +29,7 @@ CORRUPT = (
     lzma.LZMAError,
     zlib.error,
     struct.error,
-    _ZstdError,
+    _ArrowError,
     EOFError,
     UnicodeError,
     ValueError,
@@ -50,18 +51,19 @@ def open_plain(file: IO[bytes]) -> Any:
         return gzip.open(file)
     if magic.startswith(_XZ):
         return lzma.LZMAFile(file)
-    if magic.startswith(_ZSTD):
-        return io.BufferedReader(_Zstd(file))
+    for first, name in _OF_ARROW.items():
+        if magic.startswith(first):
+            return io.BufferedReader(_Unpacked(file, name))
     return file
 
 
-class _Zstd(io.RawIOBase):
-    """Zstandard through Arrow: the standard library learned it only in Python 3.14."""
+class _Unpacked(io.RawIOBase):
+    """What Arrow unpacks."""
 
-    def __init__(self, file: IO[bytes]) -> None:
+    def __init__(self, file: IO[bytes], compression: str) -> None:
         import pyarrow
 
-        self._content = pyarrow.CompressedInputStream(pyarrow.PythonFile(file, "r"), "zstd")
+        self._content = pyarrow.CompressedInputStream(pyarrow.PythonFile(file, "r"), compression)
 
     def readable(self) -> bool:
         return True
@@ -70,6 +72,6 @@ class _Zstd(io.RawIOBase):
         try:
             chunk = self._content.read(len(buffer))
         except OSError as error:
-            raise _ZstdError(str(error)) from error
+            raise _ArrowError(str(error)) from error
         buffer[: len(chunk)] = chunk
         return len(chunk)

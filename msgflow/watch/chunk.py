@@ -7,7 +7,7 @@ import re
 import shutil
 import time
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,6 +26,8 @@ _BETWEEN_SEARCHES = 1.0
 # Rotations in a second, at most.
 _MOST_A_SECOND = 20
 _MOST_OF_TIME = 0.05
+# Number, begin, end and path of a chunk.
+_Found = tuple[int, datetime, datetime, Path]
 
 
 @dataclass(frozen=True, order=True)
@@ -61,19 +63,21 @@ class ChunkFinder:
         self._names: dict[Path, set[str]] = {}
         # Of each source, which recording its last chunk belongs to, its number and its end.
         self._last: dict[Path, tuple[int, int, datetime]] = {}
-        # The number of the last directory of a source that did not go on from there.
-        self._odd: dict[Path, int] = {}
+        # Of each source, what has the form of a chunk and follows none, by number.
+        self._odd: dict[Path, dict[int, _Found]] = {}
         self._next_search = 0.0
 
-    def further(self) -> list[Chunk]:
+    def further(self, *, is_last: bool = False) -> list[Chunk]:
         """Return the chunks that have come since the last call, by number.
 
-        Where a session was created anew in the directory of an earlier one, numbers begin again:
-        all chunks of the earlier recording come first.
+        Any program may make a directory of this form: what does not follow the last chunk counts as
+        one when the next has come, or at the last look. Where a session was created anew in the
+        directory of an earlier one, numbers begin again: all chunks of the earlier recording come
+        first.
         """
         if time.monotonic() >= self._next_search:
             self._search()
-        found = [pair for archives in list(self._names) for pair in self._of(archives)]
+        found = [pair for archives in list(self._names) for pair in self._of(archives, is_last)]
         return [chunk for _, chunk in sorted(found)]
 
     def _search(self) -> None:
@@ -86,7 +90,7 @@ class ChunkFinder:
         end = time.monotonic()
         self._next_search = end + max(_BETWEEN_SEARCHES, (end - begin) / _MOST_OF_TIME)
 
-    def _of(self, archives: Path) -> Iterator[tuple[int, Chunk]]:
+    def _of(self, archives: Path, is_last: bool) -> Iterator[tuple[int, Chunk]]:
         """Yield the further chunks of a source, each with the number of its recording."""
         try:
             names = set(os.listdir(archives))
@@ -94,38 +98,56 @@ class ChunkFinder:
             self._fail(error)
             # It may come back, with other chunks.
             del self._names[archives]
+            self._last.pop(archives.parent, None)
             return
         found = [each for name in names - self._names[archives] if (each := _read(archives / name))]
         self._names[archives] = names
         source = archives.parent
-        last = self._last[source][1] if source in self._last else -1
+        last = self._number(source)
         numbers = [number for number, *_ in found]
         # A clock that is set does not mix them up.
         is_by_number = len(set(numbers)) == len(numbers) and all(each > last for each in numbers)
         found.sort(key=lambda each: each[0] if is_by_number else (each[1], each[0]))
-        for number, begin, end, path in found:
-            if not self._goes_on(source, number, begin):
-                self._odd[source] = number
-                continue
-            recording, last, _ = self._last.get(source, (0, -1, end))
-            recording += number <= last
-            self._last[source] = (recording, number, end)
-            if os.access(path, os.R_OK | os.X_OK):
-                yield recording, Chunk(number, source, path)
+        odd = self._odd.setdefault(source, {})
+        for each in found:
+            number = each[0]
+            if number == self._number(source) + 1 and self._may_follow(source, each):
+                yield from self._taken(source, each)
+            elif number - 1 in odd:
+                yield from self._taken(source, odd.pop(number - 1))
+                yield from self._taken(source, each)
             else:
-                self._fail(PermissionError(0, "permission denied", str(archives)))
+                odd[number] = each
+        if is_last:
+            now = datetime.now(UTC)
+            for each in sorted(odd.values(), key=lambda each: each[1]):
+                if each[2] <= now and self._may_follow(source, each):
+                    yield from self._taken(source, each)
+            odd.clear()
 
-    def _goes_on(self, source: Path, number: int, begin: datetime) -> bool:
-        """Tell whether a chunk follows the last one, or there was time for those in between."""
-        if source not in self._last or number == self._odd.get(source, number) + 1:
+    def _number(self, source: Path) -> int:
+        return self._last[source][1] if source in self._last else -1
+
+    def _taken(self, source: Path, found: _Found) -> Iterator[tuple[int, Chunk]]:
+        number, _, end, path = found
+        recording, last, _ = self._last.get(source, (0, -1, end))
+        recording += number <= last
+        self._last[source] = (recording, number, end)
+        if os.access(path, os.R_OK | os.X_OK):
+            yield recording, Chunk(number, source, path)
+        else:
+            self._fail(PermissionError(0, "permission denied", str(path.parent)))
+
+    def _may_follow(self, source: Path, found: _Found) -> bool:
+        """Tell whether there was time for the chunks that are missing before one."""
+        if source not in self._last:
             return True
         _, last, end = self._last[source]
+        number, begin, *_ = found
         missing = number - last - 1 if number > last else number
         passed_s = (begin - end).total_seconds()
         # Names have whole seconds.
-        return number == last + 1 or (
-            passed_s >= -1 and missing <= _MOST_A_SECOND * max(passed_s, 1)
-        )
+        return passed_s >= -1 and missing <= _MOST_A_SECOND * max(passed_s, 1)
 
     def _fail(self, error: OSError) -> None:
         # What has gone meanwhile is no fault.
@@ -151,7 +173,7 @@ def finished_chunks(directory: Path) -> list[Chunk]:
     def refuse(error: TraceError) -> None:
         raise error
 
-    return ChunkFinder(directory, refuse).further()
+    return ChunkFinder(directory, refuse).further(is_last=True)
 
 
 def remove_chunk(path: Path) -> None:
@@ -159,7 +181,7 @@ def remove_chunk(path: Path) -> None:
     shutil.rmtree(path, ignore_errors=True)
 
 
-def _read(path: Path) -> tuple[int, datetime, datetime, Path] | None:
+def _read(path: Path) -> _Found | None:
     """Return number, begin, end and path of a chunk; None of what LTTng does not write."""
     match = _NAME.fullmatch(path.name)
     if match is None or path.is_symlink() or not path.is_dir():

@@ -98,7 +98,7 @@ def watch_live(
         # Asked first: what came until then is read.
         is_last = is_over() or is_last
         looked_s = time.monotonic()
-        waiting.extend(by_arrival(finder.further()))
+        waiting.extend(by_arrival(finder.further(is_last=is_last)))
         while waiting and not watcher.history.is_full(known_ns()):
             chunk = waiting.popleft()
             if not arrivals.is_left_out(chunk):

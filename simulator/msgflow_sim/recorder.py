@@ -375,8 +375,8 @@ class Recorder:
             yield base / place
             return
         times = (self._recording.start_ns, *self._recording.rotations)
-        for ordinal, begin in enumerate(times, start=1):
-            end = times[ordinal] if ordinal < len(times) else begin
+        for ordinal, begin in enumerate(times):
+            end = times[ordinal + 1] if ordinal + 1 < len(times) else begin
             span = "-".join(
                 f"{_date(self._identity.epoch_ns + time):%Y%m%dT%H%M%S+0000}"
                 for time in (begin, end)

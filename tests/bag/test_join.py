@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import random
 import shutil
+import struct
 from collections import Counter
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -263,6 +264,46 @@ def test_a_file_that_unpacks_to_much_more_is_refused(
     monkeypatch.setenv("MSGFLOW_UNPACK_LIMIT", "11MB")
     with pytest.raises(TraceError, match="cannot read as a bag"):
         next(read_bag(tmp_path))
+
+
+@pytest.mark.parametrize("how", ["zstd", "lz4"])
+def test_an_mcap_chunk_that_unpacks_to_much_more_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, how: str
+) -> None:
+    """Whatever it says that its size is."""
+    packed = pa.compress(bytes(10_000_000), how, asbytes=True)
+    chunk = bytes(28) + struct.pack("<I", len(how)) + how.encode()
+    chunk += struct.pack("<Q", len(packed)) + packed
+    file = tmp_path / "bag.mcap"
+    header = struct.pack("<BQ", 1, 8) + bytes(8)
+    file.write_bytes(b"\x89MCAP0\r\n" + header + struct.pack("<BQ", 6, len(chunk)) + chunk)
+    monkeypatch.setenv("MSGFLOW_UNPACK_LIMIT", "9MB")
+    with pytest.raises(TraceError, match="more than 9,000,000 bytes unpacked"):
+        next(read_bag(file))
+    monkeypatch.setenv("MSGFLOW_UNPACK_LIMIT", "11MB")
+    with pytest.raises(TraceError, match="cannot read as a bag"):
+        next(read_bag(file))
+
+
+@pytest.mark.parametrize("plugin", few(["SQLITE3", "MCAP"], "MCAP"))
+def test_messages_that_unpack_to_much_more_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, plugin: str
+) -> None:
+    store = typesys.get_typestore(typesys.Stores.LATEST)
+    writer = rosbag2.Writer(
+        tmp_path / "bag", version=9, storage_plugin=rosbag2.StoragePlugin[plugin]
+    )
+    writer.set_compression(rosbag2.CompressionMode.MESSAGE, rosbag2.CompressionFormat.ZSTD)
+    with writer:
+        topic = writer.add_connection("/zeros", PLAIN, typestore=store)
+        for at in range(10):
+            writer.write(topic, at, bytes(1_000_000))
+    monkeypatch.setenv("MSGFLOW_UNPACK_LIMIT", "9MB")
+    with pytest.raises(TraceError, match="more than 9,000,000 bytes unpacked"):
+        next(read_bag(tmp_path / "bag"))
+    monkeypatch.setenv("MSGFLOW_UNPACK_LIMIT", "11MB")
+    (found,) = read_bag(tmp_path / "bag")
+    assert found["size_bytes"].to_pylist() == [1_000_000] * 10
 
 
 def test_what_is_no_bag(database: Path, tmp_path: Path) -> None:

@@ -50,7 +50,9 @@ def test_each_chunk_is_found_once(finder: ChunkFinder, tmp_path: Path) -> None:
     assert finder.further() == []
     make(tmp_path / "a", 2, 4)
     make(tmp_path / "c", 7)
-    assert numbers(finder.further()) == [2, 7]
+    assert numbers(finder.further()) == [2]
+    make(tmp_path / "c", 8, 2)
+    assert numbers(finder.further()) == [7, 8]
 
 
 def test_a_session_created_anew_begins_with_number_0(finder: ChunkFinder, tmp_path: Path) -> None:
@@ -82,12 +84,17 @@ def test_what_is_no_chunk_of_the_session_is_left_out(finder: ChunkFinder, tmp_pa
     (archives / "20260314T092604+0100-20260314T092606+0100-2").symlink_to(tmp_path / "elsewhere")
     (archives / "20260314T092606+0100-20260314T092608+0100-3").touch()
     assert numbers(finder.further()) == [0, 1]
-    make(tmp_path, 4, 8)
-    assert numbers(finder.further()) == [4]
-    # A session that is created anew is later than the earlier one.
+    # There was time for so many: in years to come, or at four in a second.
+    (archives / "20990314T092604+0100-20990314T092606+0100-77").mkdir()
+    make(tmp_path, 17, 8)
+    # The next one is not earlier than the last, and a recording that is made anew goes on.
     make(tmp_path, 2, 1)
-    make(tmp_path, 5, 10)
-    assert numbers(finder.further()) == [5]
+    make(tmp_path, 0, 20)
+    assert numbers(finder.further()) == []
+    make(tmp_path, 2, 3)
+    assert numbers(finder.further()) == [2]
+    make(tmp_path, 3, 5)
+    assert numbers(finder.further(is_last=True)) == [3, 17, 0]
 
 
 def test_a_gap_is_believed_when_the_recording_goes_on_behind_it(
@@ -100,7 +107,7 @@ def test_a_gap_is_believed_when_the_recording_goes_on_behind_it(
     assert numbers(finder.further()) == []
     make(tmp_path, 8, 2)
     make(tmp_path, 9, 4)
-    assert numbers(finder.further()) == [8, 9]
+    assert numbers(finder.further()) == [7, 8, 9]
 
 
 def test_a_directory_that_is_replaced(finder: ChunkFinder, tmp_path: Path) -> None:
@@ -129,7 +136,7 @@ def test_old_recordings_are_searched_seldom(
     make(tmp_path, 0)
     for _ in range(5):
         finder.further()
-    make(tmp_path, 1)
+    make(tmp_path, 1, 2)
     assert numbers(finder.further()) == [1]
     assert searches == 1
 

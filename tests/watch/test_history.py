@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from msgflow.run.window import Window
+from msgflow.watch import history as history_module
 from msgflow.watch.history import History
 from msgflow.watch.kept_chunk import KeptChunk
 
@@ -163,3 +164,21 @@ def test_a_host_whose_clock_errs_leaves_nothing_behind(ahead: int) -> None:
     # The last host is never left out.
     history.leave_out(ROBOT)
     assert history.newest_ns == 101_000
+
+
+def test_a_step_of_many_events_is_a_window_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(history_module, "_MOST_EVENTS", 25)
+    history = filled(250, 600)
+    # Before the first window, `skip_old` bounds it.
+    assert not history.is_full(600)
+    history = filled(250)
+    assert closed(history) == Window(0, 100)
+    history.add(chunk(250, 400))
+    assert not history.is_full(400)
+    history.add(chunk(400, 550))
+    assert history.is_full(550)
+    # Of another source, less is known.
+    assert not history.is_full(450)
+    assert closed(history) == Window(100, 400)
+    history.add(chunk(550, 700))
+    assert not history.is_full(700)

@@ -21,6 +21,7 @@ from msgflow.errors import TraceError
 from msgflow.links import LinksFile, read_links
 from msgflow.watch import Watcher, WindowReport, finished_chunks, watch_finished, watch_live
 from msgflow.watch import chunk as chunk_module
+from msgflow.watch import history as history_module
 from msgflow.watch.arrivals import Arrivals
 from msgflow.watch.learned_answers import LearnedAnswers
 from msgflow_sim import (
@@ -153,7 +154,7 @@ def test_a_damaged_and_a_missing_chunk_are_said(simulated: Path, tmp_path: Path)
     notes: list[str] = []
     found = reports(directory, window=9, step=9, notes=notes)
     assert any(
-        "chunks are missing before number 3 of" in note and note.endswith(": 1") for note in notes
+        "chunks are missing before number 2 of" in note and note.endswith(": 1") for note in notes
     )
     assert any("a chunk cannot be read" in note for note in notes)
     assert sum(row["roots"] for report in found for row in report.paths) > 0
@@ -320,7 +321,7 @@ def test_the_only_host_that_vanishes_and_a_clock_apart_are_said_once(
     watcher = watching(notes, 0.5, 0.5)
     host = sorted(simulated.glob("*/archives"))[0]
     vanished = iter([[], [tmp_path / host.parent.name], []])
-    monkeypatch.setattr(Arrivals, "vanished", lambda self, looked_s: next(vanished, []))
+    monkeypatch.setattr(Arrivals, "vanished", lambda self, looked_s, waiting: next(vanished, []))
     monkeypatch.setattr(Arrivals, "clocks_ahead_s", lambda self: {Path("robot"): -1.2})
     looks = fed([[path] for path in sorted(host.iterdir())], tmp_path, monkeypatch)
     found = list(
@@ -350,13 +351,41 @@ def test_a_session_created_anew_is_said_and_gone_on_with(
     watcher = watching(notes, 0.5, 0.5)
     looks = fed([[first], [second], [anew[0]], [anew[1]]], tmp_path / "live", monkeypatch)
     found = list(
-        watch_live(tmp_path / "live", watcher, step_ns=SECOND, is_over=looks, note=notes.append)
+        watch_live(
+            tmp_path / "live", watcher, step_ns=100 * SECOND, is_over=looks, note=notes.append
+        )
     )
     watcher.close()
-    assert len(found) == 4
+    # The first chunk of the new one counts when its second one has come.
+    assert len(found) == 3
+    assert all(one.window.end_ns == next_.window.start_ns for one, next_ in pairwise(found))
     assert all(any(row["callbacks"] for row in report.executors) for report in found)
     (said,) = [note for note in notes if "last event" not in note]
     assert said.startswith(f"a new recording has begun in {tmp_path / 'live' / third.parts[-3]}: ")
+
+
+def test_a_backlog_is_read_step_by_step(
+    simulated: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All of one host came before all of the other: windows wait for the one that is behind."""
+    monkeypatch.setattr(history_module, "_MOST_EVENTS", 1)
+    first, second = (sorted(host.iterdir()) for host in sorted(simulated.glob("*/archives")))
+    notes: list[str] = []
+    watcher = watching(notes, 0.25, 0.25)
+    come = [[first[0], second[0]], [*first[1:], *second[1:]]]
+    looks = fed(come, tmp_path / "live", monkeypatch)
+    found = list(
+        watch_live(
+            tmp_path / "live", watcher, step_ns=10 * SECOND, is_over=looks, note=notes.append
+        )
+    )
+    watcher.close()
+    assert len(found) > 3
+    assert not any(report.late_events for report in found)
+    assert not any("no chunk comes" in note for note in notes)
+    callbacks = sum(row["callbacks"] for report in found for row in report.executors)
+    (whole,) = reports(simulated, window=9, step=9)
+    assert callbacks == sum(row["callbacks"] for row in whole.executors)
 
 
 def test_a_recording_without_chunks(tmp_path: Path) -> None:
