@@ -446,15 +446,14 @@ class Database:
         return _words_of_path(connection, name, file, part)
 
     def why(self, place: str | None = None, **part: Unpack[SliceWords]) -> Explanation:
-        """Explain why a topic is late: its slowest path, where the time goes, what to ask next.
+        """Explain why a topic is late: who is to blame, where the time goes, what to ask next.
 
-        The first path is that of the slowest flow: all other sections are about it. Each section is
-        part of a named query, with the same numbers: e2e-latency, path-breakdown, critical-path,
-        waits --by pair, and topics --measure delivery.
+        The first path is that of the worst culprit, or the slowest: all other sections are about
+        it. Each section but the verdict is part of a named query, with the same numbers:
+        e2e-latency, path-breakdown, critical-path, waits --by pair, and topics --measure delivery.
 
         Args:
-            place: topic or node where the flows end; a glob is possible. By default the end of the
-                path with the slowest flow.
+            place: topic or node where the flows end; a glob is possible. By default all ends.
             **part: what to read, see `msgflow.Slice`; one run.
 
         Raises:
@@ -469,19 +468,17 @@ class Database:
         one = self._ask(Slice(part.get("run")).one_run, "an explanation")
         times = Slice(one.run_id, part.get("start"), part.get("end"))
         found = self.findings(run=one.run_id)
-        dead_ends = [(each.subject, each.detail) for each in found if each.name == "dead_end"]
-        hanging = [
-            f"{each.subject}: {each.detail}" for each in found if each.name == "hanging_callback"
-        ]
 
         def explained(connection: duckdb.DuckDBPyConnection) -> Explanation:
             with Steps(connection) as steps:
 
                 def ask(name: str, **given: Value) -> QueryResult:
                     result = run_query(connection, load_query(name), given, times, steps=steps)
-                    return with_path_numbers(connection, result)
+                    # Only its paths have to be told apart.
+                    return with_path_numbers(connection, result) if name == "e2e-latency" else result
 
-                return explain(ask, one, place, dead_ends, hanging)
+                window = times.window([one])
+                return explain(connection, ask, one, window, place, found)
 
         return self._ask(explained)
 

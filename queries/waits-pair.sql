@@ -25,14 +25,15 @@
 -- column: is_internal BOOLEAN       The callback that waited is infrastructure of ROS
 -- brief: node, meanwhile_node, worst_ns, share, meanwhile_thread, callback, meanwhile_callback,
 --     waits, overlap_max_ns, overlap_min_ns, instances
-WITH waited AS MATERIALIZED (
-    SELECT
-        run_id, callback_instance_id, callback_id, meanwhile_callback_ids, meanwhile_ns,
-        meanwhile_certain_ns, meanwhile_thread_ns, meanwhile_instances, cpu_taken_by, cpu_taken_ns
-    FROM main.executor_wait_explained($runs)
-    WHERE start_ns >= $start_ns AND start_ns < $end_ns
-),
-pair AS (
+CREATE OR REPLACE TEMP TABLE explained_wait AS
+SELECT
+    run_id, callback_instance_id, callback_id, busy_max_ns, run_queue_ns, preempted_ns,
+    meanwhile_callback_ids, meanwhile_ns, meanwhile_certain_ns, meanwhile_thread_ns,
+    meanwhile_instances, cpu_taken_by, cpu_taken_ns
+FROM main.executor_wait_explained($runs)
+WHERE start_ns >= $start_ns AND start_ns < $end_ns;
+
+WITH pair AS (
     SELECT
         run_id,
         callback_id,
@@ -41,11 +42,11 @@ pair AS (
         unnest(meanwhile_certain_ns) AS overlap_min_ns,
         unnest(meanwhile_ns) AS overlap_max_ns,
         unnest(meanwhile_thread_ns) AS thread_max_ns
-    FROM waited
+    FROM explained_wait
 ),
 taken AS (
     SELECT run_id, callback_id, unnest(cpu_taken_by) AS name, unnest(cpu_taken_ns) AS length_ns
-    FROM waited
+    FROM explained_wait
 ),
 measured AS (
     SELECT

@@ -64,6 +64,7 @@ def robot(problems: Collection[str]) -> Scenario:
             Process("control", "robot", 1801, (_controller("stale" in problems), _motors()),
                     start_ns=480 * MILLISECOND, cpus=(1,)),
         ),
+        layout="kilted",
         overwrites=True,
     )  # fmt: skip
 

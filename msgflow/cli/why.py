@@ -29,8 +29,8 @@ _PATHS = 3
 _SHOWN = {
     "paths": ("paths", "path reached roots ambiguous median_ns p95_ns max_ns reasons"),
     "nodes": ("time by node, on {}", "node share part what median_ns max_ns"),
-    "slowest_flow": (
-        "its slowest flow",
+    "slow_flow": (
+        "one of its slow flows (95 of 100 take no longer)",
         "rank latency_ns take_id duration_ns share activity state who node what",
     ),
     "waits": (
@@ -69,7 +69,8 @@ def command(
     elif wide or form is SectionsFormat.MARKDOWN:
         lines = whole_sections(found.sections, form)
     else:
-        lines = screen_sections(_shown(found), screen_width(), is_chosen=True)
+        width = screen_width()
+        lines = [*_verdict(found, width), *screen_sections(_shown(found), width, is_chosen=True)]
     print_text("\n".join(lines), output)
     for note in [*_more(found, part, database), *found.notes]:
         print_note(note)
@@ -77,13 +78,22 @@ def command(
         print_status(f"next: {_command(step, part, database)}")
 
 
+def _verdict(found: Explanation, width: int) -> Iterator[str]:
+    """Yield the sentences, each with an empty line behind."""
+    from msgflow.text.wrapping import wrap
+
+    for sentence in found.verdict.table["sentence"].to_pylist():
+        yield from wrap(sentence, width)
+        yield ""
+
+
 def _shown(found: Explanation) -> dict[str, QueryResult]:
     path = found.paths.table["path"][0].as_py()
     number = found.paths.path_numbers.get(path)
     place = "the path" if number is None else f"path {number}"
     shown = {}
-    for name, result in found.sections.items():
-        title, columns = _SHOWN[name]
+    for name, (title, columns) in _SHOWN.items():
+        result = found.sections[name]
         title = title.format(place)
         rows = result.first(_PATHS) if name == "paths" else result
         shown[title] = rows.with_columns(columns.split())

@@ -1,7 +1,8 @@
-"""Why a topic is late: the answers of the named queries on the path of its slowest flow."""
+"""Why a topic is late: a verdict, and the answers of the named queries that it stands on."""
 
 from __future__ import annotations
 
+import re
 import shlex
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
@@ -16,14 +17,19 @@ from msgflow.text.values import format_duration
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
+    import pyarrow as pa
+
+    from msgflow.db.finding import Finding
     from msgflow.result.query_result import QueryResult
     from msgflow.run.choice import Run
+    from msgflow.run.window import Window
 
     Ask = Callable[..., QueryResult]
 
 _PIECES = 5
 _WAITS = 3
-# By what took longest in the slowest flow: the query that shows more of it, by node or by topic.
+_FINDINGS = 3
+# By what took longest in a slow flow: the query that shows more of it, by node or by topic.
 _BY_NODE = {
     "callback": ("callbacks", "--each", "--slowest", "5"),
     "executor_busy": ("waits", "--by", "instance", "--slowest", "5"),
@@ -51,20 +57,24 @@ class Explanation:
     Attributes:
         run: what was read.
         place: the topic or node at which flows end; None: wherever they end.
-        paths: rows of `e2e-latency`, the path with the slowest flow first.
+        verdict: a sentence for each culprit, the worst first; before them what is wrong with the
+            recording, or the system. `who` and `kinds` say who does what.
+        paths: rows of `e2e-latency`, first the path of the worst culprit.
         nodes: share of the time of that path by node, and what most of it was; the largest first.
-        slowest_flow: rows of `critical-path`: the longest pieces of its slowest flow, in order.
+        slow_flow: rows of `critical-path`: the longest pieces of a slow flow of it, in order, and
+            the sum of the others. Of 100 flows, 95 take no longer.
         waits: rows of `waits --by pair`: what kept the callbacks of the path waiting longest.
-        losses: rows of `topics --measure delivery` on its topics with messages not delivered.
+        losses: rows of `topics --measure delivery` on its topics with messages dropped or lost.
         steps: commands that show more, as words behind `msgflow`.
         notes: a sentence each.
     """
 
     run: Run
     place: str | None
+    verdict: QueryResult
     paths: QueryResult
     nodes: QueryResult
-    slowest_flow: QueryResult
+    slow_flow: QueryResult
     waits: QueryResult
     losses: QueryResult
     steps: tuple[tuple[str, ...], ...]
@@ -73,72 +83,142 @@ class Explanation:
     @property
     def sections(self) -> dict[str, QueryResult]:
         """The results, by the names of the attributes."""
-        names = ("paths", "nodes", "slowest_flow", "waits", "losses")
+        names = ("verdict", "paths", "nodes", "slow_flow", "waits", "losses")
         return {name: getattr(self, name) for name in names}
 
 
 def explain(
+    connection: duckdb.DuckDBPyConnection,
     ask: Ask,
     run: Run,
+    window: Window,
     place: str | None,
-    dead_ends: Sequence[tuple[str, str]],
-    hanging: Sequence[str],
+    findings: Sequence[Finding],
 ) -> Explanation:
     """Return why flows are late that end at a topic or node.
 
     Args:
-        ask: runs a named query in the run and the times that are wanted.
+        connection: on which the queries run.
+        ask: runs a named query in the run and the times that are wanted, and keeps its steps.
         run: that run.
-        place: a topic or node, or a glob; the path with the slowest flow of all when None.
-        dead_ends: nodes that publish and at which messages end, with what is said of it.
-        hanging: what is said of callbacks that never ended.
+        window: these times.
+        place: a topic or node, or a glob; wherever flows end when None.
+        findings: errors and warnings of the run.
 
     Raises:
         UsageError: there is no such place, or no flow arrives there.
     """
     ends = {} if place is None else {"to": place}
-    flow = ask("critical-path", **ends)
-    pieces = flow.table.to_pylist()
-    if not pieces:
-        raise _nothing(ask, place)
-    path = pieces[0]["path"]
-    places = path.split(" → ")
     paths = ask("e2e-latency", **ends)
-    parts = _chosen(ask("path-breakdown", **ends), lambda row: row["path"] == path)
+    if not any(row["pairs"] for row in paths.table.to_pylist()):
+        raise _nothing(ask, place)
+    parts = ask("path-breakdown", **ends)
+    waits = ask("waits-pair")
+    losses = ask("topics-delivery")
+    shown = paths.table["path"].to_pylist()
+    verdict = _verdict(
+        connection,
+        {"runs": [run.run_id], **window.bindings},
+        {"path_row": paths.table, "breakdown": parts.table, "delivery": losses.table},
+        list(_touching(findings, shown)),
+    )
+    path = _worst(verdict, paths)
+    places = path.split(" → ")
+    flow = ask("critical-path", **ends, via=places, quantile="p95")
+    pieces = flow.table.to_pylist()
+    parts = _chosen(parts, lambda row: row["path"] == path)
     callbacks = {(row["node"], row["what"]) for row in parts.table.to_pylist()}
-    shown = [path] if place is None else paths.table["path"].to_pylist()
-    ends_here = list(dict.fromkeys(_ending(dead_ends, shown)))
-    waits = _chosen(ask("waits-pair"), lambda row: (row["node"], row["callback"]) in callbacks)
+    ends_here = list(
+        dict.fromkeys(
+            _ending(
+                [(each.subject, each.detail) for each in findings if each.name == "dead_end"],
+                [path] if place is None else shown,
+            )
+        )
+    )
+    waits = _chosen(waits, lambda row: (row["node"], row["callback"]) in callbacks)
     losses = _chosen(
-        ask("topics-delivery"),
+        losses,
         lambda row: (
             (row["topic_name"] or _UNNAMED) in places
             and row["subscriber"] in places
-            and row["delivered"] < row["published"]
+            and row["dropped"] + row["lost"] > 0
         ),
     )
+    paths = _worst_first(paths, path)
     return Explanation(
         run=run,
         place=place,
-        paths=_slowest_first(paths, path),
+        verdict=replace(paths, table=verdict, header=None, notes=[], path_numbers={}),
+        paths=paths,
         nodes=_by_node(parts, path),
-        slowest_flow=_longest(flow),
+        slow_flow=_longest(flow),
         waits=waits.first(_WAITS),
         losses=losses,
         steps=tuple(dict.fromkeys(_steps(places, ends_here, pieces, losses))),
         notes=tuple(
             dict.fromkeys(
-                [
-                    *hanging,
-                    *ends_here,
-                    *_preempted(pieces),
-                    *_unexplained(pieces, waits.table.to_pylist()),
-                    *paths.notes,
-                    *flow.notes,
-                ]
+                [*ends_here, *_outlier(run, paths.table.to_pylist()[0]), *paths.notes, *flow.notes]
             )
         ),
     )
+
+
+def _touching(findings: Sequence[Finding], paths: Sequence[str]) -> Iterator[Finding]:
+    """Yield what was found of these paths, or of the recording as a whole; errors come first."""
+    steps = {step for path in paths for step in path.split(" → ")}
+    for each in findings:
+        named = set(re.findall(r"/[\w/]+", each.subject))
+        # Links that are missing are told where a path ends.
+        if each.name != "dead_end" and (not named or named & steps):
+            yield each
+
+
+def _verdict(
+    connection: duckdb.DuckDBPyConnection,
+    values: dict[str, Any],
+    tables: dict[str, pa.Table],
+    findings: Sequence[Finding],
+) -> pa.Table:
+    """Return the sentences: what was found, and who delays or loses messages."""
+    import pyarrow as pa
+
+    rows = [
+        {"name": each.name, "subject": each.subject, "sentence": f"{each.subject}: {each.detail}"}
+        for each in findings[:_FINDINGS]
+    ]
+    text = pa.schema([(name, pa.string()) for name in ("name", "subject", "sentence")])
+    tables = tables | {"found": pa.Table.from_pylist(rows, text)}
+    for name, table in tables.items():
+        connection.register(name, table)
+    try:
+        for name in ("why_callback", "suspect"):
+            internal_sql().keep(connection, name, values)
+        return internal_sql().run(connection, "verdict", values).to_arrow_table()
+    finally:
+        for name in ("why_callback", "suspect"):
+            connection.execute(f"DROP TABLE IF EXISTS temp.{name}")
+        for name in tables:
+            connection.unregister(name)
+
+
+def _worst(verdict: pa.Table, paths: QueryResult) -> str:
+    """Return the path that the worst culprit delays, else the one that is slowest as a rule."""
+    for path in verdict["path"].to_pylist():
+        if path is not None:
+            return str(path)
+    slowest = max(paths.table.to_pylist(), key=lambda row: row["p95_ns"] or 0)
+    return str(slowest["path"])
+
+
+def _outlier(run: Run, path: dict[str, Any]) -> Iterator[str]:
+    """Yield when the slowest flow of a path began, if nearly all others took far less."""
+    if path["max_ns"] > 2 * path["p95_ns"]:
+        at_s = (path["max_root_ns"] - (run.start_ns or 0)) / 1e9
+        yield (
+            f"the slowest flow took {format_duration(path['max_ns'])}, at {at_s:.3f} s: an outlier"
+            f" (msgflow flow --take {path['max_take_id']} --why)"
+        )
 
 
 def _nothing(ask: Ask, place: str | None) -> UsageError:
@@ -167,65 +247,6 @@ def _ending(dead_ends: Sequence[tuple[str, str]], paths: Sequence[str]) -> Itera
             yield detail
 
 
-def _preempted(pieces: Sequence[dict[str, Any]]) -> Iterator[str]:
-    """Yield what took the CPU, if most of the slowest flow was over while others had it."""
-    lost = [row for row in pieces if row["state"] == "preempted"]
-    latency_ns = pieces[0]["latency_ns"]
-    total_ns = sum(row["duration_ns"] for row in lost)
-    if 2 * total_ns <= latency_ns:
-        return
-    by: dict[str, int] = {}
-    for row in lost:
-        who = row["who"] or "?"
-        if row["who_priority"] is not None:
-            who += f" (priority {row['who_priority']}, taken from {row['priority']})"
-        by[who] = by.get(who, 0) + row["duration_ns"]
-    names = sorted(by, key=lambda who: -by[who])[:_WAITS]
-    yield (
-        f"for {100 * total_ns / latency_ns:.0f} % of the slowest flow another thread had the CPU: "
-        + ", ".join(f"{who} for {format_duration(by[who])}" for who in names)
-    )
-
-
-def _unexplained(
-    pieces: Sequence[dict[str, Any]], waits: Sequence[dict[str, Any]]
-) -> Iterator[str]:
-    """Yield what may explain the slowest flow, if most of it was over without a known reason.
-
-    The groups of callbacks are not in a trace: one thread may be free, and must not run them.
-    """
-    latency_ns = pieces[0]["latency_ns"]
-    undecided = [row for row in pieces if row["activity"] == "undecided"]
-    undecided_ns = sum(row["duration_ns"] for row in undecided)
-    if 2 * undecided_ns > latency_ns:
-        nodes = ", ".join(dict.fromkeys(row["node"] or "?" for row in undecided))
-        yield (
-            f"for {100 * undecided_ns / latency_ns:.0f} % of the slowest flow nothing shows whether"
-            f" the message was on its way or waited in the queue of {nodes}"
-        )
-    total_ns = sum(
-        row["duration_ns"]
-        for row in pieces
-        if row["activity"] == "network_or_idle" and row["state"] is None
-    )
-    if 2 * total_ns <= latency_ns:
-        return
-    others = [row for row in waits if row["meanwhile_callback"] and 2 * row["worst_ns"] > total_ns]
-    if others:
-        other = max(others, key=lambda row: row["worst_ns"])
-        yield (
-            f"for {100 * total_ns / latency_ns:.0f} % of the slowest flow a thread of the executor"
-            f" was free, but others ran {other['meanwhile_callback']} of {other['meanwhile_node']}"
-            f" (for up to {format_duration(other['worst_ns'])} of a wait): one callback group may"
-            " have both"
-        )
-    else:
-        yield (
-            f"for {100 * total_ns / latency_ns:.0f} % of the slowest flow the message was on its"
-            " way, or its thread had no CPU: a kernel trace shows which (msgflow record --kernel)"
-        )
-
-
 def _chosen(result: QueryResult, is_wanted: Callable[[dict[str, Any]], bool]) -> QueryResult:
     rows = result.table.to_pylist()
     return _taken(result, [place for place, row in enumerate(rows) if is_wanted(row)])
@@ -240,11 +261,11 @@ def _taken(result: QueryResult, places: Sequence[int]) -> QueryResult:
     return replace(result, table=pyarrow.concat_tables(rows))
 
 
-def _slowest_first(paths: QueryResult, first: str) -> QueryResult:
+def _worst_first(paths: QueryResult, first: str) -> QueryResult:
     rows = paths.table.to_pylist()
     places = sorted(
         range(len(rows)),
-        key=lambda place: (rows[place]["path"] != first, -(rows[place]["max_ns"] or 0)),
+        key=lambda place: (rows[place]["path"] != first, -(rows[place]["p95_ns"] or 0)),
     )
     return _taken(paths, places)
 
@@ -258,9 +279,23 @@ def _by_node(parts: QueryResult, path: str) -> QueryResult:
 
 
 def _longest(flow: QueryResult) -> QueryResult:
+    """Return the longest pieces, in order, and last the sum of the others."""
+    import pyarrow as pa
+
     rows = flow.table.to_pylist()
-    longest = sorted(range(len(rows)), key=lambda place: -rows[place]["duration_ns"])[:_PIECES]
-    return _taken(flow, sorted(longest))
+    order = sorted(range(len(rows)), key=lambda place: -rows[place]["duration_ns"])
+    kept = sorted(place for place in order[:_PIECES] if rows[place]["activity"] != "rest")
+    others = [row for place, row in enumerate(rows) if place not in kept]
+    rest = dict.fromkeys(flow.columns) | {
+        name: rows[0][name] for name in ("run_id", "rank", "take_id", "latency_ns")
+    }
+    rest |= {name: sum(row[name] or 0 for row in others) for name in ("duration_ns", "pieces")}
+    rest |= {"activity": "rest", "share": round(sum(row["share"] or 0 for row in others), 4)}
+    shown = _taken(flow, kept)
+    if not others:
+        return shown
+    last = pa.Table.from_pylist([rest], shown.table.schema)
+    return replace(shown, table=pa.concat_tables([shown.table, last]))
 
 
 def _steps(

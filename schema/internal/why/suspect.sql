@@ -1,0 +1,289 @@
+-- name: internal.suspect
+-- title: What makes data late, or lets them get lost
+-- description: Everything on the paths of an explanation that costs time or messages, whether it
+--     matters or not. The cost is by how much the data at the end of the path are older because of
+--     it: 95 % of the messages are delayed by no more. It reads what an explanation has by then.
+-- grain: one row per kind, culprit and path
+-- param: runs BIGINT[]  Runs to look at
+-- param: start_ns BIGINT  Begin of the time window, epoch ns
+-- param: end_ns BIGINT  Its end, exclusive
+-- column: kind VARCHAR  'callback', 'executor', 'cpu', 'service', 'queue', 'lost', 'late_start',
+--     'stale' or 'way'
+-- column: who VARCHAR  The culprit: a node, or a thread without ROS
+-- column: what VARCHAR  What it does: its callback, service or topic
+-- column: path VARCHAR  Path that it delays
+-- column: cost_ns BIGINT [ns]  By how much
+-- column: matters BOOLEAN  It is enough to be told
+-- column: clause VARCHAR  What is to be said of the culprit
+WITH span AS (
+    SELECT
+        run_id, least(end_ns, $end_ns) - greatest(start_ns, $start_ns) AS length_ns,
+        end_ns, run_id IN (SELECT run_id FROM main.thread_state) AS has_kernel
+    FROM main.run
+    WHERE list_contains($runs, run_id)
+),
+place AS MATERIALIZED (
+    SELECT DISTINCT
+        b.node, b.what, b.path, b.part, b.p95_ns, e.p95_ns AS path_ns,
+        s.length_ns / nullif(e.roots, 0) AS period_ns, s.has_kernel
+    FROM breakdown AS b
+    JOIN path_row AS e ON b.path = e.path AND b.run_id = e.run_id
+    JOIN span AS s ON b.run_id = s.run_id
+),
+callback AS MATERIALIZED (
+    SELECT
+        m.*,
+        p.path, p.p95_ns, p.path_ns, p.has_kernel,
+        -- A callback may take up to most of its period, or 20 ms: a controller of 50 Hz notices.
+        least(20_000_000, 0.8 * m.period_ns) AS limit_ns,
+        m.run_ns > 3 * m.usual_ns AND NOT p.has_kernel AS is_unusual
+    FROM why_callback AS m
+    JOIN place AS p ON m.node = p.node AND m.label = p.what
+    WHERE p.part IN ('callback', 'service')
+),
+computing AS (
+    SELECT
+        node, label, path, path_ns, limit_ns, is_unusual, usual_ns, run_ns,
+        greatest(least(p95_ns, computed_ns), 0) + own_ns AS cost_ns,
+        own_ns
+    FROM callback
+    UNION ALL
+    -- Callbacks that are not traced: from a take to what is published.
+    SELECT node, what, path, path_ns, 20_000_000, false, NULL, NULL, p95_ns, 0
+    FROM place
+    WHERE part = 'callback' AND (node, what) NOT IN (SELECT (node, label) FROM why_callback)
+),
+other AS (
+    SELECT
+        c.node, c.label, c.path, c.path_ns, c.limit_ns, c.has_kernel,
+        greatest(c.other_ns, c.beside_ns) AS other_ns,
+        -- The groups of callbacks are not in a trace: a thread may be free, and must not run them.
+        c.beside_ns > 2 * c.other_ns AS is_supposed,
+        o.node AS other_node, o.label AS other_label, o.callback_id
+    FROM callback AS c
+    JOIN main.callback_label AS o ON c.other_id = o.callback_id
+),
+-- How long those run that keep others waiting.
+holding AS (
+    SELECT
+        callback_id, quantile_disc(end_ns - start_ns, 0.5) AS usual_ns,
+        quantile_disc(end_ns - start_ns, 0.95) AS run_ns
+    FROM main.callback_instance
+    WHERE callback_id IN (SELECT callback_id FROM other)
+        AND start_ns >= $start_ns AND start_ns < $end_ns
+    GROUP BY callback_id
+),
+calling AS (
+    SELECT
+        c.path, c.path_ns, c.limit_ns, c.call_ns, c.node AS client, v.service_name,
+        main.node_label(n.full_name, r.name, r.pid) AS server,
+        (
+            SELECT quantile_disc(i.end_ns - i.start_ns, 0.5)
+            FROM main.callback AS k
+            JOIN main.callback_instance AS i ON k.callback_id = i.callback_id
+            WHERE k.service_id = c.service_id
+        ) AS served_ns
+    FROM callback AS c
+    JOIN main.service AS v ON c.service_id = v.service_id
+    JOIN main.process AS r ON v.process_id = r.process_id
+    LEFT JOIN main.node AS n ON v.node_id = n.node_id
+),
+-- Subscriptions with messages that failed, from the first that they took on.
+failing AS (
+    SELECT
+        d.topic_name, d.subscriber, d.subscription_id, d.dropped, d.lost, d.delivered, s.queue_depth
+    FROM delivery AS d
+    JOIN main.subscription AS s ON d.subscription_id = s.subscription_id
+    WHERE d.dropped + d.lost > 0
+),
+flowing AS (
+    SELECT
+        f.subscription_id,
+        (count(*) - 1) * 1e9 / nullif(max(b.start_ns) - min(b.start_ns), 0) AS in_hz,
+        (count(*) FILTER (WHERE d.status = 'delivered') - 1) * 1e9
+        / nullif(max(b.start_ns) - min(b.start_ns), 0) AS out_hz
+    FROM failing AS f
+    JOIN main.stat_delivery AS d ON f.subscription_id = d.subscription_id
+    JOIN main.publication AS b ON d.publication_id = b.publication_id
+    WHERE d.status IN ('delivered', 'dropped', 'lost')
+        AND b.start_ns >= $start_ns AND b.start_ns < $end_ns
+    GROUP BY f.subscription_id
+),
+failed AS (
+    SELECT
+        f.topic_name, f.subscriber, f.dropped, f.lost, f.delivered + f.dropped + f.lost AS known,
+        f.queue_depth, w.in_hz, w.out_hz, p.path, p.path_ns
+    FROM failing AS f
+    JOIN flowing AS w ON f.subscription_id = w.subscription_id
+    JOIN (SELECT DISTINCT path, path_ns FROM place) AS p
+        ON list_contains(string_split(p.path, ' → '), f.subscriber)
+        AND list_contains(string_split(p.path, ' → '), coalesce(f.topic_name, '?'))
+),
+created AS (
+    SELECT
+        n.full_name, n.created_ns, median(n.created_ns) OVER () AS usual_ns, s.end_ns
+    FROM main.node AS n
+    JOIN span AS s ON n.run_id = s.run_id
+    WHERE NOT n.is_inferred AND n.created_ns IS NOT NULL
+),
+late AS (
+    SELECT
+        c.full_name AS node, p.path, p.path_ns,
+        (c.created_ns - c.usual_ns)::BIGINT AS cost_ns,
+        d.missed, d.topic_name, d.published
+    FROM created AS c
+    JOIN (SELECT DISTINCT path, path_ns FROM place) AS p
+        ON list_contains(string_split(p.path, ' → '), c.full_name)
+    LEFT JOIN (
+        SELECT
+            subscriber, sum(published) AS published, string_agg(topic_name, ', ') AS topic_name,
+            sum(regexp_extract(reasons, 'before_subscription (\d+)', 1)::BIGINT) AS missed
+        FROM delivery
+        WHERE reasons LIKE '%before_subscription%'
+        GROUP BY subscriber
+    ) AS d
+        ON c.full_name = d.subscriber
+    -- A robot starts within seconds.
+    WHERE c.created_ns - c.usual_ns > 2_000_000_000
+),
+sampled AS (
+    SELECT
+        p.node, p.what, p.path, p.path_ns, p.p95_ns AS cost_ns, p.period_ns AS input_ns,
+        c.period_ns AS timer_ns, 'Messages' AS input, true AS is_declared
+    FROM place AS p
+    JOIN callback AS c ON p.node = c.node AND p.what = c.label AND p.path = c.path
+    WHERE p.part = 'cache'
+    UNION ALL
+    SELECT
+        n.full_name, printf('Timer(%.10g ms)', t.period_ns / 1e6), p.path, p.path_ns, t.period_ns,
+        (SELECT length_ns FROM span LIMIT 1) / d.message_count, t.period_ns, d.topic_name, false
+    FROM main.dead_end($runs) AS d
+    JOIN main.node AS n ON d.node_id = n.node_id
+    JOIN main.timer AS t ON d.timer_id = t.timer_id
+    JOIN (SELECT DISTINCT path, path_ns FROM place) AS p
+        ON p.path LIKE '% → ' || d.topic_name || ' → ' || n.full_name
+    WHERE d.is_likely
+),
+moving AS (
+    SELECT
+        p.what AS topic, p.path, p.path_ns, p.has_kernel, c.node,
+        greatest(
+            p.p95_ns - coalesce(c.cpu_ns, 0) - greatest(coalesce(c.beside_ns - c.other_ns, 0), 0), 0
+        ) AS cost_ns
+    FROM place AS p
+    LEFT JOIN callback AS c
+        ON p.path = c.path AND c.label = 'Subscription(' || p.what || ')'
+    WHERE p.part IN ('network_or_idle', 'until_arrival')
+    UNION ALL
+    -- Where no callbacks are traced.
+    SELECT what, path, path_ns, has_kernel, node, p95_ns
+    FROM place
+    WHERE part = 'undecided' AND (node, what) NOT IN (SELECT (node, label) FROM why_callback)
+)
+SELECT
+    'callback' AS kind, node AS who, label AS what, path, cost_ns,
+    cost_ns >= limit_ns AND cost_ns >= 0.1 * path_ns AS matters,
+    printf(
+        'its callback %s takes %s of %s', label, main.duration_text(cost_ns - own_ns),
+        main.duration_text(path_ns)
+    )
+    || CASE WHEN own_ns > 0.2 * cost_ns
+        THEN printf(', and further messages wait for it for %s', main.duration_text(own_ns))
+        ELSE '' END
+    || CASE WHEN is_unusual
+        THEN printf(
+            ', usually %s: it ran, or was kept from the CPU: not known without a kernel trace'
+            || ' (msgflow record --kernel)',
+            main.duration_text(usual_ns)
+        )
+        ELSE '' END AS clause
+FROM computing
+UNION ALL
+SELECT
+    'executor', o.other_node, o.other_label, o.path, o.other_ns,
+    o.other_ns >= o.limit_ns AND o.other_ns >= 0.1 * o.path_ns,
+    printf(
+        'its callback %s (%s) keeps %s of %s waiting in their executor, for %s of %s',
+        o.other_label, main.duration_text(h.run_ns), o.label, o.node,
+        main.duration_text(o.other_ns), main.duration_text(o.path_ns)
+    )
+    || CASE WHEN o.is_supposed THEN ', if one callback group has both' ELSE '' END
+    || CASE WHEN h.run_ns > 3 * h.usual_ns AND NOT o.has_kernel
+        THEN printf(
+            '; usually it takes %s: it ran, or was kept from the CPU: not known without a kernel'
+            || ' trace (msgflow record --kernel)',
+            main.duration_text(h.usual_ns)
+        )
+        ELSE '' END
+FROM other AS o
+JOIN holding AS h ON o.callback_id = h.callback_id
+UNION ALL
+SELECT
+    'cpu', coalesce(cpu_by, '?'), node, path, cpu_ns,
+    cpu_ns >= limit_ns AND cpu_ns >= 0.1 * path_ns,
+    printf(
+        'takes the CPU from %s, which waits for it for %s of %s', node,
+        main.duration_text(cpu_ns), main.duration_text(path_ns)
+    )
+FROM callback
+WHERE cpu_ns > 0
+UNION ALL
+SELECT
+    'service', server, service_name, path, call_ns,
+    call_ns >= limit_ns AND call_ns >= 0.1 * path_ns,
+    printf(
+        'its service %s keeps a callback of %s waiting for %s of %s', service_name, client,
+        main.duration_text(call_ns), main.duration_text(path_ns)
+    )
+    || coalesce(printf(' (it answers in %s)', main.duration_text(served_ns)), '')
+FROM calling
+WHERE call_ns > 0
+UNION ALL
+SELECT
+    'queue', subscriber, topic_name, path, (dropped / known * 1e9 / out_hz)::BIGINT,
+    dropped >= 3 AND dropped >= 0.02 * known,
+    printf(
+        'its queue of %s overwrote %d of %d messages on %s (%.3g Hz come in, %.3g Hz are taken)',
+        coalesce(queue_depth::VARCHAR, 'unknown depth'), dropped, known, coalesce(topic_name, '?'),
+        in_hz, out_hz
+    )
+FROM failed
+WHERE dropped > 0
+UNION ALL
+SELECT
+    'lost', subscriber, topic_name, path, (lost / known * 1e9 / in_hz)::BIGINT,
+    lost >= 3 AND lost >= 0.02 * known,
+    printf('%d of %d messages on %s were lost on the way', lost, known, coalesce(topic_name, '?'))
+FROM failed
+WHERE lost > 0
+UNION ALL
+SELECT
+    'late_start', node, topic_name, path, cost_ns, true,
+    printf('started %s after the others', main.duration_text(cost_ns))
+    || coalesce(printf(' and missed %d of %d messages on %s', missed, published, topic_name), '')
+FROM late
+UNION ALL
+SELECT
+    'stale', node, what, path, cost_ns,
+    timer_ns >= 2 * input_ns AND cost_ns >= 20_000_000,
+    printf('its %s uses what it was told before', what)
+    || CASE WHEN is_declared
+        THEN printf(': messages wait for it for %s of %s',
+            main.duration_text(cost_ns), main.duration_text(path_ns))
+        ELSE printf(': messages on %s come every %s and wait for up to %s, if it uses them'
+            || ' (msgflow suggest links)',
+            input, main.duration_text(input_ns::BIGINT), main.duration_text(cost_ns))
+    END
+FROM sampled
+UNION ALL
+SELECT
+    'way', coalesce(node, 'between nodes'), topic, path, cost_ns,
+    cost_ns >= 20_000_000 AND cost_ns >= 0.1 * path_ns,
+    CASE WHEN has_kernel
+        THEN printf('messages on %s are on the way for %s of %s', topic,
+            main.duration_text(cost_ns), main.duration_text(path_ns))
+        ELSE printf('messages on %s are on the way, or its thread has no CPU, for %s of %s: which'
+            || ' is not known without a kernel trace (msgflow record --kernel)', topic,
+            main.duration_text(cost_ns), main.duration_text(path_ns))
+    END
+FROM moving
