@@ -36,6 +36,6 @@ PAIRS = (
     ("stale", "busy"),
     ("late", "queue"),
     ("late", "stale"),
-    ("hog", "queue"),
+    ("queue", "hog"),
     ("service", "hog"),
 )

@@ -156,12 +156,14 @@ sampled AS (
     UNION ALL
     SELECT
         n.full_name, printf('Timer(%.10g ms)', t.period_ns / 1e6), p.path, p.path_ns, t.period_ns,
-        (SELECT length_ns FROM span LIMIT 1) / d.message_count, t.period_ns, d.topic_name, false
+        c.period_ns, t.period_ns, d.topic_name, false
     FROM main.dead_end($runs) AS d
     JOIN main.node AS n ON d.node_id = n.node_id
     JOIN main.timer AS t ON d.timer_id = t.timer_id
     JOIN (SELECT DISTINCT path, path_ns FROM place) AS p
-        ON p.path LIKE '% → ' || d.topic_name || ' → ' || n.full_name
+        ON ends_with(p.path, ' → ' || d.topic_name || ' → ' || n.full_name)
+    JOIN why_callback AS c
+        ON n.full_name = c.node AND c.label = 'Subscription(' || d.topic_name || ')'
     WHERE d.is_likely
 ),
 moving AS (
