@@ -20,7 +20,7 @@ from msgflow.record.session import Channel, recording_session
 from recording.tracetools import build_tracetools
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
 _NODES = Path(__file__).with_name("nodes.py")
 # Those who hear go last. Seconds.
@@ -32,6 +32,11 @@ _RESTARTED = {"restarts": "filter"}
 _LATE = {"late"}
 _UNTRACED = {"mixed": {"filter"}}
 _UNTIL_LATE = 2.0
+_ROBOT_NODES = _NODES.parents[1] / "robot" / "real.py"
+_ROBOT = (
+    "lidar", "camera", "filter", "detector", "localization", "map_server", "planner", "control",
+)  # fmt: skip
+_LATE_ROBOT = 4
 
 
 class NotPossibleError(Exception):
@@ -132,6 +137,58 @@ def record(
     rows = "".join(part.read_text() for part in sorted(parts.iterdir()))
     truth.write_text(f"{meta}\n{rows}")
     return recorded, truth
+
+
+def record_robot(python: Path, problems: Sequence[str], seconds: float, directory: Path) -> Path:
+    """Record the robot with problems from its start, with callbacks and executors of rclpy.
+
+    Args:
+        python: of the environment with rclpy.
+        problems: that are planted.
+        seconds: for how long it runs once all its processes do.
+        directory: a directory to write to.
+
+    Returns:
+        The directory of the trace.
+
+    Raises:
+        NotPossibleError: see `require`.
+        subprocess.CalledProcessError: a node failed.
+        RecordingError: LTTng failed.
+    """
+    require(python)
+    library = build_tracetools(_made(directory / "library"))
+    environment = ros_environment(python)
+    environment |= {"LD_PRELOAD": str(library), "PYTHONPATH": str(PYTHON_NODES)}
+    recorded = directory / "trace"
+    processes = [*_ROBOT, *(["hog"] if "hog" in problems else [])]
+    with session(recorded):
+        running = []
+        try:
+            # The planner is the last, as it may be late.
+            for process in sorted(processes, key="planner".__eq__):
+                if process == "planner":
+                    for one in running:
+                        _wait_until_ready(one)
+                    time.sleep(_LATE_ROBOT if "late" in problems else 0)
+                command = [str(word) for word in (python, _ROBOT_NODES, process, *problems)]
+                running.append(
+                    subprocess.Popen(
+                        command, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE
+                    )
+                )
+            _wait_until_ready(running[-1])
+            time.sleep(seconds - (_LATE_ROBOT if "late" in problems else 0))
+            for one in reversed(running):
+                assert one.stdin is not None
+                one.stdin.close()
+            for one in running:
+                if one.wait(_LONGEST):
+                    raise subprocess.CalledProcessError(one.returncode, one.args)
+        finally:
+            for one in running:
+                one.kill()
+    return recorded
 
 
 @contextlib.contextmanager

@@ -1,0 +1,180 @@
+"""One process of the robot of `simulated.py`, with nodes of rclpy.
+
+    python real.py PROCESS [PROBLEM]…
+
+It says `ready` when its nodes spin, and ends when its standard input does. Needs rclpy and no package of msgflow: another Python runs it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import random
+import sys
+import threading
+import time
+
+import rclpy
+from rcl_interfaces.srv import ListParameters
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.exceptions import InvalidHandle
+from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor
+from rclpy.node import Node
+from std_msgs.msg import UInt64
+
+PROBLEMS = sys.argv[2:]
+# Where the hog is, and what it delays.
+CPU = 0
+
+
+def work(milliseconds: float, spread: float = 0) -> None:
+    """Take so long. It costs no CPU: the machine may be a small one."""
+    time.sleep((milliseconds + spread * random.random()) / 1e3)
+
+
+class Part(Node):
+    """A node of the robot."""
+
+    def says(self, topic: str):
+        """Return what publishes to a topic."""
+        publisher = self.create_publisher(UInt64, topic, 10)
+        return lambda: publisher.publish(UInt64())
+
+    def hears(self, topic: str, callback, depth: int = 10) -> None:
+        """Call back with each message of a topic."""
+        self.create_subscription(UInt64, topic, lambda _: callback(), depth)
+
+
+def sensor(name: str, topic: str, milliseconds: int) -> list[Node]:
+    """Publish with a period."""
+    node = Part(name)
+    send = node.says(topic)
+    node.create_timer(milliseconds / 1e3, lambda: (work(1), send()))
+    return [node]
+
+
+def relay(name: str, heard: str, said: str, usual: float, spread: float = 1, depth: int = 10):
+    """Answer each message of a topic."""
+    node = Part(name)
+    send = node.says(said)
+    node.hears(heard, lambda: (work(usual, spread), send()), depth)
+    return [node]
+
+
+def filters() -> list[Node]:
+    """Take 60 ms for each scan, if planted."""
+    return relay("filter", "/scan", "/points", 60 if "slow" in PROBLEMS else 3, 5)
+
+
+def detector() -> list[Node]:
+    """Take longer for each image than until the next, with a queue of 1, if planted."""
+    if "queue" in PROBLEMS:
+        return relay("detector", "/image", "/objects", 50, 35, depth=1)
+    return relay("detector", "/image", "/objects", 7)
+
+
+def localization() -> list[Node]:
+    """Localize, beside a monitor in the same executor: 80 ms each 190 ms, if planted."""
+    monitor = Part("monitor")
+    monitor.create_timer(0.19, lambda: work(80 if "busy" in PROBLEMS else 1, 4))
+    return [*relay("localizer", "/points", "/pose", 4), monitor]
+
+
+def map_server() -> list[Node]:
+    """Answer, after 120 ms if planted."""
+    node = Part("map_server")
+
+    def answer(_, response: ListParameters.Response) -> ListParameters.Response:
+        work(120 if "service" in PROBLEMS else 1, 3)
+        return response
+
+    node.create_service(ListParameters, "/get_map", answer)
+    return [node]
+
+
+def planner() -> list[Node]:
+    """Ask the map server in the callback of each pose, if planted."""
+    node = Part("planner")
+    send = node.says("/plan")
+    client = node.create_client(
+        ListParameters, "/get_map", callback_group=MutuallyExclusiveCallbackGroup()
+    )
+
+    def plan() -> None:
+        work(3)
+        if "service" in PROBLEMS and client.service_is_ready():
+            client.call(ListParameters.Request())
+        send()
+
+    node.hears("/pose", plan)
+    return [node]
+
+
+def control() -> list[Node]:
+    """Answer each plan, or the last one each 600 ms, if planted."""
+    node = Part("controller")
+    send = node.says("/cmd")
+    if "stale" in PROBLEMS:
+        node.hears("/plan", lambda: work(1))
+        node.create_timer(0.6, lambda: (work(1), send()))
+    else:
+        node.hears("/plan", lambda: (work(1), send()))
+    motors = Part("motors")
+    motors.hears("/cmd", lambda: work(1))
+    motors.hears("/objects", lambda: None)
+    return [node, motors]
+
+
+def hog() -> None:
+    """Take a CPU for 90 ms each 220 ms, before all others."""
+    os.sched_setaffinity(0, {CPU})
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(79))
+    except PermissionError:
+        os.nice(-20)
+    while True:
+        end = time.monotonic() + 0.09
+        while time.monotonic() < end:
+            pass
+        time.sleep(0.13)
+
+
+MAKE = {
+    "lidar": lambda: sensor("lidar", "/scan", 200),
+    "camera": lambda: sensor("camera", "/image", 50),
+    "filter": filters,
+    "detector": detector,
+    "localization": localization,
+    "map_server": map_server,
+    "planner": planner,
+    "control": control,
+}
+
+
+def main() -> None:
+    """Run a process until the standard input ends."""
+    process = sys.argv[1]
+    if process == "hog":
+        threading.Thread(target=lambda: (sys.stdin.read(), os._exit(0)), daemon=True).start()
+        print("ready", flush=True)
+        hog()
+    if process == "localization" and "hog" in PROBLEMS:
+        os.sched_setaffinity(0, {CPU})
+    rclpy.init()
+    executor = MultiThreadedExecutor(2) if process == "planner" else None
+    executor = executor or rclpy.executors.SingleThreadedExecutor()
+    for node in MAKE[process]():
+        executor.add_node(node)
+    end = threading.Thread(target=lambda: (sys.stdin.read(), rclpy.shutdown()))
+    end.start()
+    print("ready", flush=True)
+    # A callback may run while ROS shuts down.
+    with contextlib.suppress(ExternalShutdownException, InvalidHandle):
+        executor.spin()
+    end.join()
+    # Threads of the middleware may still call Python while it ends.
+    os._exit(0)
+
+
+if __name__ == "__main__":
+    main()
