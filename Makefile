@@ -20,7 +20,7 @@ APT := apt_install() { \
 	$$root env DEBIAN_FRONTEND=noninteractive \
 		apt-get install -y -qq --no-install-recommends "$$@"; }
 
-.PHONY: help demo quick test test-all bench truth real fuzz mutants docs babeltrace chromium ros clean
+.PHONY: help demo quick test test-all bench truth real planted fuzz mutants docs babeltrace chromium ros clean
 
 help:
 	@echo 'make demo    read a real recording, print its end-to-end latency'
@@ -81,6 +81,9 @@ truth: $(VENV)/.simulates
 
 real: $(VENV)/.installed ros
 	$(BIN)/python benchmarks/real.py --python $(VENV)/ros/bin/python
+
+planted: $(VENV)/.simulates ros
+	$(BIN)/python benchmarks/planted.py --python $(VENV)/ros/bin/python
 
 fuzz: $(VENV)/.simulates
 	$(BIN)/python benchmarks/fuzz.py

@@ -459,28 +459,11 @@ class Database:
         Raises:
             UsageError: not exactly one run, no such place or time, or no flow arrives there.
         """
-        from msgflow.query.catalogue import load_query
-        from msgflow.query.path_numbers import with_path_numbers
-        from msgflow.query.runner import run_query
-        from msgflow.query.steps import Steps
         from msgflow.query.why import explain
 
         one = self._ask(Slice(part.get("run")).one_run, "an explanation")
         times = Slice(one.run_id, part.get("start"), part.get("end"))
-        found = self.findings(run=one.run_id)
-
-        def explained(connection: duckdb.DuckDBPyConnection) -> Explanation:
-            with Steps(connection) as steps:
-
-                def ask(name: str, **given: Value) -> QueryResult:
-                    result = run_query(connection, load_query(name), given, times, steps=steps)
-                    # Only its paths have to be told apart.
-                    return with_path_numbers(connection, result) if name == "e2e-latency" else result
-
-                window = times.window([one])
-                return explain(connection, ask, one, window, place, found)
-
-        return self._ask(explained)
+        return self._ask(explain, one, times, place)
 
     def flow(
         self,

@@ -165,20 +165,21 @@ def record_robot(python: Path, problems: Sequence[str], seconds: float, director
     with session(recorded):
         running = []
         try:
-            # The planner is the last, as it may be late.
             for process in sorted(processes, key="planner".__eq__):
-                if process == "planner":
+                if process == "planner" and "late" in problems:
                     for one in running:
                         _wait_until_ready(one)
-                    time.sleep(_LATE_ROBOT if "late" in problems else 0)
+                    time.sleep(_LATE_ROBOT)
                 command = [str(word) for word in (python, _ROBOT_NODES, process, *problems)]
                 running.append(
                     subprocess.Popen(
                         command, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE
                     )
                 )
-            _wait_until_ready(running[-1])
-            time.sleep(seconds - (_LATE_ROBOT if "late" in problems else 0))
+            is_late = "late" in problems
+            for one in running[-1:] if is_late else running:
+                _wait_until_ready(one)
+            time.sleep(seconds - (_LATE_ROBOT if is_late else 0))
             for one in reversed(running):
                 assert one.stdin is not None
                 one.stdin.close()

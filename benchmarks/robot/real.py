@@ -2,7 +2,8 @@
 
     python real.py PROCESS [PROBLEM]…
 
-It says `ready` when its nodes spin, and ends when its standard input does. Needs rclpy and no package of msgflow: another Python runs it.
+It says `ready` when its nodes spin, and ends when its standard input does. Needs rclpy and no
+package of msgflow: another Python runs it.
 """
 
 from __future__ import annotations

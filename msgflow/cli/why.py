@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from msgflow.result.query_result import QueryResult
 
 _PATHS = 3
+_CULPRITS = 3
 # Titles, and the columns that answer the question.
 _SHOWN = {
     "paths": ("paths", "path reached roots ambiguous median_ns p95_ns max_ns reasons"),
@@ -79,10 +80,16 @@ def command(
 
 
 def _verdict(found: Explanation, width: int) -> Iterator[str]:
-    """Yield the sentences, each with an empty line behind."""
+    """Yield the worst sentences, each with an empty line behind, and who else is to blame."""
     from msgflow.text.wrapping import wrap
 
-    for sentence in found.verdict.table["sentence"].to_pylist():
+    rows = found.verdict.table.to_pylist()
+    # What was found of the recording costs nothing, and comes first.
+    shown = sum(row["cost_ns"] is None for row in rows) + _CULPRITS
+    sentences = [row["sentence"] for row in rows[:shown]]
+    if less := [row["who"] for row in rows[shown:]]:
+        sentences.append(f"less: {', '.join(less)} (--wide)")
+    for sentence in sentences:
         yield from wrap(sentence, width)
         yield ""
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import shlex
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
@@ -11,6 +10,10 @@ from typing import TYPE_CHECKING, Any
 import duckdb
 
 from msgflow.errors import UsageError
+from msgflow.query.catalogue import load_query
+from msgflow.query.path_numbers import with_path_numbers
+from msgflow.query.runner import run_query
+from msgflow.query.steps import Steps
 from msgflow.sql.statement import internal_sql
 from msgflow.text.values import format_duration
 
@@ -19,16 +22,15 @@ if TYPE_CHECKING:
 
     import pyarrow as pa
 
-    from msgflow.db.finding import Finding
     from msgflow.result.query_result import QueryResult
     from msgflow.run.choice import Run
-    from msgflow.run.window import Window
+    from msgflow.run.slice import Slice
+    from msgflow.sql.value import Value
 
     Ask = Callable[..., QueryResult]
 
 _PIECES = 5
 _WAITS = 3
-_FINDINGS = 3
 # By what took longest in a slow flow: the query that shows more of it, by node or by topic.
 _BY_NODE = {
     "callback": ("callbacks", "--each", "--slowest", "5"),
@@ -43,6 +45,14 @@ _BY_NODE = {
 _BY_STATE = {"preempted": "preemption", "runnable": "wakeup"}
 _BY_TOPIC = dict.fromkeys(("network_or_idle", "undecided"), ("topics", "--measure", "latency"))
 _LINKS = ("suggest", "links")
+_DEAD_ENDS = (
+    "SELECT subject, detail FROM main.finding WHERE name = 'dead_end' AND list_contains(?, run_id)"
+)
+# How to know what a sentence says is not known.
+_UNKNOWN = {
+    "not known without a kernel trace": "msgflow record --kernel shows what had the CPU",
+    "not known without its callbacks": "msgflow record -- COMMAND traces callbacks of Python nodes",
+}
 # What a path has in place of a topic without a name.
 _UNNAMED = "?"
 _NO_NAMES = (None, _UNNAMED)
@@ -89,25 +99,39 @@ class Explanation:
 
 def explain(
     connection: duckdb.DuckDBPyConnection,
-    ask: Ask,
     run: Run,
-    window: Window,
-    place: str | None,
-    findings: Sequence[Finding],
+    times: Slice,
+    place: str | None = None,
 ) -> Explanation:
     """Return why flows are late that end at a topic or node.
 
     Args:
         connection: on which the queries run.
-        ask: runs a named query in the run and the times that are wanted, and keeps its steps.
-        run: that run.
-        window: these times.
+        run: what is read.
+        times: the same run, and the times that are wanted.
         place: a topic or node, or a glob; wherever flows end when None.
-        findings: errors and warnings of the run.
 
     Raises:
         UsageError: there is no such place, or no flow arrives there.
     """
+    with Steps(connection) as steps:
+
+        def ask(name: str, **given: Value) -> QueryResult:
+            result = run_query(connection, load_query(name), given, times, steps=steps)
+            # Only its paths have to be told apart.
+            return with_path_numbers(connection, result) if name == "e2e-latency" else result
+
+        values = {"runs": [run.run_id], **times.window([run]).bindings}
+        return _explained(connection, ask, run, values, place)
+
+
+def _explained(
+    connection: duckdb.DuckDBPyConnection,
+    ask: Ask,
+    run: Run,
+    values: dict[str, Any],
+    place: str | None,
+) -> Explanation:
     ends = {} if place is None else {"to": place}
     paths = ask("e2e-latency", **ends)
     if not any(row["pairs"] for row in paths.table.to_pylist()):
@@ -118,9 +142,8 @@ def explain(
     shown = paths.table["path"].to_pylist()
     verdict = _verdict(
         connection,
-        {"runs": [run.run_id], **window.bindings},
+        values,
         {"path_row": paths.table, "breakdown": parts.table, "delivery": losses.table},
-        list(_touching(findings, shown)),
     )
     path = _worst(verdict, paths)
     places = path.split(" → ")
@@ -131,7 +154,7 @@ def explain(
     ends_here = list(
         dict.fromkeys(
             _ending(
-                [(each.subject, each.detail) for each in findings if each.name == "dead_end"],
+                connection.execute(_DEAD_ENDS, [values["runs"]]).fetchall(),
                 [path] if place is None else shown,
             )
         )
@@ -158,37 +181,24 @@ def explain(
         steps=tuple(dict.fromkeys(_steps(places, ends_here, pieces, losses))),
         notes=tuple(
             dict.fromkeys(
-                [*ends_here, *_outlier(run, paths.table.to_pylist()[0]), *paths.notes, *flow.notes]
+                [
+                    *_cures(verdict),
+                    *ends_here,
+                    *_outlier(run, paths.table.to_pylist()[0]),
+                    *paths.notes,
+                    *flow.notes,
+                ]
             )
         ),
     )
-
-
-def _touching(findings: Sequence[Finding], paths: Sequence[str]) -> Iterator[Finding]:
-    """Yield what was found of these paths, or of the recording as a whole; errors come first."""
-    steps = {step for path in paths for step in path.split(" → ")}
-    for each in findings:
-        named = set(re.findall(r"/[\w/]+", each.subject))
-        # Links that are missing are told where a path ends.
-        if each.name != "dead_end" and (not named or named & steps):
-            yield each
 
 
 def _verdict(
     connection: duckdb.DuckDBPyConnection,
     values: dict[str, Any],
     tables: dict[str, pa.Table],
-    findings: Sequence[Finding],
 ) -> pa.Table:
     """Return the sentences: what was found, and who delays or loses messages."""
-    import pyarrow as pa
-
-    rows = [
-        {"name": each.name, "subject": each.subject, "sentence": f"{each.subject}: {each.detail}"}
-        for each in findings[:_FINDINGS]
-    ]
-    text = pa.schema([(name, pa.string()) for name in ("name", "subject", "sentence")])
-    tables = tables | {"found": pa.Table.from_pylist(rows, text)}
     for name, table in tables.items():
         connection.register(name, table)
     try:
@@ -209,6 +219,14 @@ def _worst(verdict: pa.Table, paths: QueryResult) -> str:
             return str(path)
     slowest = max(paths.table.to_pylist(), key=lambda row: row["p95_ns"] or 0)
     return str(slowest["path"])
+
+
+def _cures(verdict: pa.Table) -> Iterator[str]:
+    """Yield how to know what the sentences say is not known."""
+    said = " ".join(verdict["sentence"].to_pylist())
+    for unknown, cure in _UNKNOWN.items():
+        if unknown in said:
+            yield cure
 
 
 def _outlier(run: Run, path: dict[str, Any]) -> Iterator[str]:

@@ -31,6 +31,7 @@ from msgflow.view.summary import (
     area_section,
     blame_section,
     query_section,
+    why_section,
 )
 from msgflow.view.table_encoding import encode
 
@@ -214,10 +215,12 @@ class Pages:
         through: str = "",
         params: Params | None = None,
     ) -> Section:
-        """Return a section of the summary: 'paths', 'blame', 'drops' or 'threads'."""
+        """Return a section of the summary: 'why', 'paths', 'blame', 'drops' or 'threads'."""
         if name not in SUMMARY:
             raise UsageError(f"the summary has no such section — {name}")
         part = self.part(extent, params or {})
+        if name == "why":
+            return why_section(connection, extent.run, part)
         if name != "blame":
             return query_section(connection, extent.run, part, name, through)
         self.fill_flows(connection, extent)
@@ -389,7 +392,7 @@ ANSWERS: dict[str, Callable[[Pages, duckdb.DuckDBPyConnection, Params], bytes]] 
 """Methods of the answers that are no plain page query, by name."""
 
 # Sections of the summary that need nothing but the run.
-SUMMARY = ("paths", "blame", "drops", "threads")
+SUMMARY = ("why", "paths", "blame", "drops", "threads")
 _PLAIN = (
     "row", "gap", "path", "executor_share", "executor_node", "neighbour", "rate", "callback",
     "callback_point", "callback_slowest", "topic_point", "topic_slowest", "service_point",

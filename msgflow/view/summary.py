@@ -17,6 +17,7 @@ from msgflow.files.default_files import DEFAULT_PATHS
 from msgflow.query.catalogue import load_query
 from msgflow.query.runner import run_query
 from msgflow.query.selection import Selection
+from msgflow.query.why import explain
 from msgflow.result.query_result import QueryResult
 from msgflow.sql.quoting import literal
 
@@ -51,6 +52,7 @@ _AREA = {
     "usage": ("executor-usage", "callback_ns:desc"),
 }
 _TITLES = {
+    "why": "What makes data late, or lets them get lost",
     "callbacks": "Callbacks that began in it",
     "usage": "What threads did in it",
     "paths": "Slowest paths",
@@ -61,6 +63,7 @@ _TITLES = {
     "change": "What changed",
 }
 _COLUMNS = {
+    "why": ("sentence",),
     "callbacks": ("node", "callback", "count", "total_ns", "median_ns", "max_ns"),
     "usage": ("nodes", "tid", "callback_share", "callback_ns", "take_ns", "select_ns", "wait_ns",
               "blocked_ns", "unknown_ns"),
@@ -74,6 +77,7 @@ _COLUMNS = {
                "max_percent"),
 }  # fmt: skip
 _WHEN_EMPTY = {
+    "why": "No flow reached the end of a path.",
     "callbacks": "No callback of these nodes began in it.",
     "usage": "Nothing is known of these threads in it.",
     "paths": "No flow reached the end of a path.",
@@ -90,7 +94,7 @@ class Section:
     """A part of the summary.
 
     Attributes:
-        name: 'paths', 'blame', 'drops', 'threads', 'verdicts' or 'change'; of a part of the
+        name: 'why', 'paths', 'blame', 'drops', 'threads', 'verdicts' or 'change'; of a part of the
             timeline 'callbacks' or 'usage'.
         result: its rows.
         commands: print the same numbers.
@@ -145,6 +149,16 @@ def query_section(
     words += ["--sort", *selection.sort, "--limit", str(selection.limit)]
     command = shlex.join([*words, *part.options, "--run", run.name])
     return Section(name, result, (command,))
+
+
+def why_section(connection: duckdb.DuckDBPyConnection, run: Run, part: Part) -> Section:
+    """Return the verdict of `msgflow why`: a sentence for each culprit, the worst first."""
+    command = shlex.join(["msgflow", "why", *part.options, "--run", run.name])
+    try:
+        return Section("why", explain(connection, run, part.slice).verdict, (command,))
+    # No flow arrives.
+    except UsageError:
+        return Section("why", QueryResult(pa.table({"sentence": pa.array([], pa.string())})), ())
 
 
 def area_section(

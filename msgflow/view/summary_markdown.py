@@ -29,8 +29,8 @@ def markdown(
     sections: Sequence[Section],
 ) -> str:
     """Return the summary."""
-    before = [section for section in sections if section.name in ("verdicts", "change")]
-    after = [section for section in sections if section.name not in ("verdicts", "change")]
+    before = [section for section in sections if section.name in ("verdicts", "change", "why")]
+    after = [section for section in sections if section.name not in ("verdicts", "change", "why")]
     lines = [f"# {code(format_cell(run.name))}", "", ", ".join(facts), ""]
     lines += [line for note in notes for line in (code(note), "")]
     for section in before:
@@ -49,7 +49,8 @@ def _section(section: Section) -> Iterator[str]:
         reading = code(section.reading) if section.name == "change" else f"{section.reading}."
         yield from (reading, "")
     if len(section.result):
-        yield from _flows(section) if section.name == "blame" else _table(section)
+        lines = {"blame": _flows, "why": _sentences}.get(section.name, _table)
+        yield from lines(section)
     elif not section.reading:
         yield from (section.when_empty, "")
     if section.commands:
@@ -68,6 +69,12 @@ def _table(section: Section) -> Iterator[str]:
             text if is_right or text == format_cell(None) else code(text)
             for text, is_right in zip(row, right, strict=True)
         )
+    yield ""
+
+
+def _sentences(section: Section) -> Iterator[str]:
+    for sentence in section.result.table["sentence"].to_pylist():
+        yield f"- {code(sentence)}"
     yield ""
 
 

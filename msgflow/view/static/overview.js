@@ -5,7 +5,7 @@ import { address } from "./address.js";
 import { count, duration, PATH_HELP, pathText, wallClock } from "./labels.js";
 import { besides, dataTable } from "./table.js";
 import { command, doubt, doubtHelp, failed, notes, waiting } from "./notice.js";
-import { blame, summary, withoutRepeated } from "./summary.js";
+import { blame, summary, verdict, withoutRepeated } from "./summary.js";
 
 export class OverviewPage {
   constructor(app, root) {
@@ -34,6 +34,7 @@ export class OverviewPage {
     )
       .map((part) => ({ part, ...section(part === "verdicts" ? "Requirements" : "What changed") }));
     const next = h("p", { className: "command" });
+    const why = section("What makes data late, or lets them get lost");
     const wrong = section("What is wrong with it");
     const slow = section("The slowest paths");
     const nodes = section("Where the time of the slowest flows went");
@@ -45,6 +46,7 @@ export class OverviewPage {
       root,
       places,
       given.map((one) => one.root),
+      why.root,
       wrong.root,
       slow.root,
       nodes.root,
@@ -213,10 +215,10 @@ export class OverviewPage {
       }),
     ];
     // The page stands without what takes longest.
-    this.complete = fill(
-      nodes,
-      async () => blame(await app.inWindow("summary", { part: "blame" })),
-    );
+    this.complete = Promise.all([
+      fill(why, async () => verdict(await app.inWindow("summary", { part: "why" }))),
+      fill(nodes, async () => blame(await app.inWindow("summary", { part: "blame" }))),
+    ]);
     await Promise.all([hosts, findings, paths, ...others]);
   }
 

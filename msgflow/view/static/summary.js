@@ -26,6 +26,17 @@ export function summary(table, options = {}) {
   ];
 }
 
+// A sentence for each culprit, the worst first.
+export function verdict(table) {
+  return [
+    table.rows
+      ? Array.from(table.sentence, (sentence) => h("p", {}, breakable(sentence)))
+      : h("p", {}, table.meta.when_empty),
+    notes(table.meta.notes),
+    table.meta.commands.map(command),
+  ];
+}
+
 // Of each flow how long each of its nodes took: a bar of nodes, and their names.
 export function blame(table) {
   const flows = new Map();

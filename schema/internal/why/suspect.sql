@@ -18,7 +18,7 @@
 WITH span AS (
     SELECT
         run_id, least(end_ns, $end_ns) - greatest(start_ns, $start_ns) AS length_ns,
-        end_ns, run_id IN (SELECT run_id FROM main.thread_state) AS has_kernel
+        run_id IN (SELECT run_id FROM main.thread_state) AS has_kernel
     FROM main.run
     WHERE list_contains($runs, run_id)
 ),
@@ -121,7 +121,7 @@ failed AS (
 ),
 created AS (
     SELECT
-        n.full_name, n.created_ns, median(n.created_ns) OVER () AS usual_ns, s.end_ns
+        n.full_name, n.created_ns, median(n.created_ns) OVER () AS usual_ns, s.length_ns
     FROM main.node AS n
     JOIN span AS s ON n.run_id = s.run_id
     WHERE NOT n.is_inferred AND n.created_ns IS NOT NULL
@@ -143,8 +143,8 @@ late AS (
         GROUP BY subscriber
     ) AS d
         ON c.full_name = d.subscriber
-    -- A robot starts within seconds.
-    WHERE c.created_ns - c.usual_ns > 2_000_000_000
+    -- A robot starts within seconds; of a long recording a short begin does not matter.
+    WHERE c.created_ns - c.usual_ns > greatest(2_000_000_000, 0.02 * c.length_ns)
 ),
 sampled AS (
     SELECT
@@ -168,7 +168,7 @@ sampled AS (
 ),
 moving AS (
     SELECT
-        p.what AS topic, p.path, p.path_ns, p.has_kernel, c.node,
+        p.what AS topic, p.path, p.path_ns, p.has_kernel, true AS is_traced, c.node,
         greatest(
             p.p95_ns - coalesce(c.cpu_ns, 0) - greatest(coalesce(c.beside_ns - c.other_ns, 0), 0), 0
         ) AS cost_ns
@@ -178,7 +178,7 @@ moving AS (
     WHERE p.part IN ('network_or_idle', 'until_arrival')
     UNION ALL
     -- Where no callbacks are traced.
-    SELECT what, path, path_ns, has_kernel, node, p95_ns
+    SELECT what, path, path_ns, has_kernel, false, node, p95_ns
     FROM place
     WHERE part = 'undecided' AND (node, what) NOT IN (SELECT (node, label) FROM why_callback)
 )
@@ -194,8 +194,7 @@ SELECT
         ELSE '' END
     || CASE WHEN is_unusual
         THEN printf(
-            ', usually %s: it ran, or was kept from the CPU: not known without a kernel trace'
-            || ' (msgflow record --kernel)',
+            ', usually %s: it ran, or was kept from the CPU (not known without a kernel trace)',
             main.duration_text(usual_ns)
         )
         ELSE '' END AS clause
@@ -212,8 +211,8 @@ SELECT
     || CASE WHEN o.is_supposed THEN ', if one callback group has both' ELSE '' END
     || CASE WHEN h.run_ns > 3 * h.usual_ns AND NOT o.has_kernel
         THEN printf(
-            '; usually it takes %s: it ran, or was kept from the CPU: not known without a kernel'
-            || ' trace (msgflow record --kernel)',
+            '; usually it takes %s: it ran, or was kept from the CPU (not known without a kernel'
+            || ' trace)',
             main.duration_text(h.usual_ns)
         )
         ELSE '' END
@@ -281,11 +280,15 @@ UNION ALL
 SELECT
     'way', coalesce(node, 'between nodes'), topic, path, cost_ns,
     cost_ns >= 20_000_000 AND cost_ns >= 0.1 * path_ns,
-    CASE WHEN has_kernel
-        THEN printf('messages on %s are on the way for %s of %s', topic,
-            main.duration_text(cost_ns), main.duration_text(path_ns))
-        ELSE printf('messages on %s are on the way, or its thread has no CPU, for %s of %s: which'
-            || ' is not known without a kernel trace (msgflow record --kernel)', topic,
-            main.duration_text(cost_ns), main.duration_text(path_ns))
-    END
+    printf(
+        CASE
+            WHEN NOT is_traced
+                THEN 'messages on %s are on the way, or wait in its queue, for %s of %s (not known'
+                || ' without its callbacks)'
+            WHEN has_kernel THEN 'messages on %s are on the way for %s of %s'
+            ELSE 'messages on %s are on the way, or its thread has no CPU, for %s of %s (not known'
+                || ' without a kernel trace)'
+        END,
+        topic, main.duration_text(cost_ns), main.duration_text(path_ns)
+    )
 FROM moving

@@ -4,6 +4,7 @@
 --     recording or the system as a whole comes first, then what delays data, or loses them. If
 --     nothing stands out, one row says what takes most of the slowest path.
 -- grain: one row per culprit
+-- param: runs BIGINT[]  Runs to look at
 -- column: who VARCHAR  The culprit: a node, or a thread without ROS; of the recording what a
 --     finding is about; NULL: nothing stands out
 -- column: kinds VARCHAR[]  What it does, the worst first: 'callback', 'executor', 'cpu',
@@ -12,7 +13,42 @@
 --     NULL: of findings
 -- column: path VARCHAR [path]  Path that it delays most
 -- column: sentence VARCHAR  The sentence
-WITH chosen AS (
+WITH step AS (
+    SELECT DISTINCT unnest(string_split(path, ' → ')) AS name FROM path_row
+),
+known AS (
+    SELECT full_name AS name FROM main.node WHERE list_contains($runs, run_id)
+    UNION ALL
+    SELECT topic_name FROM main.subscription WHERE list_contains($runs, run_id)
+),
+-- Of these paths, or of the recording as a whole.
+touching AS (
+    SELECT
+        f.name, f.subject, f.detail,
+        row_number() OVER (ORDER BY f.severity, f.name, f.subject, f.detail) AS place
+    FROM (SELECT *, regexp_extract_all(subject, '/[\w/]+') AS names FROM main.finding) AS f
+    WHERE list_contains($runs, f.run_id)
+        AND f.severity IN ('error', 'warning')
+        -- The verdict has sentences of its own for these, or they delay nothing by themselves.
+        AND f.name NOT IN ('dead_end', 'executor_preempted', 'busy_waiting')
+        AND (
+            list_has_any(f.names, (SELECT list(name) FROM step))
+            OR NOT list_has_any(f.names, (SELECT list(name) FROM known))
+        )
+),
+found AS (
+    SELECT
+        min(place) AS place, name, arg_min(subject, place) AS subject,
+        printf('%s: %s', arg_min(subject, place), arg_min(detail, place))
+        || CASE WHEN count(*) > 1
+            THEN printf('; %d more like this (msgflow check)', count(*) - 1)
+            ELSE '' END AS sentence
+    FROM touching
+    GROUP BY name
+    ORDER BY place
+    LIMIT 3
+),
+chosen AS (
     SELECT
         kind, who, what, arg_max(path, cost_ns) AS path, max(cost_ns) AS cost_ns,
         arg_max(clause, cost_ns) AS clause
@@ -40,16 +76,16 @@ slowest AS (
 ),
 said AS (
     SELECT
-        row_number() OVER () AS place, subject AS who, [name] AS kinds, NULL::BIGINT AS cost_ns,
+        place, subject AS who, [name] AS kinds, NULL::BIGINT AS cost_ns,
         NULL::VARCHAR AS path, sentence
     FROM found
     UNION ALL
     SELECT
-        1000 + row_number() OVER (ORDER BY cost_ns DESC, who), who, kinds, cost_ns, path, sentence
+        1e6 + row_number() OVER (ORDER BY cost_ns DESC, who), who, kinds, cost_ns, path, sentence
     FROM told
     UNION ALL
     SELECT
-        1000, NULL, [], NULL, s.path,
+        1e6, NULL, [], NULL, s.path,
         printf(
             'nothing stands out: the slowest path takes %s, most of it %s of %s, %s',
             main.duration_text(s.p95_ns), b.what, b.node, main.duration_text(b.p95_ns)
