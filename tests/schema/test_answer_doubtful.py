@@ -452,6 +452,17 @@ def test_answers_of_one_node_to_messages_of_another() -> None:
     assert process.doubtful_publishers() == {ANSWER: 0, TICK: 1}
 
 
+@pytest.mark.parametrize(("foreign", "is_doubtful"), [(10, False), (11, True)])
+def test_what_often_follows_messages_to_another_node_answers_none(
+    foreign: int, is_doubtful: bool
+) -> None:
+    takes = [(50.0 * number + number % 7, 2 if number <= foreign else 1, 1)
+             for number in range(1, 101)]  # fmt: skip
+    process = Process(takes, [(at + 1, TICK, 1) for at, _, _ in takes], foreign=[2])
+    doubted = takes if is_doubtful else takes[:foreign]
+    assert process.doubtful() == [(TICK, at + 1) for at, _, _ in doubted]
+
+
 @pytest.mark.parametrize(("more", "is_doubtful"), [(10, False), (11, True)])
 def test_another_number_per_message(more: int, is_doubtful: bool) -> None:
     """After more than a tenth of the messages; if it is less, only what comes beyond."""

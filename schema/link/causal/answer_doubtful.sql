@@ -10,7 +10,7 @@
 --     doubtful if its process has timers, or if it or a subscription is older than the recording,
 --     since a timer may then be older as well. Of a publisher that answers, what it publishes
 --     beyond the usual number per message is doubtful. So is what one node publishes after a
---     message to another.
+--     message to another; of a publisher that does so more than now and then, all is.
 -- grain: one row per publication that is not surely an answer
 -- param: only_run BIGINT  Run to look at
 -- param: links VARCHAR  Name of the rows of derive.link_causal_take_adjacent
@@ -106,7 +106,7 @@ doubtful AS (
     FROM follower AS f
     JOIN rhythm AS r ON f.publisher_id = r.publisher_id
     GROUP BY f.publisher_id, f.process_id, r.spread_ns, r.has_own_clock
-    HAVING CASE
+    HAVING count_if(f.is_between_nodes) > 0.1 * count(*) OR CASE
         WHEN count(DISTINCT f.take_id) < 5
             THEN bool_or(f.is_old)
                 OR f.process_id IN (SELECT process_id FROM store.timer WHERE run_id = only_run)
