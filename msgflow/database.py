@@ -696,22 +696,26 @@ class Database:
         """Return the text of a file of requirements that a run meets, to review and change.
 
         Args:
-            run, start: what to read, see `msgflow.Slice`; one run.
+            run, start: what to read, see `msgflow.Slice`; one run. Without a start, a warm-up of
+                the run is left out, which the file says.
             margin: how much more than measured is allowed, as a share.
 
         Raises:
             UsageError: no such run, or a margin below 0.
         """
+        from msgflow.query.compare import warm_up
         from msgflow.verify.suggested_targets import QUERIES, suggest_targets
 
         if not margin >= 0:
             raise UsageError(f"a margin is 0 or more — {margin}", "0.2 allows a fifth more")
         one = self._ask(Slice(run).one_run, "a file of requirements")
+        skipped = self._ask(warm_up, one) if start is None else 0.0
+        start = f"{skipped:g}s" if skipped else start
         results = {
             name: self.query(name, run=one.run_id, start=start).to_arrow().to_pylist()
             for name in QUERIES
         }
-        return suggest_targets(one, results, margin)
+        return suggest_targets(one, results, margin, skipped)
 
     def report(
         self,

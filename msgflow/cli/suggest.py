@@ -142,7 +142,9 @@ def targets(
     for line in text.splitlines()[1:]:
         if line.startswith("# "):
             print_note(line.removeprefix("# "))
-    if output is None:
+    if text.endswith("targets: []"):
+        print_note("nothing was measured often enough to suggest a requirement for it")
+    elif output is None:
         print_next([*_SUGGEST, "targets", "-o", _TARGETS], database, run)
     else:
         # Another run is what they are for.

@@ -194,9 +194,7 @@ def ingest(
                         interrupts=interrupts,
                         progress=watch.reading,
                     )
-                    unread = load_samples(
-                        con, beside, workspace=directory, interrupts=interrupts
-                    )
+                    unread = load_samples(con, beside, workspace=directory, interrupts=interrupts)
                 refusals.require_ros_events(traces.traces, loaded.event_counts, traces.damages)
                 names = (name, fallback_name(paths))
                 event_count = sum(loaded.event_counts.values())

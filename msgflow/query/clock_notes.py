@@ -61,7 +61,9 @@ def untraced_notes(
     if "path" not in table.column_names:
         return []
     paths = [path for path in table["path"].unique().to_pylist() if path is not None]
-    begins = internal_sql().run(connection, "untraced_begin", {"runs": [run.run_id for run in runs]})
+    begins = internal_sql().run(
+        connection, "untraced_begin", {"runs": [run.run_id for run in runs]}
+    )
     where = {True: "the stamp of each message", False: "its take: its clock may be another one"}
     return [
         f"what publishes {topic} is not traced: flows begin with {where[is_stamped]}"

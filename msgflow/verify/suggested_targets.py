@@ -31,7 +31,9 @@ _OF_ACTION = "/_action/"
 _LEAST_LATENESS_NS = 1_000_000
 
 
-def suggest_targets(run: Run, results: Mapping[str, Sequence[Row]], margin: float) -> str:
+def suggest_targets(
+    run: Run, results: Mapping[str, Sequence[Row]], margin: float, skipped: float = 0.0
+) -> str:
     """Return the text of a file that `read_targets` reads, and that the run meets.
 
     Comments behind its first line say what speaks against the run.
@@ -40,6 +42,7 @@ def suggest_targets(run: Run, results: Mapping[str, Sequence[Row]], margin: floa
         run: the measured run.
         results: rows of the named queries `QUERIES`, by name.
         margin: how much more than measured is allowed, as a share.
+        skipped: seconds at the start of the run that the results leave out, as a warm-up.
     """
     entries = [
         *_paths(results["e2e-latency"], margin),
@@ -53,6 +56,7 @@ def suggest_targets(run: Run, results: Mapping[str, Sequence[Row]], margin: floa
     lines = [
         f"# What run {in_quotes(run.name)} met, and {100 * margin:.4g} % more: review it, keep"
         " what matters.",
+        *_warm_up(skipped),
         *_undelivered(results["topics-delivery"]),
         "targets:" if entries else "targets: []",
     ]
@@ -60,6 +64,11 @@ def suggest_targets(run: Run, results: Mapping[str, Sequence[Row]], margin: floa
         lines.append(f"  - {kind}: {name}")
         lines += [f'    {metric}: "{text}"' for metric, text in requirements.items()]
     return "\n".join(lines)
+
+
+def _warm_up(seconds: float) -> Iterator[str]:
+    if seconds:
+        yield f"# Without its first {seconds:g} s, a warm-up: verify with --start, too."
 
 
 Entry = tuple[str, str, dict[str, str]]

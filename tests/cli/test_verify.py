@@ -123,3 +123,12 @@ def test_several_runs_are_refused(demo: Msgflow, tmp_path: Path) -> None:
     result = demo("verify", file, "--run", "all")
     assert result.exit_code == 2
     assert "a verification is of one run" in result.stderr
+
+
+def test_an_empty_suggestion_leads_to_nothing(
+    msgflow: Msgflow, small_database: Path, tmp_path: Path
+) -> None:
+    result = msgflow("suggest", "targets", "-o", tmp_path / "t.yaml", "--db", small_database)
+    assert result.exit_code == 0
+    assert "nothing was measured often enough" in result.stderr
+    assert "next:" not in result.stderr

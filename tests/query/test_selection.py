@@ -344,7 +344,9 @@ def test_macros_need_no_more_than_the_runs(database: Database, short: str, whole
         ("end_to_end([1], from_event := 'start')", "from_event is one of callback_start, publish"),
         ("end_to_end([1], to_event := NULL)", "to_event is one of take, callback_start"),
         ("comparison('nodes', 1, 1)", "what is one of paths, ends, callbacks, topics, not nodes"),
-        thorough("comparison(NULL, 1, 1)", "what is one of paths, ends, callbacks, topics, not NULL"),
+        thorough(
+            "comparison(NULL, 1, 1)", "what is one of paths, ends, callbacks, topics, not NULL"
+        ),
         (
             "comparison('paths', 1, 1, wanted_case := 'fist')",
             "wanted_case is one of first, last, newest, every_pair, not fist",

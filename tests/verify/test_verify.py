@@ -254,6 +254,22 @@ def test_a_suggestion_says_what_was_not_delivered(overwritten: Path) -> None:
     ]
 
 
+def test_a_suggestion_leaves_out_the_warm_up(
+    overwritten: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("msgflow.verify.suggested_targets.LEAST_VALUES", 1)
+    with Database(overwritten) as database:
+        whole = database.suggest_targets()
+        monkeypatch.setattr("msgflow.query.compare.warm_up", lambda *_: 1000.0)
+        nothing = database.suggest_targets()
+        asked = database.suggest_targets(start="0s")
+    assert asked == whole != nothing
+    assert nothing.splitlines()[1:] == [
+        "# Without its first 1000 s, a warm-up: verify with --start, too.",
+        "targets: []",
+    ]
+
+
 @pytest.mark.parametrize("name", few(["demo", "services", "actions"], "services"))
 def test_a_run_meets_what_is_suggested_from_it(
     name: str, simulated: Callable[..., Path], tmp_path: Path
