@@ -598,7 +598,9 @@ class Database:
         from_: str | None = None,
         to: str | None = None,
         case: str = "first",
-        skip_first: float = 0.0,
+        explain: bool = False,
+        at_least: str = "5%",
+        skip_first: float | None = None,
         confidence: float = 0.95,
         resamples: int | None = None,
         seed: int = 0,
@@ -623,7 +625,12 @@ class Database:
             to: topics or nodes where paths end; globs.
             case: first or last arrival of each root, newest root of each arrival, or all pairs:
                 'first', 'last', 'newest' or 'every_pair'.
-            skip_first: seconds to leave out at the begin of each run, as a warm-up.
+            explain: what the difference of the means of each path consists of, by node and part:
+                the largest first.
+            at_least: the smallest change that matters; a surely smaller or larger value that is
+                less far off is about equal.
+            skip_first: seconds to leave out at the begin of each run; by default its warm-up, where
+                it has the longest values.
             confidence: of the intervals, between 0 and 1.
             resamples: number behind the intervals, at least 20 / (1 - confidence); by default 1000
                 or that minimum; 0 leaves out intervals and verdicts, which take longest.
@@ -647,6 +654,8 @@ class Database:
             from_=from_,
             to=to,
             case=case,
+            explain=explain,
+            at_least=at_least,
             skip_first=skip_first,
             confidence=confidence,
             resamples=resamples,

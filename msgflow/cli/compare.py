@@ -44,7 +44,7 @@ OnlyDifferent = Annotated[
     typer.Option(
         "--only-different/--all",
         help="One row for each path, callback or topic: those that differ, or all",
-        show_default="on a terminal all; else every statistic",
+        show_default="in a table all; else every statistic",
         rich_help_panel=OUTPUT,
     ),
 ]
@@ -74,11 +74,13 @@ def print_comparison(
     output: Path | None,
 ) -> None:
     """Print a comparison, and exit with 1 where a condition of `fail_on` holds."""
-    from msgflow.cli.output import is_screen, print_error, print_result
+    from msgflow.cli.output import print_error, print_result
 
     result = comparison.result
     is_table = form in (None, Format.TABLE) and output is None
-    if only_different is not None or (is_table and not wide and is_screen()):
+    if (parts := getattr(comparison, "parts", None)) is not None:
+        result = parts
+    elif only_different is not None or (is_table and not wide):
         result = comparison.changes(only_different=only_different is True)
     print_result(result, form, output, wide=wide, most_rows=_MOST_ROWS)
     failures = comparison.failures(fail_on)

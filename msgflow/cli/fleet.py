@@ -225,6 +225,7 @@ def compare(
     unit: str | None = None,
     case: str = "first",
     confidence: float = 0.95,
+    at_least: str = "5%",
     fail_on: FailOn = None,
     only_different: OnlyDifferent = None,
     form: Format | None = None,
@@ -246,6 +247,7 @@ def compare(
         case: Flows that count: first or last arrival of each root, newest root of each arrival, or
             all.
         confidence: Confidence level of the intervals.
+        at_least: Smallest change that matters: less is about equal.
     """
     from msgflow.fleet.compare import compare as compared
     from msgflow.fleet.lake import Lake
@@ -259,6 +261,7 @@ def compare(
         unit=unit,
         case=case,
         confidence=confidence,
+        at_least=at_least,
     )
     print_comparison(comparison, fail_on or [], only_different, form=form, wide=wide, output=output)
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from msgflow.errors import UsageError
 from msgflow.fleet.lake_connection import Choice, Reading, choose
-from msgflow.query.compare import STATISTICS, Failure, failures
+from msgflow.query.compare import STATISTICS, Failure, failures, share_of
 from msgflow.query.selection import CASES, CUT_COLUMN
 from msgflow.result.query_result import QueryResult
 from msgflow.sql.statement import internal_sql
@@ -63,6 +63,7 @@ def compare(
     unit: str | None = None,
     case: str = "first",
     confidence: float = 0.95,
+    at_least: str = "5%",
 ) -> FleetComparison:
     """Compare runs whose label has one value with those of another.
 
@@ -77,6 +78,7 @@ def compare(
             alike than runs of several, so that they tell less.
         case: which arrivals of paths: one of CASES.
         confidence: probability that an interval contains the true difference.
+        at_least: the smallest change that matters: less is about equal.
 
     Raises:
         UsageError: no such label or value, no run, or no path in common.
@@ -111,7 +113,9 @@ def compare(
     wanted = pa.array([each.get(by) in sides for each in labels])
     with Reading(replace(choice, runs=choice.runs.filter(wanted)), _TABLES) as reading:
         reading.connection.register("sided", table)
-        result = compared(reading.connection, case=case, confidence=confidence)
+        result = compared(
+            reading.connection, case=case, confidence=confidence, at_least=share_of(at_least)
+        )
     result.notes.extend(_who(by, base, other, sided, unit))
     result.notes.extend(_left_out(by, known, sides, len(labels)))
     result.notes.extend(_one_sided(result, by))
@@ -120,13 +124,21 @@ def compare(
 
 
 def compared(
-    connection: duckdb.DuckDBPyConnection, *, case: str = "first", confidence: float = 0.95
+    connection: duckdb.DuckDBPyConnection,
+    *,
+    case: str = "first",
+    confidence: float = 0.95,
+    at_least: float = 0.05,
 ) -> QueryResult:
     """Return the differences between two sides."""
     measured = internal_sql().run(connection, "fleet_run_value", {"case": case}).to_arrow_table()
     connection.register("measured", measured)
     statement = "fleet_comparison"
-    values = {"z": NormalDist().inv_cdf((1 + confidence) / 2), "least_units": LEAST_RUNS}
+    values = {
+        "z": NormalDist().inv_cdf((1 + confidence) / 2),
+        "least_units": LEAST_RUNS,
+        "at_least": at_least,
+    }
     rows = internal_sql().run(connection, statement, values).to_arrow_table()
     return QueryResult(rows, replace(internal_sql().header(statement), name="fleet compare"))
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 import re
-from collections import Counter
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from msgflow.errors import UsageError
 from msgflow.files.resources import resource_directory
+from msgflow.query.change_parts import change_parts
 from msgflow.query.clock_notes import clock_notes
 from msgflow.query.doubt_notes import AMBIGUOUS, doubt_notes
 from msgflow.query.names import require_places
@@ -44,6 +44,7 @@ _UNITS = {"paths": "flows", "ends": "flows", "callbacks": "callback instances", 
 # What a verdict adds to a failure: the measured values decide, and these may be chance.
 _CHANCE = {
     "no difference shown": "; it may be chance",
+    "about equal": "; less than --at-least",
     "too few values": "; too few values to exclude chance",
     "too few independent values": "; too few independent values to exclude chance",
     "too few runs": "; too few runs to exclude chance",
@@ -99,15 +100,16 @@ class Comparison:
         result: one row per path (callback, topic) and statistic, see `main.comparison`.
         run_a: the baseline.
         run_b: the run that is compared with it.
-        without_warm_up: the same without the warm-up, where the longest values are at the start.
         skipped: seconds that were left out at the start of each run.
+        parts: what the differences of the means of paths consist of, see `internal.change_part`;
+            None unless asked for.
     """
 
     result: QueryResult
     run_a: Run
     run_b: Run
-    without_warm_up: Comparison | None = None
     skipped: float = 0.0
+    parts: QueryResult | None = None
 
     def __str__(self) -> str:
         return str(self.changes(only_different=False))
@@ -128,20 +130,9 @@ class Comparison:
     def failures(self, conditions: Iterable[str]) -> list[Failure]:
         """Return what exceeds run A by more than conditions such as 'p95>5%' or 'median>2ms' allow.
 
-        As `failures` of this module says. A reason also says what is left of it without warm-up.
+        As `failures` of this module says.
         """
-        conditions = list(conditions)
-        found = failures(self.result, conditions)
-        if self.without_warm_up is None:
-            return found
-        later = self.without_warm_up.failures(conditions)
-        left = {(each.condition, each.subject): each.reason for each in later}
-        when = f"without the first {self.without_warm_up.skipped:g} s"
-        return [
-            replace(each, reason=f"{each.reason}; {when}: {left.get(key, 'within the limit')}")
-            for each in found
-            for key in [(each.condition, each.subject)]
-        ]
+        return failures(self.result, conditions)
 
 
 def failures(
@@ -244,8 +235,11 @@ def compare(
     run_a: str | int | None,
     run_b: str | int | None,
     *,
-    run: str | int | None,
-    window: Sequence[str],
+    run: str | int | None = None,
+    window: Sequence[str] = (),
+    at_least: str = "5%",
+    explain: bool = False,
+    skip_first: float | None = None,
     **given: Value,
 ) -> Comparison:
     """Compare two runs of a database, or two times of one; see `Database.compare`."""
@@ -258,18 +252,41 @@ def compare(
     wanted = (run, run) if run_a is None else (run_a, run_b)
     first, second = (choose_one(runs, each, "each side of a comparison") for each in wanted)
     both: dict[str, Value] = {"run_a": first.run_id, "run_b": second.run_id}
+    both["at_least"] = share_of(at_least)
     both |= _windows(window, (first, second))
+    both["skip_first"] = skip_first or 0.0
     asked = bind(internal_sql().header("comparison"), given | both, "msgflow compare")
     _require_sense(asked)
+    if explain and asked["what"] != "paths":
+        raise UsageError(f"only changes of paths have parts — {asked['what']}", "leave out --what")
+    # Without intervals this is quick.
+    skip = 0.0
+    if skip_first is None and not window:
+        skip = _warm_up(_compared(connection, asked | {"resamples": 0}, first, second))
+        asked["skip_first"] = skip
     compared = _compared(connection, asked, first, second)
     for side, one, text in zip("AB", (first, second), window, strict=False):
         compared.result.notes.append(f"{side} is {text} of run {one.title}")
-    skip = 0.0 if window else _warm_up(compared)
-    if not skip or not asked["resamples"]:
+    if skip:
+        compared.result.notes.append(
+            f"the first {skip:g} s are left out, where the longest values lie: a warm-up"
+            " (--skip-first 0 compares all)"
+        )
+    if not explain:
         return compared
-    without = _compared(connection, asked | {"skip_first": skip}, first, second, is_strict=False)
-    compared.result.notes.append(_without(compared, without))
-    return replace(compared, without_warm_up=without)
+    times = [*(window or ("..", ".."))]
+    return replace(compared, parts=change_parts(connection, compared, asked, times))
+
+
+def share_of(text: str) -> float:
+    """Return a share that stands in percent, such as '5%'."""
+    try:
+        share = float(text.strip().removesuffix("%")) / 100
+    except ValueError:
+        share = -1.0
+    if not 0 <= share < math.inf:
+        raise UsageError(f"what matters is a share — {text}", "such as --at-least 5%")
+    return share
 
 
 def _windows(window: Sequence[str], runs: tuple[Run, Run]) -> dict[str, Value]:
@@ -295,7 +312,7 @@ def warm_up(connection: duckdb.DuckDBPyConnection, run: Run) -> float:
     0 means that it does not warm up.
     """
     both: dict[str, Value] = {"run_a": run.run_id, "run_b": run.run_id, "resamples": 0}
-    both |= _windows((), (run, run))
+    both |= {"skip_first": 0.0, "at_least": 0.0, **_windows((), (run, run))}
     asked = bind(internal_sql().header("comparison"), both, "msgflow compare")
     _require_sense(asked)
     return _warm_up(_compared(connection, asked, run, run, is_strict=False))
@@ -332,29 +349,6 @@ def _warm_up(compared: Comparison) -> float:
     ends = [*table.column("a_warm_up_ns").to_pylist(), *table.column("b_warm_up_ns").to_pylist()]
     end = max((end for end in ends if end is not None), default=None)
     return 0.0 if end is None else (end // _STEP_NS + 1) * _STEP_NS / 1e9
-
-
-def _without(compared: Comparison, without: Comparison) -> str:
-    """Say which run starts slowly, and what differs without its start."""
-    table = compared.result.table
-    slow = [
-        run.title
-        for side, run in (("a", compared.run_a), ("b", compared.run_b))
-        if table.column(f"{side}_warm_up_ns").null_count < len(table)
-    ]
-    changes = Counter(without.changes(only_different=False).table["change"].to_pylist())
-    shown = changes.pop("none shown", 0)
-    if changes:
-        parts = [f"{shown} with no difference shown"] if shown else []
-        parts += [f"{number} {change}" for change, number in sorted(changes.items())]
-        found = ", ".join(parts)
-    else:
-        found = "no difference is shown"
-    seconds = f"{without.skipped:g}"
-    return (
-        f"run {' and run '.join(slow)} may warm up: its longest values lie at its start. Without"
-        f" the first {seconds} s: {found} (--skip-first {seconds})"
-    )
 
 
 @cache

@@ -13,13 +13,14 @@ end_place AS MATERIALIZED (FROM derive.place(runs, to_topic)),
 hop AS MATERIALIZED (
     SELECT
         h.run_id, h.from_subscription_id, h.route, h.publisher_id, h.subscription_id, h.is_cached,
+        coalesce(p.topic_name, s.topic_name) AS topic,
         CASE
             WHEN h.from_subscription_id IS NOT NULL THEN false
             WHEN from_topic IS NULL THEN h.is_source
-            ELSE (coalesce(p.topic_name, s.topic_name) IN (SELECT topic_name FROM start_place)) IS true
+            ELSE (topic IN (SELECT topic_name FROM start_place)) IS true
                 OR (p.node_id IN (SELECT node_id FROM start_place)) IS true
         END AS is_start,
-        (coalesce(p.topic_name, s.topic_name) IN (SELECT topic_name FROM end_place)) IS true
+        (topic IN (SELECT topic_name FROM end_place)) IS true
         OR (s.node_id IN (SELECT node_id FROM end_place)) IS true AS is_last
     FROM store.flow_hop AS h
     LEFT JOIN store.publisher AS p ON h.publisher_id = p.publisher_id

@@ -1,9 +1,8 @@
 -- name: main.comparison
 -- kind: macro
 -- description: How a run differs from another one, or from itself at another time, by path, ends
---     of paths, callback or topic: what was measured in
---     each, the difference with a bootstrap confidence interval, and how well the values of the two
---     can be told apart.
+--     of paths, callback or topic: what was measured in each, and the difference with a bootstrap
+--     confidence interval.
 --     Values that follow each other are alike, so blocks of neighbouring values are resampled
 --     (circular block bootstrap). The length of a block is estimated from the values of each run.
 --     An interval needs ten blocks in either run, and five independent values beyond a quantile;
@@ -25,6 +24,7 @@
 --     it
 -- param: b_window BIGINT[] = NULL  The same for run B
 -- param: confidence DOUBLE = 0.95  Share of intervals that would contain the true difference
+-- param: at_least DOUBLE = 0.05  Smallest difference that counts as one, as a share of A
 -- param: resamples BIGINT = 1000  Number of resamples for the interval
 -- param: seed BIGINT = 0  Random seed
 -- param: internal BOOLEAN = false  Include what ROS does for itself
@@ -39,14 +39,9 @@
 -- column: low_ns BIGINT [ns]  Lower end of the confidence interval of the difference
 -- column: high_ns BIGINT [ns]  Its upper end
 -- column: verdict VARCHAR  'B is longer' or 'B is shorter', of these two recordings, where both
---     ends have one sign; 'no difference shown', 'too few values' or 'too few independent values'
+--     ends have one sign; 'about equal' where they have, and the difference is less than at_least;
+--     'no difference shown', 'too few values' or 'too few independent values'
 --     for an interval, 'too few resamples', 'not estimated' (maximum), 'only in A' or 'only in B'
--- column: cliffs_delta DOUBLE  How often a value of B exceeds one of A, minus how often it is the
---     other way round: -1 to 1
--- column: separation VARCHAR  How well the values of the two runs can be told apart, by
---     cliffs_delta: 'negligible', 'small', 'medium' or 'large'. It says nothing of how large the
---     change is: a change of 1 % separates them well if they vary by less. NULL: fewer than 20
---     values
 -- column: a_count BIGINT  Values of run A
 -- column: b_count BIGINT  Values of run B
 -- column: a_independent BIGINT  How many independent values the values of run A are worth for this
@@ -71,8 +66,8 @@
 --     and receiving node
 CREATE OR REPLACE MACRO main.comparison(
     what, run_a, run_b, from_topic := NULL, to_topic := NULL, wanted_case := 'first',
-    skip_ns := 0, a_window := NULL, b_window := NULL, confidence := 0.95, resamples := 1000,
-    seed := 0, internal := false, max_depth := 32, max_paths := 1000
+    skip_ns := 0, a_window := NULL, b_window := NULL, confidence := 0.95, at_least := 0.05,
+    resamples := 1000, seed := 0, internal := false, max_depth := 32, max_paths := 1000
 ) AS TABLE
 WITH flow AS (
     SELECT
@@ -202,9 +197,6 @@ measured AS MATERIALIZED (
     FROM sided
     GROUP BY side, subject
 ),
-dominance AS (
-    FROM derive.dominance('sided')
-),
 -- What each statistic varies with, about its mean: the value, or whether it lies beyond a quantile.
 centred AS MATERIALIZED (
     SELECT
@@ -222,7 +214,6 @@ centred AS MATERIALIZED (
         (s.value_ns > m.quantiles[3])::BIGINT AS p99_part
     FROM sided AS s
     JOIN measured AS m ON s.side = m.side AND s.subject = m.subject
-    JOIN dominance AS e ON s.subject = e.subject
     WHERE s.value_ns IS NOT NULL AND m.number >= 20
 ),
 -- By chance, three values are the longest and all of the first quarter in 1 of 64 cases.
@@ -296,7 +287,6 @@ judged AS (
         p.subject, p.statistic, p.a_ns, p.b_ns, p.a_count, p.b_count, p.a_independent,
         p.b_independent, p.a_share, p.b_share, p.a_loss_affected, p.b_loss_affected, p.a_ambiguous,
         p.b_ambiguous, p.a_warm_up_ns, p.b_warm_up_ns, p.is_cut,
-        CASE WHEN least(p.a_count, p.b_count) >= 20 THEN e.cliffs_delta END AS cliffs_delta,
         CASE
             WHEN p.a_count = 0 AND p.b_count = 0 THEN 'too few values'
             WHEN p.b_count = 0 THEN 'only in A'
@@ -314,7 +304,6 @@ judged AS (
         p.b_ns - p.a_ns + round(s.ends[1])::BIGINT AS low_ns,
         p.b_ns - p.a_ns + round(s.ends[2])::BIGINT AS high_ns
     FROM paired AS p
-    LEFT JOIN dominance AS e ON p.subject = e.subject
     LEFT JOIN spread AS s ON p.subject = s.subject AND p.statistic = s.statistic
 )
 SELECT
@@ -327,17 +316,11 @@ SELECT
     CASE WHEN reason IS NULL THEN high_ns END AS high_ns,
     CASE
         WHEN reason IS NOT NULL THEN reason
+        WHEN low_ns <= 0 AND high_ns >= 0 THEN 'no difference shown'
+        WHEN abs(b_ns - a_ns) < at_least * abs(a_ns) THEN 'about equal'
         WHEN low_ns > 0 THEN 'B is longer'
-        WHEN high_ns < 0 THEN 'B is shorter'
-        ELSE 'no difference shown'
+        ELSE 'B is shorter'
     END AS verdict,
-    round(cliffs_delta, 4) AS cliffs_delta,
-    CASE
-        WHEN abs(cliffs_delta) < 0.147 THEN 'negligible'
-        WHEN abs(cliffs_delta) < 0.33 THEN 'small'
-        WHEN abs(cliffs_delta) < 0.474 THEN 'medium'
-        WHEN cliffs_delta IS NOT NULL THEN 'large'
-    END AS separation,
     a_count,
     b_count,
     floor(a_independent + 1e-9)::BIGINT AS a_independent,

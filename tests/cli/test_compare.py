@@ -29,11 +29,26 @@ def test_a_table_and_the_runs(msgflow: Msgflow, database: Path) -> None:
     result = msgflow("compare", "before", "2", "--db", database)
     assert result.exit_code == 0
     assert "runs: before (1), after (2)" in result.stderr
-    header, _, *rows = result.stdout.splitlines()
+    shown = dict(line.split(maxsplit=1) for line in result.stdout.splitlines() if line)
+    assert (shown["a_median"], shown["b_median"]) == ("300 ns", "300 ns")
+    assert shown["change"] == "too few values"
+    assert max(map(len, result.stdout.splitlines())) <= 100
+    wide = msgflow("compare", "before", "2", "--wide", "--db", database)
+    header, _, *rows = wide.stdout.splitlines()
     assert header.split()[:4] == ["statistic", "a", "b", "difference"]
     assert [row.split()[0] for row in rows] == ["median", "mean", "p95", "p99", "max"]
     assert "-100 ns" in rows[-1]
-    assert "too few values" in rows[0]
+
+
+def test_a_change_is_the_sum_of_those_of_its_parts(msgflow: Msgflow, database: Path) -> None:
+    result = msgflow("compare", 1, 2, "--explain", "--format", "json", "--db", database)
+    whole, *parts = json.loads(result.stdout)
+    assert (whole["part"], whole["difference_ns"], whole["a_mean_ns"]) == ("all", -50, 400)
+    assert sum(part["difference_ns"] for part in parts) == -50
+    sizes = [abs(part["difference_ns"]) for part in parts]
+    assert sizes == sorted(sizes, reverse=True)
+    wrong = msgflow("compare", 1, 2, "--explain", "--what", "topics", "--db", database)
+    assert wrong.exit_code == 2
 
 
 def test_json_is_exact(msgflow: Msgflow, database: Path) -> None:

@@ -19,7 +19,7 @@ def compared(subject: str, verdicts: dict[str, str], difference_ns: int | None, 
             "subject": subject, "statistic": statistic, "verdict": verdict, "a_ns": 1_000,
             "b_ns": None if difference_ns is None else 1_000 + difference_ns,
             "change_percent": None if difference_ns is None else difference_ns / 10,
-            "separation": None, "a_share": 1.0, "b_share": 0.5, "a_count": 30, "b_count": 20,
+            "a_share": 1.0, "b_share": 0.5, "a_count": 30, "b_count": 20,
             "a_ambiguous": 0, "b_ambiguous": 0, **more,
         }
         for statistic, verdict in verdicts.items()
@@ -29,7 +29,7 @@ def compared(subject: str, verdicts: dict[str, str], difference_ns: int | None, 
 ROWS = [
     *compared(A_TO_B, {"median": "B is longer", "p95": "no difference shown"}, 100),
     *compared("/same", {"median": "no difference shown", "p95": "too few values"}, 500),
-    *compared("/both", {"median": "B is shorter", "p95": "B is longer"}, -300, separation="large"),
+    *compared("/both", {"median": "B is shorter", "p95": "B is longer"}, -300),
     *compared("/gone", {"median": "only in A", "p95": "only in A"}, None, b_count=0),
 ]
 RESULT = QueryResult(pa.Table.from_pylist(ROWS), notes=["a note"])
@@ -46,7 +46,6 @@ def test_a_row_for_each_that_differs_the_greatest_change_first() -> None:
     assert rows[2]["a_median_ns"] == 1_000
     assert rows[2]["b_median_ns"] == 1_100
     assert rows[2]["median_percent"] == 10.0
-    assert rows[1]["separation"] == "large"
     assert (rows[1]["median_verdict"], rows[1]["p95_verdict"]) == ("B is shorter", "B is longer")
     assert found.notes == ["4 compared, 1 with no difference shown: --all lists them", "a note"]
     assert found.when_empty == "no rows"

@@ -60,8 +60,8 @@ def test_two_threads_do_what_one_did_one_after_the_other(runs: Any) -> None:
     waited = rows["/PointCloudFusion → /VoxelGridDownsampler"]
     assert waited["a_ns"] > 20_000_000
     assert waited["b_ns"] < 1_000_000
-    assert waited["separation"] == "large"
     # Every cycle is like the one before: that makes few values that tell something new.
     assert waited["verdict"] == "too few independent values"
     # What does not depend on that process takes as long as before.
-    assert rows["/Lanelet2MapLoader → /LanePlanner"]["separation"] != "large"
+    unrelated = rows["/Lanelet2MapLoader → /LanePlanner"]
+    assert abs(unrelated["difference_ns"]) < 0.5 * unrelated["a_ns"]

@@ -100,7 +100,6 @@ const TITLES = {
   rate_hz: "rate",
   callback_share: "busy",
   orphans: "takes without publication",
-  cliffs_delta: "Cliff's delta",
   start_at: "begin",
   length: "duration",
   a_ns: "A",

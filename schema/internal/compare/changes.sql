@@ -5,7 +5,8 @@
 -- grain: one row per path, callback or topic
 -- param: only_different BOOLEAN  Leave out rows without a shown difference
 -- column: change VARCHAR            'longer', 'shorter', 'both' (of different statistics),
---     'only in A', 'only in B', 'none shown' (the intervals contain 0), or why it is not known:
+--     'only in A', 'only in B', 'about equal' (less than matters), 'none shown' (the intervals
+--     contain 0), or why it is not known:
 --     'too few values', 'too few independent values', 'too few resamples'
 -- column: of VARCHAR                Statistics of which that is said
 -- column: a_median_ns BIGINT [ns]   Median in run A
@@ -20,8 +21,6 @@
 -- column: b_max_ns BIGINT [ns]      Longest value in run B
 -- column: max_percent DOUBLE [%]    Change of that
 -- column: max_verdict VARCHAR       'not estimated': one value of either run says nothing of chance
--- column: separation VARCHAR        How well the values of the two runs can be told apart, by
---     Cliff's delta; not how large the change is
 -- column: a_share DOUBLE            Share that arrived in run A
 -- column: b_share DOUBLE            Share that arrived in run B
 -- column: a_count BIGINT            Values of run A
@@ -29,16 +28,15 @@
 -- column: a_ambiguous BIGINT        Of these, values that pass a link that may be another one
 -- column: b_ambiguous BIGINT        The same of run B
 -- column: path VARCHAR              Path, callback or topic
--- brief: path, change, median_percent, p95_percent, p95_verdict, max_percent, max_verdict, of,
---     a_median_ns, b_median_ns, a_p95_ns, b_p95_ns, median_verdict, a_max_ns, b_max_ns,
---     separation, a_ambiguous, b_ambiguous, a_count, b_count
+-- brief: path, change, of, a_median_ns, b_median_ns, median_percent, a_p95_ns, b_p95_ns,
+--     p95_percent, max_percent, a_ambiguous, b_ambiguous, a_count, b_count, a_max_ns, b_max_ns,
+--     median_verdict, p95_verdict, max_verdict
 WITH subject AS (
     SELECT
         subject,
         bool_or(verdict = 'B is longer') AS is_longer,
         bool_or(verdict = 'B is shorter') AS is_shorter,
         any_value(verdict) FILTER (WHERE verdict LIKE 'only in %') AS only_in,
-        any_value(separation) AS separation,
         any_value(a_share) AS a_share,
         any_value(b_share) AS b_share,
         any_value(a_count) AS a_count,
@@ -47,6 +45,7 @@ WITH subject AS (
         any_value(b_ambiguous) AS b_ambiguous,
         string_agg(statistic, ', ') FILTER (WHERE verdict IN ('B is longer', 'B is shorter'))
             AS differing,
+        string_agg(statistic, ', ') FILTER (WHERE verdict = 'about equal') AS alike,
         string_agg(statistic, ', ') FILTER (WHERE verdict = 'no difference shown') AS estimated,
         any_value({a: a_ns, b: b_ns, percent: change_percent, verdict: verdict})
             FILTER (WHERE statistic = 'median') AS median,
@@ -63,10 +62,11 @@ SELECT
         WHEN is_longer THEN 'longer'
         WHEN is_shorter THEN 'shorter'
         WHEN only_in IS NOT NULL THEN only_in
+        WHEN alike IS NOT NULL THEN 'about equal'
         WHEN estimated IS NOT NULL THEN 'none shown'
         ELSE median.verdict
     END AS change,
-    coalesce(differing, estimated) AS of,
+    coalesce(differing, alike, estimated) AS of,
     median.a AS a_median_ns,
     median.b AS b_median_ns,
     median.percent AS median_percent,
@@ -79,7 +79,7 @@ SELECT
     longest.b AS b_max_ns,
     longest.percent AS max_percent,
     longest.verdict AS max_verdict,
-    separation, a_share, b_share, a_count, b_count, a_ambiguous, b_ambiguous, subject AS path
+    a_share, b_share, a_count, b_count, a_ambiguous, b_ambiguous, subject AS path
 FROM subject
 WHERE NOT $only_different OR is_longer OR is_shorter OR only_in IS NOT NULL
 ORDER BY

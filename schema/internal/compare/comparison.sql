@@ -13,8 +13,9 @@
 -- param: to VARCHAR = NULL  Topics or nodes where paths end; globs
 -- param: case VARCHAR {first|last|newest|every_pair} = 'first'  First or last arrival of each root,
 --     newest root of each arrival, or all pairs
--- param: skip_first DOUBLE = 0.0  Skip the first seconds of each run (warm-up)
+-- param: skip_first DOUBLE  Skip the first seconds of each run (warm-up)
 -- param: confidence DOUBLE = 0.95  Confidence level of the intervals
+-- param: at_least DOUBLE  Smallest difference that counts as one, as a share of A
 -- param: resamples BIGINT = NULL  Number of resamples for the intervals: 1000, or
 --     20 / (1 - confidence) if that is more, where none is given; 0 for no intervals
 -- param: seed BIGINT = 0  Random seed
@@ -25,6 +26,6 @@
 FROM main.comparison(
     $what, $run_a, $run_b, from_topic := $from, to_topic := $to, wanted_case := $case,
     skip_ns := round($skip_first * 1e9)::BIGINT, a_window := $a_window, b_window := $b_window,
-    confidence := $confidence, resamples := $resamples, seed := $seed, internal := $internal,
-    max_depth := $max_depth, max_paths := $max_paths
+    confidence := $confidence, at_least := $at_least, resamples := $resamples, seed := $seed,
+    internal := $internal, max_depth := $max_depth, max_paths := $max_paths
 )

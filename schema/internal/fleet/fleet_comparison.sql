@@ -10,6 +10,7 @@
 --     runs of either side allow. So none is below one that it cannot be below.
 -- grain: one row per path and statistic; paths that only one side has, too
 -- param: z DOUBLE  Quantile of the standard normal distribution for the confidence wanted
+-- param: at_least DOUBLE  Smallest difference that counts as one, as a share of A
 -- param: least_units BIGINT  Fewest runs of either side for an interval
 -- column: statistic VARCHAR  'median', 'mean', 'p95', 'p99' or 'max'
 -- column: a_ns BIGINT [ns]  Its value in a typical run of side A
@@ -17,18 +18,15 @@
 -- column: change_percent DOUBLE  Difference in percent of A; NULL where A is not positive
 -- column: low_percent DOUBLE  Lower end of the confidence interval of the change
 -- column: high_percent DOUBLE  Its upper end
--- column: verdict VARCHAR  'B is longer' or 'B is shorter' where both ends have one sign, else 'no
---     difference shown'; 'too few runs', 'too few values' (in too many of the runs) or 'not
---     estimated' (maximum), 'only in A' or 'only in B'
+-- column: verdict VARCHAR  'B is longer' or 'B is shorter' where both ends have one sign, or 'about
+--     equal' if the difference is less than at_least; else 'no difference shown'; 'too few runs',
+--     'too few values' (in too many of the runs) or 'not estimated' (maximum), 'only in A' or 'only
+--     in B'
 -- column: a_spread_percent DOUBLE  Width of the middle half of the runs of A, in percent
 -- column: b_spread_percent DOUBLE  Width of the middle half of the runs of B, in percent
 -- column: difference_ns BIGINT [ns]  B less A
 -- column: low_ns BIGINT [ns]  Lower end of the confidence interval of the difference
 -- column: high_ns BIGINT [ns]  Its upper end
--- column: cliffs_delta DOUBLE  How often a run of B exceeds one of A, minus how often it is the
---     other way round: -1 to 1
--- column: separation VARCHAR  How well medians of the runs of both can be told apart, by Cliff's
---     delta: 'negligible', 'small', 'medium' or 'large'
 -- column: a_count BIGINT  Runs of A whose values count
 -- column: b_count BIGINT  Runs of B whose values count
 -- column: a_flows BIGINT  Flows measured in all runs of A
@@ -110,12 +108,8 @@ unit AS (
 scaled AS (
     SELECT
         *,
-        min(value_ns) OVER (PARTITION BY subject) > 0 AS is_log,
-        -- Ties in the middle.
-        rank() OVER (whole ORDER BY value_ns)
-            + (count(*) OVER (PARTITION BY subject, statistic, value_ns) - 1) / 2 AS place
+        min(value_ns) OVER (PARTITION BY subject) > 0 AS is_log
     FROM unit
-    WINDOW whole AS (PARTITION BY subject, statistic)
 ),
 ranked AS (
     SELECT
@@ -123,7 +117,6 @@ ranked AS (
         subject,
         statistic,
         is_log,
-        place,
         CASE WHEN is_log THEN ln(value_ns) ELSE value_ns END AS x,
         row_number() OVER (PARTITION BY side, subject, statistic ORDER BY value_ns, unit) AS nth,
         count(*) OVER (PARTITION BY side, subject, statistic) AS number,
@@ -141,8 +134,7 @@ ends AS (
         avg(x) FILTER (nth > trimmed AND nth <= number - trimmed) AS centre,
         min(x) FILTER (nth > trimmed) AS lowest,
         max(x) FILTER (nth <= number - trimmed) AS highest,
-        quantile_cont(x, 0.75) - quantile_cont(x, 0.25) AS spread,
-        sum(place) AS places
+        quantile_cont(x, 0.75) - quantile_cont(x, 0.25) AS spread
     FROM ranked
     GROUP BY side, subject, statistic
 ),
@@ -158,7 +150,6 @@ centre AS (
         any_value(CASE
             WHEN e.is_log THEN 100 * (exp(e.spread) - 1) ELSE 100 * e.spread / abs(e.centre)
         END) AS spread_percent,
-        any_value(e.places) AS places,
         -- How far the trimmed mean may be off, squared.
         var_samp(greatest(e.lowest, least(e.highest, r.x))) * (any_value(e.number) - 1)
             / any_value(e.kept * (e.kept - 1)) AS error
@@ -186,7 +177,6 @@ known AS (
         c.centre,
         c.error,
         c.spread_percent,
-        c.places,
         round(CASE WHEN c.is_log THEN exp(c.centre) ELSE c.centre END)::BIGINT AS value_ns
     FROM of_side AS s
     LEFT JOIN centre AS c
@@ -217,7 +207,6 @@ paired AS (
         -- Welch and Satterthwaite.
         pow(a.error + b.error, 2)
             / nullif(pow(a.error, 2) / (a.kept - 1) + pow(b.error, 2) / (b.kept - 1), 0) AS freedom,
-        (2 * b.places - b.number * (b.number + 1)) / (a.number * b.number) - 1 AS delta,
         CASE
             WHEN a.number IS NULL AND b.number IS NULL THEN 'too few values'
             WHEN b.number IS NULL THEN 'only in A'
@@ -268,9 +257,10 @@ SELECT
     CASE WHEN reason IS NULL THEN round(high, 3) END AS high_percent,
     CASE
         WHEN reason IS NOT NULL THEN reason
+        WHEN difference - off <= 0 AND difference + off >= 0 THEN 'no difference shown'
+        WHEN abs(b_ns - a_ns) < $at_least * abs(a_ns) THEN 'about equal'
         WHEN difference - off > 0 THEN 'B is longer'
-        WHEN difference + off < 0 THEN 'B is shorter'
-        ELSE 'no difference shown'
+        ELSE 'B is shorter'
     END AS verdict,
     round(a_spread_percent, 2) AS a_spread_percent,
     round(b_spread_percent, 2) AS b_spread_percent,
@@ -283,13 +273,6 @@ SELECT
         WHEN reason IS NULL AND is_log THEN round(a_ns * high / 100)
         WHEN reason IS NULL THEN round(difference + off)
     END::BIGINT AS high_ns,
-    CASE WHEN reason IS NULL THEN round(delta, 4) END AS cliffs_delta,
-    CASE
-        WHEN abs(of_median) < 0.147 THEN 'negligible'
-        WHEN abs(of_median) < 0.33 THEN 'small'
-        WHEN abs(of_median) < 0.474 THEN 'medium'
-        WHEN of_median IS NOT NULL THEN 'large'
-    END AS separation,
     a_count,
     b_count,
     a_flows,
@@ -302,12 +285,6 @@ SELECT
     b_ambiguous,
     is_cut,
     subject
-FROM (
-    SELECT
-        *,
-        any_value(delta) FILTER (statistic = 'median' AND reason IS NULL)
-            OVER (PARTITION BY subject) AS of_median
-    FROM bounded
-)
+FROM bounded
 ORDER BY
     subject, list_position(['median', 'mean', 'p95', 'p99', 'max'], statistic)

@@ -1,0 +1,63 @@
+"""What the change of a path consists of: the changes of its parts, by node."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import duckdb
+
+from msgflow.query.catalogue import load_query
+from msgflow.query.runner import run_query
+from msgflow.result.query_result import QueryResult
+from msgflow.run.slice import Slice
+from msgflow.sql.statement import internal_sql
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from msgflow.query.compare import Comparison
+
+_ASKED = ("from", "to", "case", "max_depth", "max_paths")
+# Where the kernel was traced: what callbacks did with their time, all instances together.
+_STATES = """
+SELECT
+    l.node, l.label AS what, sum(s.running_ns) AS running,
+    sum(s.preempted_ns + s.runnable_ns) AS run_queue,
+    sum(s.sleeping_ns + s.uninterruptible_ns) AS blocked
+FROM main.callback_schedule AS s
+JOIN main.callback_instance AS i ON s.callback_instance_id = i.callback_instance_id
+JOIN main.callback_label AS l ON i.callback_id = l.callback_id
+WHERE i.run_id = $run_id AND i.start_ns >= $start_ns AND i.start_ns < $end_ns
+GROUP BY l.node, l.label
+"""
+
+
+def change_parts(
+    connection: duckdb.DuckDBPyConnection,
+    comparison: Comparison,
+    asked: Mapping[str, Any],
+    windows: Sequence[str],
+) -> QueryResult:
+    """Return the parts of the difference of the means of each path, the largest first.
+
+    Args:
+        connection: to the database of the runs.
+        comparison: of paths.
+        asked: with the parameters that it was asked with.
+        windows: 'START..END' of either side.
+    """
+    parameters = {name: asked[name] for name in _ASKED}
+    with duckdb.connect() as con:
+        con.register("compared", comparison.result.table)
+        for side, run, window in zip("ab", comparison.result.runs, windows, strict=True):
+            start, _, end = window.partition("..")
+            start = start or (str(comparison.skipped) if comparison.skipped else None)
+            part = Slice(run.run_id, start, end or None)
+            found = run_query(connection, load_query("path-breakdown"), parameters, part)
+            con.register(f"part_{side}", found.table)
+            values = {"run_id": run.run_id, **part.window([run]).bindings}
+            con.register(f"state_{side}", connection.sql(_STATES, params=values).to_arrow_table())
+        table = internal_sql().run(con, "change_part", {}).to_arrow_table()
+    header = replace(internal_sql().header("change_part"), name="compare --explain")
+    return QueryResult(table, header, comparison.result.runs, comparison.result.notes)
