@@ -94,11 +94,12 @@ def missed(problems: Sequence[str], verdict: Sequence[Row], *, has_kernel: bool)
     if not problems and (told or "nothing stands out" not in verdict[-1]["sentence"]):
         yield "that nothing stands out"
     for place, name in enumerate(problems):
-        if place >= len(told) or not _is_named(PROBLEMS[name], told[place], has_kernel):
+        if place >= len(told) or not is_named(PROBLEMS[name], told[place], has_kernel=has_kernel):
             yield name
 
 
-def _is_named(problem: Problem, row: Row, has_kernel: bool) -> bool:
+def is_named(problem: Problem, row: Row, *, has_kernel: bool) -> bool:
+    """Whether a sentence says who is to blame for a problem, for what, and a true number."""
     if problem.without_kernel is not None and not has_kernel:
         return (
             row["who"] == problem.without_kernel

@@ -1,0 +1,58 @@
+"""What `why` says first of a robot with problems that are planted in it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from planted import is_named, missed
+from robot.problems import PROBLEMS
+from robot.simulated import robot
+from thorough import thorough
+
+from msgflow import Database
+from msgflow.ingest import ingest
+from msgflow.query.why import Explanation
+from msgflow_sim import simulate
+from msgflow_sim.entity import SECOND
+
+
+def explained(
+    directory: Path, problems: Collection[str], seconds: int, *, with_kernel: bool = True
+) -> Explanation:
+    """Record the robot, and ask."""
+    simulate(replace(robot(problems), duration_ns=seconds * SECOND), directory)
+    database = directory / "run.duckdb"
+    ingest([directory / "robot" if with_kernel else directory / "robot" / "ust"], database)
+    with Database(database) as opened:
+        return opened.why()
+
+
+@pytest.mark.parametrize("with_kernel", [True, thorough(False)])
+def test_it_names_each_of_seven_problems_at_once(tmp_path: Path, with_kernel: bool) -> None:
+    why = explained(tmp_path, PROBLEMS, 7, with_kernel=with_kernel)
+    rows: list[dict[str, Any]] = why.verdict.table.to_pylist()
+    for name, problem in PROBLEMS.items():
+        # The hog makes others longer.
+        one = replace(problem, most=2 * problem.most)
+        assert any(is_named(one, row, has_kernel=with_kernel) for row in rows), (name, rows)
+    costs = [row["cost_ns"] for row in rows]
+    assert costs == sorted(costs, reverse=True)
+    # The first sentence leads to the tables below it.
+    assert why.paths.table["path"][0].as_py() == rows[0]["path"]
+    pieces = why.slow_flow.table.to_pylist()
+    assert pieces[-1]["activity"] == "rest"
+    assert sum(piece["duration_ns"] for piece in pieces) == pieces[0]["latency_ns"]
+    kernel = "msgflow record --kernel shows what had the CPU"
+    assert (kernel in why.notes) is not with_kernel
+
+
+def test_nothing_stands_out_where_nothing_was_planted(tmp_path: Path) -> None:
+    why = explained(tmp_path, (), 3)
+    rows = why.verdict.table.to_pylist()
+    assert list(missed((), rows, has_kernel=True)) == []
+    assert len(rows) == 1
+    assert not len(why.losses)
