@@ -18,8 +18,8 @@ _ALL = "SELECT DISTINCT path FROM main.flow_path($runs, NULL, NULL, only_paths :
 def with_path_numbers(connection: duckdb.DuckDBPyConnection, result: QueryResult) -> QueryResult:
     """Return a result with the numbers of its paths, if it has several.
 
-    Where flows were asked for that end in the midst of a path, what they take is no path of its
-    own: numbers go on there.
+    A query may ask for flows that end in the middle of a path. What they pass is no path of the
+    runs: its number comes behind those of all paths.
 
     Args:
         connection: to the database with the runs.

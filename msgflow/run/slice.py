@@ -100,6 +100,3 @@ class Slice:
 
 LATEST = Slice()
 """All of the latest run."""
-
-ALL_RUNS = Slice("all")
-"""All of all runs."""

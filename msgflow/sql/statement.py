@@ -1,4 +1,4 @@
-"""SQL statements in files: parts of each other are put in front, parameters are bound by name."""
+"""SQL statements in files: what one needs of others is put in front, parameters go by name."""
 
 from __future__ import annotations
 

@@ -51,6 +51,6 @@ PACKET_SCHEMA: Final = pa.schema(
 is the place of the packet in its stream. `discarded_event_count` events were lost after
 `last_event_ns` and before `end_ns`; `lost_packet_count` packets are missing right before this
 one. Both are NULL where something was lost but the trace does not say how much. Where
-`is_numbered`, that was told by numbers that go on through the directories of a recording; else it
-is not known how many are missing before the first packet of a directory.
+`is_numbered`, packets have numbers that go on from one directory of a recording to the next. Else
+nothing says how many packets are missing before the first one of a directory.
 """

@@ -1,7 +1,7 @@
 -- name: overlap.process_namespace
 -- kind: inline
--- description: PID namespaces of processes that some traces of a host know and others do not. The
---     traces that know it agree.
+-- description: PID namespaces of processes that some traces of a host have and others lack, where
+--     all traces that have one have the same.
 -- grain: one row per process
 SELECT s.host, r.vpid, any_value(r.pid_ns) AS pid_ns
 FROM raw.thread AS r

@@ -1,8 +1,7 @@
 -- name: fleet.info_quality
 -- title: Data quality: what is missing, and in how many runs
--- description: As the query info --section quality says it of one run, added up over traces and
---     processes;
---     topics have a row each.
+-- description: What msgflow info --section quality says of each run, added up over all its traces
+--     and over all its processes, and over the runs. Each topic has a row.
 -- grain: one row per scope, topic, measure and group of runs
 -- column: label_group BIGINT     Group of runs
 -- column: scope VARCHAR          'trace', 'process', 'topic' or 'run'

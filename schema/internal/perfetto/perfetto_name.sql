@@ -1,6 +1,7 @@
 -- name: internal.perfetto_name
 -- title: Names in Perfetto
--- description: Names that slices refer to by number; with 0 those of what is not known.
+-- description: Names of slices. A slice refers to its name by code and id; id 0 is what is not
+--     known.
 -- grain: one row per name
 -- param: run_id BIGINT  Run
 -- column: code INTEGER  What kind of slice has it

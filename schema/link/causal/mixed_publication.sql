@@ -1,7 +1,7 @@
 -- name: derive.mixed_publication
 -- kind: macro
--- description: Publications of processes that are several with equal ids: nothing says which of
---     these processes published.
+-- description: Publications under ids that several processes share: nothing says which of these
+--     processes published.
 -- grain: one row per such publication
 -- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.mixed_publication(only_run) AS TABLE

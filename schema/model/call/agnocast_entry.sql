@@ -1,6 +1,6 @@
 -- name: staging.agnocast_entry
--- description: The numbers of messages that went through Agnocast. They count on one topic of one
---     kernel; those of subscriptions are left out.
+-- description: The number that Agnocast gave each message. It counts the messages of one topic on
+--     one kernel.
 -- grain: one row per publication or take of Agnocast
 -- when: raw.agnocast_agnocast_publish, staging.agnocast_take
 SELECT n.publication_id, NULL::BIGINT AS take_id, b.entry_id, b.event_id

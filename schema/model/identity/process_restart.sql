@@ -2,8 +2,8 @@
 -- description: Where a pid begins a new life. That is an rcl_init which is not the first event of
 --     its process, in three cases. (1) Its context handle was initialised before. (2) It is the
 --     first one recorded, and a publisher was made or a callback was seen before it. (3) The main
---     thread or the process name is another than at the one before. In (1) and (2), the life goes
---     on if a publisher or callback of it is used afterwards without being made again, or if a
+--     thread or the process name differs from that of the rcl_init before. In (1) and (2), the life
+--     goes on if a publisher or callback of it is used afterwards without being made again, or if a
 --     callback ends that began before. (Threads that seem to go on prove nothing there: containers
 --     number them alike in every life.) What is used behind a gap proves nothing: its object may
 --     have been made again in the gap, and a restart is likelier than a second context. In (3), the
@@ -12,7 +12,7 @@
 -- when: raw.ros2_rcl_init WHERE event_id NOT IN (
 --     SELECT min(first_event_id) FROM staging.thread_presence GROUP BY host_id, pid_ns, vpid)
 
--- `is_other_main`: by another thread, or under another name, than the one before.
+-- `is_other_main`: another thread, or another process name, than that of the rcl_init before.
 WITH every_initialisation AS (
     SELECT
         p.host_id,
