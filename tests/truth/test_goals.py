@@ -20,7 +20,7 @@ KINDS = {"goal_accepted", "goal_rejected", "goal_result", "goal_message"}
 
 
 def test_goals_of_a_simulation(tmp_path: Path) -> None:
-    simulation = simulate("actions", tmp_path / "trace", factor=0.5)
+    simulation = simulate("actions", tmp_path / "trace", factor=0.25)
     ingest([simulation.directory], tmp_path / "run.duckdb")
     scores, _ = compare_simulated(tmp_path / "run.duckdb", simulation.truth)
     assert_right(scores)

@@ -22,7 +22,7 @@ SCRIPT = Path(__file__).parents[2] / "benchmarks" / "truth.py"
 def simulation(tmp_path_factory):
     directory = tmp_path_factory.mktemp("scoring")
     recording = Recording(lost_event_share=0.2)
-    return simulate("two_hosts", directory / "trace", factor=0.2, recording=recording)
+    return simulate("two_hosts", directory / "trace", factor=0.1, recording=recording)
 
 
 @pytest.fixture(scope="module")
