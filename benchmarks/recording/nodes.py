@@ -25,7 +25,6 @@ import rclpy
 from rcl_interfaces.srv import ListParameters
 from rclpy.action import ActionClient, ActionServer, CancelResponse, GoalResponse
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
-from rclpy.exceptions import InvalidHandle
 from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNodeMixin
 from rclpy.node import Node
@@ -626,7 +625,7 @@ def main() -> None:
                 executor.spin()
     except ExternalShutdownException:
         pass
-    except InvalidHandle:
+    except Exception:
         # A callback may run while ROS shuts down.
         if rclpy.ok():
             raise

@@ -32,8 +32,8 @@ def with_python_nodes(note: Callable[[str], None]) -> dict[str, str]:
 def _why_not(folder: Path) -> str | None:
     if os.pathsep in str(folder):
         return f"PYTHONPATH cannot have a folder with a {os.pathsep!r} — {folder}"
-    # What others may write would run in the processes of this user.
-    for path in (*folder.glob("*.py"), folder, *folder.parents):
+    # What others may write would run in the processes of this user; so would compiled files.
+    for path in (*folder.rglob("*"), folder, *folder.parents):
         status = path.stat()
         is_shared = status.st_mode & stat.S_IWOTH and not (
             path.is_dir() and status.st_mode & stat.S_ISVTX

@@ -70,6 +70,11 @@ class Robot:
         return [line for line in lines if "#msgflow python" not in line and "executor " not in line]
 
 
+@pytest.fixture(autouse=True)
+def _alone() -> None:
+    """Nothing is recorded here: other tests need not wait."""
+
+
 @pytest.fixture(scope="session")
 def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
     if shutil.which("gcc") is None:
@@ -323,6 +328,53 @@ def test_processes_that_fork_are_traced_both(robot: Robot) -> None:
             os.waitpid(child, 0)
     """)
     assert robot.traced().count("callback_start 7") == 2
+    # Both say so, and what they are made of.
+    assert robot.trace.read_text().count("#msgflow python") == 2
+    assert robot.traced().count("register 7 __main__:heard") == 2
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("method", ["fork", "spawn", "forkserver"])
+def test_nodes_in_processes_of_multiprocessing(robot: Robot, method: str) -> None:
+    code, out, error = robot.run(f"""
+        import multiprocessing
+
+        def node():
+            executor.ready = [(subscription.Subscription(7, heard), ["a"])]
+            executor.spin_once()
+
+        if __name__ == "__main__":
+            child = multiprocessing.get_context("{method}").Process(target=node)
+            child.start()
+            child.join()
+            assert child.exitcode == 0
+    """)
+    assert (code, error) == (0, "")
+    assert "a\n" in out
+    assert robot.traced().count("callback_start 7") == 1
+
+
+@pytest.mark.thorough
+def test_interpreters_within_a_process_run(robot: Robot) -> None:
+    """What cannot be traced in one runs all the same."""
+    (robot.directory / "robot_inside.py").write_text(
+        textwrap.dedent("""
+        from rclpy import executors, subscription
+        executor = executors.SingleThreadedExecutor()
+        executor.ready = [(subscription.Subscription(8, print), ["inside"])]
+        executor.spin_once()
+    """)
+    )
+    robot.environment["PYTHONPATH"] += f"{os.pathsep}{robot.directory}"
+    code, out, _ = robot.run("""
+        import _xxsubinterpreters as interpreters
+        code = "import robot_inside, sys; sys.stdout.flush()"
+        interpreters.run_string(interpreters.create(), code)
+        executor.ready = [(subscription.Subscription(7, heard), ["outside"])]
+        executor.spin_once()
+    """)
+    assert (code, out) == (0, "inside\noutside\nover\n")
+    assert robot.traced().count("callback_start 7") == 1
 
 
 def test_programs_without_rclpy_see_nothing(tmp_path: Path) -> None:
@@ -388,7 +440,7 @@ def test_python_path_gets_no_empty_entry(
     assert (told["PYTHONPATH"], notes) == (f"{folder}{after}", [])
 
 
-@pytest.mark.parametrize("what", ["folder", "file", "parent", "colon"])
+@pytest.mark.parametrize("what", ["folder", "file", "compiled", "parent", "colon"])
 def test_what_others_may_write_is_not_run(
     environment: Environment, folder: Path, monkeypatch: pytest.MonkeyPatch, what: str
 ) -> None:
@@ -399,7 +451,11 @@ def test_what_others_may_write_is_not_run(
         monkeypatch.setattr(module, "PYTHON_NODES", renamed)
     else:
         file = folder / "sitecustomize.py"
-        {"folder": folder, "file": file, "parent": folder.parent}[what].chmod(0o777)
+        compiled = folder / "__pycache__"
+        compiled.mkdir(exist_ok=True)
+        {"folder": folder, "file": file, "compiled": compiled, "parent": folder.parent}[what].chmod(
+            0o777
+        )
     told, (note,) = environment()
     assert "PYTHONPATH" not in told
     assert note.startswith("callbacks of Python nodes are not traced: ")

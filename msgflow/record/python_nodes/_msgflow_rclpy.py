@@ -126,6 +126,7 @@ def wrap_executors(executors):
             # Lyrical: asyncio has others of the same base.
             owner = getattr(module, "Base" + name, None) or getattr(module, name)
             _wrap(owner, "__init__", functools.partial(_made, announce))
+        os.register_at_fork(after_in_child=_begin_anew)
     except Exception as error:
         _turn_off(error)
 
@@ -179,6 +180,12 @@ def _announce_process():
 def _register(number, symbol):
     text = symbol[:_LONGEST_SYMBOL].replace("\0", "\\0")
     _tracepoints.rclcpp_callback_register(number, text.encode("utf-8", "backslashreplace"))
+
+
+def _begin_anew():
+    """Let a process that was forked say itself what it is made of."""
+    global _is_recorded, _is_announced
+    _is_recorded = _is_announced = False
 
 
 def _announce_again():
