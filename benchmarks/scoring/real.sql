@@ -127,6 +127,8 @@ link AS (
     SELECT 'called_with', 'take', c.callback, 'callback_instance', c.callback
     FROM truth_callback AS c
     JOIN traced AS t ON c.pid = t.pid
+    -- Without its topic, which take it was is not known.
+    SEMI JOIN (FROM truth_time WHERE kind = 'take') AS k ON c.callback = k.id
     WHERE c.kind = 'sub'
     UNION ALL
     SELECT s.k, s.k || '_sent', s.sent, s.k || '_taken', c.callback

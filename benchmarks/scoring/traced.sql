@@ -52,20 +52,25 @@ LEFT JOIN run AS r ON s.thread_id = r.thread_id;
 -- it began to measure, or behind that.
 CREATE OR REPLACE TEMP TABLE traced_score AS
 SELECT
-    'callback_time' AS kind, count(*) AS happened, count(*) AS decided,
+    'callback_time' AS kind, count(*) AS happened,
+    -- A process that was there before its session asks for one when it waits.
+    count(*) FILTER (NOT is_late) AS decided,
     count(longer_ns) AS found,
     CASE
         WHEN median(longer_ns) NOT BETWEEN 0 AND 20_000 THEN count(longer_ns)
         ELSE count(*) FILTER (longer_ns < 0)
     END AS wrong,
-    0 AS loss_affected, 0 AS misguessed, 0 AS repeated, count(*) - count(longer_ns) AS missing,
-    0 AS doubted, 1.0 - wrong / greatest(found, 1) AS precision,
-    found / greatest(decided, 1) AS recall,
+    0 AS loss_affected, 0 AS misguessed, 0 AS repeated,
+    greatest(decided - found, 0) AS missing, 0 AS doubted,
+    1.0 - wrong / greatest(found, 1) AS precision, 1.0 - missing / greatest(decided, 1) AS recall,
     printf(
         'longer by %.1f us, 95 %% by %.1f us', median(longer_ns) / 1e3,
         quantile_cont(longer_ns, 0.95) / 1e3
     ) AS labels
 FROM traced_duration
+CROSS JOIN (
+    SELECT count(*) > 0 AS is_late FROM analysed.store.finding WHERE name = 'started_late'
+)
 HAVING count(*) > 0
 UNION ALL
 SELECT

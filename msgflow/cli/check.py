@@ -61,7 +61,7 @@ def command(
         runs = every if detail else chosen
         notes = [
             *opened.clock_verdicts(run=run, only_several=True),
-            *share_of_cpu(opened, [one.run_id for one in chosen]),
+            *share_of_cpu(opened, chosen),
         ]
         if detail:
             notes += part_of_latencies(opened, opened.query("e2e-latency", run=run))

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 from msgflow.text.values import format_duration
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterator, Sequence
 
     from msgflow.database import Database
     from msgflow.result.query_result import QueryResult
+    from msgflow.run import Run
 
 _ARROW = " → "
 # What a message makes from one callback to the next: ten in the layers of ROS, two of the executor.
@@ -24,18 +25,19 @@ WHERE run_id = ? AND domain = 'ust'
 """
 
 
-def share_of_cpu(database: Database, runs: Iterable[int]) -> Iterator[str]:
+def share_of_cpu(database: Database, runs: Sequence[Run]) -> Iterator[str]:
     """Yield a sentence for each run: what share of a CPU its events took."""
     from msgflow.record import USUAL_NS
 
     for run in runs:
-        events, took_ns, measured = _traced(database, run)
+        events, took_ns, measured = _traced(database, run.run_id)
         if events and took_ns:
             each = USUAL_NS if measured is None else measured
-            where = "elsewhere" if measured is None else "on this machine, before the recording"
+            where = "elsewhere" if measured is None else "there, before the recording"
+            label = f"run {run.title}: " if len(runs) > 1 else ""
             yield (
-                f"tracing took about {100 * events * each / took_ns:.2g} % of a CPU: {events:,}"
-                f" events, {each:.0f} ns each (measured {where})"
+                f"{label}tracing took about {100 * events * each / took_ns:.2g} % of a CPU:"
+                f" {events:,} events, {each:.0f} ns each (measured {where})"
             )
 
 

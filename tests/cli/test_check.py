@@ -71,6 +71,23 @@ def test_nothing_is_wrong(msgflow: Msgflow, database: Path) -> None:
     assert next_steps == f"msgflow why --db {database}\n"
 
 
+def test_what_the_recording_cost(msgflow: Msgflow, database: Path, tmp_path: Path) -> None:
+    """A million events in ten seconds; their cost stands beside the trace, or is the usual one."""
+    trace = {"trace_id": "2", "path": str(tmp_path / "robot" / "ust" / "uid" / "0" / "64-bit")}
+    trace |= {"domain": "ust", "event_count": "1000000", "start_ns": "0", "end_ns": "10000000000"}
+    add(database, "trace", trace)
+
+    def said() -> list[str]:
+        lines = msgflow("check", "--db", database).stderr.splitlines()
+        return [line for line in lines if line.startswith("tracing")]
+
+    took = "tracing took about {} % of a CPU: 1,000,000 events, {} ns each (measured {})"
+    assert said() == [took.format(1.6, 158, "elsewhere")]
+    (tmp_path / "robot").mkdir()
+    (tmp_path / "robot" / "event-cost-ns").write_text("200\n")
+    assert said() == [took.format(2, 200, "there, before the recording")]
+
+
 def test_warnings_leave_the_exit_code_at_0(msgflow: Msgflow, database: Path) -> None:
     add(database, "gap", pause())
     result = msgflow("check", "--db", database)
