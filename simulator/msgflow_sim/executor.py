@@ -3,6 +3,9 @@
 In the order of rclcpp: what is ready is decided when a wait ends, timers first, then subscriptions,
 then services, clients and intra-process buffers; only when nothing of it may be executed comes the
 next wait. One thread at a time looks for something ready or waits; the others are blocked.
+
+An events executor has a queue instead: what arrived first is executed first, and a timer stands
+there from when it is due.
 """
 
 from __future__ import annotations
@@ -73,6 +76,7 @@ class Executor:
         has_events: it emits executor events.
         handle: its address, where an event names it.
         has_callbacks: it calls callbacks, which emit events.
+        is_in_order: it is an events executor.
         owner: the thread that looks for something ready, or waits; others are blocked meanwhile.
         sleeper: the thread that waits.
         thread_count: threads that spin it.
@@ -87,6 +91,7 @@ class Executor:
         self.waitables: list[Entity] = []
         self.has_events = is_rclcpp and description.kind in _HAVING_EVENTS
         self.has_callbacks = is_rclcpp and description.kind not in _WITHOUT_CALLBACKS
+        self.is_in_order = description.kind == "events"
         self.handle = 0
         self.owner: Spinner | None = None
         self.sleeper: Spinner | None = None
@@ -95,12 +100,19 @@ class Executor:
         self._waits_busily = description.waits_busily
         self._scheduler = scheduler
         self._ready: deque[Entity] = deque()
+        self._arrived: deque[tuple[int, Entity]] = deque()
         self._blocked: deque[Spinner] = deque()
 
     def wake(self, time: int) -> None:
         """Something has arrived at `time`: end the wait, if there is one."""
         if self.sleeper is not None:
             self.sleeper.wake(time)
+
+    def arrive(self, entity: Entity, time: int) -> None:
+        """Something has arrived at `time` for an entity: it waits for that in the queue."""
+        if self.is_in_order:
+            self._arrived.append((time, entity))
+        self.wake(time)
 
     def block(self, thread: Spinner) -> None:
         """Let a thread wait until it owns the executor."""
@@ -118,11 +130,14 @@ class Executor:
         for entities in (self.subscriptions, self.waitables, self._ready):
             if entity in entities:
                 entities.remove(entity)
+        self._arrived = deque(one for one in self._arrived if one[1] is not entity)
 
     def collect(self, time: int) -> None:
         """A wait is over: see what is ready."""
         ready = self._ready
         ready.clear()
+        if self.is_in_order:
+            return
         for timer in self.timers:
             if timer.due <= time:
                 ready.append(timer)
@@ -134,8 +149,14 @@ class Executor:
         if not ready and self.subscriptions and self._scheduler.random() < _FAILED_TAKE:
             ready.append(self.subscriptions[-1])
 
-    def pick(self) -> Entity | None:
+    def pick(self, time: int) -> Entity | None:
         """What to execute next; None if there is nothing, or if its groups are busy."""
+        if self.is_in_order:
+            timer = min(self.timers, key=lambda timer: timer.due, default=None)
+            came = self._arrived[0][0] if self._arrived else time + 1
+            if timer is not None and timer.due <= min(time, came):
+                return timer
+            return self._arrived.popleft()[1] if came <= time else None
         for position, entity in enumerate(self._ready):
             if _is_free(entity.group):
                 del self._ready[position]
@@ -144,7 +165,7 @@ class Executor:
 
     def next_wake_up(self, asleep: int) -> int | None:
         """When a wait that begins at `asleep` ends at the latest, None if it may be for ever."""
-        due: int | None = None
+        due: int | None = self._arrived[0][0] if self._arrived else None
         for timer in self.timers:
             if (due is None or timer.due < due) and self._ends_wait(timer.group):
                 due = timer.due

@@ -110,7 +110,7 @@ class ExecutorThread(Thread):
                 continue
             executor.owner = self
             self._enter(executor, _PROCESS, time)
-            entity = executor.pick()
+            entity = executor.pick(time)
             if entity is None:
                 self._fall_asleep(executor, time, until)
                 time = yield None
@@ -120,7 +120,7 @@ class ExecutorThread(Thread):
                 executor.sleeper = None
                 executor.collect(time)
                 self._enter(executor, _PROCESS, time)
-                entity = executor.pick()
+                entity = executor.pick(time)
                 if entity is None:
                     # It may have to wait for the executor next, but has used its CPU up to here.
                     self.keep_cpu(time + 1)
@@ -144,7 +144,7 @@ class ExecutorThread(Thread):
             time += 1_500 + int(self.scheduler.random() * 3_000)
             executor.collect(time)
             self._enter(executor, _PROCESS, time)
-            while (entity := executor.pick()) is not None:
+            while (entity := executor.pick(time)) is not None:
                 time = yield from self._execute(executor, entity, time)
                 self._enter(executor, _PROCESS, time)
             self.keep_cpu(time + 1)

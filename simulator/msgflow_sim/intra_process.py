@@ -64,4 +64,4 @@ def put(
     replaced = buffer.ring.enqueue(thread, time, message)
     if replaced is not None:
         middleware.lose(replaced, buffer.subscription, "overwritten")
-    buffer.subscription.executor.wake(time)
+    buffer.subscription.executor.arrive(buffer, time)

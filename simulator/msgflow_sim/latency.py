@@ -22,6 +22,8 @@ class Latency:
 
 
 _SAME_PROCESS = Latency(12 * MICROSECOND, 3 * MICROSECOND, 0, 0)
+# The publishing thread itself puts the message into the queue.
+AT_ONCE = Latency(0, 0, 0, 0)
 _SAME_HOST = Latency(35 * MICROSECOND, 15 * MICROSECOND, 4 * MILLISECOND, 12 * MILLISECOND)
 AGNOCAST = Latency(4 * MICROSECOND, 3 * MICROSECOND, 0, 0)
 _OTHER_HOST = Latency(220 * MICROSECOND, 90 * MICROSECOND, 12 * MILLISECOND, 25 * MILLISECOND)

@@ -155,7 +155,7 @@ class ServiceNetwork:
         service = self._services.get(request.client.name)
         if service is not None and not service.process.is_stopped:
             arrival = self._arrival(time, request.client.process, service.process)
-            self._scheduler.at(arrival, self._arrive, (service.requests, service.executor, request))
+            self._scheduler.at(arrival, self._arrive, (service, request))
 
     def send_response(self, time: int, service: ServiceObject, request: Request) -> None:
         """Send a response: all clients of the service get it, one can take it."""
@@ -163,8 +163,7 @@ class ServiceNetwork:
             if client is request.client or not client.process.is_stopped:
                 arrival = self._arrival(time, service.process, client.process)
                 response = request if client is request.client else None
-                delivery = (client.responses, client.executor, response)
-                self._scheduler.at(arrival, self._arrive, delivery)
+                self._scheduler.at(arrival, self._arrive, (client, response))
 
     def finish(self) -> None:
         """Write down what became of each request."""
@@ -172,11 +171,12 @@ class ServiceNetwork:
             write_request(self._scheduler.truth, request)
 
     def _arrive(
-        self, time: int, delivery: tuple[deque[Request | None], Executor, Request | None]
+        self, time: int, delivery: tuple[ServiceObject | ClientObject, Request | None]
     ) -> None:
-        queue, executor, request = delivery
+        owner, request = delivery
+        queue = owner.requests if isinstance(owner, ServiceObject) else owner.responses
         queue.append(request)
-        executor.wake(time)
+        owner.executor.arrive(owner, time)
 
     def _arrival(self, time: int, source: RunningProcess, target: RunningProcess) -> int:
         latency = latency_between(source, target)

@@ -52,9 +52,10 @@ class Executor:
 
     Attributes:
         kind: 'single_threaded', 'multi_threaded', 'static_single_threaded' (without executor
-            events), 'agnocast' (likewise, and names itself), 'wait_set' (user code that waits and
-            takes by itself: neither executor events nor callbacks), 'nested' (only callbacks spin
-            it, which wait for something).
+            events), 'events' (likewise; its one thread serves what came first first), 'agnocast'
+            (likewise, and names itself), 'wait_set' (user code that waits and takes by itself:
+            neither executor events nor callbacks), 'nested' (only callbacks spin it, which wait
+            for something).
         thread_count: its threads; the first one of the first executor is the main thread.
         polled_ns: the main thread executes what is ready, and then does something else for so long
             (spin_some); None: it spins.

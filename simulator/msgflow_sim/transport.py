@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter, defaultdict, deque
 from typing import TYPE_CHECKING
 
-from msgflow_sim.latency import AGNOCAST, latency_between
+from msgflow_sim.latency import AGNOCAST, AT_ONCE, latency_between
 from msgflow_sim.objects import Match
 
 if TYPE_CHECKING:
@@ -155,7 +155,7 @@ class Middleware:
         queue.append(message)
         if subscription.process.machine.kernel is not None:
             subscription.arrivals[message.publication_id] = time
-        subscription.executor.wake(time)
+        subscription.executor.arrive(subscription, time)
 
     def next_message(self, subscription: SubscriptionObject, time: int) -> Message | None:
         """Take the oldest message that may still be taken at `time`."""
@@ -241,6 +241,8 @@ class Middleware:
             if publisher.process.machine is not subscription.process.machine:
                 return
             latency = AGNOCAST
+        elif subscription.executor.is_in_order and publisher.process is subscription.process:
+            latency = AT_ONCE
         since = max(publisher.created, subscription.created) + latency.discovery
         since += int(self._scheduler.random() * latency.discovery_spread)
         since += subscription.description.discovery_ns

@@ -45,6 +45,42 @@ def test_threads_that_share_callbacks_are_one_executor(system: RosSystem, analys
     assert model.value("SELECT count(*) FROM executor_state WHERE executor_id IS NULL") == 0
 
 
+@pytest.mark.parametrize(("swapped", "kind"), [
+    (0, "events"),
+    # One message that came first was served later.
+    (1, "unknown"),
+    # The order of the subscriptions explains it, as in a wait set.
+    (None, "unknown"),
+])  # fmt: skip
+def test_what_serves_in_order_of_arrival_is_an_events_executor(
+    system: RosSystem, analyse: Analyse, swapped: int | None, kind: str
+) -> None:
+    """Thirteen times two messages wait; the older one is taken first."""
+    talker = Thread(200)
+    # That its process has executor events at all shows that they were enabled.
+    system.ready(talker)
+    for number in (1, 2):
+        system.publisher(talker, number, f"/topic{number}")
+        system.subscription(MAIN, 0x10 + number, f"/topic{number}")
+        system.subscription_callback(MAIN, 0x10 + number, 0xC0 + number)
+    for turn in range(13):
+        topics = (1, 2) if turn % 2 or swapped is None else (2, 1)
+        stamps = 10 + 10 * turn, 15 + 10 * turn
+        for topic, stamp in zip(topics, stamps, strict=True):
+            system.publish(talker, topic, stamp)
+            system.wait(2_000_000)
+        served = list(zip(topics, stamps, strict=True))
+        if turn == 5 and swapped:
+            served.reverse()
+        for topic, stamp in served:
+            system.take(MAIN, 0x10 + topic, stamp)
+            system.start(MAIN, 0xC0 + topic)
+            system.end(MAIN, 0xC0 + topic)
+    assert (
+        analyse(system).value("SELECT kind FROM executor WHERE kind <> 'single_threaded'") == kind
+    )
+
+
 @pytest.mark.parametrize(("turns", "at_once", "kinds"), [
     (6, False, [("multi_threaded", 2)]),
     # Too few turns to say, or two threads that wait at once: executors of their own.

@@ -17,7 +17,7 @@ from msgflow_sim import executor_thread, simulate
 from msgflow_sim.objects import TimerObject
 from msgflow_sim.transport import Middleware
 
-SCENARIOS = ["demo", "executors", "multi_threaded", "nested", "overload"]
+SCENARIOS = ["demo", "events_executors", "executors", "multi_threaded", "nested", "overload"]
 _LENGTH = 0.2
 _ARRIVED = """
 SELECT w.earliest_ns, a.arrived_ns, w.latest_ns
@@ -144,7 +144,7 @@ def witnessed(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Inges
     return get
 
 
-@pytest.mark.parametrize("name", few(SCENARIOS, "executors"))
+@pytest.mark.parametrize("name", few(SCENARIOS, "events_executors", "executors"))
 def test_inputs_arrive_within_their_bounds(name: str, witnessed: Callable[[str], Ingested]) -> None:
     ingested = witnessed(name)
     arrived, due = ingested.rows(_ARRIVED), ingested.rows(_DUE)

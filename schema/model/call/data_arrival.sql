@@ -2,8 +2,9 @@
 -- description: When messages arrived before they were taken. The listener of the middleware says so
 --     (CARET, with Fast DDS): the first time that its process had one of that stamp. With several
 --     readers in the process it is not known which of them had it then. In an events executor, the
---     queue has what its own thread publishes when publish() returns; of other messages, a kernel
---     trace shows how the publishing thread woke the middleware's (staging.middleware_waking).
+--     queue has what its own thread publishes when publish() has returned; of other messages, a
+--     kernel trace shows how the publishing thread woke the middleware's
+--     (staging.middleware_waking).
 -- grain: one row per take of which this is known
 -- when: raw.ros2_caret_on_data_available, staging.executor WHERE kind = 'events'
 WITH heard AS (
@@ -27,7 +28,7 @@ queued AS (
 SELECT take_id, waited_ns, is_ambiguous
 FROM heard
 UNION ALL
-SELECT take_id, taken_ns - end_ns, false
+SELECT take_id, taken_ns - least(next_ns, taken_ns), false
 FROM queued
 WHERE publishing_thread_id = thread_id
 UNION ALL

@@ -7,12 +7,7 @@
 --     thread itself published both.
 -- grain: one row per such thread
 -- when: staging.queued_message
-
--- What came before the thread ran the first callback was not served in the order of its arrival.
-WITH began AS (
-    SELECT thread_id, min(start_ns) AS start_ns FROM staging.callback_pair GROUP BY thread_id
-),
-served AS (
+WITH served AS (
     SELECT
         m.thread_id, m.subscription_id, m.taken_ns, m.end_ns,
         CASE WHEN m.publishing_thread_id = m.thread_id THEN 0 ELSE 1_000_000 END AS margin_ns,
@@ -21,7 +16,6 @@ served AS (
         lead(CASE WHEN m.publishing_thread_id = m.thread_id THEN 0 ELSE 1_000_000 END)
             OVER on_thread AS next_margin_ns
     FROM staging.queued_message AS m
-    JOIN began AS b ON m.thread_id = b.thread_id AND m.published_ns >= b.start_ns
     WINDOW on_thread AS (PARTITION BY m.thread_id ORDER BY m.start_event_id)
 ),
 pair AS (

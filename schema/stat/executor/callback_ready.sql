@@ -23,7 +23,7 @@ release AS (
     SELECT
         r.run_id, r.executor_id, r.thread_id, r.callback_id, r.callback_instance_id, r.start_ns,
         r.previous_start_ns, r.since, r.origin_ns, r.subscribed_ns, s.thread_count,
-        least(r.latest_ns, min(CASE WHEN s.is_in_order AND r.is_own THEN r.origin_ns END) OVER (
+        least(r.latest_ns, min(CASE WHEN s.is_in_order THEN r.returned_ns END) OVER (
             PARTITION BY r.thread_id ORDER BY r.start_ns, r.callback_instance_id
             ROWS BETWEEN CURRENT ROW AND UNBOUNDED FOLLOWING
         )) AS latest_ns

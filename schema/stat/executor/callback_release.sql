@@ -4,8 +4,8 @@
 --     due for certain. A message can have been due since the end of its publication, or since its
 --     stamp where the two clocks cannot be compared; a request since it was sent. A timer is due
 --     as derive.timer_due says, in any case after its previous call. All times are those of the
---     executor's clock; times of other clocks are brought to it. `is_own`: its thread published
---     the message.
+--     executor's clock; times of other clocks are brought to it. `returned_ns`: its own thread had
+--     published the message by then.
 -- grain: one row per callback instance that is not nested in another
 -- param: executors VARCHAR  Name of rows of executor_id, until_ns: those to look at. Callback
 --     instances that began after the last of these moments are left out (where all are NULL: none)
@@ -49,12 +49,13 @@ message AS (
             )
         END AS origin_ns,
         CASE WHEN l.publication_id IS NULL THEN 'stamp' ELSE 'publication' END AS since,
-        coalesce(b.thread_id = t.thread_id, false) AS is_own
+        CASE WHEN b.thread_id = t.thread_id THEN t.taken_ns - d.waited_ns END AS returned_ns
     FROM store.take AS t
     JOIN derive.process_clock AS tc ON t.process_id = tc.process_id
     LEFT JOIN store.subscription AS s ON t.subscription_id = s.subscription_id
     LEFT JOIN store.link_transport AS l ON t.take_id = l.take_id
     LEFT JOIN store.publication AS b ON l.publication_id = b.publication_id
+    LEFT JOIN store.data_arrival AS d ON t.take_id = d.take_id
     LEFT JOIN derive.process_clock AS bc ON b.process_id = bc.process_id
     LEFT JOIN derive.clock_comparable AS p
         ON b.process_id = p.process_id AND t.process_id = p.other_process_id
@@ -96,7 +97,7 @@ SELECT
     END AS origin_ns,
     coalesce(m.created_ns, i.called_ns) AS subscribed_ns,
     least(i.latest_ns, q.taken_ns, m.taken_ns, i.start_ns) AS latest_ns,
-    m.is_own
+    m.returned_ns
 FROM started AS i
 LEFT JOIN message AS m ON i.take_id = m.take_id
 LEFT JOIN request AS q ON i.request_id = q.request_id

@@ -65,7 +65,7 @@ pause AS MATERIALIZED (
         lead(due_ns) OVER on_thread AS due_ns
     FROM seen
     WINDOW on_thread AS (PARTITION BY thread_id ORDER BY start_ns, end_ns NULLS LAST)
-    QUALIFY end_ns > start_ns
+    QUALIFY lead(start_ns) OVER on_thread > seen.end_ns
 ),
 slept AS MATERIALIZED (
     SELECT p.thread_id, p.start_ns AS pause_ns, s.start_ns, s.end_ns

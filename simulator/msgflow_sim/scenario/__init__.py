@@ -51,6 +51,7 @@ def scenarios() -> Mapping[str, Scenario]:
         robot.demo(),
         executors.multi_threaded(),
         executors.executors(),
+        executors.events_executors(),
         executors.busy_waiting(),
         executors.polled(),
         executors.timers(),

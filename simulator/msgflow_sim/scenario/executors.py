@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from msgflow_sim.entity import MILLISECOND, SECOND, Publisher, Subscription, Timer, Work
 from msgflow_sim.system import Executor, Group, Host, Node, Process, Scenario
 
@@ -79,6 +81,57 @@ def executors() -> Scenario:
                 ),
             ),
             Process("sink", "alpha", 1301, (_SINK,), start_ns=7 * MILLISECOND),
+        ),
+        duration_ns=4 * SECOND,
+    )  # fmt: skip
+
+
+def events_executors() -> Scenario:
+    """Two events executors, one of which publishes to itself; a queue that overflows."""
+    source = replace(
+        _SOURCE,
+        timers=(
+            Timer(4 * MILLISECOND, ("/fast",)),
+            Timer(7 * MILLISECOND, ("/slow",)),
+        ),
+    )
+    relay = Node(
+        "relay",
+        publishers=(Publisher("/own"), Publisher("/mine"), Publisher("/seen")),
+        subscriptions=(
+            Subscription("/own", ("/seen",), Work(200_000)),
+            Subscription("/mine", ("/seen",), Work(MILLISECOND)),
+        ),
+        timers=(
+            Timer(6 * MILLISECOND, ("/own", "/mine"), Work(300_000)),
+            Timer(10 * MILLISECOND, ("/mine", "/own"), Work(300_000)),
+        ),
+    )
+    worker = Node(
+        "worker",
+        publishers=(Publisher("/checked"),),
+        subscriptions=(
+            Subscription("/fast", work=Work(MILLISECOND)),
+            Subscription("/slow", ("/checked",), Work(MILLISECOND, MILLISECOND, 0.05, 20_000_000)),
+            Subscription("/seen", work=Work(100_000), depth=2),
+        ),
+        timers=(Timer(20 * MILLISECOND, work=Work(MILLISECOND)),),
+    )
+    return Scenario(
+        name="events_executors",
+        description="Two events executors, one that publishes to itself, a queue that overflows.",
+        hosts=(Host("alpha"),),
+        processes=(
+            Process("source", "alpha", 1101, (source,)),
+            Process(
+                "relay", "alpha", 1201, (relay,), start_ns=3 * MILLISECOND,
+                executors=(Executor("events"),),
+            ),
+            Process(
+                "worker", "alpha", 1301, (worker,), start_ns=5 * MILLISECOND,
+                executors=(Executor("events"),),
+            ),
+            Process("sink", "alpha", 1401, (_SINK,), start_ns=7 * MILLISECOND),
         ),
         duration_ns=4 * SECOND,
     )  # fmt: skip
