@@ -27,11 +27,7 @@ EXPECTED: dict[str, list[tuple[str, str | None, int]]] = {
         ("busy_waiting", "component_conta 7031 on vm", 22_700),
         ("dead_end", "/fusion", 191),
     ],
-    "real_events": [
-        ("dead_end", "/filter", 180),
-        ("executor_without_events", "back 14325 on vm", 532),
-        ("executor_without_events", "front 14327 on vm", 1029),
-    ],
+    "real_events": [("dead_end", "/filter", 180)],
     "real_filters": [("dead_end", "/approx", 96), ("dead_end", "/exact", 84)],
     "real_intra": [],
     "real_jazzy_container": [
