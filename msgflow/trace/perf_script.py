@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,15 +15,15 @@ from msgflow.trace.regular_file import open_regular
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
+    from io import BufferedReader
 
 DATA, TEXT = "perf.data", "perf.script"
 """Names of the files: what perf recorded, and what `perf script` made of it."""
 _MAGIC = b"PERFILE2"
 # perf asks no server for symbols, and reads no settings.
-_SCRIPT = (
-    "perf", "script", "--header", "--ns", "--no-inline",
-    "--fields=pid,tid,cpu,time,event,period,ip,sym,dso",
-)  # fmt: skip
+_SCRIPT = ("perf", "script", "--header", "--ns", "--no-inline")
+# perf writes no field that it was not asked to record: the CPU and the period.
+_FIELDS = ("pid,tid,cpu,time,event,period,ip,sym,dso", "pid,tid,time,event,ip,sym,dso")
 _SECONDS = 600.0
 # What a damaged file may have perf write.
 _MOST_BYTES = 1 << 32
@@ -79,12 +78,20 @@ def write_script(data: Path, text: Path) -> None:
         raise _unread(data, error.strerror or str(error)) from None
     if not is_data:
         raise _unread(data, "this is no recording of perf")
+    for fields in _FIELDS:
+        reason = _why_not_written(data, text, fields)
+        if reason is None:
+            return
+    raise _unread(data, str(reason))
+
+
+def _why_not_written(data: Path, text: Path, fields: str) -> str | None:
     environment = {**os.environ, "PERF_CONFIG": os.devnull, "DEBUGINFOD_URLS": ""}
-    command = ["prlimit", f"--fsize={_MOST_BYTES}", *_SCRIPT, f"--input={data}"]
+    command = [*_SCRIPT, f"--fields={fields}", f"--input={data}"]
     try:
         with text.open("wb") as output:
             run = subprocess.run(
-                command,
+                ["prlimit", f"--fsize={_MOST_BYTES}", *command],
                 env=environment,
                 stdin=subprocess.DEVNULL,
                 stdout=output,
@@ -93,10 +100,11 @@ def write_script(data: Path, text: Path) -> None:
                 start_new_session=True,
             )
     except subprocess.TimeoutExpired:
-        raise _unread(data, f"perf takes longer than {_SECONDS:.0f} s") from None
-    if run.returncode:
-        said = run.stderr.decode(errors="replace").strip().splitlines()
-        raise _unread(data, said[-1].strip() if said else f"perf ends with {run.returncode}")
+        return f"perf takes longer than {_SECONDS:.0f} s"
+    if run.returncode == 0:
+        return None
+    said = run.stderr.decode(errors="replace").strip().splitlines()
+    return said[-1].strip() if said else f"perf ends with {run.returncode}"
 
 
 def read_script(text: Path, at_once: int = 10_000) -> Iterator[Samples]:
@@ -113,18 +121,24 @@ def read_script(text: Path, at_once: int = 10_000) -> Iterator[Samples]:
     def taken() -> Samples:
         return Samples(hostname, is_monotonic, heads, ["\n".join(lines) for lines in stacks])
 
+    # A name may have any characters, also ends of lines: a sample begins behind an empty line.
+    is_within = False
     try:
         with open_regular(text) as file:
-            while raw := file.readline(_LONGEST_LINE):
-                line = raw.decode(errors="replace").replace("\0", "").rstrip()
-                if line.startswith("# hostname :"):
+            for line in _lines(file):
+                if not line:
+                    is_within = False
+                elif line.startswith("\t"):
+                    is_within = True
+                    if stacks and len(stacks[-1]) < _MOST_LINES:
+                        stacks[-1].append(line)
+                elif is_within:
+                    continue
+                elif line.startswith("# hostname :"):
                     hostname = line.partition(":")[2].strip()
                 elif line.startswith("# clockid: monotonic ("):
                     is_monotonic = True
-                elif line.startswith("\t"):
-                    if stacks and len(stacks[-1]) < _MOST_LINES:
-                        stacks[-1].append(line)
-                elif line and not line.startswith("#"):
+                elif not line.startswith("#"):
                     if len(heads) == at_once:
                         yield taken()
                         heads, stacks = [], []
@@ -134,6 +148,15 @@ def read_script(text: Path, at_once: int = 10_000) -> Iterator[Samples]:
         raise _unread(text, error.strerror or str(error)) from None
     if heads:
         yield taken()
+
+
+def _lines(file: BufferedReader) -> Iterator[str]:
+    """Yield lines without their ends; of a line that is too long for a name, its begin."""
+    is_begin = True
+    while piece := file.readline(_LONGEST_LINE):
+        if is_begin:
+            yield piece.decode(errors="replace").replace("\0", "").rstrip()
+        is_begin = piece.endswith(b"\n")
 
 
 def _unread(path: Path, reason: str) -> TraceError:

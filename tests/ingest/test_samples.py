@@ -1,0 +1,177 @@
+"""Samples of perf beside a trace: which files are read, and what is said of those that are not."""
+
+from __future__ import annotations
+
+import itertools
+import random
+import shutil
+import subprocess
+import time
+from pathlib import Path
+
+import duckdb
+import pytest
+from thorough import examples
+
+from msgflow import trace as trace_package
+from msgflow.errors import TraceError
+from msgflow.ingest import IngestReport, ingest
+from msgflow.trace.perf_script import DATA, TEXT, read_script, write_script
+
+STACK = "\t    11a8 hog (/lib/libhog.so)\n\t     279 main (/bin/robot)\n"
+HEADER = "# hostname : {}\n# clockid: monotonic (1)\n"
+
+
+@pytest.fixture
+def session(trace: Path, tmp_path: Path) -> Path:
+    """A copy of a trace."""
+    return Path(shutil.copytree(trace, tmp_path / "session"))
+
+
+@pytest.fixture
+def text(session: Path, database: Path) -> str:
+    """What `perf script` says of it: a sample in the middle of each callback."""
+    with trace_package.open([session]) as opened:
+        offset, hostname = opened.traces[0].clock_offset_ns, opened.traces[0].hostname
+    with duckdb.connect(str(database), read_only=True) as con:
+        rows = con.execute(
+            "SELECT p.pid, t.tid, (i.start_ns + i.end_ns) // 2 FROM callback_instance AS i "
+            "JOIN thread AS t USING (thread_id) JOIN process AS p ON i.process_id = p.process_id"
+        ).fetchall()
+    heads = [
+        f"  {pid}/{tid}  [000] {(ns - offset) // 10**9}.{(ns - offset) % 10**9:09}:  7 cpu-clock: \n"
+        for pid, tid, ns in rows
+    ]
+    return HEADER.format(hostname) + "".join(f"\n{head}{STACK}" for head in heads)
+
+
+def inside(report: IngestReport, database: Path) -> tuple[int, int]:
+    """Return how many samples there are, and of how many callback instances."""
+    assert not report.warnings
+    with duckdb.connect(str(database), read_only=True) as con:
+        row = con.execute(
+            "SELECT count(*), count(DISTINCT callback_instance_id) FROM stack_sample"
+        ).fetchone()
+    assert row is not None
+    return row
+
+
+def test_the_text_of_perf_beside_a_trace_is_read(
+    session: Path, text: str, new_database: Path
+) -> None:
+    (session / TEXT).write_text(text)
+    (session / DATA).write_text("of a folder with a text, nothing else is read")
+    count = text.count("cpu-clock")
+    assert count
+    assert inside(ingest([session], new_database), new_database) == (count, count)
+
+
+def test_what_perf_recorded_is_read_by_perf(session: Path, new_database: Path) -> None:
+    if shutil.which("perf") is None:
+        pytest.skip("no perf")
+    command = ["perf", "record", "-q", "-e", "cpu-clock", "-g", "-o", str(session / DATA)]
+    if subprocess.run([*command, "--", "true"], stderr=subprocess.DEVNULL).returncode:
+        pytest.skip("perf may not")
+    report = ingest([session], new_database)
+    assert not report.warnings
+    # This process was not traced, and perf's own clock is another one.
+    (finding,) = [one for one in report.findings if one.name == "samples_not_joined"]
+    assert "have times of another clock" in finding.detail
+
+
+def test_what_cannot_be_read_is_said_and_the_run_is_stored(
+    session: Path, new_database: Path
+) -> None:
+    (session / DATA).write_bytes(b"no such thing")
+    report = ingest([session], new_database)
+    (warning,) = report.warnings
+    assert warning == (
+        f"the samples of functions are not read: this is no recording of perf — {session / DATA}"
+    )
+    assert new_database.exists()
+
+
+def test_a_damaged_recording_of_perf_is_not_read(tmp_path: Path) -> None:
+    (tmp_path / DATA).write_bytes(b"PERFILE2" + bytes(100))
+    with pytest.raises(TraceError, match="are not read"):
+        write_script(tmp_path / DATA, tmp_path / TEXT)
+
+
+def test_without_perf_its_recording_is_not_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / DATA).write_bytes(b"PERFILE2")
+    monkeypatch.setenv("PATH", "")
+    with pytest.raises(TraceError, match="perf is not installed") as raised:
+        write_script(tmp_path / DATA, tmp_path / TEXT)
+    assert raised.value.hint == "apt-get install linux-perf"
+
+
+HOSTILE = [
+    "\t 1 a;b'\"\\ <script>alert(1)</script> ((([[ (/lib/x)\n",
+    "\t 1 " + "x" * 100_000 + " (/lib/x)\n",
+    "\t 1 \udcff\x00\x1b[31m (/lib/../../etc/passwd)\n",
+    "\t 1 py:::: (/tmp/perf-1.map)\n",
+    "\t 1 new\nline 1/1 [000] 1.000000000: 7 cpu-clock: \n (/lib/x)\n",
+    "\t" * 5_000 + "\n",
+]
+
+
+def test_names_of_an_attacker_do_no_harm(session: Path, text: str, new_database: Path) -> None:
+    """Each is in the stacks of some samples."""
+    count = text.count("cpu-clock")
+    assert count > len(HOSTILE)
+    head, *others = text.split(STACK)
+    parts = [f"{line}{STACK}{other}" for line, other in zip(itertools.cycle(HOSTILE), others)]
+    (session / TEXT).write_bytes("".join([head, *parts]).encode(errors="surrogateescape"))
+    assert inside(ingest([session], new_database), new_database) == (count, count)
+
+
+def test_a_deep_stack_is_cut(tmp_path: Path) -> None:
+    (tmp_path / TEXT).write_text("1/1 1.000000: cpu-clock:\n" + "\t1 f (/a)\n" * 5_000)
+    (samples,) = read_script(tmp_path / TEXT)
+    assert samples.stacks[0].count("\n") < 2_000
+
+
+@pytest.mark.thorough
+def test_damaged_files_end_no_ingest(session: Path, text: str, new_database: Path) -> None:
+    """Bytes that change, and ends that are missing: the callbacks are those of the trace always."""
+    chance = random.Random(1)
+    whole = text.encode()
+    for number in range(examples(10, 300)):
+        damaged = bytearray(whole)
+        for _ in range(chance.randrange(1, 60)):
+            damaged[chance.randrange(len(damaged))] = chance.randrange(256)
+        (session / TEXT).write_bytes(damaged[: chance.randrange(len(damaged))])
+        ingest([session], new_database, name="damaged", replace=bool(number))
+        with duckdb.connect(str(new_database)) as con:
+            assert con.execute(
+                "SELECT count(*) FROM stack_sample AS s ANTI JOIN stack USING (stack_id)"
+            ).fetchone() == (0,)
+
+
+@pytest.mark.thorough
+def test_damaged_recordings_of_perf_end_no_ingest(session: Path, tmp_path: Path) -> None:
+    """perf itself may crash: the text that it wrote until then is not used."""
+    if shutil.which("perf") is None:
+        pytest.skip("no perf")
+    data = tmp_path / DATA
+    command = ["perf", "record", "-q", "-e", "cpu-clock", "-g", "-k", "CLOCK_MONOTONIC"]
+    subprocess.run([*command, "-o", str(data), "--", "python3", "-c", "sum(range(10**7))"])
+    if not data.exists():
+        pytest.skip("perf may not")
+    chance = random.Random(2)
+    whole = data.read_bytes()
+    begun = time.monotonic()
+    for _ in range(examples(10, 300)):
+        damaged = bytearray(whole)
+        for _ in range(chance.randrange(1, 20)):
+            damaged[chance.randrange(8, len(damaged))] = chance.randrange(256)
+        data.write_bytes(damaged[: chance.randrange(8, len(damaged))])
+        try:
+            write_script(data, tmp_path / TEXT)
+        except TraceError as error:
+            assert "are not read" in error.message
+        else:
+            list(read_script(tmp_path / TEXT))
+    assert time.monotonic() - begun < 600
