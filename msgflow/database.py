@@ -460,10 +460,11 @@ class Database:
             UsageError: not exactly one run, no such place or time, or no flow arrives there.
         """
         from msgflow.query.why import explain
+        from msgflow.query.why_functions import with_functions
 
         one = self._ask(Slice(part.get("run")).one_run, "an explanation")
         times = Slice(one.run_id, part.get("start"), part.get("end"))
-        return self._ask(explain, one, times, place)
+        return self._ask(with_functions, self._ask(explain, one, times, place))
 
     def flow(
         self,

@@ -1,0 +1,23 @@
+-- name: internal.callback_function
+-- title: Functions of a callback
+-- description: The three functions in which a callback was most of its CPU time.
+-- grain: one row per function
+-- param: run_id BIGINT  Run
+-- param: node VARCHAR  Its node
+-- param: callback VARCHAR  What triggers it
+-- column: function VARCHAR  The function
+-- column: self_share DOUBLE [share]  Part of the samples of the callback in which it ran
+-- column: all_samples BIGINT  Samples of the callback
+WITH sample AS (
+    SELECT 1 AS group_id, s.stack_id, s.cpu_ns
+    FROM main.stack_sample AS s
+    JOIN main.callback_instance AS i ON s.callback_instance_id = i.callback_instance_id
+    JOIN main.callback_label AS l ON i.callback_id = l.callback_id
+    WHERE s.run_id = $run_id AND l.node = $node AND l.label = $callback
+)
+SELECT f.function, t.self_share, (SELECT count(*) FROM sample) AS all_samples
+FROM main.function_time('sample') AS t
+JOIN main.stack_frame AS f ON t.stack_frame_id = f.stack_frame_id
+WHERE t.self_samples > 0
+ORDER BY t.self_samples DESC, f.function, f.file
+LIMIT 3
