@@ -1,0 +1,141 @@
+"""Samples of functions beside a recording: what is said before it, and shares that are known."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from msgflow import Database, UsageError
+from msgflow.record import perf
+from msgflow.record.profile import Rate, read_rate, recorded_samples, with_python_functions
+from msgflow.trace.perf_script import TEXT
+
+HOGS = """
+#include <time.h>
+namespace {
+double now() {
+  timespec t;
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return t.tv_sec + t.tv_nsec * 1e-9;
+}
+volatile long sink;
+template <int percent> __attribute__((noinline)) void hog(double seconds) {
+  for (double end = now() + seconds * percent / 100; now() < end;)
+    for (int i = 0; i < 20000; i++) sink = sink + i;
+}
+}
+extern "C" __attribute__((noinline)) void detect(double seconds) {
+  hog<10>(seconds);
+  hog<30>(seconds);
+  hog<60>(seconds);
+  sink = 0;
+}
+extern "C" __attribute__((noinline)) void look(double seconds) { hog<100>(seconds); sink = 0; }
+"""
+NODES = """
+import ctypes, sys
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from std_msgs.msg import UInt64
+
+hogs = ctypes.CDLL(sys.argv[1])
+hogs.detect.argtypes = hogs.look.argtypes = [ctypes.c_double]
+rclpy.init()
+camera, detector = Node("camera"), Node("detector")
+image = camera.create_publisher(UInt64, "/image", 10)
+detector.create_subscription(UInt64, "/image", lambda message: hogs.detect(0.06), 10)
+camera.create_timer(0.1, lambda: (hogs.look(0.01), image.publish(UInt64())))
+executor = rclpy.executors.SingleThreadedExecutor()
+executor.add_node(camera)
+executor.add_node(detector)
+try:
+    executor.spin()
+except (ExternalShutdownException, KeyboardInterrupt):
+    pass
+"""
+SHARES = {"hog<10>": 0.1, "hog<30>": 0.3, "hog<60>": 0.6}
+
+
+def test_a_rate_may_say_how_callers_are_found() -> None:
+    assert read_rate("99") == Rate(99, "fp")
+    assert read_rate("49:dwarf") == Rate(49, "dwarf")
+    for text in ("", "0", "fast", "99:lbr", "20000"):
+        with pytest.raises(UsageError, match="no rate of samples"):
+            read_rate(text)
+
+
+@pytest.mark.parametrize(
+    ("script", "said"),
+    [
+        (None, "perf is not installed (apt-get install linux-perf)"),
+        ("echo Access to performance monitoring is limited >&2; exit 1", "perf may not: Access"),
+    ],
+)
+def test_what_is_missing_is_said_before_the_recording(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, script: str | None, said: str
+) -> None:
+    if script is not None:
+        (tmp_path / "perf").write_text(f"#!/bin/sh\n{script}\n")
+        (tmp_path / "perf").chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    notes: list[str] = []
+    with recorded_samples(tmp_path, Rate(99, "fp"), is_ours=True, note=notes.append):
+        (note,) = notes
+    assert said in note
+    assert "sysctl kernel.perf_event_paranoid=1" in note
+    assert not (tmp_path / TEXT).exists()
+
+
+def test_python_is_asked_to_name_its_functions(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    notes: list[str] = []
+    python = tmp_path / "python3"
+    python.write_text("#!/bin/sh\nexit 1\n")
+    python.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert with_python_functions({"A": "b"}, notes.append) == {"A": "b", "PYTHONPERFSUPPORT": "1"}
+    assert "is older than 3.12" in notes[0]
+    python.write_text("#!/bin/sh\nexit 0\n")
+    with_python_functions({}, notes.append)
+    assert len(notes) == 1
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("rate", ["199", "199:dwarf"])
+def test_shares_of_known_functions(robot: list[str], tmp_path: Path, rate: str) -> None:
+    """Within 5 points at 400 samples; nothing of a callback is of another one."""
+    if reason := perf.why_not(["--event=cpu-clock"]):
+        pytest.skip(reason)
+    (tmp_path / "hogs.cpp").write_text(HOGS)
+    flags = "-O1 -g -fno-omit-frame-pointer -fno-optimize-sibling-calls -shared -fPIC".split()
+    subprocess.run(["g++", *flags, "hogs.cpp", "-o", "libhogs.so"], cwd=tmp_path, check=True)
+    command = [sys.executable, "-m", "msgflow", "record", "--profile", rate, "--duration", "14"]
+    program = [*robot[: robot.index("-c")], "-c", NODES, str(tmp_path / "libhogs.so")]
+    subprocess.run(
+        [*command, "-o", "trace", "--", *program],
+        cwd=tmp_path, check=True, capture_output=True, env=os.environ,
+    )  # fmt: skip
+    assert sorted(path.name for path in (tmp_path / "trace").iterdir()) == [TEXT, "ust"]
+    with Database(tmp_path / "msgflow.duckdb") as database:
+        rows = database.query("functions").to_arrow().to_pylist()
+        why = database.why()
+    of_hogs = [row for row in rows if "hog<" in row["function"]]
+    found = {
+        (row["callback"], row["function"][row["function"].index("hog<") :][:7]): row
+        for row in of_hogs
+    }
+    assert {function for callback, function in found if "/image" in callback} == set(SHARES)
+    assert {function for callback, function in found if "Timer" in callback} == {"hog<100"}
+    assert {callback for callback, _ in found} == {"Subscription(/image)", "Timer(100 ms)"}
+    shares = {row["function"]: row["total_share"] for row in of_hogs}
+    samples = sum(row["samples"] for row in of_hogs if "/image" in row["callback"])
+    for function, share in SHARES.items():
+        row = found["Subscription(/image)", function]
+        assert abs(row["total_share"] - share) < (0.05 if samples >= 400 else 0.1), shares
+    assert any("hog<60>" in note for note in why.notes)
