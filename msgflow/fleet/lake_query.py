@@ -28,7 +28,7 @@ from msgflow.fleet.lake_connection import (
 from msgflow.fleet.layout import VIEWS
 from msgflow.query.catalogue import choose_query, load_query, queries_meant
 from msgflow.query.runner import bind, shown_rows
-from msgflow.query.selection import make_selection, selected
+from msgflow.query.selection import make_selection, selected, values_of
 from msgflow.result.query_result import QueryResult
 from msgflow.sql.failure import first_line
 from msgflow.sql.header import Column, relations_of
@@ -120,7 +120,7 @@ def fleet_query(
     for variant in header.variants:
         # It has chosen the statement, which does not take it.
         del own[variant.name]
-    chosen = make_selection(dict(selection or {}))
+    chosen = make_selection(dict(selection or {}), lake_names)
     choice = choose(lake, where)
     with Reading(choice, _tables(header)) as reading:
         con = reading.connection
@@ -145,6 +145,13 @@ def fleet_query(
     if _BUCKETS in header.relations and not is_each_alone:
         notes.append("medians and other quantiles of several runs are off by less than 1 %")
     return QueryResult(table, grouped, notes=notes)
+
+
+def lake_names(kind: str, text: str) -> Sequence[str]:
+    """Return what a text may name: a name with commas in some run, or several without."""
+    parts = values_of(text)
+    # A path goes through all of several places.
+    return parts if kind == "place" or parts == (text,) else (text, *parts)
 
 
 def fleet_sql(

@@ -282,7 +282,7 @@ class Pages:
         is_quick = bool(params.get("quick"))
         what = str(params.get("what", "paths"))
         comparison = compare(
-            connection, str(_whole(params, "other")), str(extent.run.run_id),
+            connection, str(_whole(params, "other")), str(extent.run.run_id), run=None, window=(),
             what=what, resamples=0 if is_quick else None,
         )  # fmt: skip
         return encoded_comparison(comparison, what, is_quick=is_quick)

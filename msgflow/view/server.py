@@ -1,8 +1,10 @@
 """The server of `msgflow ui`: it sends the pages of one database to the browser of its user.
 
-A request needs the token of the printed address, which becomes a cookie. The server refuses
-requests that other sites make, or that name another host than this machine. Behind `ssh -L` the
-host is still this machine.
+A page needs the token of the printed address, or the cookie that it then gets. Browsers send
+cookies to all ports of a host, also to those of other users: so the cookie opens pages without
+data, and a question needs the token itself, which the page keeps for its own port. The server
+refuses requests that other sites make, or that name another host than this machine. Behind `ssh -L`
+the host is still this machine.
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ import duckdb
 import uvicorn
 from starlette.applications import Starlette
 from starlette.datastructures import Headers
-from starlette.responses import JSONResponse, PlainTextResponse, RedirectResponse, Response
+from starlette.responses import JSONResponse, PlainTextResponse, Response
 from starlette.routing import Route
 
 from msgflow.errors import MsgflowError, QueryError, UsageError
@@ -188,7 +190,8 @@ def single_application(make: Callable[[], str], token: str) -> ASGIApp:
             return PlainTextResponse(f"error: {error.message}{hint}\n", status_code=500)
         return Response(content, media_type="text/html")
 
-    return Guard(Starlette(routes=[Route("/", page)]), token, _POLICY_OF_FILES)
+    # Its data are in the page, which no cookie opens.
+    return Guard(Starlette(routes=[Route("/", page)]), token, _POLICY_OF_FILES, has_cookie=False)
 
 
 def serve_single(
@@ -262,9 +265,12 @@ def _head() -> str:
 class Guard:
     """A guard: it passes on requests with the token, from our own page, to this machine."""
 
-    def __init__(self, app: ASGIApp, token: str, policy: str = _POLICY) -> None:
+    def __init__(
+        self, app: ASGIApp, token: str, policy: str = _POLICY, *, has_cookie: bool = True
+    ) -> None:
         self._app = app
         self._token = token
+        self._has_cookie = has_cookie
         self._headers = _HEADERS | {"Content-Security-Policy": policy}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -280,9 +286,14 @@ class Guard:
             await _with_headers(refusal)(scope, receive, send)
             return
 
+        headers = dict(self._headers)
+        if self._has_cookie and "token" in request.query_params:
+            cookie = f"{_cookie_name(request)}={cookie_of(self._token)}"
+            headers["Set-Cookie"] = f"{cookie}; HttpOnly; Path=/; SameSite=strict"
+
         async def send_with_headers(message: Any) -> None:
             if message["type"] == "http.response.start":
-                known = [(k.lower().encode(), v.encode()) for k, v in self._headers.items()]
+                known = [(k.lower().encode(), v.encode()) for k, v in headers.items()]
                 message["headers"] = [*message["headers"], *known]
             await send(message)
 
@@ -300,18 +311,23 @@ class Guard:
             is_visit = request.headers.get("sec-fetch-mode") == "navigate"
             if not (is_visit and request.url.path == "/"):
                 return PlainTextResponse("error: another site asks\n", status_code=403)
-        port = request.url.port or 80
-        cookie = f"msgflow_{port}"
-        given = request.query_params.get("token")
-        if given is not None and request.url.path == "/":
-            if not _same(given, self._token):
-                return _unknown()
-            response = RedirectResponse("/", status_code=303)
-            response.set_cookie(cookie, self._token, httponly=True, samesite="strict", path="/")
-            return response
-        if not _same(request.cookies.get(cookie, ""), self._token):
-            return _unknown()
-        return None
+        if request.url.path.startswith("/api/"):
+            is_known = _same(request.headers.get("X-Token", ""), self._token)
+        elif request.url.path == "/" and "token" in request.query_params:
+            is_known = _same(request.query_params["token"], self._token)
+        else:
+            cookie = request.cookies.get(_cookie_name(request), "")
+            is_known = self._has_cookie and _same(cookie, cookie_of(self._token))
+        return None if is_known else _unknown()
+
+
+def cookie_of(token: str) -> str:
+    """Return the value of the cookie: the token does not follow from it."""
+    return hmac.new(token.encode(), b"page", "sha256").hexdigest()
+
+
+def _cookie_name(request: Request) -> str:
+    return f"msgflow_{request.url.port or 80}"
 
 
 def _with_headers(response: Response) -> Response:

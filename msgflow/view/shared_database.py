@@ -178,8 +178,14 @@ class SharedDatabase:
     def _current(self) -> Opened:
         # A process has a file of one name open once: the old one is closed before the new one.
         self._asked_at = time.monotonic()
+        end = self._asked_at + _MOST_SECONDS_TO_END
         while self._opened is None or not self._is_same(self._opened.answers):
             if self._cursors:
+                if time.monotonic() > end:
+                    raise UnopenedError(
+                        "a question to the database as it was before does not end",
+                        "end msgflow ui with Ctrl-C, and start it again",
+                    )
                 self._end_questions()
                 continue
             self._free()

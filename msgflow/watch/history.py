@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
     from msgflow.watch.kept_chunk import KeptChunk
 
-# One takes half a kilobyte of memory while it is analysed.
-_MOST_EVENTS = 500_000
+# One takes up to two kilobytes of memory while it is analysed.
+_MOST_EVENTS = 250_000
 
 
 class History:

@@ -25,6 +25,7 @@ from msgflow.fleet.lake_query import (
     fleet_query,
     fleet_sql,
     fleet_worst,
+    lake_names,
     header_of,
     names,
     statements,
@@ -32,6 +33,7 @@ from msgflow.fleet.lake_query import (
 from msgflow.fleet.part import Content, write_part
 from msgflow.ingest import ingest
 from msgflow.query.catalogue import load_query
+from msgflow.query.selection import make_selection
 from msgflow_sim import simulate
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "fleet.md").read_text(encoding="utf-8")
@@ -86,6 +88,13 @@ def test_one_run_is_what_its_database_says(
     shared = [column for column in found.columns if column in expected.column_names]
     assert len(shared) >= 3
     assert rows(found.table, shared) == rows(expected, shared)
+
+
+def test_a_text_is_a_name_with_commas_or_several_names() -> None:
+    given = {"node": "/a, /b", "topic": "/a", "host": ["x,y"], "via": "/a,/b"}
+    chosen = make_selection(given, lake_names)
+    assert chosen.node == ("/a, /b", "/a", "/b")
+    assert (chosen.topic, chosen.host, chosen.via) == (("/a",), ("x,y",), ("/a", "/b"))
 
 
 def test_findings_of_one_run_are_added_up(night: Lake, databases: tuple[Path, Path]) -> None:

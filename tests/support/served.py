@@ -15,7 +15,7 @@ from urllib.parse import urlsplit
 import duckdb
 
 from msgflow.confined.query import WarmSql
-from msgflow.view.server import running
+from msgflow.view.server import cookie_of, running
 
 _UNITS = ((10**9, "s"), (10**6, "ms"), (10**3, "µs"), (1, "ns"))
 
@@ -37,9 +37,10 @@ class Served:
     def get(
         self, path: str, *, method: str = "GET", **headers: str
     ) -> tuple[int, dict[str, str], bytes]:
-        """Ask as the browser does that has the cookie; headers replace what it says."""
+        """Ask as the browser does that has opened the address; headers replace what it says."""
         connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=30)
-        said = {"Host": f"127.0.0.1:{self.port}", "Cookie": f"msgflow_{self.port}={self.token}"}
+        cookie = f"msgflow_{self.port}={cookie_of(self.token)}"
+        said = {"Host": f"127.0.0.1:{self.port}", "Cookie": cookie, "X-Token": self.token}
         said |= {name.replace("_", "-"): value for name, value in headers.items()}
         connection.request(method, path, headers=said)
         answer = connection.getresponse()

@@ -129,7 +129,7 @@ def test_a_query_that_nobody_waits_for_ends_and_keeps_no_page_waiting(
         reader.sendall(
             f"GET /api/sql?{urlencode({'text': SLOW})} HTTP/1.1\r\n"
             f"Host: 127.0.0.1:{server.port}\r\n"
-            f"Cookie: msgflow_{server.port}={server.token}\r\n\r\n".encode()
+            f"X-Token: {server.token}\r\n\r\n".encode()
         )
         time.sleep(0.5)
         begin = time.monotonic()
@@ -169,7 +169,7 @@ def test_a_signal_ends_the_server_and_the_query(demo: Path, tmp_path: Path) -> N
         with socket.create_connection(("127.0.0.1", port)) as reader:
             reader.sendall(
                 f"GET /api/sql?{urlencode({'text': SLOW})} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n"
-                f"Cookie: msgflow_{port}={token}\r\n\r\n".encode()
+                f"X-Token: {token}\r\n\r\n".encode()
             )
             for _ in range(200):
                 if children := children_of(process.pid):

@@ -25,7 +25,7 @@ from msgflow.errors import DatabaseInUseError
 from msgflow.view import pages
 from msgflow.view.kept_token import kept_token
 from msgflow.view.pages import Pages
-from msgflow.view.shared_database import SharedDatabase
+from msgflow.view.shared_database import SharedDatabase, UnopenedError
 
 HOLD = (
     "import duckdb, sys; con = duckdb.connect(sys.argv[1]); print('held', flush=True);"
@@ -239,7 +239,6 @@ def test_a_question_that_no_interrupt_ends_keeps_nothing_open_for_ever(
     begun, ended = threading.Event(), threading.Event()
 
     def answer(*_: object) -> bytes:
-        begun.set()
         ended.wait(60)
         return b""
 
@@ -247,9 +246,12 @@ def test_a_question_that_no_interrupt_ends_keeps_nothing_open_for_ever(
     monkeypatch.setattr("msgflow.view.shared_database._MOST_SECONDS_TO_END", 0.2)
     shared = SharedDatabase(small_database, None)
     with ThreadPoolExecutor(1) as beside:
-        asked = beside.submit(shared.answer, "run", {}, None, lambda _: None)
+        asked = beside.submit(shared.answer, "run", {}, None, lambda _: begun.set())
         begun.wait(60)
         begin = time.monotonic()
+        os.utime(small_database)
+        with pytest.raises(UnopenedError, match="does not end"):
+            shared.generation()
         shared.close()
         assert time.monotonic() - begin < 30
         assert not asked.done()

@@ -56,6 +56,7 @@ class ServedSource {
     this.notes = [];
     this.kept = new Map();
     this.generation = document.documentElement.dataset.generation ?? "";
+    this.token = keptToken();
   }
 
   async fetch(name, params = {}, signal = undefined) {
@@ -77,7 +78,7 @@ class ServedSource {
     try {
       answer = await fetch(placeOf(name, params), {
         signal,
-        headers: { "X-Generation": this.generation },
+        headers: { "X-Generation": this.generation, "X-Token": this.token },
       });
     } catch (error) {
       if (error.name === "AbortError") throw error;
@@ -95,6 +96,16 @@ class ServedSource {
     this.generation = generation;
     this.kept.clear();
   }
+}
+
+// The token of the printed address, which leaves the address bar. What is kept is kept by port: other
+// servers of this machine do not see it.
+function keptToken() {
+  const given = new URLSearchParams(location.search).get("token");
+  if (given === null) return localStorage.getItem("msgflow-token") ?? "";
+  localStorage.setItem("msgflow-token", given);
+  history.replaceState(null, "", `${location.pathname}${location.hash}`);
+  return given;
 }
 
 function placeOf(name, params) {
