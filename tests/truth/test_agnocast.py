@@ -87,6 +87,7 @@ def database(
         yield connection
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("what", TRUTHS)
 def test_every_row_is_as_it_was(database: duckdb.DuckDBPyConnection, what: str) -> None:
     truth, found = (text.replace(" store.", " run.store.") for text in TRUTHS[what])
@@ -95,6 +96,7 @@ def test_every_row_is_as_it_was(database: duckdb.DuckDBPyConnection, what: str) 
         assert database.execute(f"({one}) EXCEPT ALL ({other})").fetchall() == []
 
 
+@pytest.mark.thorough
 def test_what_the_system_shows(database: duckdb.DuckDBPyConnection) -> None:
     """Numbers that begin again, receipts before the event of the publication, old periods."""
     assert database.execute(

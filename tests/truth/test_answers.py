@@ -91,6 +91,7 @@ ANSWERED = {
 }
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", few(ANSWERED, "4-main-loops"))
 def test_only_answers_are_certain(recordings: Callable[[str], Ingested], name: str) -> None:
     pairs = recordings(f"../wild/{name}.tar.xz").rows(PAIRS)
