@@ -69,7 +69,6 @@ def test_twenty_resamples_have_to_lie_beyond_the_ends(con: duckdb.DuckDBPyConnec
     assert not ends(con, 5, [1, 1, 1, 1], 399)
 
 
-@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("number", "block_length", "narrowing", "drawn"),
     [
