@@ -72,6 +72,7 @@ follower AS MATERIALIZED (
         l.start_ns,
         l.start_ns - l.taken_ns AS delay_ns,
         n.taken_ns - l.start_ns AS rest_ns,
+        o.interval_ns, o.message_count,
         CASE WHEN o.interval_ns < least(l.start_ns - l.taken_ns, r.mean_ns / 10) THEN 0 ELSE 1 END
             AS number,
         p.process_id,
