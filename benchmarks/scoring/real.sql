@@ -126,7 +126,7 @@ link AS (
     UNION ALL
     SELECT 'called_with', 'take', c.callback, 'callback_instance', c.callback
     FROM truth_callback AS c
-    JOIN traced AS t ON c.pid = t.pid
+    SEMI JOIN (FROM analysed.store.process WHERE python_version IS NOT NULL) AS p ON c.pid = p.pid
     -- Without its topic, which take it was is not known.
     SEMI JOIN (FROM truth_time WHERE kind = 'take') AS k ON c.callback = k.id
     WHERE c.kind = 'sub'

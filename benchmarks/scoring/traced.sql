@@ -8,11 +8,7 @@ FROM (
     -- What is behind the session is not traced; a task is told apart by its thread alone.
     WHERE k = 'callback' AND kind <> 'client'
 ) AS c
-JOIN (
-    SELECT DISTINCT p.pid
-    FROM analysed.store.callback_instance AS i
-    JOIN place AS p ON i.thread_id = p.thread_id
-) AS t ON c.pid = t.pid
+SEMI JOIN (FROM analysed.store.process WHERE python_version IS NOT NULL) AS t ON c.pid = t.pid
 LEFT JOIN truth_time AS b ON b.kind = 'callback_instance' AND c.callback = b.id
 LEFT JOIN place AS p ON b.host = p.host AND b.pid = p.pid AND b.tid = p.tid
 LEFT JOIN analysed.store.callback_instance AS i
@@ -46,7 +42,10 @@ SELECT
     s.thread_id, s.end_ns - s.start_ns - s.known_ns AS hole_ns,
     s.callback_ns - coalesce(r.callback_ns, 0) AS more_ns
 FROM spent AS s
-LEFT JOIN run AS r ON s.thread_id = r.thread_id;
+JOIN analysed.store.thread AS t ON s.thread_id = t.thread_id
+JOIN analysed.store.process AS p ON t.process_id = p.process_id
+LEFT JOIN run AS r ON s.thread_id = r.thread_id
+WHERE p.python_version IS NOT NULL;
 
 -- Half of the callbacks are known within 20 us: of others, the node itself was interrupted before
 -- it began to measure, or behind that.

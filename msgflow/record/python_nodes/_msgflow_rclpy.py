@@ -469,6 +469,9 @@ def _work_for(executor):
 
 def _make_handler(original):
     def _make_handler(self, entity, node, take_from_wait_list, *args, **kwargs):
+        if not _is_recorded:
+            return original(self, entity, node, take_from_wait_list, *args, **kwargs)
+
         def take(entity):
             if _is_recorded:
                 try:
