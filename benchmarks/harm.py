@@ -3,10 +3,11 @@
     python benchmarks/harm.py --python PYTHON [--seconds 5] [--rounds 20] [--calls 2000]
 
 Ten nodes of rclpy are recorded without the tracer, with it, and with one that finds no library,
-meets another rclpy, or raises: when it is loaded, and while callbacks run. Exit codes and the number
-of callbacks have to be the same, and where it fails one line more is on stderr. Then callbacks run
-as fast as they can, without the tracer, with it and no session, and with both, in turn: the CPU
-that one takes, and how many run in a second. PYTHON has the wheels of ROS 2 (`make ros`). The exit code is 1 if it harms.
+meets another rclpy, or raises: when it is loaded, and while callbacks run. Exit codes and the
+number of callbacks have to be the same, and where it fails one line more is on stderr. Then
+callbacks run as fast as they can, without the tracer, with it and no session, and with both, in
+turn: the CPU that one takes, and how many run in a second. PYTHON has the wheels of ROS 2 (`make
+ros`). The exit code is 1 if it harms.
 """
 
 from __future__ import annotations

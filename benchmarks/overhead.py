@@ -184,7 +184,7 @@ def report(blocks: dict[str, list[Block]], draws: random.Random) -> None:
     print("| recorded | median | difference of medians | of means | CPU per message | events | "
           "bytes per event | ns of CPU per event |")  # fmt: skip
     print("| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |")
-    for kind, some in blocks.items():
+    for kind, some in sorted(blocks.items(), key=lambda item: item[0] != _NOTHING):
         median = statistics.median(_latencies(some)) / 1e6
         cpu = statistics.mean(one.cpu_ns for one in some)
         events = statistics.mean(one.events for one in some)
