@@ -95,6 +95,8 @@ def test_from_a_robot_to_an_answer(record: Record, robot: list[str], tmp_path: P
     assert "/camera → /image → /detector" in ended.out
     assert "process_without_rclcpp" not in ended.out
     assert "run: drive (1)" in ended.err
+    assert "tracing took about " in ended.err
+    assert "of the latencies, tracing is about " in ended.err
     assert " 0 discarded" in ended.err
     # Only what LTTng wrote.
     assert [path.name for path in (tmp_path / "trace").iterdir()] == ["ust"]
