@@ -101,7 +101,7 @@ CREATE TABLE store.ring_buffer_event (
     event_id BIGINT  -- The event [event order] {hidden}
 );
 
--- One row per take of a message whose arrival is known but by the waking of its thread
+-- One row per take of a message whose arrival something else than its thread told
 -- view: When messages were there before they were taken, as CARET's hook in Fast DDS says. In
 -- events executors also: those that their own thread published, and those for which, as a kernel
 -- trace shows, the publishing thread woke one of the middleware.

@@ -115,11 +115,11 @@ Table(
     reference("take_id", "Take of the message", to="take.take_id", required=True),
     number("waited_ns", "From there until the take", unit="ns", required=True),
     flag("is_ambiguous", "Several readers of the process had a message of that stamp"),
-    comment="One row per take of a message whose arrival is known but by the waking of its thread",
+    comment="One row per take of a message whose arrival something else than its thread told",
     info={
-        "view": "When messages were there before they were taken, as CARET's hook in Fast DDS says. "
-        "In events executors also: those that their own thread published, and those for which, as "
-        "a kernel trace shows, the publishing thread woke one of the middleware."
+        "view": "When messages were there before they were taken, as CARET's hook in Fast DDS "
+        "says. In events executors also: those that their own thread published, and those for "
+        "which, as a kernel trace shows, the publishing thread woke one of the middleware."
     },
 )
 
