@@ -3,10 +3,12 @@
     python benchmarks/fuzz.py [--cases 10000] [--first 0] [--seed 1] [--jobs N] [--kind KIND]…
         [--case N]…
 
-Each case changes a small recording, an archive of one, a database, a file of links or clocks, a
-manifest, or a lake, and runs all of msgflow on it in a process with limits: ingest, check, and
-three queries, or what `fleet` does with a lake. The process is forked from one that has done all
-that with a recording as it was, so that no case pays for imports and for what is kept of `schema/`.
+Each case changes a small recording, an archive of one, a database or a name in it, a file of links
+or clocks, a manifest, a lake, a bag, the chunks of a rotated recording, or the parameters of a
+page, and runs all of msgflow on it in a process with limits: ingest, check, and three queries, or
+what `fleet`, `bag`, `watch`, `export` or `ui` do with it. The process is forked from one that has
+done all that with a recording as it was, so that no case pays for imports and for what is kept of
+`schema/`.
 Counted are, by kind of input:
 
 - traceback: one is printed; mistake: an error says "mistake of msgflow"; crash: the process ends by
@@ -411,6 +413,16 @@ def case(
         change, traces, protected = damage_file(database, random), [], False
     elif kind in ("lake", "manifest"):
         return case_of_fleet(number, kind, base, place, random)
+    elif kind in OTHERS:
+        outside = place / "outside"
+        outside.mkdir()
+        (outside / "file").write_text("mine")
+        shutil.copyfile(base.database, database)
+        change, work = OTHERS[kind](base, place, random)
+        ending, found, said = run(lambda: unchanged(outside, work), place)
+        refused = any(found.get("codes", ()))
+        bad = tuple(faults(ending, found, said))
+        return Outcome(number, kind, change, bad, said, "refused" if refused else ending)
     else:
         name, text, option = FILES[kind]
         content, change = damage_text(text.replace("{host}", random.choice(base.hosts)), random)
@@ -454,6 +466,138 @@ def case_of_fleet(number: int, kind: str, base: Base, place: Path, random: Rando
     refused = bool(found.get("codes")) and found["codes"][0] != 0
     bad = tuple(faults(ending, found, said))
     return Outcome(number, kind, change, bad, said, "refused" if refused else ending)
+
+
+def unchanged(outside: Path, work: Callable[[], list[int]]) -> dict[str, Any]:
+    """Do something; nothing outside may change."""
+
+    def state() -> list[tuple[str, bytes]]:
+        return [(path.name, path.read_bytes()) for path in sorted(outside.iterdir())]
+
+    before = state()
+    codes = work()
+    return {"codes": codes, "damaged": state() != before}
+
+
+ODD_NAMES = (
+    "../../outside/file", "/a, /b", "=1+1", "\x1b[31m", "\r", "\u2028", " ", "'; DROP TABLE x; --",
+    "-", "a" * 5000, "\U0001f916", "%s{}", "*?[", "..", "\x7f\x85",
+)  # fmt: skip
+
+
+def odd_names(base: Base, place: Path, random: Random) -> tuple[str, Callable[[], list[int]]]:
+    """Give things of a database odd names: topics, nodes, files of its views."""
+    import duckdb
+
+    name = random.choice(ODD_NAMES)
+    table, column = random.choice(
+        (("publisher", "topic_name"), ("subscription", "topic_name"), ("node", "name"),
+         ("node", "namespace"), ("trace", "hostname"), ("run", "name"), ("process", "procname"))
+    )  # fmt: skip
+    with duckdb.connect(str(place / "run.duckdb")) as connection:
+        with contextlib.suppress(duckdb.Error):
+            connection.execute(f"UPDATE store.{table} SET {column} = ?", [name])
+        connection.execute(f'CREATE VIEW main."{name.replace(chr(34), "")}" AS SELECT 1 AS x')
+    given = ("--db", str(place / "run.duckdb"))
+    words = random.choice(
+        (("export", "csv", "-o", str(place / "out")), ("export", "parquet", "-o", str(place / "o")),
+         ("report", "-o", str(place / "r.html")), ("graph",), ("suggest", "paths"), ("why",),
+         ("query", "flows", "--from", name), ("query", "e2e-latency", "--format", "csv"))
+    )  # fmt: skip
+    return f"{table}.{column} = {name[:30]!r}: {' '.join(words[:2])}", lambda: [
+        msgflow(*words, *given)[0]
+    ]
+
+
+def odd_chunks(base: Base, place: Path, random: Random) -> tuple[str, Callable[[], list[int]]]:
+    """Put junk beside the chunks of a recording, and damage one; watch reads it."""
+    changes = []
+    for source in sorted({path.parents[1] for path in base.directory.rglob("ust/uid")}):
+        archives = place / "live" / source.name / "archives"
+        for number in range(2):
+            span = f"20260314T09260{number}+0000-20260314T09260{number + 1}+0000"
+            shutil.copytree(source, archives / f"{span}-{number}")
+        junk = archives / random.choice(
+            ("20990101T000000+0000-20990101T000001+0000-77", "20260314T092601+0000-x-1", "notes",
+             "20260314T092602+0000-20260314T092603+0000-2", "99999999T999999+0000-0-1",
+             "20260314T092602+0000-20260314T092603+0000-99999999999999999999")
+        )  # fmt: skip
+        made = random.choice(("folder", "file", "pipe", "link", "damage"))
+        if made == "folder":
+            junk.mkdir()
+        elif made == "file":
+            junk.write_bytes(random.randbytes(99))
+        elif made == "pipe":
+            os.mkfifo(junk)
+        elif made == "link":
+            junk.symlink_to(place)
+        else:
+            file = random.choice(sorted(path for path in archives.rglob("*") if path.is_file()))
+            changes.append(damage_file(file, random))
+        changes.append(f"{made} {junk.name}")
+    words = ("watch", str(place / "live"), "--once", "--json")
+    return "; ".join(changes), lambda: [msgflow(*words)[0]]
+
+
+def odd_bag(base: Base, place: Path, random: Random) -> tuple[str, Callable[[], list[int]]]:
+    """Damage a bag."""
+    from rosbags import rosbag2
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.LATEST)
+    plugin = random.choice(list(rosbag2.StoragePlugin))
+    bag = place / "bag"
+    writer = rosbag2.Writer(bag, version=9, storage_plugin=plugin)
+    mode = random.choice(list(rosbag2.CompressionMode))
+    if mode is rosbag2.CompressionMode.STORAGE and plugin is rosbag2.StoragePlugin.SQLITE3:
+        mode = rosbag2.CompressionMode.NONE
+    writer.set_compression(mode, rosbag2.CompressionFormat.ZSTD)
+    with writer:
+        topic = writer.add_connection("/camera/image", "std_msgs/msg/String", typestore=store)
+        for at in range(50):
+            writer.write(topic, at, b"\0\1\0\0\x06\0\0\0hello\0")
+    file = random.choice(sorted(bag.iterdir()))
+    change = f"{plugin.name}, {mode.name}, {file.name}: {damage_file(file, random)}"
+    return change, lambda: [msgflow("bag", str(bag), "--db", str(place / "run.duckdb"))[0]]
+
+
+def odd_parameters(base: Base, place: Path, random: Random) -> tuple[str, Callable[[], list[int]]]:
+    """Ask pages with parameters that they do not expect."""
+    from msgflow.view.pages import ANSWERS
+
+    name = random.choice(sorted(ANSWERS))
+    words = ("run", "start", "end", "bins", "limit", "kind", "id", "other", "path", "part", "of",
+             "what", "width", "quick", "node", "flow")  # fmt: skip
+    values = (*ODD_NAMES, "0", "-1", "1e308", "nan", str(2**63), str(-(2**63)), "1000000000", "[]",
+              "{}", "null", "1.5", "publication")  # fmt: skip
+    params = {word: random.choice(values) for word in random.sample(words, random.randrange(6))}
+    if random.random() < 0.8:
+        params["run"] = "1"
+
+    def ask() -> list[int]:
+        import duckdb
+
+        from msgflow import MsgflowError
+        from msgflow.view.shared_database import SharedDatabase
+
+        shared = SharedDatabase(place / "run.duckdb", "1GB")
+        try:
+            shared.answer(name, params, None, lambda _: None)
+        except MsgflowError as error:
+            print(f"error: {error}", file=sys.stderr)
+            return [1]
+        except duckdb.Error as error:
+            # The page gets status 500.
+            print(f"mistake of msgflow: {error}", file=sys.stderr)
+            return [1]
+        finally:
+            shared.close()
+        return [0]
+
+    return f"{name} {params}"[:300], ask
+
+
+OTHERS = {"name": odd_names, "chunk": odd_chunks, "bag": odd_bag, "parameter": odd_parameters}
 
 
 def faults(ending: str, found: dict[str, Any], said: str) -> list[str]:
@@ -546,6 +690,7 @@ KINDS = (
     *FILES,
     *("lake",) * 2,
     "manifest",
+    *OTHERS,
 )
 
 

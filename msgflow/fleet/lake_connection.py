@@ -25,7 +25,7 @@ from msgflow.fleet.answers import answers
 from msgflow.fleet.layout import RUN, VIEWS, part_path
 from msgflow.fleet.run_views import write_views
 from msgflow.sql.failure import first_line
-from msgflow.sql.quoting import identifier
+from msgflow.sql.quoting import identifier, literal
 from msgflow.text.name_suggestions import meant_or, nearest
 from msgflow.version import __version__
 
@@ -237,7 +237,7 @@ class Reading:
     def _local_scan(self, name: str, paths: list[str]) -> str:
         self._local_files += paths
         self.connection.execute(f"SET VARIABLE {identifier(name)} = $paths", {"paths": paths})
-        return f"read_parquet(getvariable('{name}'), union_by_name = true)"
+        return f"read_parquet(getvariable({literal(name)}), union_by_name = true)"
 
     def _scan(self, table: str, files: dict[str, str]) -> str:
         """Return SQL for the rows of a table."""

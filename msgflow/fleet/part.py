@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from msgflow.db.objects import public_names
 from msgflow.errors import TraceError
 from msgflow.fleet.answers import answers
 from msgflow.fleet.layout import RUN, database_path, metadata, new_part, part_path, view_path
@@ -104,12 +105,16 @@ def _keyed(schema: pa.Schema) -> pa.Schema:
 
 
 def public_views(connection: duckdb.DuckDBPyConnection) -> list[str]:
-    """Return the names of the public views that a lake may hold."""
+    """Return the names of the public views that a lake may hold.
+
+    A database may have others, with any name: what is no view of msgflow becomes no path.
+    """
     found = connection.execute(
         "SELECT view_name FROM duckdb_views() WHERE database_name = current_database() "
         "AND schema_name = 'main' AND NOT internal ORDER BY view_name"
     ).fetchall()
-    return [name for (name,) in found if name not in _LEFT_OUT]
+    known = set(public_names()).difference(_LEFT_OUT)
+    return [name for (name,) in found if name in known]
 
 
 def view_rows(connection: duckdb.DuckDBPyConnection, view: str) -> pa.RecordBatchReader:

@@ -7,9 +7,11 @@ import json
 import os
 import re
 import shutil
+import tempfile
 from pathlib import Path
 from typing import Any
 
+import duckdb
 import pyarrow as pa
 import pyarrow.parquet
 import pytest
@@ -294,3 +296,37 @@ def test_commands_are_quoted(lake: Lake) -> None:
     with pytest.raises(UsageError) as raised:
         open_run(lake, "x; touch PWN")
     assert raised.value.hint == "msgflow ingest ''"
+
+
+def test_names_of_views_are_neither_paths_nor_sql(
+    lake: Lake, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Those of a database in the lake, and those of its folders."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
+    (tmp_path / "temporary").mkdir()
+    row, part, *_ = (each for each in lake.runs().to_pylist() if each["database_part"] is not None)
+    # Its views are read from its database.
+    lake.commit([{**row, "view_part": None}])
+    packed = Path(lake.store.url, database_path(row["database_part"]))
+    database = tmp_path / "run.duckdb"
+    with pa.input_stream(packed, compression="zstd") as stream:
+        database.write_bytes(stream.read())
+    with duckdb.connect(str(database)) as connection:
+        connection.execute('CREATE VIEW main."../../../victim" AS SELECT 1 AS x')
+    with pa.output_stream(packed, compression="zstd") as sink:
+        sink.write(database.read_bytes())
+    name = "a'), union_by_name = true)) TO 'b.csv'; --"
+    folder = Path(lake.store.url, "view", name)
+    folder.mkdir(parents=True)
+    (folder / f"{part['view_part']}.parquet").write_bytes(
+        parquet(run=[part["run"]], part=[part["view_part"]], x=[1])
+    )
+    before = {path for path in tmp_path.rglob("*") if "temporary" not in path.parts}
+    found = fleet_sql(lake, "SELECT view_name FROM duckdb_views() WHERE schema_name = 'view'")
+    names = found.table["view_name"].to_pylist()
+    assert "publication" in names
+    assert name in names
+    assert "../../../victim" not in names
+    assert {path for path in tmp_path.rglob("*") if "temporary" not in path.parts} == before
+    assert not any((tmp_path / "temporary").iterdir())

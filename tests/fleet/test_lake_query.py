@@ -25,8 +25,8 @@ from msgflow.fleet.lake_query import (
     fleet_query,
     fleet_sql,
     fleet_worst,
-    lake_names,
     header_of,
+    lake_names,
     names,
     statements,
 )

@@ -1,12 +1,26 @@
 from __future__ import annotations
 
+import shutil
+from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
 from pathlib import Path
 
 import duckdb
 import pytest
+from thorough import few
 
 import msgflow
 from msgflow import DatabaseError, QueryError, UsageError
+from msgflow.db.store_table import store_tables
+
+NOTHING = ("NULL", "NULL")
+EXTREMES = {
+    "BIGINT": (str(-(2**63)), str(2**63 - 1)),
+    "INTEGER": (str(-(2**31)), str(2**31 - 1)),
+    "DOUBLE": ("'inf'::DOUBLE", "'nan'::DOUBLE"),
+    "VARCHAR": ("chr(27) || '[31m' || chr(8232)", "''"),
+}
 
 
 def test_the_public_names_are_there() -> None:
@@ -161,3 +175,30 @@ def test_values_that_no_recording_has_are_said(small_database: Path, value: int)
         pytest.raises(DatabaseError, match="values that no recording has: Overflow"),
     ):
         database.flow("/chatter")
+
+
+@pytest.mark.parametrize("place", [0, 1])
+@pytest.mark.parametrize("table", few(store_tables(), "publication"))
+def test_extremes_in_all_columns_are_answered_or_said(
+    simulated: Callable[..., Path], tmp_path: Path, table: str, place: int
+) -> None:
+    path = Path(shutil.copyfile(simulated("pipeline", 0.1), tmp_path / "run.duckdb"))
+    with duckdb.connect(str(path)) as connection:
+        columns = connection.execute(
+            "SELECT column_name, data_type FROM duckdb_columns()"
+            " WHERE schema_name = 'store' AND table_name = $table AND column_name <> 'run_id'",
+            {"table": table},
+        ).fetchall()
+        for name, kind in columns:
+            # What the table refuses is no such database.
+            with suppress(duckdb.Error):
+                connection.execute(
+                    f"UPDATE store.{table} SET {name} = {EXTREMES.get(kind, NOTHING)[place]}"
+                    " WHERE rowid % 3 = 0"
+                )
+    with msgflow.open_db(path) as database:
+        asked: list[Callable[[], object]] = [database.check, database.findings, database.why]
+        asked += [partial(database.query, each) for each in ("info", "e2e-latency", "callbacks")]
+        for ask in asked:
+            with suppress(msgflow.MsgflowError):
+                ask()
