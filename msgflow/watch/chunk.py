@@ -135,7 +135,7 @@ class ChunkFinder:
         self._last[source] = (recording, number, end)
         if os.access(path, os.R_OK | os.X_OK):
             yield recording, Chunk(number, source, path)
-        else:
+        elif os.path.lexists(path):
             self._fail(PermissionError(0, "permission denied", str(path.parent)))
 
     def _may_follow(self, source: Path, found: _Found) -> bool:
