@@ -601,7 +601,7 @@ class Database:
         case: str = "first",
         explain: bool = False,
         at_least: str = "5%",
-        skip_first: float | None = None,
+        skip_first: float = 0.0,
         confidence: float = 0.95,
         resamples: int | None = None,
         seed: int = 0,
@@ -630,8 +630,7 @@ class Database:
                 the largest first.
             at_least: the smallest change that matters; a surely smaller or larger value that is
                 less far off is about equal.
-            skip_first: seconds to leave out at the begin of each run; by default its warm-up, where
-                it has the longest values.
+            skip_first: seconds to leave out at the begin of each run, as a warm-up.
             confidence: of the intervals, between 0 and 1.
             resamples: number behind the intervals, at least 20 / (1 - confidence); by default 1000
                 or that minimum; 0 leaves out intervals and verdicts, which take longest.

@@ -239,7 +239,6 @@ def compare(
     window: Sequence[str] = (),
     at_least: str = "5%",
     explain: bool = False,
-    skip_first: float | None = None,
     **given: Value,
 ) -> Comparison:
     """Compare two runs of a database, or two times of one; see `Database.compare`."""
@@ -254,24 +253,17 @@ def compare(
     both: dict[str, Value] = {"run_a": first.run_id, "run_b": second.run_id}
     both["at_least"] = share_of(at_least)
     both |= _windows(window, (first, second))
-    both["skip_first"] = skip_first or 0.0
     asked = bind(internal_sql().header("comparison"), given | both, "msgflow compare")
     _require_sense(asked)
     if explain and asked["what"] != "paths":
         raise UsageError(f"only changes of paths have parts — {asked['what']}", "leave out --what")
-    # Without intervals this is quick.
-    skip = 0.0
-    if skip_first is None and not window:
-        skip = _warm_up(_compared(connection, asked | {"resamples": 0}, first, second))
-        asked["skip_first"] = skip
+    if explain and window and asked["skip_first"]:
+        raise UsageError("a window leaves out the start itself", "leave out --skip-first")
     compared = _compared(connection, asked, first, second)
     for side, one, text in zip("AB", (first, second), window, strict=False):
         compared.result.notes.append(f"{side} is {text} of run {one.title}")
-    if skip:
-        compared.result.notes.append(
-            f"the first {skip:g} s are left out, where the longest values lie: a warm-up"
-            " (--skip-first 0 compares all)"
-        )
+    if not window:
+        compared.result.notes.extend(_slow_starts(compared))
     if not explain:
         return compared
     times = [*(window or ("..", ".."))]
@@ -312,7 +304,7 @@ def warm_up(connection: duckdb.DuckDBPyConnection, run: Run) -> float:
     0 means that it does not warm up.
     """
     both: dict[str, Value] = {"run_a": run.run_id, "run_b": run.run_id, "resamples": 0}
-    both |= {"skip_first": 0.0, "at_least": 0.0, **_windows((), (run, run))}
+    both |= {"at_least": 0.0, **_windows((), (run, run))}
     asked = bind(internal_sql().header("comparison"), both, "msgflow compare")
     _require_sense(asked)
     return _warm_up(_compared(connection, asked, run, run, is_strict=False))
@@ -349,6 +341,21 @@ def _warm_up(compared: Comparison) -> float:
     ends = [*table.column("a_warm_up_ns").to_pylist(), *table.column("b_warm_up_ns").to_pylist()]
     end = max((end for end in ends if end is not None), default=None)
     return 0.0 if end is None else (end // _STEP_NS + 1) * _STEP_NS / 1e9
+
+
+def _slow_starts(compared: Comparison) -> Iterable[str]:
+    """Say which run starts slowly, and how to leave that out."""
+    table = compared.result.table
+    slow = [
+        run.title
+        for side, run in (("a", compared.run_a), ("b", compared.run_b))
+        if table.column(f"{side}_warm_up_ns").null_count < len(table)
+    ]
+    if slow:
+        yield (
+            f"run {' and run '.join(slow)} may warm up: its longest values lie at its start;"
+            f" --skip-first {_warm_up(compared):g} leaves it out"
+        )
 
 
 @cache

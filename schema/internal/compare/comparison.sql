@@ -13,7 +13,7 @@
 -- param: to VARCHAR = NULL  Topics or nodes where paths end; globs
 -- param: case VARCHAR {first|last|newest|every_pair} = 'first'  First or last arrival of each root,
 --     newest root of each arrival, or all pairs
--- param: skip_first DOUBLE  Skip the first seconds of each run (warm-up)
+-- param: skip_first DOUBLE = 0.0  Skip the first seconds of each run (warm-up)
 -- param: confidence DOUBLE = 0.95  Confidence level of the intervals
 -- param: at_least DOUBLE  Smallest difference that counts as one, as a share of A
 -- param: resamples BIGINT = NULL  Number of resamples for the intervals: 1000, or
