@@ -147,7 +147,8 @@ def _explained(
     )
     path = _worst(verdict, paths)
     places = path.split(" → ")
-    flow = ask("critical-path", **ends, via=places, quantile="p95")
+    via = [step for step in places if step != _UNNAMED]
+    flow = ask("critical-path", **ends, via=via, quantile="p95")
     pieces = flow.table.to_pylist()
     parts = _chosen(parts, lambda row: row["path"] == path)
     callbacks = {(row["node"], row["what"]) for row in parts.table.to_pylist()}

@@ -51,7 +51,7 @@ def test_the_way_of_a_message_is_the_work_of_no_node(ask: Msgflow, name: str) ->
     words = ("query", "critical-path", "--slowest", "5", "--detail", "full", "--format", "json")
     pieces: Rows = json.loads(ask(name, *words).stdout)
     rows = [(row["part"], row["node"]) for row in found["nodes"] + parts]
-    rows += [(row["activity"], row["node"]) for row in found["slowest_flow"] + pieces]
+    rows += [(row["activity"], row["node"]) for row in found["slow_flow"] + pieces]
     on_the_way = Counter(node for part, node in rows if part == "network_or_idle")
     assert set(on_the_way) == {"between nodes"}, on_the_way
     assert all(part == "network_or_idle" for part, node in rows if node == "between nodes")
@@ -73,7 +73,7 @@ def test_why_keeps_its_columns(ask: Msgflow, name: str, columns: int) -> None:
     shown = ask(name, "why", columns=columns).stdout
     titles = shown.partition("TIME BY NODE, ON ")[2].splitlines()[1].split()
     assert titles == ["node", "share", "part", "what", "median", "max"]
-    titles = section(shown, "ITS SLOWEST FLOW").splitlines()[1].split()
+    titles = section(shown, "ONE OF ITS SLOW FLOWS (95 OF 100 TAKE NO LONGER)").splitlines()[1].split()
     assert titles == ["duration", "share", "activity", "node", "what"]
     assert "── 1 ──" not in shown
     if name == "real_overload":

@@ -59,11 +59,14 @@ chosen AS (
 told AS (
     SELECT
         who,
-        list(kind ORDER BY cost_ns DESC, kind, what) AS kinds,
+        -- What weighs less of one culprit would hide the others.
+        list(kind ORDER BY cost_ns DESC, kind, what)[: 2] AS kinds,
         max(cost_ns) AS cost_ns,
         arg_max(path, cost_ns) AS path,
-        printf('%s: %s', who, string_agg(clause, '; ' ORDER BY cost_ns DESC, kind, what))
-            AS sentence
+        printf(
+            '%s: %s', who,
+            array_to_string(list(clause ORDER BY cost_ns DESC, kind, what)[: 2], '; ')
+        ) AS sentence
     FROM chosen
     GROUP BY who
 ),

@@ -87,7 +87,10 @@ instance AS MATERIALIZED (
         w.run_queue_ns + w.preempted_ns AS queued_ns,
         coalesce(q.call_ns, 0) AS call_ns,
         coalesce(m.own_ns, 0) AS own_ns,
-        greatest(w.busy_max_ns - coalesce(m.own_ns, 0), 0) AS other_ns,
+        -- What the executor did between callbacks is the work of none.
+        least(
+            greatest(w.busy_max_ns - coalesce(m.own_ns, 0), 0), coalesce(m.sum_ns, 0)
+        ) AS other_ns,
         coalesce(m.beside_ns, 0) AS beside_ns
     FROM chosen AS c
     JOIN main.callback_instance AS i ON c.callback_id = i.callback_id
@@ -103,6 +106,7 @@ instance AS MATERIALIZED (
         SELECT
             callback_instance_id,
             sum(overlap_ns) FILTER (WHERE is_own)::BIGINT AS own_ns,
+            sum(overlap_ns) FILTER (WHERE NOT is_own)::BIGINT AS sum_ns,
             max(overlap_ns) FILTER (WHERE NOT is_own) AS beside_ns
         FROM ran
         GROUP BY callback_instance_id
