@@ -95,8 +95,6 @@ def test_it_names_what_took_the_cpu(
         )
     result = msgflow("why", "--db", str(path))
     said = " ".join(result.stderr.split())
-    sentence = " ".join(result.stdout.partition("\n\n")[0].split())
-    assert sentence.startswith(f"stress (911): takes the CPU from {longest['node']}, which waits")
     assert f"next: msgflow query scheduling --measure preemption --db {path}" in said
     assert "preempted stress" in " ".join(result.stdout.split())
 

@@ -244,10 +244,11 @@ SELECT
     'queue', subscriber, topic_name, path, (dropped / known * 1e9 / out_hz)::BIGINT,
     dropped >= 3 AND dropped >= 0.02 * known,
     printf(
-        'its queue of %s overwrote %d of %d messages on %s (%.3g Hz come in, %.3g Hz are taken)',
-        coalesce(queue_depth::VARCHAR, 'unknown depth'), dropped, known, coalesce(topic_name, '?'),
-        in_hz, out_hz
+        'its queue of %s overwrote %d of %d messages on %s',
+        coalesce(queue_depth::VARCHAR, 'unknown depth'), dropped, known, coalesce(topic_name, '?')
     )
+    -- A single message has no rate.
+    || coalesce(printf(' (%.3g Hz come in, %.3g Hz are taken)', in_hz, out_hz), '')
 FROM failed
 WHERE dropped > 0
 UNION ALL

@@ -24,7 +24,7 @@ known AS (
 -- Of these paths, or of the recording as a whole.
 touching AS (
     SELECT
-        f.name, f.subject, f.detail,
+        f.name, f.title, f.subject, f.detail,
         row_number() OVER (ORDER BY f.severity, f.name, f.subject, f.detail) AS place
     FROM (SELECT *, regexp_extract_all(subject, '/[\w/]+') AS names FROM main.finding) AS f
     WHERE list_contains($runs, f.run_id)
@@ -39,7 +39,9 @@ touching AS (
 found AS (
     SELECT
         min(place) AS place, name, arg_min(subject, place) AS subject,
-        printf('%s: %s', arg_min(subject, place), arg_min(detail, place))
+        printf(
+            '%s — %s: %s', any_value(title), arg_min(subject, place), arg_min(detail, place)
+        )
         || CASE WHEN count(*) > 1
             THEN printf('; %d more like this (msgflow check)', count(*) - 1)
             ELSE '' END AS sentence
@@ -52,8 +54,12 @@ chosen AS (
     SELECT
         kind, who, what, arg_max(path, cost_ns) AS path, max(cost_ns) AS cost_ns,
         arg_max(clause, cost_ns) AS clause
-    FROM suspect
-    WHERE matters
+    FROM (
+        SELECT
+            kind, coalesce(who, '?') AS who, what, path, coalesce(cost_ns, 0) AS cost_ns, clause
+        FROM suspect
+        WHERE matters AND clause IS NOT NULL
+    )
     GROUP BY kind, who, what
 ),
 told AS (
@@ -91,7 +97,8 @@ said AS (
         1e6, NULL, [], NULL, s.path,
         printf(
             'nothing stands out: the slowest path takes %s, most of it %s of %s, %s',
-            main.duration_text(s.p95_ns), b.what, b.node, main.duration_text(b.p95_ns)
+            main.duration_text(s.p95_ns), coalesce(b.what, '?'), coalesce(b.node, '?'),
+            main.duration_text(b.p95_ns)
         )
     FROM slowest AS s
     JOIN breakdown AS b ON s.path = b.path
