@@ -73,7 +73,9 @@ def test_why_keeps_its_columns(ask: Msgflow, name: str, columns: int) -> None:
     shown = ask(name, "why", columns=columns).stdout
     titles = shown.partition("TIME BY NODE, ON ")[2].splitlines()[1].split()
     assert titles == ["node", "share", "part", "what", "median", "max"]
-    titles = section(shown, "ONE OF ITS SLOW FLOWS (95 OF 100 TAKE NO LONGER)").splitlines()[1].split()
+    titles = (
+        section(shown, "ONE OF ITS SLOW FLOWS (95 OF 100 TAKE NO LONGER)").splitlines()[1].split()
+    )
     assert titles == ["duration", "share", "activity", "node", "what"]
     assert "── 1 ──" not in shown
     if name == "real_overload":
