@@ -16,8 +16,6 @@ from msgflow.sql.statement import internal_sql
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from msgflow.query.compare import Comparison
-
 _ASKED = ("from", "to", "case", "max_depth", "max_paths")
 # Where the kernel was traced: what callbacks did with their time, all instances together.
 _STATES = """
@@ -35,7 +33,7 @@ GROUP BY l.node, l.label
 
 def change_parts(
     connection: duckdb.DuckDBPyConnection,
-    comparison: Comparison,
+    compared: QueryResult,
     asked: Mapping[str, Any],
     windows: Sequence[str],
 ) -> QueryResult:
@@ -43,16 +41,16 @@ def change_parts(
 
     Args:
         connection: to the database of the runs.
-        comparison: of paths.
-        asked: with the parameters that it was asked with.
+        compared: the comparison of the paths.
+        asked: what it was asked with.
         windows: 'START..END' of either side.
     """
     parameters = {name: asked[name] for name in _ASKED}
     with duckdb.connect() as con:
-        con.register("compared", comparison.result.table)
-        for side, run, window in zip("ab", comparison.result.runs, windows, strict=True):
+        con.register("compared", compared.table)
+        for side, run, window in zip("ab", compared.runs, windows, strict=True):
             start, _, end = window.partition("..")
-            start = start or (str(comparison.skipped) if comparison.skipped else None)
+            start = start or (str(asked["skip_first"]) if asked["skip_first"] else None)
             part = Slice(run.run_id, start, end or None)
             found = run_query(connection, load_query("path-breakdown"), parameters, part)
             con.register(f"part_{side}", found.table)
@@ -60,4 +58,4 @@ def change_parts(
             con.register(f"state_{side}", connection.sql(_STATES, params=values).to_arrow_table())
         table = internal_sql().run(con, "change_part", {}).to_arrow_table()
     header = replace(internal_sql().header("change_part"), name="compare --explain")
-    return QueryResult(table, header, comparison.result.runs, comparison.result.notes)
+    return QueryResult(table, header, compared.runs, compared.notes)

@@ -267,7 +267,7 @@ def compare(
     if not explain:
         return compared
     times = [*(window or ("..", ".."))]
-    return replace(compared, parts=change_parts(connection, compared, asked, times))
+    return replace(compared, parts=change_parts(connection, compared.result, asked, times))
 
 
 def share_of(text: str) -> float:
