@@ -75,8 +75,6 @@ def test_why_keeps_its_columns(ask: Msgflow, name: str, columns: int) -> None:
     assert titles == ["node", "share", "part", "what", "median", "max"]
     title = "ONE OF ITS SLOW FLOWS (95 OF 100 TAKE NO LONGER)"
     titles = section(shown, title).splitlines()[1].split()
-        section(shown, "ONE OF ITS SLOW FLOWS (95 OF 100 TAKE NO LONGER)").splitlines()[1].split()
-    )
     assert titles == ["duration", "share", "activity", "node", "what"]
     assert "── 1 ──" not in shown
     if name == "real_overload":
