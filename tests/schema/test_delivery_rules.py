@@ -67,17 +67,14 @@ class Delivery:
     def con(self) -> duckdb.DuckDBPyConnection:
         """The tables, with all that was published."""
         rows, self._published = self._published, []
-        for table, names, of in (
-            ("derive.expected_arrival", "publication_id, publisher_id, arrival_ns", (0, 1, 3)),
-            ("store.publication", "publication_id, publisher_id, thread_id, end_ns", (0, 1, 2, 3)),
-        ):
-            insert(self._con, table, names, [[row[n] for n in of] for row in rows])
         taken = [row for row in rows if row[4] is not None]
-        for table, names, of in (
-            ("store.link_transport", "publication_id, publisher_id, take_id", (0, 1, 0)),
-            ("store.take", "take_id, taken_ns", (0, 4)),
+        for table, names, of, found in (
+            ("derive.expected_arrival", "publication_id, publisher_id, arrival_ns", "013", rows),
+            ("store.publication", "publication_id, publisher_id, thread_id, end_ns", "0123", rows),
+            ("store.link_transport", "publication_id, publisher_id, take_id", "010", taken),
+            ("store.take", "take_id, taken_ns", "04", taken),
         ):
-            insert(self._con, table, names, [[row[n] for n in of] for row in taken])
+            insert(self._con, table, names, [[row[int(n)] for n in of] for row in found])
         return self._con
 
     def lives(self, **columns: int | None) -> None:
