@@ -1,9 +1,9 @@
 -- name: functions
 -- title: Functions that the CPU time of callbacks goes to
--- description: Which functions ran inside each callback, as samples of perf tell (docs/functions.md,
---     record --profile), and outside of callbacks, such as in the executor and the middleware. Rows
---     of one callback overlap: a function has the time of what it calls, too. Few samples say
---     little: of 100, a share is right within 10 points.
+-- description: Which functions ran inside each callback, as samples of perf tell
+--     (docs/functions.md, record --profile), and outside of callbacks, such as in the executor and
+--     the middleware. Rows of one callback overlap: a function has the time of what it calls, too.
+--     Few samples say little: of 100, a share is right within 10 points.
 -- grain: one row per callback, or process outside of callbacks, and function
 -- variant: flows BOOLEAN = false  Only callbacks on the way of flows along paths
 -- param: slowest BIGINT {1..} = NULL  Only so many instances of each callback, the longest

@@ -2,8 +2,8 @@
 -- kind: macro
 -- description: How often functions ran, and were called by what ran, in samples of stacks.
 -- grain: one row per group and function that a sample of the group saw
--- param: of_samples VARCHAR  Name of the samples, with columns group_id, stack_id and cpu_ns: a table,
---     or a part of the query
+-- param: of_samples VARCHAR  Name of the samples, with columns group_id, stack_id and cpu_ns: a
+--     table, or a part of the query
 -- column: group_id BIGINT  Group of the samples
 -- column: stack_frame_id BIGINT  Function
 -- column: self_samples BIGINT  Samples in which it ran

@@ -38,6 +38,7 @@ TABLES = {
     "intervals": "(SELECT callback_instance_id AS interval_id, thread_id, start_ns AS from_ns,"
     " end_ns AS to_ns FROM main.callback_instance)",
     "parts": "main.end_to_end_part([1])",
+    "of_samples": "(SELECT 1::BIGINT AS group_id, stack_id, cpu_ns FROM main.stack_sample)",
     "vertices": "(SELECT 8::BIGINT AS key, 'take' AS kind, 1::BIGINT AS id, 0 AS depth)",
 }
 INTERNAL = [file for file in FILES if file.layer == "internal"]

@@ -2,8 +2,8 @@
 -- title: Samples do not show all functions
 -- description: For a part of the samples it is not known which function ran, or what called it.
 -- cause: A file without symbols; or code that keeps no frame pointers, such as Python before 3.12.
--- cure: For names, install the debug symbols of that package, or do not strip it. For callers, build
---     with -fno-omit-frame-pointer, or record with --profile 99:dwarf (docs/functions.md).
+-- cure: For names, install the debug symbols of that package, or do not strip it. For callers,
+--     build with -fno-omit-frame-pointer, or record with --profile 99:dwarf (docs/functions.md).
 -- grain: one row per reason that holds for at least a tenth of the samples
 -- severity: info
 -- when: staging.stack_sample
@@ -32,7 +32,9 @@ WHERE cut >= 0.1 * greatest(samples, 1)
 UNION ALL
 SELECT
     unnamed,
-    printf('%d of %d samples do not name the function, most of them in %s', unnamed, samples,
-        unnamed_file)
+    printf(
+        '%d of %d samples do not name the function, most of them in %s', unnamed, samples,
+        unnamed_file
+    )
 FROM counted
 WHERE unnamed >= 0.1 * greatest(samples, 1)
