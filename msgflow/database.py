@@ -609,7 +609,7 @@ class Database:
         max_depth: int = 32,
         max_paths: int = 1_000,
     ) -> Comparison:
-        """Compare run B with run A, or two times of one run: medians, means, percentiles, chance.
+        """Compare run B with run A, or two times of one run, with what chance explains.
 
         low and high enclose the difference with the given confidence. If both have the same sign,
         the verdict is that B is longer or shorter. This concerns chance within these two recordings
@@ -619,25 +619,23 @@ class Database:
             run_a: baseline run: name or id.
             run_b: run to compare with it: name or id.
             run: in place of both, the one run whose windows are compared.
-            window (START..END): what counts of each side, such as 0s..60s and 60s..120s.
-            what: 'paths' (end-to-end latency), 'ends' (the same between two topics, by any path),
-                'callbacks' (duration) or 'topics' (time from publication to take).
+            window (START..END): what counts of each side, such as 0s..60s.
+            what: latency of 'paths' or between their 'ends', duration of 'callbacks', time from
+                publication to take of 'topics'.
             from_: topics or nodes where paths start; globs.
             to: topics or nodes where paths end; globs.
-            case: first or last arrival of each root, newest root of each arrival, or all pairs:
-                'first', 'last', 'newest' or 'every_pair'.
-            explain: what the difference of the means of each path consists of, by node and part:
-                the largest first.
-            at_least: the smallest change that matters; a surely smaller or larger value that is
-                less far off is about equal.
-            skip_first: seconds to leave out at the begin of each run, as a warm-up.
+            case: 'first' or 'last' arrival of each root, 'newest' root of each arrival, or
+                'every_pair'.
+            explain: what the changes of paths consist of, by node and part.
+            at_least: less than that is about equal.
+            skip_first: seconds of warm-up to leave out.
             confidence: of the intervals, between 0 and 1.
-            resamples: number behind the intervals, at least 20 / (1 - confidence); by default 1000
-                or that minimum; 0 leaves out intervals and verdicts, which take longest.
-            seed: of the resampling; the same seed gives the same intervals.
-            internal: also compare what ROS does for itself.
+            resamples: behind the intervals, at least 20 / (1 - confidence), by default at least
+                1000; 0 leaves out intervals and verdicts, which take longest.
+            seed: of the resampling.
+            internal: what ROS does for itself, too.
             max_depth: longest path, in topics.
-            max_paths: most paths, shortest first, and most chains per length.
+            max_paths: most paths, shortest first.
 
         Raises:
             UsageError: a run, topic or choice that does not exist, or runs with nothing in common.

@@ -124,7 +124,7 @@ SHARED: dict[str, Any] = {
     "compare": _selecting("Run to compare it with", "NAME|ID", autocompletion=_RUN),
     "run_a": typer.Argument(metavar="RUN_A", autocompletion=_RUN),
     "run_b": typer.Argument(metavar="RUN_B", autocompletion=_RUN),
-    "what": _words("paths", "callbacks", "topics"),
+    "what": _words("paths", "ends", "callbacks", "topics"),
     "views": typer.Argument(metavar="VIEW", autocompletion=complete("view")),
     "form": _printed(
         "--format",
