@@ -421,8 +421,8 @@ def case(
         change, work = OTHERS[kind](base, place, random)
         ending, found, said = run(lambda: unchanged(outside, work), place)
         refused = any(found.get("codes", ()))
-        bad = tuple(faults(ending, found, said))
-        return Outcome(number, kind, change, bad, said, "refused" if refused else ending)
+        bad = faults(ending, found, said)
+        return Outcome(number, kind, change, tuple(bad), said, "refused" if refused else ending)
     else:
         name, text, option = FILES[kind]
         content, change = damage_text(text.replace("{host}", random.choice(base.hosts)), random)

@@ -163,7 +163,7 @@ def record_robot(python: Path, problems: Sequence[str], seconds: float, director
     recorded = directory / "trace"
     processes = [*_ROBOT, *(["hog"] if "hog" in problems else [])]
     with session(recorded):
-        running = []
+        running: list[subprocess.Popen[bytes]] = []
         try:
             for process in sorted(processes, key="planner".__eq__):
                 if process == "planner" and "late" in problems:

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
     from msgflow.database import Database
     from msgflow.result.query_result import QueryResult
-    from msgflow.run import Run
+    from msgflow.run.choice import Run
 
 _ARROW = " → "
 # What a message makes from one callback to the next: ten in the layers of ROS, two of the executor.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
@@ -71,7 +72,7 @@ def command(
         lines = whole_sections(found.sections, form)
     else:
         width = screen_width()
-        lines = [*_verdict(found, width), *screen_sections(_shown(found), width, is_chosen=True)]
+        lines = chain(_verdict(found, width), screen_sections(_shown(found), width, is_chosen=True))
     print_text("\n".join(lines), output)
     for note in [*_more(found, part, database), *found.notes]:
         print_note(note)
