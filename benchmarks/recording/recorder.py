@@ -108,7 +108,10 @@ def record(
         )
 
     with contextlib.ExitStack() as stack:
-        if system not in _LATE:
+        if system in _LATE:
+            # Processes that run already would connect to a new one later.
+            stack.enter_context(session_daemon(with_kernel=False, note=print))
+        else:
             stack.enter_context(session(recorded))
         running: dict[str, subprocess.Popen[bytes]] = {}
         try:
