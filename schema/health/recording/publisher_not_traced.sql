@@ -3,8 +3,8 @@
 -- description: Messages were taken whose publication is not in the traces, although the known
 --     publishers have no gap at that time. Their flows begin at the take.
 -- cause: A node on another host or in another container is not part of the recording, or runs with
---     a tracetools without LTTng, or with TRACETOOLS_RUNTIME_DISABLE=1 (Lyrical); or events or files of a publisher are missing and the trace does
---     not say so.
+--     a tracetools without LTTng, or with TRACETOOLS_RUNTIME_DISABLE=1 (Lyrical); or events or
+--     files of a publisher are missing and the trace does not say so.
 -- cure: Trace every host and give all traces to one ingest. In the environment of every node, ros2
 --     run tracetools status must say that tracing is enabled.
 -- grain: one row per topic

@@ -2,13 +2,13 @@
 -- kind: macro
 -- description: Between which moments the input of a callback became ready in its executor. Not
 --     before its release, nor before the subscription was made. In an executor of one thread also
---     not before it last went to sleep, nor before the last polling point but one, which would
---     have found it (unless that callback ran in between: then more of its input may have
---     waited). At the latest when the executor last learned what is ready, before it picked this
---     callback. In an events executor, which serves what came first first, also not after what its
---     own thread published and it ran then or later. With that wait of the executor, the end of the wait before it, the time spent
---     waiting before, and the moment at which its thread began to look for work and picked it
---     (the start, with one thread or where that does not show).
+--     not before it last went to sleep, nor before the last polling point but one, which would have
+--     found it (unless that callback ran in between: then more of its input may have waited). At
+--     the latest when the executor last learned what is ready, before it picked this callback. In
+--     an events executor, which serves what came first first, also not after what its own thread
+--     published and it ran then or later. With that wait of the executor, the end of the wait
+--     before it, the time spent waiting before, and the moment at which its thread began to look
+--     for work and picked it (the start, with one thread or where that does not show).
 -- grain: one row per callback instance that is not nested in another
 -- param: executors VARCHAR  Name of rows of executor_id, until_ns: those to look at. Callback
 --     instances that began after the last of these moments are left out (where all are NULL: none)
