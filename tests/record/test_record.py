@@ -132,7 +132,7 @@ class TestKernel:
             )
         assert len(found) > 20
 
-    @pytest.mark.parametrize(("how", "left"), [("INT", "perf"), ("KILL", "perf.data")])
+    @pytest.mark.parametrize(("how", "left"), [("INT", "perf"), ("KILL", "perf.scheduler")])
     def test_a_perf_that_ends_early_is_said(
         self, record: Record, robot: list[str], tmp_path: Path, how: str, left: str
     ) -> None:
