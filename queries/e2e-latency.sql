@@ -7,11 +7,9 @@
 --     did not publish), not connected, cut by the recording (too close to its start or end to
 --     know), or unknown.
 -- grain: one row per path
--- variant: measure VARCHAR {latency|age|reaction|response} = 'latency'  What is measured: from
---     the start of a flow to its end, how old the data behind an output are, how long at most
---     until an event shows, or the response times of CARET
--- variant: by VARCHAR {path|ends} = 'path'  A row for each path, or one for all paths between two
---     topics
+-- variant: measure VARCHAR {latency|age|reaction|response} = 'latency'  From start to end of flows,
+--     age of the data behind an output, time until an event shows, or response times of CARET
+-- variant: by VARCHAR {path|ends} = 'path'  A row for each path, or for two topics
 -- param: from VARCHAR = NULL  Topics or nodes where flows start: globs, with commas between
 -- param: to VARCHAR = NULL  Topics or nodes where flows end, likewise
 -- param: from_event VARCHAR {callback_start|publish} = 'callback_start'  Event that starts

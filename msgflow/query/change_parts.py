@@ -16,6 +16,7 @@ from msgflow.sql.statement import internal_sql
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+
 _ASKED = ("from", "to", "case", "max_depth", "max_paths")
 # Where the kernel was traced: what callbacks did with their time, all instances together.
 _STATES = """
@@ -34,6 +35,7 @@ GROUP BY l.node, l.label
 def change_parts(
     connection: duckdb.DuckDBPyConnection,
     compared: QueryResult,
+    skipped: float,
     asked: Mapping[str, Any],
     windows: Sequence[str],
 ) -> QueryResult:
@@ -41,8 +43,9 @@ def change_parts(
 
     Args:
         connection: to the database of the runs.
-        compared: the comparison of the paths.
-        asked: what it was asked with.
+        compared: paths of two runs.
+        skipped: seconds that were left out at the start of each.
+        asked: with the parameters that it was asked with.
         windows: 'START..END' of either side.
     """
     parameters = {name: asked[name] for name in _ASKED}
@@ -50,7 +53,7 @@ def change_parts(
         con.register("compared", compared.table)
         for side, run, window in zip("ab", compared.runs, windows, strict=True):
             start, _, end = window.partition("..")
-            start = start or (str(asked["skip_first"]) if asked["skip_first"] else None)
+            start = start or (str(skipped) if skipped else None)
             part = Slice(run.run_id, start, end or None)
             found = run_query(connection, load_query("path-breakdown"), parameters, part)
             con.register(f"part_{side}", found.table)

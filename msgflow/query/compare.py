@@ -267,7 +267,8 @@ def compare(
     if not explain:
         return compared
     times = [*(window or ("..", ".."))]
-    return replace(compared, parts=change_parts(connection, compared.result, asked, times))
+    parts = change_parts(connection, compared.result, compared.skipped, asked, times)
+    return replace(compared, parts=parts)
 
 
 def share_of(text: str) -> float:
