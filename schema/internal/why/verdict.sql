@@ -61,18 +61,21 @@ chosen AS (
         WHERE matters AND clause IS NOT NULL
     )
     GROUP BY kind, who, what
+    -- What delays less than two others of one culprit would hide the others.
+    QUALIFY kind IN ('queue', 'lost', 'late_start')
+        OR row_number() OVER (
+            PARTITION BY who, kind IN ('queue', 'lost', 'late_start')
+            ORDER BY max(cost_ns) DESC, kind, what
+        ) <= 2
 ),
 told AS (
     SELECT
         who,
-        -- What weighs less of one culprit would hide the others.
-        list(kind ORDER BY cost_ns DESC, kind, what)[: 2] AS kinds,
+        list(kind ORDER BY cost_ns DESC, kind, what) AS kinds,
         max(cost_ns) AS cost_ns,
         arg_max(path, cost_ns) AS path,
-        printf(
-            '%s: %s', who,
-            array_to_string(list(clause ORDER BY cost_ns DESC, kind, what)[: 2], '; ')
-        ) AS sentence
+        printf('%s: %s', who, string_agg(clause, '; ' ORDER BY cost_ns DESC, kind, what))
+            AS sentence
     FROM chosen
     GROUP BY who
 ),
