@@ -313,8 +313,7 @@ CREATE TABLE store.flow_call (
     taken_response_id BIGINT  -- Response that the caller took {to response}
 );
 
--- One row per publication on a topic of the application, and per take of a message whose publisher
--- is not traced
+-- One row per publication on a topic of the application, and per take from (not traced)
 CREATE TABLE store.flow_root (
     run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
     publication_id BIGINT NOT NULL,  -- The message; below 0: its publisher is not traced

@@ -107,7 +107,9 @@ def test_a_version_that_is_slower_is_found(slower: Lake) -> None:
 
 def test_the_same_is_not_found_the_other_way_round(slower: Lake) -> None:
     forth, back = rows_of(slower), rows_of(slower, base="2.10", other="2.9")
-    assert back["p95"]["verdict"] == "B is shorter"
+    # 5 % longer one way is 4.8 % shorter the other way: surely shorter, and less than matters.
+    assert back["p95"]["high_percent"] < 0
+    assert back["p95"]["verdict"] == "about equal"
     for one, other in (("low_percent", "high_percent"), ("high_percent", "low_percent")):
         ratio = (1 + forth["p95"][one] / 100) * (1 + back["p95"][other] / 100)
         assert ratio == pytest.approx(1, abs=1e-4)

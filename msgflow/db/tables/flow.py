@@ -48,10 +48,7 @@ Table(
     number("root_id", "Row of that kind where its flow begins", required=True),
     route(),
     number("before_take_ns", "Of a take: how long before it the flow begins", unit="ns"),
-    comment=(
-        "One row per publication on a topic of the application, and per take of a message whose "
-        "publisher is not traced"
-    ),
+    comment="One row per publication on a topic of the application, and per take from (not traced)",
 )
 
 Table(
