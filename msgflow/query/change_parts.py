@@ -53,8 +53,7 @@ def change_parts(
         con.register("compared", compared.table)
         for side, run, window in zip("ab", compared.runs, windows, strict=True):
             start, _, end = window.partition("..")
-            start = start or (str(skipped) if skipped else None)
-            part = Slice(run.run_id, start, end or None)
+            part = Slice(run.run_id, start or (str(skipped) if skipped else None), end or None)
             found = run_query(connection, load_query("path-breakdown"), parameters, part)
             con.register(f"part_{side}", found.table)
             values = {"run_id": run.run_id, **part.window([run]).bindings}
