@@ -43,7 +43,7 @@ PROBLEMS = {
         without_kernel="/localizer",
     ),
     "late": Problem(
-        "late_start", "/planner", r"started ([\d.]+) s after the others and missed", 3, 10
+        "late_start", "/planner", r"started ([\d.]+) s after the others and missed", 3, 6
     ),
     "stale": Problem(
         "stale", "/controller", r"Timer\(600 ms\) .* on /plan .* for up to ([\d.]+) ms", 600, 600
