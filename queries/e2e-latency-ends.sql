@@ -1,8 +1,11 @@
 -- name: e2e-latency-ends
 -- title: End-to-end latency between two topics
--- description: How long flows took by any path between two topics. The first arrival of a root says
---     how soon the end reacted, the last one how long it had an effect, the newest root how old the
---     data were. Give --from and --to: else there is a row for any two topics.
+-- description: How long it took from the start of a flow (as for e2e-latency) to its end at a node,
+--     over all paths between the topic of its first message and that of its last one. A root that
+--     several messages reflect at the end arrives several times: its first arrival says how soon
+--     the end reacted to it, its last one how long it had an effect. The newest root that an
+--     arrival reflects says how old the data were. Give --from and --to: else there is a row for
+--     each two topics between which a path leads.
 -- grain: one row per topic where flows start, topic where they end, and node that takes it
 -- param: from VARCHAR = NULL  Topics or nodes where flows start: globs, with commas between
 -- param: to VARCHAR = NULL  Topics or nodes where flows end, likewise
@@ -32,19 +35,28 @@
 -- column: ambiguous BIGINT         Pairs of root and arrival that no path leads to without a link
 --     that may be another one (a candidate_count above 1)
 -- column: messages BIGINT          Messages at the end that reflect a root
+-- column: pairs BIGINT             Pairs of root and arrival whose latency is known
 -- column: per_root DOUBLE         Messages that reflect a root which arrived, on average
--- column: first_median_ns BIGINT [ns]  Latency of the first arrival of each root: its median
+-- column: first_min_ns BIGINT [ns]     Latency of the first arrival of each root: the shortest
+-- column: first_median_ns BIGINT [ns]  Its median
+-- column: first_mean_ns BIGINT [ns]    Its mean
 -- column: first_p95_ns BIGINT [ns]     95 % are at most this
+-- column: first_p99_ns BIGINT [ns]     99 % are at most this
 -- column: first_max_ns BIGINT [ns]     The longest
 -- column: first_max_root_ns BIGINT [epoch ns]  When the flow with the longest one began
 -- column: first_max_take_id BIGINT     Take at its end: msgflow flow --take
--- column: last_median_ns BIGINT [ns]   Latency of the last arrival of each root: its median
+-- column: last_min_ns BIGINT [ns]      Latency of the last arrival of each root: the shortest
+-- column: last_median_ns BIGINT [ns]   Its median
+-- column: last_mean_ns BIGINT [ns]     Its mean
 -- column: last_p95_ns BIGINT [ns]      95 % are at most this
+-- column: last_p99_ns BIGINT [ns]      99 % are at most this
 -- column: last_max_ns BIGINT [ns]      The longest
 -- column: last_max_root_ns BIGINT [epoch ns]  When the flow with the longest one began
 -- column: last_max_take_id BIGINT      Take at its end: msgflow flow --take
 -- column: newest_median_ns BIGINT [ns]  Age of the newest root of each arrival: its median
+-- column: newest_mean_ns BIGINT [ns]   Its mean
 -- column: newest_p95_ns BIGINT [ns]    95 % are at most this
+-- column: newest_p99_ns BIGINT [ns]    99 % are at most this
 -- column: newest_max_ns BIGINT [ns]    The highest
 -- column: is_cut BOOLEAN           There may be more paths, beyond max_depth or max_paths
 -- brief: first_topic, last_topic, node, first_median_ns, last_max_ns, reached, lost, ambiguous,
@@ -92,16 +104,22 @@ measured AS (
         histogram(CASE WHEN is_first IS NOT false THEN status END)::MAP(VARCHAR, BIGINT) AS number,
         count(*) FILTER (WHERE is_first IS NOT false) AS roots,
         count(DISTINCT take_id) AS messages,
+        count(latency_ns) AS pairs,
         count(take_id) AS arrivals,
         count(*) FILTER (WHERE is_ambiguous) AS ambiguous,
-        quantile_disc(first_ns, [0.5, 0.95]) AS firsts,
+        min(first_ns) AS first_min_ns,
+        quantile_disc(first_ns, [0.5, 0.95, 0.99]) AS firsts,
+        round(avg(first_ns))::BIGINT AS first_mean_ns,
         -- Of equally long ones the first, and of its arrivals the first.
         max(struct_pack(latency_ns := first_ns, before_ns := -root_ns, before_take := -take_id))
             FILTER (WHERE first_ns IS NOT NULL) AS longest_first,
-        quantile_disc(last_ns, [0.5, 0.95]) AS lasts,
+        min(last_ns) AS last_min_ns,
+        quantile_disc(last_ns, [0.5, 0.95, 0.99]) AS lasts,
+        round(avg(last_ns))::BIGINT AS last_mean_ns,
         max(struct_pack(latency_ns := last_ns, before_ns := -root_ns, before_take := -take_id))
             FILTER (WHERE last_ns IS NOT NULL) AS longest_last,
-        quantile_disc(newest_ns, [0.5, 0.95]) AS newests,
+        quantile_disc(newest_ns, [0.5, 0.95, 0.99]) AS newests,
+        round(avg(newest_ns))::BIGINT AS newest_mean_ns,
         max(newest_ns) AS newest_max_ns
     FROM arrival
     GROUP BY run_id, first_topic, last_topic, node
@@ -131,19 +149,28 @@ SELECT
     coalesce(a.number, 0) AS loss_affected,
     coalesce(m.ambiguous, 0) AS ambiguous,
     coalesce(m.messages, 0) AS messages,
+    coalesce(m.pairs, 0) AS pairs,
     round(m.arrivals / nullif(m.number['reached'], 0), 2) AS per_root,
+    m.first_min_ns,
     m.firsts[1] AS first_median_ns,
+    m.first_mean_ns,
     m.firsts[2] AS first_p95_ns,
+    m.firsts[3] AS first_p99_ns,
     m.longest_first.latency_ns AS first_max_ns,
     -m.longest_first.before_ns AS first_max_root_ns,
     -m.longest_first.before_take AS first_max_take_id,
+    m.last_min_ns,
     m.lasts[1] AS last_median_ns,
+    m.last_mean_ns,
     m.lasts[2] AS last_p95_ns,
+    m.lasts[3] AS last_p99_ns,
     m.longest_last.latency_ns AS last_max_ns,
     -m.longest_last.before_ns AS last_max_root_ns,
     -m.longest_last.before_take AS last_max_take_id,
     m.newests[1] AS newest_median_ns,
+    m.newest_mean_ns,
     m.newests[2] AS newest_p95_ns,
+    m.newests[3] AS newest_p99_ns,
     m.newest_max_ns,
     n.is_cut
 FROM ends AS n

@@ -31,7 +31,7 @@ def asked(words: list[str]) -> Any:
 @operation
 def command(
     *,
-    section: Annotated[str | None, header_option(_SECTION[0], SELECTION)] = None,
+    section: Annotated[str | None, header_option(_SECTION, SELECTION)] = None,
     run: str | None = None,
     internal: bool = False,
     form: SectionsFormat | None = None,

@@ -99,7 +99,8 @@ said AS (
     SELECT
         1e6, NULL, [], NULL, s.path,
         printf(
-            'nothing stands out: the slowest path takes %s, most of it %s of %s, %s',
+            'nothing stands out: 95 %% of the data on the slowest path arrive within %s; what takes'
+            || ' longest on it is %s of %s, with up to %s',
             main.duration_text(s.p95_ns), coalesce(b.what, '?'), coalesce(b.node, '?'),
             main.duration_text(b.p95_ns)
         )
