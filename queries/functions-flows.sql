@@ -72,7 +72,13 @@ sample AS (
     FROM main.stack_sample AS s
     JOIN instance AS i ON s.callback_instance_id = i.callback_instance_id
 ),
-found AS (SELECT * FROM main.function_time('sample'))
+found AS (SELECT * FROM main.function_time('sample')),
+-- Those with most samples come first.
+placed AS (
+    SELECT group_id, row_number() OVER (ORDER BY sum(self_samples) DESC, group_id) AS place
+    FROM found
+    GROUP BY group_id
+)
 SELECT
     f.run_id,
     l.node AS node,
@@ -90,9 +96,8 @@ SELECT
     l.callback_id AS callback_id,
     l.is_internal AS is_internal
 FROM found AS t
+JOIN placed AS g ON t.group_id = g.group_id
 JOIN main.stack_frame AS f ON t.stack_frame_id = f.stack_frame_id
 JOIN main.callback_label AS l ON t.group_id = l.callback_id
 JOIN counted AS c ON t.group_id = c.group_id
-ORDER BY
-    f.run_id, sum(t.self_samples) OVER (PARTITION BY t.group_id) DESC, t.group_id,
-    t.self_samples DESC, t.samples DESC, f.function, f.file
+ORDER BY f.run_id, g.place, t.self_samples DESC, t.samples DESC, f.function, f.file

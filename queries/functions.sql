@@ -46,7 +46,13 @@ sample AS (
             ELSE $slowest IS NULL AND s.at_ns >= $start_ns AND s.at_ns < $end_ns
         END
 ),
-found AS (SELECT * FROM main.function_time('sample'))
+found AS (SELECT * FROM main.function_time('sample')),
+-- Those with most samples come first.
+placed AS (
+    SELECT group_id, row_number() OVER (ORDER BY sum(self_samples) DESC, group_id) AS place
+    FROM found
+    GROUP BY group_id
+)
 SELECT
     f.run_id,
     coalesce(l.node, main.node_label(NULL, p.name, p.pid)) AS node,
@@ -64,10 +70,9 @@ SELECT
     l.callback_id AS callback_id,
     coalesce(l.is_internal, false) AS is_internal
 FROM found AS t
+JOIN placed AS g ON t.group_id = g.group_id
 JOIN main.stack_frame AS f ON t.stack_frame_id = f.stack_frame_id
 LEFT JOIN main.callback_label AS l ON t.group_id = l.callback_id
 LEFT JOIN main.process AS p ON t.group_id = -p.process_id
 LEFT JOIN counted AS c ON t.group_id = c.group_id
-ORDER BY
-    f.run_id, sum(t.self_samples) OVER (PARTITION BY t.group_id) DESC, t.group_id,
-    t.self_samples DESC, t.samples DESC, f.function, f.file
+ORDER BY f.run_id, g.place, t.self_samples DESC, t.samples DESC, f.function, f.file

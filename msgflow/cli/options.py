@@ -146,7 +146,7 @@ SHARED: dict[str, Any] = {
     ),
     "links": typer.Option(help="Indirect links to declare, as YAML"),
     "clock_sync": typer.Option(
-        metavar="none|messages|FILE",
+        metavar="messages|FILE",
         parser=os.path.expanduser,
         help="Synchronise the clocks of several hosts: by their messages (and the network"
         " packets of kernel traces), or by offsets in a file",

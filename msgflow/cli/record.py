@@ -64,6 +64,7 @@ def command(
         print_python_path: Only print the folder that does so, in front of PYTHONPATH.
         subbuf_size (SIZE): Size of a sub-buffer of LTTng, per CPU.
         num_subbuf: Number of sub-buffers, per CPU.
+        clock_sync (messages|FILE): As msgflow ingest has it.
         ingest: Read the recording into the database.
     """
     from msgflow.cli.output import print_note, print_status

@@ -55,6 +55,7 @@ _UNKNOWN = {
 }
 # What a path has in place of a topic without a name.
 _UNNAMED = "?"
+_UNTRACED = "(not traced)"
 _NO_NAMES = (None, _UNNAMED)
 # Queries with rows of callbacks: none of what a node without traced callbacks did.
 _OF_CALLBACKS = ("callbacks", "waits")
@@ -147,7 +148,7 @@ def _explained(
     )
     path = _worst(verdict, paths)
     places = path.split(" → ")
-    via = [step for step in places if step != _UNNAMED]
+    via = [step for step in places if step not in (_UNNAMED, _UNTRACED)]
     flow = ask("critical-path", **ends, via=via, quantile="p95")
     pieces = flow.table.to_pylist()
     parts = _chosen(parts, lambda row: row["path"] == path)

@@ -54,7 +54,7 @@ def measure_event_cost(directory: Path, channel: Channel) -> None:
     with suppress(RecordingError, OSError, ValueError):
         cost = _measured(channel)
         if cost > _LEAST_NS:
-            (directory / _FILE).write_text(f"{cost:.0f}\n")
+            (directory / _FILE).write_text(f"{cost:.0f}\n", "utf-8")
 
 
 def _measured(channel: Channel) -> float:
@@ -88,5 +88,5 @@ def event_cost_ns(traces: Iterable[str]) -> float | None:
     for trace in traces:
         for folder in [Path(trace), *Path(trace).parents][:_LEVELS]:
             with suppress(OSError, ValueError):
-                return float((folder / _FILE).read_text())
+                return float((folder / _FILE).read_text("utf-8"))
     return None

@@ -235,7 +235,7 @@ def test_a_rotated_trace_is_one_trace_in_chunks(made):
 def test_a_chunk_is_missing(made):
     """What the lost chunk held is missing, and nothing else."""
     simulation = made("chunk")
-    kept = [path for path in made("rotated").trace_directories if not path.parts[-5].endswith("-2")]
+    kept = [path for path in made("rotated").trace_directories if not path.parts[-5].endswith("-1")]
     ends = [path.parts[-5:] for path in simulation.trace_directories]
     assert ends == [path.parts[-5:] for path in kept]
     assert all((path / "metadata").exists() for path in simulation.trace_directories)

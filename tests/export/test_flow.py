@@ -342,7 +342,7 @@ def test_what_cannot_be_started_from_is_named(small_database: Path) -> None:
             ({}, "starts from one thing"),
             ({"place": "/chatter", "take_id": 1}, "starts from one thing"),
             ({"publication_id": 7}, "no such publication — 7"),
-            ({"publication_id": 1, "at": "1s"}, "an identity tells"),
+            ({"publication_id": 1, "at": "1s"}, "an identity has a time"),
             ({"place": "/chatter", "run": "all"}, "a message is of one run"),
             ({"place": "/chatter", "at": "noon"}, "cannot read the time of --at"),
             ({"place": "/chatter", "direction": "up"}, "--direction has no such value"),

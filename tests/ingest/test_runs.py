@@ -36,7 +36,11 @@ def of_run(database: Path, run_id: int) -> dict[str, list[tuple[Any, ...]]]:
                         "WHERE run_id = $run) END + 1"
                     )
                     continue
-                key = next((own.column for own in column.foreign_keys), column)
+                # Some have no foreign key: ids below 0 stand for what is not traced.
+                own = STORE.tables.get(f"store.{column.name.removesuffix('_id')}")
+                keys = [each.column for each in column.foreign_keys]
+                key = next(iter(keys), column if own is None else own.columns.get(column.name))
+                key = column if key is None else key
                 base = ""
                 if column.name != "run_id" and key.name == f"{key.table.name}_id":
                     first = f"SELECT min({key.name}) FROM {key.table.fullname} WHERE run_id = $run"

@@ -445,7 +445,9 @@ def test_what_exceeds_a_condition_fails(fresh_database: Path) -> None:
             "mean>1us",
             "mean>0.001ms",
         }
-        assert all(failure.reason.endswith("ms)") for failure in failures[:4])
+        # Less than what matters by default: the condition decides, and the reason says so.
+        assert all(" % more (" in failure.reason for failure in failures[:4])
+        assert failures[0].reason.endswith("ms); less than --at-least")
 
 
 @pytest.mark.thorough

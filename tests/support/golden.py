@@ -13,7 +13,8 @@
         == TABLE             rows of store.TABLE as CSV; columns left out are NULL, or where it
                              forbids NULL 1 for a key, else 0, false or an empty text
         == scratch TABLE     of page queries over what pages compute once per run, and of macros
-                             over a table that they are given: its rows
+                             over a table that they are given: its rows; `name::TYPE` where
+                             the text of a column does not show its type
         == staging TABLE     of what was read: the columns of staging.TABLE that are needed
         == expected          the output in order; leave it empty for a new case, then let
                              `pytest --update-golden` write it, and read what it wrote
@@ -486,11 +487,14 @@ def _internal_rows(
 
 def _create(connection: duckdb.DuckDBPyConnection, what: str, text: str) -> None:
     """Make what stands behind CREATE, with the columns that the rows of text are of."""
-    rows = [line for line in text.splitlines(keepends=True) if not line.startswith("#")]
+    head, *rows = [line for line in text.splitlines(keepends=True) if not line.startswith("#")]
+    # No type that its text does not show is found: `ids::BIGINT[]`.
+    typed = dict(re.findall(r"(\w+)::([^,\n]+)", head))
     with tempfile.NamedTemporaryFile("w", suffix=".csv") as file:
-        file.writelines(rows)
+        file.writelines([re.sub(r"::[^,\n]+", "", head), *rows])
         file.flush()
-        connection.execute(f"CREATE {what} AS FROM read_csv(?, header = true)", [file.name])
+        types = f", types = {typed}" if typed else ""
+        connection.execute(f"CREATE {what} AS FROM read_csv(?, header = true{types})", [file.name])
 
 
 def stage(connection: duckdb.DuckDBPyConnection, case: Case) -> None:
