@@ -87,6 +87,9 @@ def event_cost_ns(traces: Iterable[str]) -> float | None:
     """Return what an event cost where the traces were made; None if none of them says so."""
     for trace in traces:
         for folder in [Path(trace), *Path(trace).parents][:_LEVELS]:
+            # The folder is what a database says, and that may be a stranger's: a pipe would hang.
+            file = folder / _FILE
             with suppress(OSError, ValueError):
-                return float((folder / _FILE).read_text("utf-8"))
+                if file.is_file():
+                    return float(file.read_text("utf-8"))
     return None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 from pathlib import Path
 
@@ -21,6 +22,14 @@ def test_it_is_not_known_without_the_library(tmp_path: Path) -> None:
     measure_event_cost(tmp_path, CHANNEL)
     assert list(tmp_path.iterdir()) == []
     assert event_cost_ns([str(tmp_path)]) is None
+
+
+def test_a_pipe_beside_a_trace_is_not_read(tmp_path: Path) -> None:
+    (tmp_path / "event-cost-ns").write_text("146\n")
+    assert event_cost_ns([str(tmp_path / "ust")]) == 146
+    (tmp_path / "event-cost-ns").unlink()
+    os.mkfifo(tmp_path / "event-cost-ns")
+    assert event_cost_ns([str(tmp_path / "ust")]) is None
 
 
 @pytest.mark.thorough
