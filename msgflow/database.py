@@ -464,7 +464,7 @@ class Database:
 
         one = self._ask(Slice(part.get("run")).one_run, "an explanation")
         times = Slice(one.run_id, part.get("start"), part.get("end"))
-        return self._ask(with_functions, self._ask(explain, one, times, place))
+        return self._ask(with_functions, self._ask(explain, one, times, place), times)
 
     def flow(
         self,

@@ -51,5 +51,6 @@ def write_folded(connection: duckdb.DuckDBPyConnection, path: Path, part: Slice)
             "msgflow record --profile 99, or perf beside the session (docs/functions.md)",
         )
     with replacing(path) as temporary:
-        temporary.write_text("".join(f"{stack} {samples}\n" for stack, samples in rows))
+        lines = (f"{stack} {samples}\n" for stack, samples in rows)
+        temporary.write_text("".join(lines), encoding="utf-8")
     return FoldedStacks(path, run, len(rows), sum(samples for _, samples in rows))

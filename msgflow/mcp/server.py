@@ -258,7 +258,7 @@ class _Tools:
     ) -> str:
         """Explain why a topic is late: what stands out, the paths, and where their time goes.
 
-        place: topic or node where the flows end; by default the end of the latest path. run, start,
+        place: topic or node where the flows end; by default all ends. run, start,
         end: as for run_query.
         """
         from msgflow.export.formats import json_rows

@@ -247,6 +247,11 @@ def compare(
             "a comparison is of two runs, or of two times of one",
             "msgflow compare before after, or --run drive --window 0s..60s --window 60s..120s",
         )
+    if run is not None and run_a is not None:
+        raise UsageError(
+            f"two runs are named already — --run {run}",
+            "leave it out, or compare two times of it: --run RUN --window … --window …",
+        )
     runs = read_runs(connection)
     wanted = (run, run) if run_a is None else (run_a, run_b)
     first, second = (choose_one(runs, each, "each side of a comparison") for each in wanted)

@@ -148,8 +148,10 @@ def _explained(
     )
     path = _worst(verdict, paths)
     places = path.split(" → ")
-    via = [step for step in places if step not in (_UNNAMED, _UNTRACED)]
-    flow = ask("critical-path", **ends, via=via, quantile="p95")
+    # Services stand in brackets, and no path may pass what only others do.
+    via = _names(places)
+    without = sorted({step for other in shown for step in _names(other.split(" → "))} - {*via})
+    flow = ask("critical-path", **ends, via=via, without=without or None, quantile="p95")
     pieces = flow.table.to_pylist()
     parts = _chosen(parts, lambda row: row["path"] == path)
     callbacks = {(row["node"], row["what"]) for row in parts.table.to_pylist()}
@@ -212,6 +214,11 @@ def _verdict(
             connection.execute(f"DROP TABLE IF EXISTS temp.{name}")
         for name in tables:
             connection.unregister(name)
+
+
+def _names(steps: Sequence[str]) -> list[str]:
+    names = [step.strip("()") for step in steps if step != _UNTRACED]
+    return [name for name in names if name != _UNNAMED]
 
 
 def _worst(verdict: pa.Table, paths: QueryResult) -> str:

@@ -11,11 +11,14 @@ if TYPE_CHECKING:
     import duckdb
 
     from msgflow.query.why import Explanation
+    from msgflow.run.slice import Slice
 
 _SAMPLED = "SELECT 1 FROM main.stack_sample WHERE run_id = ? LIMIT 1"
 
 
-def with_functions(connection: duckdb.DuckDBPyConnection, found: Explanation) -> Explanation:
+def with_functions(
+    connection: duckdb.DuckDBPyConnection, found: Explanation, times: Slice
+) -> Explanation:
     """Add a sentence with the three functions, where functions were sampled."""
     parts = found.nodes.table.to_pylist()
     slowest = next((row for row in parts if row["part"] == "callback"), None)
@@ -23,6 +26,7 @@ def with_functions(connection: duckdb.DuckDBPyConnection, found: Explanation) ->
     if slowest is None or not connection.execute(_SAMPLED, [run_id]).fetchall():
         return found
     asked = {"run_id": run_id, "node": slowest["node"], "callback": slowest["what"]}
+    asked |= times.window([found.run]).bindings
     rows = internal_sql().run(connection, "callback_function", asked).fetchall()
     if not rows:
         return found

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from contextlib import suppress
 from pathlib import Path
+from threading import Timer
 from typing import TYPE_CHECKING
 
 from msgflow.errors import RecordingError
@@ -24,6 +25,9 @@ _LEVELS = 5
 _EVENT = "ros2:callback_end"
 # What takes less is no event: the library has no tracepoints.
 _LEAST_NS = 10
+_MOST_NS = 1e6
+_MOST_BYTES = 64
+_LONGEST_S = 5.0
 # In a process of its own: ours is none of ROS. The library is what the nodes are to load. What the
 # call itself takes is measured first, without a session.
 _MEASURE = """
@@ -71,6 +75,9 @@ def _measured(channel: Channel) -> float:
     ):
         assert child.stdin is not None
         assert child.stdout is not None
+        # LTTng may let a process wait for its daemon for ever.
+        late = Timer(_LONGEST_S, child.kill)
+        late.start()
         try:
             if not child.stdout.readline():
                 raise ValueError("no library")
@@ -80,6 +87,7 @@ def _measured(channel: Channel) -> float:
                 child.stdin.flush()
                 return float(child.stdout.readline())
         finally:
+            late.cancel()
             child.kill()
 
 
@@ -90,6 +98,7 @@ def event_cost_ns(traces: Iterable[str]) -> float | None:
             # The folder is what a database says, and that may be a stranger's: a pipe would hang.
             file = folder / _FILE
             with suppress(OSError, ValueError):
-                if file.is_file():
-                    return float(file.read_text("utf-8"))
+                if file.is_file() and file.stat().st_size <= _MOST_BYTES:
+                    cost = float(file.read_text("utf-8"))
+                    return cost if _LEAST_NS < cost < _MOST_NS else None
     return None

@@ -69,14 +69,16 @@ def recorded_samples(
     data = directory / DATA
     with perf.recorded(data, [*options, place], note):
         yield
-    text = directory / TEXT
+    # Half a text would stand before all of the data.
+    part = directory / f"{TEXT}.part"
     try:
-        write_script(data, text)
-    except TraceError as error:
-        text.unlink(missing_ok=True)
-        note(error.message)
-    else:
+        write_script(data, part)
+        part.replace(directory / TEXT)
         data.unlink()
+    except TraceError as error:
+        note(error.message)
+    finally:
+        part.unlink(missing_ok=True)
 
 
 def with_python_functions(

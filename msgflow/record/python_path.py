@@ -34,7 +34,11 @@ def _why_not(folder: Path) -> str | None:
         return f"PYTHONPATH cannot have a folder with a {os.pathsep!r} — {folder}"
     # What others may write would run in the processes of this user; so would compiled files.
     for path in (*folder.rglob("*"), folder, *folder.parents):
-        status = path.stat()
+        try:
+            status = path.stat()
+        # Python writes compiled files under names that go again.
+        except FileNotFoundError:
+            continue
         is_shared = status.st_mode & stat.S_IWOTH and not (
             path.is_dir() and status.st_mode & stat.S_ISVTX
         )

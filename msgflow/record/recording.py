@@ -134,9 +134,11 @@ def record(
         else:
             require_snapshot(snapshot)
         directory.mkdir(parents=True, exist_ok=True)
-        measure_event_cost(directory, channel)
         if snapshot is not None:
             record_snapshot(snapshot, directory / "snapshot")
+        # What is measured are events: other sessions would have them, too.
+        if not sessions():
+            measure_event_cost(directory, channel)
         by_lttng = kernel and can_trace_kernel()
         if kernel and not by_lttng:
             if (reason := why_perf_cannot_record()) is None:

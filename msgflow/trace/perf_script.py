@@ -101,6 +101,9 @@ def _why_not_written(data: Path, text: Path, fields: str) -> str | None:
             )
     except subprocess.TimeoutExpired:
         return f"perf takes longer than {_SECONDS:.0f} s"
+    # A full disk, or no prlimit.
+    except OSError as error:
+        return f"{error.filename or command[0]}: {error.strerror or error}"
     if run.returncode == 0:
         return None
     said = run.stderr.decode(errors="replace").strip().splitlines()

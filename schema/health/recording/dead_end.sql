@@ -1,8 +1,8 @@
 -- name: finding.dead_end
 -- title: Messages that end at a node which publishes
--- description: No callback of a subscription led to anything, but the node publishes by a timer, or
---     because of other messages. If it keeps the messages for that, paths and flows that should go
---     on end there, and no end-to-end latency goes through the node.
+-- description: No callback of a subscription led to anything, but the node publishes by a timer,
+--     outside of callbacks, or because of other messages. If it keeps the messages for that, paths
+--     and flows that should go on end there, and no end-to-end latency goes through the node.
 -- cause: The trace does not show that a node keeps a message for later. Or it really only consumes
 --     these messages.
 -- cure: msgflow suggest links writes a file with the links that are likely; with --apply it

@@ -3,8 +3,8 @@
 -- description: The difference of the means of a path (`compared`: rows of `main.comparison`) is the
 --     sum of the differences of its parts (`part_a` and `part_b`: rows of `path-breakdown`): the
 --     time of all flows in a part, by the number of flows. What only one run has took no time in
---     the other one. Where the kernel was traced, the time of a callback is divided as
---     that of all its instances is (`state_a` and `state_b`).
+--     the other one. Where the kernel was traced in both, the time of a callback is divided as that
+--     of all its instances is (`state_a` and `state_b`).
 -- grain: one row per path that both runs have, and part of it at a node; one more for each path,
 --     with all of it
 -- column: difference_ns BIGINT [ns]  Mean of B less mean of A
@@ -41,7 +41,11 @@ both_sides AS (
         UNION ALL
         SELECT 'b', path, node, part, what, total_ns FROM part_b
     ) AS p
-    LEFT JOIN spent AS s
+    -- A part that only one of them can tell would look like a change.
+    LEFT JOIN (
+        FROM spent
+        QUALIFY count(DISTINCT side) OVER (PARTITION BY node, what) = 2
+    ) AS s
         ON p.side = s.side AND p.node = s.node AND p.what = s.what AND p.part = 'callback'
 ),
 part AS (

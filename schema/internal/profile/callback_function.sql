@@ -5,6 +5,8 @@
 -- param: run_id BIGINT  Run
 -- param: node VARCHAR  Its node
 -- param: callback VARCHAR  What triggers it
+-- param: start_ns BIGINT  Begin of the time window, epoch ns
+-- param: end_ns BIGINT  Its end, exclusive
 -- column: function VARCHAR  The function
 -- column: self_share DOUBLE [share]  Part of the samples of the callback in which it ran
 -- column: all_samples BIGINT  Samples of the callback
@@ -14,6 +16,7 @@ WITH sample AS (
     JOIN main.callback_instance AS i ON s.callback_instance_id = i.callback_instance_id
     JOIN main.callback_label AS l ON i.callback_id = l.callback_id
     WHERE s.run_id = $run_id AND l.node = $node AND l.label = $callback
+        AND i.start_ns >= $start_ns AND i.start_ns < $end_ns
 )
 SELECT f.function, t.self_share, (SELECT count(*) FROM sample) AS all_samples
 FROM main.function_time('sample') AS t

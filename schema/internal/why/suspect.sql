@@ -43,13 +43,13 @@ callback AS MATERIALIZED (
 ),
 computing AS (
     SELECT
-        node, label, path, path_ns, limit_ns, is_unusual, usual_ns, run_ns,
+        node, label, path, path_ns, limit_ns, is_unusual, usual_ns,
         greatest(least(p95_ns, computed_ns), 0) + own_ns AS cost_ns,
         own_ns
     FROM callback
     UNION ALL
     -- Callbacks that are not traced: from a take to what is published.
-    SELECT node, what, path, path_ns, 20_000_000, false, NULL, NULL, p95_ns, 0
+    SELECT node, what, path, path_ns, 20_000_000, false, NULL, p95_ns, 0
     FROM place
     WHERE part = 'callback' AND (node, what) NOT IN (SELECT (node, label) FROM why_callback)
 ),
@@ -100,7 +100,8 @@ flowing AS (
     SELECT
         f.subscription_id,
         (count(*) - 1) * 1e9 / nullif(max(b.start_ns) - min(b.start_ns), 0) AS in_hz,
-        (count(*) FILTER (WHERE d.status = 'delivered') - 1) * 1e9
+        -- One message has no rate.
+        (nullif(greatest(count(*) FILTER (WHERE d.status = 'delivered'), 1), 1) - 1) * 1e9
         / nullif(max(b.start_ns) - min(b.start_ns), 0) AS out_hz
     FROM failing AS f
     JOIN main.stat_delivery AS d ON f.subscription_id = d.subscription_id
@@ -121,7 +122,8 @@ failed AS (
 ),
 created AS (
     SELECT
-        n.full_name, n.created_ns, median(n.created_ns) OVER () AS usual_ns, s.length_ns
+        n.full_name, n.created_ns, quantile_disc(n.created_ns, 0.5) OVER () AS usual_ns,
+        s.length_ns
     FROM main.node AS n
     JOIN span AS s ON n.run_id = s.run_id
     WHERE NOT n.is_inferred AND n.created_ns IS NOT NULL
@@ -145,6 +147,7 @@ late AS (
         ON c.full_name = d.subscriber
     -- A robot starts within seconds; of a long recording a short begin does not matter.
     WHERE c.created_ns - c.usual_ns > greatest(2_000_000_000, 0.02 * c.length_ns)
+        AND c.created_ns >= $start_ns AND c.created_ns < $end_ns
 ),
 sampled AS (
     SELECT
@@ -220,12 +223,18 @@ FROM other AS o
 JOIN holding AS h ON o.callback_id = h.callback_id
 UNION ALL
 SELECT
-    'cpu', coalesce(cpu_by, '?'), node, path, cpu_ns,
+    'cpu', coalesce(cpu_by, node), node, path, cpu_ns,
     cpu_ns >= limit_ns AND cpu_ns >= 0.1 * path_ns,
-    printf(
-        'takes the CPU from %s, which waits for it for %s of %s', node,
-        main.duration_text(cpu_ns), main.duration_text(path_ns)
-    )
+    CASE WHEN cpu_by IS NULL
+        THEN printf(
+            'waits for a CPU for %s of %s (what had it is not known)',
+            main.duration_text(cpu_ns), main.duration_text(path_ns)
+        )
+        ELSE printf(
+            'takes the CPU from %s, which waits for it for %s of %s', node,
+            main.duration_text(cpu_ns), main.duration_text(path_ns)
+        )
+    END
 FROM callback
 WHERE cpu_ns > 0
 UNION ALL
