@@ -5,7 +5,7 @@ SELECT c.callback, c.kind, i.end_ns - i.start_ns - c.took_ns AS longer_ns
 FROM (
     SELECT node || ' ' || n AS callback, kind, pid, tid, t0, t1 - t0 AS took_ns
     FROM truth_row
-    -- What is behind the session is not traced; a task is told apart by its thread alone.
+    -- Callbacks of clients run in tasks. Only a thread tells these apart: they are left out.
     WHERE k = 'callback' AND kind <> 'client'
 ) AS c
 SEMI JOIN (FROM analysed.store.process WHERE python_version IS NOT NULL) AS t ON c.pid = t.pid

@@ -78,8 +78,8 @@ def print_comparison(
 
     result = comparison.result
     is_table = form in (None, Format.TABLE) and output is None
-    if (parts := getattr(comparison, "parts", None)) is not None:
-        result = parts
+    if comparison.parts is not None:
+        result = comparison.parts
     elif only_different is not None or (is_table and not wide):
         result = comparison.changes(only_different=only_different is True)
     print_result(result, form, output, wide=wide, most_rows=_MOST_ROWS)

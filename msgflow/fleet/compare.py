@@ -37,9 +37,11 @@ class FleetComparison:
 
     Attributes:
         result: one row per path and statistic, see `internal.fleet_comparison`.
+        parts: None: only a comparison of two runs has them.
     """
 
     result: QueryResult
+    parts: None = None
 
     def changes(self, *, only_different: bool = True) -> QueryResult:
         """Return a row for each path, the greatest change first."""

@@ -28,8 +28,8 @@ _LEAST_NS = 10
 _MOST_NS = 1e6
 _MOST_BYTES = 64
 _LONGEST_S = 5.0
-# In a process of its own: ours is none of ROS. The library is what the nodes are to load. What the
-# call itself takes is measured first, without a session.
+# A child process calls the library that the nodes will load. It measures the call first without a
+# session, then with one.
 _MEASURE = """
 import ctypes, time
 event = ctypes.CDLL("libtracetools.so").ros_trace_callback_end

@@ -1,6 +1,6 @@
 -- name: main.executor_activity
--- description: What executor threads did, in detail: their states, split where a callback begins
---     and ends and where a message is taken. Before its callback, an executing thread takes the
+-- description: What executor threads did. Each state is divided where a callback begins or ends,
+--     and where the thread takes a message. Before its callback, an executing thread takes the
 --     message (for a timer there is none: it is still selecting). After the callback, and after it
 --     looked in vain, a thread of a multi-threaded executor is blocked until it may look for work
 --     again. If callbacks are nested, the innermost counts; inside a callback that spins, what it

@@ -6,9 +6,9 @@
 --     links are not affected. Callbacks of Agnocast do not count: its executors have no events.
 --     Nor do those of a thread that was seen to serve what came first first, as an events executor
 --     does: when it waited is known, at least in part.
--- cause: The process uses a StaticSingleThreadedExecutor, a loop of its own that calls callbacks
---     (wait sets), or an EventsExecutor of which the recording shows too little, or which has
---     several threads. rclcpp has no tracepoints in these.
+-- cause: rclcpp has no tracepoints in a StaticSingleThreadedExecutor, in a loop of the process that
+--     calls callbacks itself (wait sets), and in an EventsExecutor. The recording shows an
+--     EventsExecutor only if it has one thread and served enough messages.
 -- cure: None needed. For executor states, use a SingleThreadedExecutor or MultiThreadedExecutor.
 -- grain: one row per process with such threads
 -- severity: warning
