@@ -121,6 +121,8 @@ def choose_query(
     chosen: dict[str, str] = {}
     for variant in header.variants:
         if (value := given.get(variant.name)) is None:
+            if own in (*variant.choices, variant.name):
+                chosen[header.name] = header.words.partition(" ")[2]
             continue
         if variant.type == "BOOLEAN":
             with suppress(ValueError):

@@ -64,7 +64,11 @@ def untraced_notes(
     begins = internal_sql().run(
         connection, "untraced_begin", {"runs": [run.run_id for run in runs]}
     )
-    where = {True: "the stamp of each message", False: "its take: its clock may be another one"}
+    where = {
+        True: "the stamp of each message",
+        False: "its take: its clock may be another one",
+        None: "the stamp of each message, or its take where its clock may be another one",
+    }
     return [
         f"what publishes {topic} is not traced: flows begin with {where[is_stamped]}"
         for topic, is_stamped in begins.fetchall()

@@ -126,10 +126,10 @@ SUBJECTS: dict[str, Subject] = {
     ENDS: Subject(
         {
             "latency": Metric(
-                _BETWEEN, "first_{}_ns", Dimension.TIME, _ALL, "pairs", "first_flow", _NO_FLOW
+                _BETWEEN, "first_{}_ns", Dimension.TIME, _ALL, "reached", "first_flow", _NO_FLOW
             ),
             "last": Metric(
-                _BETWEEN, "last_{}_ns", Dimension.TIME, _ALL, "pairs", "last_flow", _NO_FLOW
+                _BETWEEN, "last_{}_ns", Dimension.TIME, _ALL, "reached", "last_flow", _NO_FLOW
             ),
             "age": Metric(_BETWEEN, "newest_{}_ns", Dimension.TIME, _ALL[1:], "messages"),
             "completeness": Metric(

@@ -74,6 +74,8 @@ def test_an_option_chooses_a_variant(name: str, given: dict[str, Value], words: 
 def test_two_variants_are_not_one_answer() -> None:
     with pytest.raises(UsageError, match="do not go together — --measure age and --by ends"):
         choose_query("e2e-latency", {"measure": "age", "by": "ends"})
+    with pytest.raises(UsageError, match="do not go together — --measure age and --by ends"):
+        choose_query("e2e-latency-age", {"by": "ends"})
 
 
 def test_a_value_that_no_variant_has_is_refused(small_database: Path) -> None:

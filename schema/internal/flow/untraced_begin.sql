@@ -5,8 +5,13 @@
 -- grain: one row per topic
 -- param: runs BIGINT[]  Runs
 -- column: topic_name VARCHAR [topic]  Topic
--- column: is_stamped BOOLEAN  Flows begin with the stamp
-SELECT s.topic_name, bool_or(r.before_take_ns <> 0) AS is_stamped
+-- column: is_stamped BOOLEAN  Flows begin with the stamp; NULL: some do
+SELECT
+    s.topic_name,
+    CASE
+        WHEN bool_or(r.before_take_ns <> 0) = bool_and(r.before_take_ns <> 0)
+            THEN bool_or(r.before_take_ns <> 0)
+    END AS is_stamped
 FROM store.flow_root AS r
 JOIN store.subscription AS s ON r.publisher_id = -s.subscription_id
 WHERE r.root_kind = 'take' AND list_contains($runs, r.run_id)
