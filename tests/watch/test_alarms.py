@@ -60,15 +60,17 @@ def test_a_violation_names_the_culprit_and_is_kept(watched, tmp_path: Path) -> N
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text("matters")
     options = ("--window", "3s", "--step", "3s", "--json", "--keep-most", 1)
-    result = watched(TARGETS, *options, "--keep-on-violation", kept)
+    between = "  - {from: /scan, to: /filtered, latency: max < 80 ms}\n"
+    result = watched(f"{TARGETS}{between}", *options, "--keep-on-violation", kept)
     assert result.exit_code == 1
     # What this program did not write stays.
     assert all(file.read_text() == "matters" for file in others_own)
     first, *others = map(json.loads, result.stdout.splitlines())
-    (violation,) = first["violations"]
-    assert violation["subject"] == "/scan → /filtered"
-    assert violation["worst_ns"] == 99_343_279
-    assert "/filter ran 48.084 ms" in violation["culprit"]
+    subjects = [violation["subject"] for violation in first["violations"]]
+    assert subjects == ["/scan → /filtered", "/scan → /filtered → /sink"]
+    for violation in first["violations"]:
+        assert violation["worst_ns"] == 99_343_279
+        assert "/filter ran 48.084 ms" in violation["culprit"]
     assert not any(window["violations"] for window in others)
     (directory,) = kept.glob("violation-2*")
     assert len(list(directory.glob("archives/*/*"))) > 2
