@@ -18,8 +18,15 @@ JOIN analysed.store.process AS p ON t.process_id = p.process_id
 JOIN analysed.store.host AS h ON p.host_id = h.host_id;
 
 -- Runs of callbacks: number `n` of its node, and the message, request or response that it got.
+-- `is_run`: it has events of its own. Of a response, it is known by its taking, or before Kilted by
+-- the callback of Python; rclcpp had no event for it.
 CREATE OR REPLACE TEMP TABLE truth_callback AS
-SELECT node || ' ' || n AS callback, kind, name, id, node, pid, tid, t0, accepted
+SELECT
+    node || ' ' || n AS callback, kind, name, id, node, pid, tid, t0, accepted,
+    kind <> 'client' OR (
+        NOT EXISTS (FROM analysed.store.response)
+        AND pid IN (SELECT pid FROM analysed.store.process WHERE python_version IS NOT NULL)
+    ) AS is_run
 FROM truth_row
 WHERE k = 'callback';
 
@@ -95,9 +102,7 @@ UNION ALL
 SELECT 'callback_instance', c.callback, i.host, i.pid, i.tid, i.start_ns
 FROM truth_callback AS c
 ASOF JOIN placed_run AS i ON c.pid = i.pid AND c.tid = i.tid AND c.t0 >= i.start_ns
-WHERE coalesce(c.t0 <= i.end_ns, true)
-    -- Before Kilted, of a response nothing is known but the callback of Python.
-    AND (c.kind <> 'client' OR NOT EXISTS (FROM analysed.store.response));
+WHERE coalesce(c.t0 <= i.end_ns, true) AND c.is_run;
 
 -- Nothing says what of these recordings is missing or was torn.
 CREATE OR REPLACE TEMP TABLE truth_torn (kind VARCHAR, id VARCHAR);
@@ -143,7 +148,7 @@ link AS (
     FROM truth_sent AS s
     JOIN truth_callback AS c ON s.callback = c.callback
     JOIN traced AS t ON s.pid = t.pid
-    WHERE c.kind <> 'client' OR NOT EXISTS (FROM analysed.store.response)
+    WHERE c.is_run
     UNION ALL
     SELECT
         'link_call', 'response_taken', s.callback,

@@ -156,7 +156,7 @@ class Kernel:
         later = []
         for cpu in sorted(self._cpus(thread), key=lambda one: one != thread.cpu):
             may = self._may_take(thread, cpu, time)
-            if latest is not None and latest.is_preempted and cpu != latest.cpu:
+            if latest is not None and thread not in self._wakings and cpu != latest.cpu:
                 may = max(may, latest.end + _BALANCE_NS)
             # Of two that want a CPU now, the more urgent one comes first.
             if self._is_wanted(thread, cpu):
