@@ -231,20 +231,22 @@ twin AS (
     GROUP BY a.publication_id
 ),
 -- Or it was stamped while another thread wrote as well, as far as the trace shows: threads of rclpy
--- have no event until they take the next message.
+-- have no event until they look for the next message. Of a look in vain the truth knows nothing: the
+-- last publication of a thread may go on for as long as its process.
 rivalled AS (
     SELECT DISTINCT a.publication_id
     FROM simulated_publication AS a
     JOIN (
         SELECT p.topic_name, p.host, p.pid, p.tid, p.rmw_ns, e.ts_ns AS next_ns
         FROM simulated_publication AS p
-        ASOF JOIN (FROM truth_event WHERE is_recorded) AS e
+        ASOF LEFT JOIN (FROM truth_event WHERE is_recorded) AS e
             ON p.host = e.host AND p.pid = e.pid AND p.tid = e.tid AND p.rmw_ns < e.ts_ns
     ) AS b
         ON a.topic_name = b.topic_name
         AND a.host = b.host
         AND (a.pid, a.tid) IS DISTINCT FROM (b.pid, b.tid)
-        AND a.rmw_ns BETWEEN b.rmw_ns AND b.next_ns
+        AND a.rmw_ns >= b.rmw_ns
+        AND coalesce(a.rmw_ns <= b.next_ns, a.pid = b.pid)
 ),
 asked AS (
     SELECT

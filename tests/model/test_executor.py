@@ -45,17 +45,19 @@ def test_threads_that_share_callbacks_are_one_executor(system: RosSystem, analys
     assert model.value("SELECT count(*) FROM executor_state WHERE executor_id IS NULL") == 0
 
 
-@pytest.mark.parametrize(("swapped", "kind"), [
-    (0, "events"),
+@pytest.mark.parametrize(("swapped", "threads", "kind"), [
+    (0, 1, "events"),
     # One message that came first was served later.
-    (1, "unknown"),
+    (1, 1, "unknown"),
     # The order of the subscriptions explains it, as in a wait set.
-    (None, "unknown"),
+    (None, 1, "unknown"),
+    # An EventsCBGExecutor: the order is that of each group of callbacks, not of a thread.
+    (0, 2, "multi_threaded"),
 ])  # fmt: skip
 def test_what_serves_in_order_of_arrival_is_an_events_executor(
-    system: RosSystem, analyse: Analyse, swapped: int | None, kind: str
+    system: RosSystem, analyse: Analyse, swapped: int | None, threads: int, kind: str
 ) -> None:
-    """Thirteen times two messages wait; the older one is taken first."""
+    """Thirteen times two messages wait; the older one is taken first. Else pauses are not known."""
     talker = Thread(200)
     # That its process has executor events at all shows that they were enabled.
     system.ready(talker)
@@ -63,7 +65,7 @@ def test_what_serves_in_order_of_arrival_is_an_events_executor(
         system.publisher(talker, number, f"/topic{number}")
         system.subscription(MAIN, 0x10 + number, f"/topic{number}")
         system.subscription_callback(MAIN, 0x10 + number, 0xC0 + number)
-    for turn in range(13):
+    for turn in range(13 * threads):
         topics = (1, 2) if turn % 2 or swapped is None else (2, 1)
         stamps = 10 + 10 * turn, 15 + 10 * turn
         for topic, stamp in zip(topics, stamps, strict=True):
@@ -72,13 +74,16 @@ def test_what_serves_in_order_of_arrival_is_an_events_executor(
         served = list(zip(topics, stamps, strict=True))
         if turn == 5 and swapped:
             served.reverse()
+        thread = Thread(100, 100 + turn // 2 % threads)
         for topic, stamp in served:
-            system.take(MAIN, 0x10 + topic, stamp)
-            system.start(MAIN, 0xC0 + topic)
-            system.end(MAIN, 0xC0 + topic)
-    assert (
-        analyse(system).value("SELECT kind FROM executor WHERE kind <> 'single_threaded'") == kind
-    )
+            system.take(thread, 0x10 + topic, stamp)
+            system.start(thread, 0xC0 + topic)
+            system.end(thread, 0xC0 + topic)
+    assert analyse(system).rows(
+        "SELECT e.kind, bool_or(a.activity IN ('wait', 'select')) FROM executor AS e "
+        "JOIN executor_activity AS a USING (executor_id) "
+        "WHERE e.kind <> 'single_threaded' GROUP BY ALL"
+    ) == [(kind, kind == "events")]
 
 
 @pytest.mark.parametrize(("turns", "at_once", "kinds"), [
