@@ -292,7 +292,7 @@ class Database:
         Raises:
             UsageError: no such run or several, clocks that are not synchronised, or the package
                 rosbags is not installed.
-            TraceError: not a bag, or a damaged one.
+            TraceError: not a bag, a damaged one, or one that takes too much memory.
         """
         from msgflow.bag.join import join_bag
 

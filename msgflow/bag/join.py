@@ -48,7 +48,8 @@ def join_bag(
         path: the database.
         bag: directory of a rosbag2, or one of its files (.mcap, .db3).
         run: a name or an id; the latest run when None.
-        memory_limit: most memory that the database takes, such as '2GB'.
+        memory_limit: most memory that the database takes, and the process that reads the bag
+            (and a quarter more), such as '2GB'.
 
     Returns:
         A row per topic of the bag: how many messages were joined, and why others were not.
@@ -56,11 +57,9 @@ def join_bag(
     Raises:
         UsageError: no such run or several, clocks that are not synchronised, or the package rosbags
             is not installed.
-        TraceError: not a bag, or a damaged one.
+        TraceError: not a bag, a damaged one, or one that takes too much memory.
         DatabaseError: the database is missing, locked, foreign, or of another schema revision.
     """
-    batches = read_bag(bag)
-    first = next(batches)  # the database is opened for a bag that can be read
 
     def join(con: duckdb.DuckDBPyConnection, runs: tuple[Run, ...]) -> QueryResult:
         if len(runs) > 1:
@@ -68,12 +67,9 @@ def join_bag(
         (one,) = runs
         _require_one_time(con, one)
         given: dict[str, Any] = {"run_id": one.run_id}
-        con.register("bag_batch", first)
-        con.execute("CREATE OR REPLACE TEMP TABLE bag_read AS FROM bag_batch")
-        for batch in batches:
-            con.register("bag_batch", batch)
-            con.execute("INSERT INTO bag_read FROM bag_batch")
-        con.unregister("bag_batch")
+        con.register("bag_messages", messages)
+        con.execute("CREATE OR REPLACE TEMP TABLE bag_read AS FROM bag_messages")
+        con.unregister("bag_messages")
         internal_sql().keep(con, "bag_joined", given)
         con.execute("DELETE FROM store.bag_message WHERE run_id = $run_id", given)
         con.execute(_STORED, given)
@@ -82,7 +78,9 @@ def join_bag(
         con.execute("DROP TABLE temp.bag_joined")
         return QueryResult(table, internal_sql().header("bag_topic"), runs)
 
-    return change_runs(path, run, join, memory_limit=memory_limit)
+    # The database is opened for a bag that can be read.
+    with read_bag(bag, memory_limit=memory_limit) as messages:
+        return change_runs(path, run, join, memory_limit=memory_limit)
 
 
 def _require_one_time(con: duckdb.DuckDBPyConnection, run: Run) -> None:

@@ -1,23 +1,25 @@
-"""Messages of a bag, read with the package rosbags."""
+"""Messages of a bag, read with the package rosbags in a process of its own."""
 
 from __future__ import annotations
 
 import contextlib
-import io
-import os
-import struct
-from typing import IO, TYPE_CHECKING, Any
+import errno
+import importlib.util
+import resource
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
 
-from msgflow.errors import TraceError, UsageError
-from msgflow.trace.compression import CORRUPT, open_plain
+from msgflow.confined.process import ConfinedProcess
+from msgflow.db.memory import bound_process, default_limit, set_memory_limit
+from msgflow.errors import QueryError, TraceError, UsageError
 from msgflow.trace.extraction import LIMIT_VARIABLE, limit_of
 from msgflow.trace.regular_file import irregular
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-    from pathlib import Path
+    from collections.abc import Callable, Iterator
 
 _HEADER = "std_msgs/msg/Header"
 _SCHEMA = pa.schema(
@@ -32,105 +34,96 @@ _SCHEMA = pa.schema(
     }
 )
 _ROWS_AT_ONCE = 50_000
-_BYTES_AT_ONCE = 1 << 20
-_MCAP_MAGIC_SIZE = 8
-# Of each record of MCAP: its kind and its length.
-_RECORD = struct.Struct("<BQ")
-_CHUNK = 6
-_BEFORE_COMPRESSION = 28
 
 
-def read_bag(bag: Path) -> Iterator[pa.Table]:
-    """Yield the messages of a bag in the order of their receipt, in one table or more.
+@contextlib.contextmanager
+def read_bag(bag: Path, *, memory_limit: str | None = None) -> Iterator[pa.RecordBatchReader]:
+    """Have the messages of a bag, in the order of their receipt.
+
+    What chunks, messages and definitions of types take in memory, and files on the disk, is known
+    only when rosbags has unpacked them: the bounds are those of the process that does so.
 
     Yields:
-        Tables with `message` (number), `topic_name`, `type_name`, `received_ns`, `size_bytes` (of
+        Rows with `message` (number), `topic_name`, `type_name`, `received_ns`, `size_bytes` (of
         the serialised message), and where the type has a header `stamp_ns` and `frame_id`.
     """
-    try:
-        from rosbags.highlevel import AnyReader
-        from rosbags.typesys import Stores, get_typestore
-    except ImportError:
+    if importlib.util.find_spec("rosbags") is None:
         raise UsageError(
             "the package that reads bags is not installed — rosbags",
             "pip install rosbags; or in a checkout of msgflow: uv tool install '.[bag]'",
-        ) from None
+        )
     if not bag.exists():
         raise TraceError(f"no such bag — {bag}", "give the directory of a rosbag2")
-    _require_safe(bag)
-    try:
-        # Bags from before Iron do not hold their types. The reader knows those of ROS itself.
-        with AnyReader([bag], default_typestore=get_typestore(Stores.LATEST)) as reader:
-            if any(getattr(each, "compression_mode", None) == "message" for each in reader.readers):
-                _require_sizes_of_messages(bag)
-            yield from _tables(reader)
-    except TraceError:
-        raise
-    except Exception as error:  # what its parsers raise in a damaged file has no common class
-        said = str(error).strip().splitlines()
-        raise TraceError(
-            f"cannot read as a bag of ROS 2: {said[0] if said else type(error).__name__} — {bag}",
-            "give the directory of a rosbag2; ros2 bag reindex repairs one that was cut off",
-        ) from error
-
-
-def _require_safe(bag: Path) -> None:
-    """Raise where a bag would hang its reader, or fill the disk or the memory that unpacks it."""
-    files = [bag, *(bag.rglob("*") if bag.is_dir() else ())]
-    for file in files:
+    size = 0
+    for file in (bag, *(bag.rglob("*") if bag.is_dir() else ())):
         if kind := irregular(file):
             raise TraceError(f"{kind}, no file — {file}", "copy the bag again, with cp -rL")
-        if not file.is_file():
-            continue
-        with file.open("rb") as opened, contextlib.suppress(*CORRUPT):
-            if file.suffix == ".zstd":
-                _require_size(file, [opened])
-            elif file.suffix == ".mcap":
-                _require_size(file, _chunks(opened))
-
-
-def _require_sizes_of_messages(bag: Path) -> None:
-    """Raise where messages that were compressed one by one are larger than the limit."""
-    from rosbags.rosbag2 import Reader
-
-    for file in sorted(bag.rglob("*")):
-        if file.suffix in (".db3", ".mcap"):
-            # The file alone does not say that its messages are compressed: they come as they are.
-            with Reader(file) as reader, contextlib.suppress(*CORRUPT):
-                _require_size(file, (io.BytesIO(data) for _, _, data in reader.messages()))
-
-
-def _require_size(file: Path, parts: Iterable[IO[bytes]]) -> None:
-    """Raise where compressed parts of a file have more bytes than the limit of archives."""
-    left = limit_of(file)
-    for part in parts:
-        content = open_plain(part)
-        while chunk := content.read(_BYTES_AT_ONCE):
-            left -= len(chunk)
-            if left < 0:
-                raise TraceError(
-                    f"the file has more than {limit_of(file):,} bytes unpacked — {file}",
-                    f"{LIMIT_VARIABLE}=100GB msgflow … reads it, if you know who made it",
+        size += file.stat().st_size
+    with tempfile.TemporaryDirectory(prefix="msgflow-") as place:
+        target = Path(place, "messages")
+        with ConfinedProcess(__name__) as process:
+            try:
+                process.call(
+                    "write_messages",
+                    {
+                        "bag": str(bag),
+                        "target": str(target),
+                        "memory_limit": memory_limit or default_limit(),
+                        "most_bytes": limit_of(size),
+                    },
                 )
+            except QueryError as error:  # it has ended
+                raise _unread(bag, error) from error
+        with pa.OSFile(str(target)) as file, pa.ipc.open_stream(file) as messages:
+            yield messages
 
 
-def _chunks(file: IO[bytes]) -> Iterator[IO[bytes]]:
-    """Yield the chunks of an MCAP file as they stand there: see its specification, Records."""
-    size = os.fstat(file.fileno()).st_size
-    file.seek(_MCAP_MAGIC_SIZE)
-    while len(head := file.read(_RECORD.size)) == _RECORD.size:
-        kind, length = _RECORD.unpack(head)
-        end = file.tell() + length
-        if kind == _CHUNK:
-            # Times, size, and checksum; then the name of the compression, and the size of the rest.
-            file.seek(_BEFORE_COMPRESSION, os.SEEK_CUR)
-            (name_size,) = struct.unpack("<I", file.read(4))
-            file.seek(name_size + 8, os.SEEK_CUR)
-            yield io.BytesIO(file.read(max(0, min(end, size) - file.tell())))
-        file.seek(min(end, size))
+def write_messages(
+    write: Callable[[Any], int], *, bag: str, target: str, memory_limit: str, most_bytes: int
+) -> None:
+    """Write the messages of a bag to a file, in the child; what it unpacks lies beside it."""
+    import duckdb
+    from rosbags.highlevel import AnyReader
+    from rosbags.typesys import Stores, get_typestore
+
+    path = Path(bag)
+    tempfile.tempdir = str(Path(target).parent)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, resource.RLIM_INFINITY))
+    with duckdb.connect() as con:
+        set_memory_limit(con, memory_limit)
+        bound_process(con)
+    try:
+        # Bags from before Iron do not hold their types. The reader knows those of ROS itself.
+        with (
+            AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as reader,
+            pa.OSFile(target, "w") as stream,
+            pa.ipc.new_stream(stream, _SCHEMA) as rows,
+        ):
+            for table in _tables(reader, most_bytes):
+                rows.write_table(table)
+    except MemoryError:
+        raise TraceError(
+            f"the bag takes more memory unpacked than {memory_limit} and a quarter — {bag}",
+            "--memory-limit=20GB reads it, if you know who made it",
+        ) from None
+    except Exception as error:  # what its parsers raise in a damaged file has no common class
+        if isinstance(error, OSError) and error.errno == errno.EFBIG:
+            raise TraceError(
+                f"the bag has more than {most_bytes:,} bytes unpacked — {bag}",
+                f"{LIMIT_VARIABLE}=100GB msgflow … reads it, if you know who made it",
+            ) from None
+        raise _unread(path, error) from error
 
 
-def _tables(reader: Any) -> Iterator[pa.Table]:
+def _unread(bag: Path, error: Exception) -> TraceError:
+    said = str(error).strip().splitlines()
+    return TraceError(
+        f"cannot read as a bag of ROS 2: {said[0] if said else type(error).__name__} — {bag}",
+        "give the directory of a rosbag2; ros2 bag reindex repairs one that was cut off",
+    )
+
+
+def _tables(reader: Any, most_bytes: int) -> Iterator[pa.Table]:
     with_header = {
         connection.msgtype
         for connection in reader.connections
@@ -139,7 +132,12 @@ def _tables(reader: Any) -> Iterator[pa.Table]:
     }
     rows: list[tuple[Any, ...]] = []
     number = 0
+    left = most_bytes
     for number, (connection, received_ns, data) in enumerate(reader.messages(), 1):
+        # They may be compressed one by one.
+        left -= len(data)
+        if left < 0:
+            raise OSError(errno.EFBIG, "messages are too large")
         stamp_ns = frame_id = None
         if connection.msgtype in with_header:
             header = reader.deserialize(data, connection.msgtype).header

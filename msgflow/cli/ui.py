@@ -41,7 +41,7 @@ def command(
             4GB.
     """
     from msgflow.cli.output import print_note, print_status
-    from msgflow.confined.query import WarmSql
+    from msgflow.cli.sql_process import WarmSql
     from msgflow.view.server import serve, serve_single
     from msgflow.view.sql_page import MOST_SECONDS
 

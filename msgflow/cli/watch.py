@@ -247,7 +247,7 @@ def _pages(port: int | None, clock_sync: str) -> Iterator[WindowDatabase | None]
         yield None
         return
     from msgflow.cli.output import print_status
-    from msgflow.confined.query import WarmSql
+    from msgflow.cli.sql_process import WarmSql
     from msgflow.record import temporary_directory
     from msgflow.view.server import serving
     from msgflow.view.sql_page import MOST_SECONDS

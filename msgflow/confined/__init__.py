@@ -1,1 +1,1 @@
-"""Child processes, with bounds on memory and time, for the SQL of a person or an agent."""
+"""Child processes, with bounds on memory and time, for what others made: their SQL, their bags."""

@@ -137,7 +137,7 @@ def _fetch(lake: Lake, row: Mapping[str, Any], target: Path) -> None:
     packed = target.with_name(f"{target.name}.zst")
     try:
         lake.store.fetch(path, packed)
-        limit, size = limit_of(packed), 0
+        limit, size = limit_of(packed.stat().st_size), 0
         with pa.CompressedInputStream(str(packed), "zstd") as source, target.open("xb") as file:
             while chunk := source.read(_CHUNK):
                 size += len(chunk)

@@ -74,11 +74,11 @@ def unpack(archive: Path, directory: Path) -> None:
         ) from error
 
 
-def limit_of(archive: Path) -> int:
-    """Return how much an archive may have unpacked [bytes]."""
+def limit_of(packed: int) -> int:
+    """Return how much an archive of so many bytes may have unpacked [bytes]."""
     text = os.environ.get(LIMIT_VARIABLE)
     if text is None:
-        return max(MOST_UNPACKED, _MOST_RATIO * archive.stat().st_size)
+        return max(MOST_UNPACKED, _MOST_RATIO * packed)
     match = _SIZE.fullmatch(text.strip())
     if match is None:
         raise UsageError(f"not an amount of bytes: {text} — {LIMIT_VARIABLE}", "give one like 20GB")
@@ -103,7 +103,7 @@ class Target:
     def __post_init__(self) -> None:
         free = shutil.disk_usage(self.directory).free
         self.room = free - free // _FREE_PART_LEFT
-        self.limit = limit_of(self.archive)
+        self.limit = limit_of(self.archive.stat().st_size)
 
     def take(self, size: int) -> None:
         """Use up some bytes of the disk."""

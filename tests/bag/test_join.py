@@ -6,6 +6,7 @@ import os
 import random
 import shutil
 import struct
+import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -245,44 +246,98 @@ def test_a_damaged_bag_is_an_error_and_changes_nothing(
     assert stored(database) == before
 
 
-@pytest.mark.parametrize("name", ["metadata.yaml", "bag.mcap"])
+@pytest.mark.parametrize("name", few(["metadata.yaml", "bag.mcap"], "bag.mcap"))
 def test_a_pipe_is_refused(tmp_path: Path, name: str) -> None:
     os.mkfifo(tmp_path / name)
     for bag in (tmp_path, tmp_path / name):
-        with pytest.raises(TraceError, match="a pipe, no file"):
-            next(read_bag(bag))
+        with pytest.raises(TraceError, match="a pipe, no file"), read_bag(bag):
+            pass
 
 
 def test_a_file_that_unpacks_to_much_more_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    content = bytes(10_000_000)
-    (tmp_path / "bag.db3.zstd").write_bytes(pa.compress(content, "zstd", asbytes=True))
+    """Before the disk has it; nothing of it stays."""
+    monkeypatch.setenv("TMPDIR", str(tmp_path / "temporary"))
+    (tmp_path / "temporary").mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    bag = compressed(write_bag(tmp_path / "bag", [(1, "/topic", 2)]), bytes(10_000_000))
     monkeypatch.setenv("MSGFLOW_UNPACK_LIMIT", "9MB")
-    with pytest.raises(TraceError, match="more than 9,000,000 bytes unpacked"):
-        next(read_bag(tmp_path))
+    with pytest.raises(TraceError, match="more than 9,000,000 bytes unpacked"), read_bag(bag):
+        pass
+    assert list((tmp_path / "temporary").iterdir()) == []
     monkeypatch.setenv("MSGFLOW_UNPACK_LIMIT", "11MB")
-    with pytest.raises(TraceError, match="cannot read as a bag"):
-        next(read_bag(tmp_path))
+    with pytest.raises(TraceError, match="cannot read as a bag"), read_bag(bag):
+        pass
 
 
-@pytest.mark.parametrize("how", ["zstd", "lz4"])
-def test_an_mcap_chunk_that_unpacks_to_much_more_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, how: str
-) -> None:
-    """Whatever it says that its size is."""
-    packed = pa.compress(bytes(10_000_000), how, asbytes=True)
-    chunk = bytes(28) + struct.pack("<I", len(how)) + how.encode()
-    chunk += struct.pack("<Q", len(packed)) + packed
-    file = tmp_path / "bag.mcap"
-    header = struct.pack("<BQ", 1, 8) + bytes(8)
-    file.write_bytes(b"\x89MCAP0\r\n" + header + struct.pack("<BQ", 6, len(chunk)) + chunk)
-    monkeypatch.setenv("MSGFLOW_UNPACK_LIMIT", "9MB")
-    with pytest.raises(TraceError, match="more than 9,000,000 bytes unpacked"):
-        next(read_bag(file))
-    monkeypatch.setenv("MSGFLOW_UNPACK_LIMIT", "11MB")
-    with pytest.raises(TraceError, match="cannot read as a bag"):
-        next(read_bag(file))
+def compressed(bag: Path, content: bytes) -> Path:
+    """Return the bag with another content, compressed as a file."""
+    (data,) = (file for file in bag.iterdir() if file.suffix in (".db3", ".mcap"))
+    data.with_name(f"{data.name}.zstd").write_bytes(pa.compress(content, "zstd", asbytes=True))
+    about = (bag / "metadata.yaml").read_text()
+    for word, value in (("format", "zstd"), ("mode", "file")):
+        about = about.replace(f"compression_{word}: ''", f"compression_{word}: {value}")
+    about = about.replace(data.name, f"{data.name}.zstd")
+    (bag / "metadata.yaml").write_text(about)
+    data.unlink()
+    return bag
+
+
+def record(kind: int, *fields: bytes) -> bytes:
+    return struct.pack("<BQ", kind, sum(map(len, fields))) + b"".join(fields)
+
+
+def sized(text: bytes) -> bytes:
+    return struct.pack("<I", len(text)) + text
+
+
+def bomb(how: str) -> bytes:
+    """Return an MCAP file of some kB whose one chunk has 768 MB unpacked.
+
+    A reader finds it by the summary alone, whatever else stands where it lies.
+    """
+    packed = pa.compress(bytes(96 << 20), "lz4" if how == "lz4" else "zstd", asbytes=True) * 8
+    if how == "skippable frame":
+        packed = struct.pack("<II4x", 0x184D2A50, 4) + packed
+    name = b"lz4" if how == "lz4" else b"zstd"
+    content = struct.pack("<QQQI", 0, 1, 768 << 20, 0) + sized(name)
+    chunk = record(6, content, struct.pack("<Q", len(packed)), packed)
+    begin = b"\x89MCAP0\r\n" + record(1, sized(b"ros2"), sized(b"x"))
+    if how == "attachment":
+        begin += struct.pack("<BQ", 9, len(chunk))
+    elif how == "damage before":
+        begin += record(6, bytes(28), sized(b"zstd"), struct.pack("<Q", 4), b"\x28\xb5\x2f\xfd")
+    schema = record(
+        3, struct.pack("<H", 1), sized(PLAIN.encode()), sized(b"ros2msg"), sized(b"string data")
+    )
+    channel = record(4, struct.pack("<HH", 1, 1), sized(b"/plain"), sized(b"cdr"), sized(b""))
+    end = len(begin) + len(chunk)
+    index = record(
+        8, struct.pack("<QQQQ", 0, 1, len(begin), len(chunk)), sized(struct.pack("<HQ", 1, end)),
+        struct.pack("<Q", 31), sized(name), struct.pack("<QQ", len(packed), 768 << 20),
+    )  # fmt: skip
+    statistics = record(11, struct.pack("<QHIIIIQQ", 1, 1, 1, 0, 0, 1, 0, 1), sized(b""))
+    footer = record(2, struct.pack("<QQI", end, 0, 0))
+    return begin + chunk + schema + channel + index + statistics + footer + begin[:8]
+
+
+HIDDEN = ["chunk", "lz4", "attachment", "skippable frame", "damage before", "file"]
+
+
+@pytest.mark.parametrize("how", few(HIDDEN, "attachment", "file"))
+def test_a_chunk_that_unpacks_to_much_more_is_refused(tmp_path: Path, how: str) -> None:
+    """Wherever it lies, and whatever is said of its size."""
+    bag = tmp_path / "bag.mcap"
+    if how == "file":
+        bag = compressed(write_bag(tmp_path / "bag", [(1, "/plain", 2)], plugin="MCAP"), bomb(how))
+    else:
+        bag.write_bytes(bomb(how))
+    with (
+        pytest.raises(TraceError, match=r"more memory unpacked than 50MB|Failed to resize buffer"),
+        read_bag(bag, memory_limit="50MB"),
+    ):
+        pass
 
 
 @pytest.mark.parametrize("plugin", few(["SQLITE3", "MCAP"], "MCAP"))
@@ -299,11 +354,14 @@ def test_messages_that_unpack_to_much_more_are_refused(
         for at in range(10):
             writer.write(topic, at, bytes(1_000_000))
     monkeypatch.setenv("MSGFLOW_UNPACK_LIMIT", "9MB")
-    with pytest.raises(TraceError, match="more than 9,000,000 bytes unpacked"):
-        next(read_bag(tmp_path / "bag"))
+    with (
+        pytest.raises(TraceError, match="more than 9,000,000 bytes unpacked"),
+        read_bag(tmp_path / "bag"),
+    ):
+        pass
     monkeypatch.setenv("MSGFLOW_UNPACK_LIMIT", "11MB")
-    (found,) = read_bag(tmp_path / "bag")
-    assert found["size_bytes"].to_pylist() == [1_000_000] * 10
+    with read_bag(tmp_path / "bag") as found:
+        assert found.read_all()["size_bytes"].to_pylist() == [1_000_000] * 10
 
 
 def test_what_is_no_bag(database: Path, tmp_path: Path) -> None:

@@ -16,14 +16,14 @@ import duckdb
 import pytest
 from processes import children_of, has_ended
 
+from msgflow.cli.sql_process import MOST_BYTES, WarmSql
 from msgflow.confined.process import ConfinedProcess, LateError
-from msgflow.confined.query import MOST_BYTES, WarmSql
 from msgflow.db.memory import default_limit
 from msgflow.errors import DatabaseError, QueryError, UsageError
 
 SLOW = "SELECT levenshtein(repeat('a', 400000), repeat('b', 400000))"
 ASKING = """
-import sys; from msgflow.confined.query import WarmSql
+import sys; from msgflow.cli.sql_process import WarmSql
 WarmSql(sys.argv[1], memory_limit=None, seconds=100)(sys.argv[2], 1)
 """
 LARGE = "SELECT list_sum(range(700000000))"
@@ -85,7 +85,7 @@ def test_functions_of_duckdb_keep_to_the_memory(small_database: Path) -> None:
 
 def test_a_late_call_is_killed_and_the_next_one_works(small_database: Path) -> None:
     asked = {"path": str(small_database), "memory_limit": None, "limit": None}
-    with ConfinedProcess("msgflow.confined.query", seconds=4) as process:
+    with ConfinedProcess("msgflow.cli.sql_process", seconds=4) as process:
         begin = time.monotonic()
         with pytest.raises(LateError, match="longer than 4 s"):
             process.call("answer", asked | {"text": SLOW})
@@ -126,7 +126,7 @@ def test_another_thread_ends_a_query_and_the_next_one_works(small_database: Path
 def test_a_child_killed_before_it_begins_fails_no_call(small_database: Path) -> None:
     asked = {"path": str(small_database), "memory_limit": None, "limit": None}
     before = set(children_of(os.getpid()))
-    with ConfinedProcess("msgflow.confined.query") as process, ThreadPoolExecutor(1) as pool:
+    with ConfinedProcess("msgflow.cli.sql_process") as process, ThreadPoolExecutor(1) as pool:
         process.call("answer", asked | {"text": "SELECT 1 AS one"})
         (child,) = set(children_of(os.getpid())) - before
         os.kill(child, signal.SIGSTOP)
@@ -151,7 +151,7 @@ def test_a_call_that_begins_to_run_is_not_repeated(
 
 def test_a_mistake_in_the_child_is_no_error_of_the_user() -> None:
     with (
-        ConfinedProcess("msgflow.confined.query") as process,
+        ConfinedProcess("msgflow.cli.sql_process") as process,
         pytest.raises(RuntimeError, match="no attribute 'nothing'"),
     ):
         process.call("nothing", {})

@@ -14,7 +14,7 @@ from urllib.parse import urlsplit
 
 import duckdb
 
-from msgflow.confined.query import WarmSql
+from msgflow.cli.sql_process import WarmSql
 from msgflow.view.server import cookie_of, running
 
 _UNITS = ((10**9, "s"), (10**6, "ms"), (10**3, "µs"), (1, "ns"))

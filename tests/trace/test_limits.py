@@ -65,10 +65,5 @@ def test_metadata_of_64_mebibytes(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("packed", "limit"), [(0, 1 << 30), (1 << 24, 1 << 30), ((1 << 24) + 1, (1 << 30) + 64)]
 )
-def test_archives_of_a_gibibyte_or_64_times_their_size(
-    tmp_path: Path, packed: int, limit: int
-) -> None:
-    archive = tmp_path / "robot.tar.gz"
-    archive.touch()
-    os.truncate(archive, packed)
-    assert extraction.limit_of(archive) == limit
+def test_archives_of_a_gibibyte_or_64_times_their_size(packed: int, limit: int) -> None:
+    assert extraction.limit_of(packed) == limit

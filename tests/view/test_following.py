@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from served import Page, colors
 
+from msgflow.cli.sql_process import WarmSql
 from msgflow.clocks import read_clock_sync
-from msgflow.confined.query import WarmSql
 from msgflow.view.server import serving
 from msgflow.watch import Watcher, WindowDatabase, WindowReport, watch_finished
 

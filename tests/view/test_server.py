@@ -24,7 +24,7 @@ from served import Served
 from tables import decoded
 from thorough import few
 
-from msgflow.confined.query import WarmSql
+from msgflow.cli.sql_process import WarmSql
 from msgflow.errors import QueryError, UsageError
 from msgflow.view import pages
 from msgflow.view.connection import timed
