@@ -8,7 +8,6 @@ package of msgflow: another Python runs it.
 
 from __future__ import annotations
 
-import contextlib
 import os
 import random
 import sys
@@ -17,9 +16,7 @@ import time
 
 import rclpy
 from rcl_interfaces.srv import ListParameters
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
-from rclpy.exceptions import InvalidHandle
-from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import UInt64
 
@@ -94,21 +91,28 @@ def map_server() -> list[Node]:
 
 
 def planner() -> list[Node]:
-    """Ask the map server in the callback of each pose, if planted."""
+    """Ask the map server in the callback of each pose, if planted, in an executor of its own.
+
+    No executor of several threads: that of rclpy looks for work again and again until a thread of
+    its pool begins with it, and can keep that thread from beginning for some hundred milliseconds.
+    """
     node = Part("planner")
     send = node.says("/plan")
-    client = node.create_client(
-        ListParameters, "/get_map", callback_group=MutuallyExclusiveCallbackGroup()
-    )
-
-    def plan() -> None:
-        work(3)
-        if "service" in PROBLEMS and client.service_is_ready():
-            client.call(ListParameters.Request())
-        send()
-
-    node.hears("/pose", plan)
+    ask = asking() if "service" in PROBLEMS else lambda: None
+    node.hears("/pose", lambda: (work(3), ask(), send()))
     return [node]
+
+
+def asking():
+    """Return what asks the map server, and waits for its answer."""
+    node = rclpy.create_node("planner_client")
+    client = node.create_client(ListParameters, "/get_map")
+
+    def ask() -> None:
+        if client.service_is_ready():
+            rclpy.spin_until_future_complete(node, client.call_async(ListParameters.Request()))
+
+    return ask
 
 
 def control() -> list[Node]:
@@ -155,26 +159,19 @@ MAKE = {
 def main() -> None:
     """Run a process until the standard input ends."""
     process = sys.argv[1]
+    # At once: the middleware may never end, if others end at the same time.
+    threading.Thread(target=lambda: (sys.stdin.read(), os._exit(0)), daemon=True).start()
     if process == "hog":
-        threading.Thread(target=lambda: (sys.stdin.read(), os._exit(0)), daemon=True).start()
         print("ready", flush=True)
         hog()
     if process == "localization" and "hog" in PROBLEMS:
         os.sched_setaffinity(0, {CPU})
     rclpy.init()
-    executor = MultiThreadedExecutor(2) if process == "planner" else None
-    executor = executor or rclpy.executors.SingleThreadedExecutor()
+    executor = SingleThreadedExecutor()
     for node in MAKE[process]():
         executor.add_node(node)
-    end = threading.Thread(target=lambda: (sys.stdin.read(), rclpy.shutdown()))
-    end.start()
     print("ready", flush=True)
-    # A callback may run while ROS shuts down.
-    with contextlib.suppress(ExternalShutdownException, InvalidHandle):
-        executor.spin()
-    end.join()
-    # Threads of the middleware may still call Python while it ends.
-    os._exit(0)
+    executor.spin()
 
 
 if __name__ == "__main__":
