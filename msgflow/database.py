@@ -211,7 +211,7 @@ class Database:
         What an earlier file declared for these runs is removed.
 
         Args:
-            file: YAML; docs/causes.md has its form.
+            file: YAML; docs/links.md has its form.
             run: 'all', a name or an id; the latest run when None.
             content: of the file, if it is not written yet.
 

@@ -6,7 +6,7 @@
 -- cause: Callbacks of the inputs overlapped on several threads, or were nested. Of messages that
 --     approximate_sync puts together, the headers may be older than the publications.
 -- cure: Next time, give the inputs and the output one mutually exclusive callback group, or stamp
---     headers when messages are published (docs/causes.md says what each link is marked for).
+--     headers when messages are published (docs/links.md says what each link is marked for).
 -- grain: one row per node
 -- severity: warning
 -- when: store.link_causal WHERE annotation_id IS NOT NULL AND candidate_count > 1

@@ -8,7 +8,7 @@
 -- cause: Timers of rclpy emit no event when they fire, and loops with a clock of their own none
 --     either, so that what they publish follows some message. Or callbacks are so long that the
 --     trace cannot tell.
--- cure: Say which it is in a file of links, kind independent or direct (docs/causes.md), and apply
+-- cure: Say which it is in a file of links, kind independent or direct (docs/links.md), and apply
 --     it with msgflow links apply FILE; msgflow suggest links prints the entries.
 -- grain: one row per node
 -- severity: warning

@@ -5,7 +5,7 @@
 -- cause: The session was started after the nodes, or events of initialisation were lost.
 -- cure: Name it in a file of links: write the line shown below topics:, with the topic in place of
 --     /NAME, then msgflow links apply FILE. msgflow suggest links writes a file with a line for
---     each (docs/causes.md).
+--     each (docs/links.md).
 -- grain: one row per topic
 -- severity: warning
 -- when: store.publisher WHERE topic_name IS NULL OR is_topic_learned OR is_topic_declared,
