@@ -60,10 +60,11 @@ def untraced_notes(
     """Return where flows begin whose first publisher is not traced, if paths have any."""
     if "path" not in table.column_names:
         return []
+    chosen = {"runs": [run.run_id for run in runs]}
+    begins = internal_sql().run(connection, "untraced_begin", chosen).fetchall()
+    if not begins:
+        return []
     paths = [path for path in table["path"].unique().to_pylist() if path is not None]
-    begins = internal_sql().run(
-        connection, "untraced_begin", {"runs": [run.run_id for run in runs]}
-    )
     where = {
         True: "the stamp of each message",
         False: "its take: its clock may be another one",
@@ -71,7 +72,7 @@ def untraced_notes(
     }
     return [
         f"what publishes {topic} is not traced: flows begin with {where[is_stamped]}"
-        for topic, is_stamped in begins.fetchall()
+        for topic, is_stamped in begins
         if any(path.startswith(f"(not traced) → {topic} → ") for path in paths)
     ]
 

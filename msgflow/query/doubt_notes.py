@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from msgflow.sql.statement import registered
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -29,18 +31,19 @@ def doubt_notes(
     connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], table: pa.Table
 ) -> list[str]:
     """Return a sentence for each node at which flows of these rows pass a link that is in doubt."""
-    import pyarrow as pa
-
     mark, way = (
         next((name for name in names if name in table.column_names), None)
         for names in (_MARKS, _WAYS)
     )
     if mark is None or way is None:
         return []
-    doubted = table.filter(table[mark].cast(pa.bool_()))[way].unique().to_pylist()
+    with registered(connection, doubtful=table):
+        doubted = connection.execute(
+            f"SELECT DISTINCT {way} FROM doubtful WHERE {mark}::BOOLEAN"
+        ).fetchall()
     if not doubted:
         return []
-    places = {step for steps in doubted if steps is not None for step in steps.split(" → ")}
+    places = {step for (steps,) in doubted if steps is not None for step in steps.split(" → ")}
     found = connection.execute(_FOUND, {"runs": [run.run_id for run in runs]}).fetchall()
     return [
         f"{subject}: {detail}, and flows through it with them. {cure.rstrip('.')}"

@@ -66,6 +66,7 @@ def run_query(
     internal: bool = False,
     selection: Selection | None = None,
     steps: Steps | None = None,
+    runs: Sequence[Run] | None = None,
 ) -> QueryResult:
     """Run the query of `header`.
 
@@ -77,6 +78,7 @@ def run_query(
         internal: show the rows of ROS's own topics and services too.
         selection: which rows are wanted; all when None.
         steps: tables that it shares with other queries, which stay; its own when None.
+        runs: those of `part`, where they are known.
 
     Raises:
         UsageError: a parameter, run, name, id, column or time that does not exist or cannot be
@@ -88,7 +90,7 @@ def run_query(
             f"the query has no time window — {header.words}",
             "leave out --start and --end",
         )
-    runs = part.runs(connection)
+    runs = part.runs(connection) if runs is None else runs
     window = part.window(runs)
     reserved: dict[str, Value] = {"runs": [run.run_id for run in runs], **window.bindings}
     own = bind(header, parameters)

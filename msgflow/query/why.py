@@ -7,19 +7,18 @@ from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING, Any
 
-import duckdb
-
 from msgflow.errors import UsageError
 from msgflow.query.catalogue import load_query
 from msgflow.query.path_numbers import with_path_numbers
 from msgflow.query.runner import run_query
 from msgflow.query.steps import Steps
-from msgflow.sql.statement import internal_sql
+from msgflow.sql.statement import internal_sql, registered
 from msgflow.text.values import format_duration
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
+    import duckdb
     import pyarrow as pa
 
     from msgflow.result.query_result import QueryResult
@@ -30,6 +29,7 @@ if TYPE_CHECKING:
     Ask = Callable[..., QueryResult]
 
 _PIECES = 5
+_OF_VERDICT = ("why_callback", "suspect")
 _WAITS = 3
 # By what took longest in a slow flow: the query that shows more of it, by node or by topic.
 _BY_NODE = {
@@ -118,7 +118,7 @@ def explain(
     with Steps(connection) as steps:
 
         def ask(name: str, **given: Value) -> QueryResult:
-            result = run_query(connection, load_query(name), given, times, steps=steps)
+            result = run_query(connection, load_query(name), given, times, steps=steps, runs=(run,))
             # Only its paths have to be told apart.
             return with_path_numbers(connection, result) if name == "e2e-latency" else result
 
@@ -178,8 +178,8 @@ def _explained(
         place=place,
         verdict=replace(paths, table=verdict, header=None, notes=[], path_numbers={}),
         paths=paths,
-        nodes=_by_node(parts, path),
-        slow_flow=_longest(flow),
+        nodes=_by_node(connection, parts, path),
+        slow_flow=_longest(connection, flow),
         waits=waits.first(_WAITS),
         losses=losses,
         steps=tuple(dict.fromkeys(_steps(places, ends_here, pieces, losses))),
@@ -203,17 +203,14 @@ def _verdict(
     tables: dict[str, pa.Table],
 ) -> pa.Table:
     """Return the sentences: what was found, and who delays or loses messages."""
-    for name, table in tables.items():
-        connection.register(name, table)
-    try:
-        for name in ("why_callback", "suspect"):
-            internal_sql().keep(connection, name, values)
-        return internal_sql().run(connection, "verdict", values).to_arrow_table()
-    finally:
-        for name in ("why_callback", "suspect"):
-            connection.execute(f"DROP TABLE IF EXISTS temp.{name}")
-        for name in tables:
-            connection.unregister(name)
+    with registered(connection, **tables):
+        try:
+            for name in _OF_VERDICT:
+                internal_sql().keep(connection, name, values)
+            return internal_sql().run(connection, "verdict", values).to_arrow_table()
+        finally:
+            for name in _OF_VERDICT:
+                connection.execute(f"DROP TABLE IF EXISTS temp.{name}")
 
 
 def _names(steps: Sequence[str]) -> list[str]:
@@ -297,32 +294,18 @@ def _worst_first(paths: QueryResult, first: str) -> QueryResult:
     return _taken(paths, places)
 
 
-def _by_node(parts: QueryResult, path: str) -> QueryResult:
+def _by_node(connection: duckdb.DuckDBPyConnection, parts: QueryResult, path: str) -> QueryResult:
     """Return the share of each node in the time of a path, and the largest of its parts."""
-    with duckdb.connect() as con:
-        con.register("breakdown", parts.table)
-        table = internal_sql().run(con, "node_share", {"path": path}).to_arrow_table()
-    return replace(parts, table=table)
+    with registered(connection, breakdown=parts.table):
+        found = internal_sql().run(connection, "node_share", {"path": path})
+        return replace(parts, table=found.to_arrow_table())
 
 
-def _longest(flow: QueryResult) -> QueryResult:
+def _longest(connection: duckdb.DuckDBPyConnection, flow: QueryResult) -> QueryResult:
     """Return the longest pieces, in order, and last the sum of the others."""
-    import pyarrow as pa
-
-    rows = flow.table.to_pylist()
-    order = sorted(range(len(rows)), key=lambda place: -rows[place]["duration_ns"])
-    kept = sorted(place for place in order[:_PIECES] if rows[place]["activity"] != "rest")
-    others = [row for place, row in enumerate(rows) if place not in kept]
-    rest = dict.fromkeys(flow.columns) | {
-        name: rows[0][name] for name in ("run_id", "rank", "take_id", "latency_ns")
-    }
-    rest |= {name: sum(row[name] or 0 for row in others) for name in ("duration_ns", "pieces")}
-    rest |= {"activity": "rest", "share": round(sum(row["share"] or 0 for row in others), 4)}
-    shown = _taken(flow, kept)
-    if not others:
-        return shown
-    last = pa.Table.from_pylist([rest], shown.table.schema)
-    return replace(shown, table=pa.concat_tables([shown.table, last]))
+    with registered(connection, slow_flow=flow.table):
+        found = internal_sql().run(connection, "longest_piece", {"count": _PIECES})
+        return replace(flow, table=found.to_arrow_table())
 
 
 def _steps(

@@ -142,11 +142,11 @@ def lay_out(
 
 def _without_zero_rows(result: Rows) -> tuple[Rows, int]:
     """Return the rows that are not 0 throughout, and how many are; all if each of them is."""
-    from pyarrow import compute
-
     name = None if result.header is None else result.header.zero
     if name is None or name not in result.columns:
         return result, 0
+    from pyarrow import compute
+
     table = result.table.filter(compute.not_equal(result.table[name], 0))
     count = len(result) - table.num_rows
     return (replace(result, table=table), count) if table.num_rows else (result, 0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any
@@ -10,10 +11,11 @@ from msgflow.files.resources import resource_directory
 from msgflow.sql.header import Header, read
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable, Iterator, Mapping
     from pathlib import Path
 
     import duckdb
+    import pyarrow as pa
 
 
 @dataclass(frozen=True)
@@ -65,6 +67,18 @@ class Statements:
     ) -> dict[str, Any]:
         inherited = {p.name: p.default for p in self.header(name).params if p.has_default}
         return {key: values.get(key, inherited.get(key)) for key in statement.named_parameters}
+
+
+@contextmanager
+def registered(connection: duckdb.DuckDBPyConnection, **tables: pa.Table) -> Iterator[None]:
+    """Let statements read tables of this program, by their names, until the block ends."""
+    for name, table in tables.items():
+        connection.register(name, table)
+    try:
+        yield
+    finally:
+        for name in tables:
+            connection.unregister(name)
 
 
 @cache
