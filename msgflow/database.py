@@ -386,7 +386,7 @@ class Database:
             sort: column to sort by, 'p99_ns' or 'p99_ns:desc', or several.
             limit: most rows.
             slowest: number of the slowest rows, for queries whose rows have a duration.
-            path: name of a path in a file; in place of from, to, via and without.
+            path: number of a path, or its name in a file; in place of from, to, via and without.
             paths: the file with the paths that have names.
             parameters: the query's own; `from_` means `from`.
 
@@ -1032,7 +1032,7 @@ class Database:
             via: topics, nodes and services that all flows visit.
             without: those that they do not visit.
             slowest: number of the slowest flows.
-            path: name of a path in a file; in place of from, to, via and without.
+            path: number of a path, or its name in a file; in place of from, to, via and without.
             paths: the file with the paths that have names.
             **part: what to read, see `msgflow.Slice`; one run.
 
@@ -1060,10 +1060,14 @@ def _words_of_path(
     connection: duckdb.DuckDBPyConnection, name: str, file: Path, part: Slice
 ) -> dict[str, list[str]]:
     from msgflow.paths import read_paths
+    from msgflow.query.path_numbers import numbered_path
 
+    runs = part.runs(connection)
+    if name.isdecimal():
+        return numbered_path(connection, runs, int(name))
     named = read_paths(file)
     path = named.named(name)
-    named.require(connection, part.runs(connection), path)
+    named.require(connection, runs, path)
     return path.words()
 
 

@@ -90,20 +90,7 @@ WITH path AS (
     SELECT path_id
     FROM named_path
     WHERE ($via IS NOT NULL OR $without IS NOT NULL)
-        AND coalesce(list_bool_and(list_transform(
-            $via::VARCHAR[],
-            lambda each: list_bool_or(list_transform(
-                string_split(path, ' → '),
-                lambda step: step = trim(each) OR trim(step, '()') GLOB trim(each)
-            ))
-        )), true)
-        AND NOT coalesce(list_bool_or(list_transform(
-            $without::VARCHAR[],
-            lambda each: list_bool_or(list_transform(
-                string_split(path, ' → '),
-                lambda step: step = trim(each) OR trim(step, '()') GLOB trim(each)
-            ))
-        )), false)
+        AND main.path_visits(path, $via, $without)
 )
 SELECT
     flow_id, run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns,

@@ -2,11 +2,17 @@
 -- title: Functions that the CPU time of callbacks goes to
 -- description: Which functions ran inside each callback, as samples of perf tell
 --     (docs/functions.md, record --profile), and outside of callbacks, such as in the executor and
---     the middleware. Rows of one callback overlap: a function has the time of what it calls, too.
---     Few samples say little: of 100, a share is right within 10 points.
+--     the middleware. With a path, or places on it, only the callbacks on the way of flows count:
+--     their instances whole, also what they did behind their publication. Rows of one callback
+--     overlap: a function has the time of what it calls, too. Few samples say little: of 100, a
+--     share is right within 10 points.
 -- grain: one row per callback, or process outside of callbacks, and function
--- variant: flows BOOLEAN = false  Only callbacks on the way of flows along paths
--- param: slowest BIGINT {1..} = NULL  Only so many instances of each callback, the longest
+-- param: from VARCHAR = NULL  Topics or nodes where flows start: globs, with commas between
+-- param: to VARCHAR = NULL  Topics or nodes where flows end, likewise
+-- param: via VARCHAR = NULL  Only flows through all of these topics or nodes
+-- param: without VARCHAR = NULL  Only flows through none of these
+-- param: slowest BIGINT {1..} = NULL  Only so many flows, the slowest; where none are chosen, so
+--     many instances of each callback, the longest
 -- column: run_id BIGINT            Run
 -- column: node VARCHAR [node]      Node of the callback, or the process in brackets
 -- column: callback VARCHAR [callback]  What triggers it, or 'outside of callbacks'
@@ -23,14 +29,48 @@
 -- column: callback_id BIGINT       Identity of the callback, of the first of several
 -- column: is_internal BOOLEAN      Infrastructure of ROS
 -- brief: callback, function, self_share, total_share, per_call_ns, node, self_ns, samples, file
+-- note: clocks
+CREATE OR REPLACE TEMP TABLE function_outcome AS
+SELECT
+    run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns, status,
+    reason, is_first, is_last, is_newest, is_loss_affected, is_ambiguous
+FROM main.end_to_end($runs, $from, $to, 'callback_start', 'callback_end', $start_ns, $end_ns)
+WHERE coalesce($from, $to, $via, $without) IS NOT NULL
+    AND path_id IN (
+        SELECT path_id
+        FROM main.flow_path($runs, $from, $to, only_paths := true)
+        WHERE main.path_visits(path, $via, $without)
+    );
+
+CREATE OR REPLACE TEMP TABLE function_flow AS
+SELECT
+    flow_id, run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns,
+    is_ambiguous
+FROM main.chosen_flow('function_outcome', most_flows := $slowest);
+
+CREATE OR REPLACE TEMP TABLE function_trail AS
+SELECT flow_id, hop, take_id, publication_id, previous_take_id, next_take_id
+FROM main.end_to_end_trail('function_flow', $runs, $from, $to);
+
+CREATE OR REPLACE TEMP TABLE function_instance AS
+SELECT DISTINCT callback_instance_id
+FROM main.end_to_end_piece('function_flow', 'function_trail', $runs)
+WHERE part IN ('callback', 'service')
+UNION ALL
+SELECT i.callback_instance_id
+FROM main.callback_instance AS i
+JOIN main.callback_alike AS k ON i.callback_id = k.callback_id
+WHERE coalesce($from, $to, $via, $without) IS NULL AND list_contains($runs, i.run_id)
+    AND i.start_ns >= $start_ns AND i.start_ns < $end_ns
+QUALIFY $slowest IS NULL OR row_number() OVER (
+    PARTITION BY k.alike_id ORDER BY i.end_ns - i.start_ns DESC NULLS LAST, i.start_ns
+) <= $slowest;
+
 WITH instance AS (
     SELECT i.callback_instance_id, k.alike_id AS callback_id
-    FROM main.callback_instance AS i
+    FROM function_instance AS f
+    JOIN main.callback_instance AS i ON f.callback_instance_id = i.callback_instance_id
     JOIN main.callback_alike AS k ON i.callback_id = k.callback_id
-    WHERE list_contains($runs, i.run_id) AND i.start_ns >= $start_ns AND i.start_ns < $end_ns
-    QUALIFY $slowest IS NULL OR row_number() OVER (
-        PARTITION BY k.alike_id ORDER BY i.end_ns - i.start_ns DESC NULLS LAST, i.start_ns
-    ) <= $slowest
 ),
 counted AS (
     SELECT callback_id AS group_id, count(*) AS calls FROM instance GROUP BY callback_id
@@ -43,7 +83,8 @@ sample AS (
     WHERE list_contains($runs, s.run_id)
         AND CASE
             WHEN s.callback_instance_id IS NOT NULL THEN i.callback_id IS NOT NULL
-            ELSE $slowest IS NULL AND s.at_ns >= $start_ns AND s.at_ns < $end_ns
+            ELSE coalesce($from, $to, $via, $without) IS NULL AND $slowest IS NULL
+                AND s.at_ns >= $start_ns AND s.at_ns < $end_ns
         END
 ),
 found AS (SELECT * FROM main.function_time('sample')),

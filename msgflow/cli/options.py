@@ -116,7 +116,7 @@ SHARED: dict[str, Any] = {
     "limit": _selecting("Maximum number of rows", "N", min=1),
     "slowest": _selecting("Only the N slowest flows", "N", min=1),
     "path": _selecting(
-        "A path by its name in a file, see msgflow suggest paths",
+        "A path by its number, or its name in a file (msgflow suggest paths)",
         "NAME",
         autocompletion=complete_path,
     ),

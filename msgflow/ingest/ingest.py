@@ -194,7 +194,14 @@ def ingest(
                         interrupts=interrupts,
                         progress=watch.reading,
                     )
-                    unread = load_samples(con, beside, workspace=directory, interrupts=interrupts)
+                    unread = load_samples(
+                        con,
+                        beside,
+                        traces,
+                        hostnames=hostnames,
+                        workspace=directory,
+                        interrupts=interrupts,
+                    )
                 refusals.require_ros_events(traces.traces, loaded.event_counts, traces.damages)
                 names = (name, fallback_name(paths))
                 event_count = sum(loaded.event_counts.values())

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pyarrow as pa
@@ -11,27 +13,37 @@ from msgflow.errors import TraceError
 from msgflow.trace.perf_script import DATA, TEXT, read_script, sample_files, write_script
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
+    from collections.abc import Mapping, Sequence
 
     import duckdb
 
     from msgflow.sql.interrupt import Interrupts
+    from msgflow.trace import TraceSet
 
 
 def load_samples(
     con: duckdb.DuckDBPyConnection,
     paths: Sequence[str | Path],
+    traces: TraceSet,
     *,
+    hostnames: Mapping[int, str],
     workspace: Path,
     interrupts: Interrupts,
 ) -> tuple[str, ...]:
     """Load the samples below these paths, and return what could not be read, for people.
 
-    `workspace` is a folder for the text of perf.
+    Args:
+        con: where `raw` is.
+        paths: directories; those of archives are where the traces have them unpacked.
+        traces: what is ingested with them.
+        hostnames: the names that the user gives to the hosts of traces.
+        workspace: a folder for the text of perf.
+        interrupts: end it.
     """
     warnings = []
-    for file in sample_files(paths):
+    for file in sample_files([*paths, *traces.unpacked]):
+        shown = _shown(file, traces)
+        hostname = _given_name(shown, traces, hostnames)
         text = file
         try:
             if file.name == DATA:
@@ -43,7 +55,7 @@ def load_samples(
                     count = len(part.heads)
                     rows = pa.table(
                         {
-                            "hostname": pa.array([part.hostname] * count, pa.string()),
+                            "hostname": pa.array([hostname or part.hostname] * count, pa.string()),
                             "is_monotonic": [part.is_monotonic] * count,
                             "head": part.heads,
                             "stack": part.stacks,
@@ -51,5 +63,24 @@ def load_samples(
                     )
                     con.from_arrow(rows).insert_into("raw.main.stack_sample")
         except TraceError as error:
-            warnings.append(f"{error.message}{f'; {error.hint}' if error.hint else ''}")
+            message = error.message.replace(str(file), str(shown))
+            warnings.append(f"{message}{f'; {error.hint}' if error.hint else ''}")
     return tuple(warnings)
+
+
+def _shown(file: Path, traces: TraceSet) -> Path:
+    """Return the path of a file as traces have theirs: below that of the archive."""
+    for directory, archive in traces.unpacked.items():
+        if file.is_relative_to(directory):
+            return archive / file.relative_to(directory)
+    return Path(os.path.realpath(file))
+
+
+def _given_name(file: Path, traces: TraceSet, hostnames: Mapping[int, str]) -> str | None:
+    """Return the name that was given to the host of the traces beside a file, if it is one."""
+    for folder in file.parents:
+        beside = [trace.index for trace in traces.traces if trace.path.is_relative_to(folder)]
+        if beside:
+            names = {hostnames.get(index) for index in beside}
+            return names.pop() if len(names) == 1 else None
+    return None

@@ -5,14 +5,19 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from msgflow.errors import UsageError
 from msgflow.query.selection import PATH
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
     import duckdb
 
     from msgflow.result.query_result import QueryResult
+    from msgflow.run.choice import Run
 
 _ALL = "SELECT DISTINCT path FROM main.flow_path($runs, NULL, NULL, only_paths := true)"
+_UNNAMED = ("?", "(not traced)")
 
 
 def with_path_numbers(connection: duckdb.DuckDBPyConnection, result: QueryResult) -> QueryResult:
@@ -30,7 +35,40 @@ def with_path_numbers(connection: duckdb.DuckDBPyConnection, result: QueryResult
     own = {path for path in result.table[PATH].to_pylist() if path is not None}
     if len(own) < 2:
         return result
-    runs = {"runs": [run.run_id for run in result.runs]}
-    every = {path for (path,) in connection.execute(_ALL, runs).fetchall()}
-    texts = [*sorted(every), *sorted(own - every)]
+    every = _every_path(connection, result.runs)
+    texts = [*every, *sorted(own.difference(every))]
     return replace(result, path_numbers={text: n for n, text in enumerate(texts, start=1)})
+
+
+def numbered_path(
+    connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], number: int
+) -> dict[str, list[str]]:
+    """Return the arguments of `Database.query` that choose the path with a number.
+
+    Raises:
+        UsageError: the runs have no such path.
+    """
+    every = _every_path(connection, runs)
+    if not 1 <= number <= len(every):
+        raise UsageError(
+            f"no path has this number — {number}",
+            f"msgflow query e2e-latency shows paths 1 to {len(every)}" if every else None,
+        )
+    return only_path(every[number - 1], every)
+
+
+def only_path(path: str, every: Iterable[str]) -> dict[str, list[str]]:
+    """Return what tells a path from the others: the places that it visits, and those of others."""
+    via = _places(path)
+    others = {step for other in every for step in _places(other)}
+    return {"via": via, "without": sorted(others.difference(via))}
+
+
+def _every_path(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run]) -> list[str]:
+    rows = connection.execute(_ALL, {"runs": [run.run_id for run in runs]}).fetchall()
+    return sorted(path for (path,) in rows)
+
+
+def _places(path: str) -> list[str]:
+    """Return nodes, topics and services of a path; services stand in brackets there."""
+    return [step.strip("()") for step in path.split(" → ") if step not in _UNNAMED]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from msgflow.errors import UsageError
 from msgflow.query.catalogue import load_query
-from msgflow.query.path_numbers import with_path_numbers
+from msgflow.query.path_numbers import only_path, with_path_numbers
 from msgflow.query.runner import run_query
 from msgflow.query.steps import Steps
 from msgflow.sql.statement import internal_sql, registered
@@ -55,7 +55,6 @@ _UNKNOWN = {
 }
 # What a path has in place of a topic without a name.
 _UNNAMED = "?"
-_UNTRACED = "(not traced)"
 _NO_NAMES = (None, _UNNAMED)
 # Queries with rows of callbacks: none of what a node without traced callbacks did.
 _OF_CALLBACKS = ("callbacks", "waits")
@@ -148,10 +147,8 @@ def _explained(
     )
     path = _worst(verdict, paths)
     places = path.split(" → ")
-    # Services stand in brackets, and no path may pass what only others do.
-    via = _names(places)
-    without = sorted({step for other in shown for step in _names(other.split(" → "))} - {*via})
-    flow = ask("critical-path", **ends, via=via, without=without or None, quantile="p95")
+    # No path may pass what only others do.
+    flow = ask("critical-path", **ends, **only_path(path, shown), quantile="p95")
     pieces = flow.table.to_pylist()
     parts = _chosen(parts, lambda row: row["path"] == path)
     callbacks = {(row["node"], row["what"]) for row in parts.table.to_pylist()}
@@ -211,11 +208,6 @@ def _verdict(
         finally:
             for name in _OF_VERDICT:
                 connection.execute(f"DROP TABLE IF EXISTS temp.{name}")
-
-
-def _names(steps: Sequence[str]) -> list[str]:
-    names = [step.strip("()") for step in steps if step != _UNTRACED]
-    return [name for name in names if name != _UNNAMED]
 
 
 def _worst(verdict: pa.Table, paths: QueryResult) -> str:

@@ -12,7 +12,7 @@ from msgflow.errors import RecordingError
 from msgflow.record.lttng import is_daemon_running, sessions
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Sequence
 
 _LONGEST_START = 10.0
 _LONGEST_END = 20.0
@@ -50,7 +50,9 @@ def session_daemon(*, with_kernel: bool, note: Callable[[str], None]) -> Iterato
                 daemon.kill()
 
 
-def started(command: list[str], words: IO[str], end: str = "TERM") -> subprocess.Popen[str]:
+def started(
+    command: list[str], words: IO[str], end: str = "TERM", *, pass_fds: Sequence[int] = ()
+) -> subprocess.Popen[str]:
     """Start a program that gets the signal `end` when this process ends, however it ends."""
     try:
         # A group of its own: Ctrl-C of the terminal is not for it.
@@ -61,6 +63,7 @@ def started(command: list[str], words: IO[str], end: str = "TERM") -> subprocess
             stderr=words,
             text=True,
             start_new_session=True,
+            pass_fds=pass_fds,
         )
     except FileNotFoundError:
         raise RecordingError("setpriv is not installed", "apt-get install util-linux") from None

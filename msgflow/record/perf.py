@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import shutil
 import signal
+import socket
 import subprocess
 import tempfile
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
 from msgflow.record.daemon import started
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
 # The clock of LTTng.
 _RECORD = ("perf", "record", "--clockid=CLOCK_MONOTONIC")
+_LONGEST_START = 10.0
 
 
 def why_not(options: Sequence[str]) -> str | None:
@@ -35,10 +37,17 @@ def why_not(options: Sequence[str]) -> str | None:
 @contextmanager
 def recorded(data: Path, options: Sequence[str], note: Callable[[str], None]) -> Iterator[None]:
     """Have perf record into a file during the block."""
-    with tempfile.TemporaryFile("w+") as words:
-        command = [*_RECORD, *options, f"--output={data}", "--quiet"]
-        perf = started(command, words, end="INT")
+    with tempfile.TemporaryFile("w+") as words, _control() as (ours, of_perf):
+        place = of_perf.fileno()
+        control = f"--control=fd:{place},{place}"
+        command = [*_RECORD, *options, control, f"--output={data}", "--quiet"]
+        perf = started(command, words, end="INT", pass_fds=(place,))
+        of_perf.close()
         try:
+            # It answers when it samples: what starts before is not sampled.
+            with suppress(OSError):
+                ours.sendall(b"enable\n")
+                ours.recv(8)
             yield
         finally:
             ended_early = perf.poll() is not None
@@ -47,6 +56,15 @@ def recorded(data: Path, options: Sequence[str], note: Callable[[str], None]) ->
         words.seek(0)
         if ended_early:
             note(f"perf ended before the recording{reason(words.read())}")
+
+
+@contextmanager
+def _control() -> Iterator[tuple[socket.socket, socket.socket]]:
+    """Give both ends of what perf takes commands from."""
+    ours, of_perf = socket.socketpair()
+    ours.settimeout(_LONGEST_START)
+    with ours, of_perf:
+        yield ours, of_perf
 
 
 def reason(printed: str) -> str:

@@ -21,7 +21,10 @@ if TYPE_CHECKING:
 # keeps for later is not needed.
 _OPTIONS = ("--event=cpu-clock", "--sample-cpu", "--no-buildid", "--no-buildid-cache")
 _MOST_HZ = 10_000
-_PYTHON_NAMES = "import sys; sys.exit(not hasattr(sys, 'activate_stack_trampoline'))"
+_TOO_OLD = 12
+_PYTHON_NAMES = (
+    f"import sys; sys.exit(0 if hasattr(sys, 'activate_stack_trampoline') else {_TOO_OLD})"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,9 +89,13 @@ def with_python_functions(
 ) -> dict[str, str]:
     """Return an environment in which perf sees the functions of Python, from 3.12 on."""
     python = shutil.which("python3")
-    if python is not None and subprocess.run([python, "-c", _PYTHON_NAMES]).returncode:
+    code = 0
+    if python is not None:
+        code = subprocess.run([python, "-c", _PYTHON_NAMES], stderr=subprocess.DEVNULL).returncode
+    if code:
+        why = "is older than 3.12" if code == _TOO_OLD else f"does not run (exit code {code})"
         note(
-            f"functions of Python have no names in the samples: {python} is older than 3.12; those"
-            " of C and C++ have"
+            f"functions of Python have no names in the samples: {python} {why}; those of C and C++"
+            " have"
         )
     return {**environment, "PYTHONPERFSUPPORT": "1"}

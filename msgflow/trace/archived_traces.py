@@ -33,11 +33,12 @@ class Unpacked:
 
     Attributes:
         paths: the paths given, archives replaced by the directories they were unpacked to.
+        archives: each of these directories, and its archive.
     """
 
     def __init__(self, paths: Sequence[str | Path]) -> None:
         """Unpack all archives among `paths`."""
-        self._archives: dict[Path, Path] = {}
+        self.archives: dict[Path, Path] = {}
         try:
             self._root = Path(tempfile.mkdtemp(prefix=_PREFIX)).resolve()
         except OSError as error:
@@ -54,7 +55,7 @@ class Unpacked:
 
     def shown(self, path: Path) -> Path:
         """Return the path that a user knows: that of the archive, then that inside."""
-        for directory, archive in self._archives.items():
+        for directory, archive in self.archives.items():
             if path.is_relative_to(directory):
                 return archive / path.relative_to(directory)
         return path
@@ -72,17 +73,17 @@ class Unpacked:
         if not is_archive(path):
             return path
         archive = Path(os.path.realpath(path))
-        for directory, known in self._archives.items():
+        for directory, known in self.archives.items():
             if known == archive:
                 return directory
-        directory = self._root / str(len(self._archives))
+        directory = self._root / str(len(self.archives))
         directory.mkdir()
-        self._archives[directory] = archive
+        self.archives[directory] = archive
         unpack(archive, directory)
         return directory
 
     def _translated(self, text: str) -> str:
-        for directory, archive in self._archives.items():
+        for directory, archive in self.archives.items():
             text = text.replace(str(directory), str(archive))
         return text
 
@@ -94,6 +95,7 @@ class UnpackedTraceSet(TraceSet):
         """Take over both; closing this set closes the other one and removes what was unpacked."""
         self._traces = traces
         self._unpacked = unpacked
+        self.unpacked = unpacked.archives
         self.traces = tuple(
             dataclasses.replace(info, path=unpacked.shown(info.path)) for info in traces.traces
         )

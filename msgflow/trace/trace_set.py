@@ -13,6 +13,7 @@ from msgflow.trace.model import Progress
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterator, Mapping, Sequence
+    from pathlib import Path
     from types import TracebackType
 
     import pyarrow as pa
@@ -39,6 +40,8 @@ class TraceSet(ABC):
             twice, such as those of a stream file copied beside itself.
         damages: what is damaged and was left out or read as far as possible. Complete after
             `batches` has ended.
+        unpacked: directories where archives were unpacked to until the set is closed, each with
+            its archive.
     """
 
     traces: tuple[TraceInfo, ...]
@@ -46,6 +49,7 @@ class TraceSet(ABC):
     duplicate_packet_count: int
     repeated_packet_counts: Mapping[int, int] = MappingProxyType({})
     damages: Sequence[Damage] = ()
+    unpacked: Mapping[Path, Path] = MappingProxyType({})
 
     @abstractmethod
     def batches(

@@ -31,13 +31,19 @@ def session(trace: Path, tmp_path: Path) -> Path:
 
 @pytest.fixture
 def text(session: Path, database: Path) -> str:
-    """What `perf script` says of it: a sample in the middle of each callback."""
+    return text_of(session, database)
+
+
+def text_of(session: Path, database: Path) -> str:
+    """Return what `perf script` says of it: a sample in the middle of each callback."""
     with trace_package.open([session]) as opened:
         offset, hostname = opened.traces[0].clock_offset_ns, opened.traces[0].hostname
     with duckdb.connect(str(database), read_only=True) as con:
         rows = con.execute(
             "SELECT p.pid, t.tid, (i.start_ns + i.end_ns) // 2 FROM callback_instance AS i "
-            "JOIN thread AS t USING (thread_id) JOIN process AS p ON i.process_id = p.process_id"
+            "JOIN thread AS t USING (thread_id) JOIN process AS p ON i.process_id = p.process_id "
+            "JOIN host AS h USING (host_id) WHERE h.hostname = ?",
+            [hostname],
         ).fetchall()
     moments = [(pid, tid, *divmod(ns - offset, 10**9)) for pid, tid, ns in rows]
     heads = [
@@ -66,6 +72,36 @@ def test_the_text_of_perf_beside_a_trace_is_read(
     count = text.count("cpu-clock")
     assert count
     assert inside(ingest([session], new_database), new_database) == (count, count)
+
+
+def test_samples_in_an_archive_are_read(session: Path, text: str, new_database: Path) -> None:
+    (session / TEXT).write_text(text)
+    archive = shutil.make_archive(str(session), "tar", session)
+    count = text.count("cpu-clock")
+    assert inside(ingest([archive], new_database), new_database) == (count, count)
+
+
+def test_what_cannot_be_read_in_an_archive_is_named_there(
+    session: Path, new_database: Path
+) -> None:
+    (session / DATA).write_bytes(b"no such thing")
+    archive = shutil.make_archive(str(session), "tar", session)
+    (warning,) = ingest([archive], new_database).warnings
+    assert warning.endswith(f"— {archive}/{DATA}")
+
+
+@pytest.mark.thorough
+def test_samples_are_of_the_host_that_the_traces_beside_them_are_given(
+    other_trace: Path, new_database: Path, tmp_path: Path
+) -> None:
+    """Of two hosts, each with a clock of its own."""
+    pair = Path(shutil.copytree(other_trace, tmp_path / "pair"))
+    ingest([pair], tmp_path / "before.duckdb")
+    text = text_of(pair / "alpha", tmp_path / "before.duckdb")
+    (pair / "alpha" / TEXT).write_text(text.replace("# hostname : ", "# hostname : outside-"))
+    report = ingest([pair], new_database, hosts={"robot": pair / "alpha"})
+    count = text.count("cpu-clock")
+    assert inside(report, new_database) == (count, count)
 
 
 def test_what_perf_recorded_is_read_by_perf(session: Path, new_database: Path) -> None:

@@ -90,6 +90,18 @@ def test_what_is_not_seen_to_end_lasts_until_the_next(system: RosSystem, analyse
     assert analyse(system).rows(OF_CALLBACKS) == [(3_000, None)]
 
 
+def test_what_is_not_seen_to_end_is_over_when_the_executor_goes_on(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    begin(system, 0xC1, 2_000)
+    system.ready(MAIN)
+    system.events[-1][1]["ts_ns"] = 4_000
+    system.node(MAIN, 0x1, "last")
+    system.events[-1][1]["ts_ns"] = 9_000
+    sampled(system, 3_000, 5_000)
+    assert analyse(system).rows(OF_CALLBACKS) == [(3_000, 2_000), (5_000, None)]
+
+
 def test_only_processes_of_the_recording_and_while_it_saw_them(
     busy: RosSystem, analyse: Analyse
 ) -> None:
@@ -116,7 +128,11 @@ def test_the_host_tells_of_which_clock_times_are(busy: RosSystem, analyse: Analy
     end(busy, 0xC1, 4_000, other)
     busy.add_sample(head(2_200), HOG, hostname="beta")
     busy.add_sample(head(2_200), HOG, hostname="none of both")
-    assert analyse(busy).rows(OF_CALLBACKS) == [(2_700, 2_600)]
+    model = analyse(busy)
+    assert model.rows(OF_CALLBACKS) == [(2_700, 2_600)]
+    assert details(model) == [
+        "1 samples of functions are of a host of another name, and the traces have several clocks"
+    ]
 
 
 def test_a_pid_of_two_containers_is_of_neither(busy: RosSystem, analyse: Analyse) -> None:
@@ -155,12 +171,14 @@ def test_calls_are_from_the_outermost_to_what_ran(busy: RosSystem, analyse: Anal
         "\tffffffff816 do_syscall_64 ([kernel.kallsyms])",
         "\t  11a8 Foo::operator() (int) (/opt/ros/lib (x86)/libfoo.so)",
         "\t  99 py::Node.tick:/src/a:b.py (/tmp/perf-100.map)",
+        "\t  98 py::detail::call:once (/usr/lib/libpybind.so)",
         "\t  22 [unknown] (/opt/lib/libbar.so (deleted))",
         "\t  not a line of a stack",
     )
     assert stacks_of(busy, analyse, *lines) == [
         ([
-            "[unknown] in /opt/lib/libbar.so (deleted)", "Node.tick in /src/a:b.py",
+            "[unknown] in /opt/lib/libbar.so (deleted)",
+            "py::detail::call:once in /usr/lib/libpybind.so", "Node.tick in /src/a:b.py",
             "Foo::operator() (int) in /opt/ros/lib (x86)/libfoo.so",
             "do_syscall_64 in [kernel.kallsyms]",
         ],)

@@ -48,6 +48,17 @@ def test_a_name_stands_for_a_path(database: Database, tmp_path: Path) -> None:
     assert rest.num_rows == 2
 
 
+def test_a_number_stands_for_a_path(database: Database) -> None:
+    """It is the number in the tables of paths."""
+    every = database.query("e2e-latency")
+    path, number = list(every.path_numbers.items())[1]
+    (row,) = database.query("e2e-latency", path=str(number)).to_arrow().to_pylist()
+    assert row["path"] == path
+    with pytest.raises(UsageError, match="no path has this number — 99") as raised:
+        database.query("functions", path="99")
+    assert raised.value.hint == f"msgflow query e2e-latency shows paths 1 to {len(every)}"
+
+
 @pytest.mark.parametrize(
     ("text", "message", "hint"),
     [

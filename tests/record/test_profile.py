@@ -58,6 +58,15 @@ try:
 except (ExternalShutdownException, KeyboardInterrupt):
     pass
 """
+SLOW_PERF = """#!{python}
+import os, pathlib, signal, sys, time
+(control,) = [word for word in sys.argv if word.startswith("--control=fd:")]
+place = int(control.rpartition(",")[2])
+time.sleep(0.3)
+pathlib.Path("{place}", os.read(place, 100).decode().strip()).touch()
+os.write(place, b"ack")
+signal.pause()
+"""
 SHARES = {"hog<10>": 0.1, "hog<30>": 0.3, "hog<60>": 0.6}
 
 
@@ -91,19 +100,33 @@ def test_what_is_missing_is_said_before_the_recording(
     assert not (tmp_path / TEXT).exists()
 
 
+def test_a_recording_begins_when_perf_samples(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Else nothing is known of a program that starts before: perf samples what comes later."""
+    (tmp_path / "perf").write_text(SLOW_PERF.format(python=sys.executable, place=tmp_path))
+    (tmp_path / "perf").chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
+    with perf.recorded(tmp_path / "data", [], note=pytest.fail):
+        assert (tmp_path / "enable").exists()
+
+
 def test_python_is_asked_to_name_its_functions(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     notes: list[str] = []
     python = tmp_path / "python3"
-    python.write_text("#!/bin/sh\nexit 1\n")
+    python.write_text("#!/bin/sh\nexit 12\n")
     python.chmod(0o755)
     monkeypatch.setenv("PATH", str(tmp_path))
     assert with_python_functions({"A": "b"}, notes.append) == {"A": "b", "PYTHONPERFSUPPORT": "1"}
     assert "is older than 3.12" in notes[0]
+    python.write_text("#!/bin/sh\nexit 3\n")
+    with_python_functions({}, notes.append)
+    assert "does not run (exit code 3)" in notes[1]
     python.write_text("#!/bin/sh\nexit 0\n")
     with_python_functions({}, notes.append)
-    assert len(notes) == 1
+    assert len(notes) == 2
 
 
 @pytest.mark.thorough

@@ -16,20 +16,7 @@ WITH path AS (
     SELECT path_id
     FROM main.flow_path($runs, $from, $to, only_paths := true)
     WHERE ($via IS NOT NULL OR $without IS NOT NULL)
-        AND coalesce(list_bool_and(list_transform(
-            $via::VARCHAR[],
-            lambda each: list_bool_or(list_transform(
-                string_split(path, ' → '),
-                lambda step: step = trim(each) OR trim(step, '()') GLOB trim(each)
-            ))
-        )), true)
-        AND NOT coalesce(list_bool_or(list_transform(
-            $without::VARCHAR[],
-            lambda each: list_bool_or(list_transform(
-                string_split(path, ' → '),
-                lambda step: step = trim(each) OR trim(step, '()') GLOB trim(each)
-            ))
-        )), false)
+        AND main.path_visits(path, $via, $without)
 ),
 part AS MATERIALIZED (
     SELECT root_kind, root_id, take_id, callback_instance_id, publication_id

@@ -42,6 +42,7 @@ SELECT
     try_cast(p.cpu AS INTEGER) AS cpu,
     CASE WHEN p.is_monotonic THEN h.clock_key END AS clock_key,
     CASE WHEN h.is_known THEN h.hostname END AS hostname,
+    p.is_monotonic,
     try_cast(p.second || rpad(p.fraction, 9, '0') AS BIGINT) + h.origin_ns AS at_ns,
     CASE
         WHEN p.event LIKE '%-clock%' THEN try_cast(p.period AS BIGINT)

@@ -2,7 +2,7 @@
 -- description: Samples of the processes that have events, while they had any. A sample is of the
 --     innermost callback instance on its thread at its time: of those that began the last, unless
 --     it was over; else the nearest one around that which was not. One that is not seen to end
---     lasts until the next begins, unless a gap may hide its end.
+--     lasts until its thread's executor goes on, or the next begins, unless a gap may hide its end.
 -- grain: one row per sample of a process that recorded events
 -- when: staging.stack_text
 WITH RECURSIVE sample AS MATERIALIZED (
@@ -22,11 +22,12 @@ WITH RECURSIVE sample AS MATERIALIZED (
 ),
 run AS MATERIALIZED (
     SELECT
-        callback_instance_id, thread_id, start_ns, parent_id, start_event_id,
+        i.callback_instance_id, i.thread_id, i.start_ns, i.parent_id,
         coalesce(
-            end_ns, CASE WHEN is_loss_affected THEN start_ns ELSE 9223372036854775807 END
+            i.end_ns, CASE WHEN i.is_loss_affected THEN i.start_ns END, x.ts_ns, 9223372036854775807
         ) AS end_ns
-    FROM staging.callback_instance
+    FROM staging.callback_instance AS i
+    LEFT JOIN staging.executor_event AS x ON i.effective_end_event_id = x.event_id
 ),
 around AS (
     SELECT s.number, r.callback_instance_id, r.parent_id, s.at_ns, s.at_ns >= r.end_ns AS is_over

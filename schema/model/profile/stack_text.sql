@@ -1,7 +1,7 @@
 -- name: staging.stack_text
 -- description: What perf wrote of each stack, and its calls, the outermost first. Where a function
 --     keeps no frame pointer, what comes above it in the stack is no code: it is cut off. Python
---     names its functions as 'py::function:file'.
+--     names its functions as 'py::function:file', in a map of its own: C++ may have a namespace py.
 -- grain: one row per different text
 -- when: staging.sample_text
 WITH line AS (
@@ -31,9 +31,8 @@ SELECT
     list_transform(
         list_reverse(CASE WHEN cut > 0 THEN calls[:cut] ELSE calls END),
         lambda call: CASE
-            WHEN call.function LIKE 'py::%' THEN regexp_extract(
-                call.function, '^py::([^:]*):(.*)$', ['function', 'file']
-            )
+            WHEN call.function LIKE 'py::%' AND regexp_matches(call.file, '/perf-\d+\.map$')
+                THEN regexp_extract(call.function, '^py::([^:]*):(.*)$', ['function', 'file'])
             ELSE call
         END
     ) AS calls,
