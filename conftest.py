@@ -35,6 +35,10 @@ _LEFT_OUT = pytest.StashKey[int]()
 def _surroundings(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """The tests' own cache, and signals that are not ignored, as `&` and `nohup` of a shell do."""
     with pytest.MonkeyPatch.context() as patch:
+        if thorough.is_quick:
+            # Each worker has a core, and threads of DuckDB would wait for those of the others: it
+            # takes as many as this says. `make test-all` leaves it as many as there are cores.
+            patch.setenv("SLURM_CPUS_ON_NODE", "1")
         patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
         patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
         if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:

@@ -32,6 +32,7 @@ def test_a_full_queue_drops_its_oldest_message(recordings):
     assert all(count >= depth for _, depth, count in newer)
 
 
+@pytest.mark.thorough
 def test_each_loss_has_its_own_reason(recordings):
     recording = recordings["losses"]
     lossy = _reasons(recording, "/lossy")

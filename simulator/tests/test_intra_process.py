@@ -97,6 +97,7 @@ def test_a_dequeue_leads_to_an_intra_process_callback(intra):
     assert dequeues > 100
 
 
+@pytest.mark.thorough
 def test_only_what_somebody_else_wants_goes_through_dds(recordings):
     counts = "SELECT count(*), count(rmw_ns) FROM publication WHERE intra_ns IS NOT NULL"
     ((alone, published),) = recordings["intra_process"].truth(counts)

@@ -12,6 +12,7 @@ from msgflow_sim.system import Host, Process, Scenario
 KINDS = ("periodic_async", "partial_sync")
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", few(KINDS, "partial_sync"))
 def test_annotations_name_the_handles_of_their_objects(recordings, name):
     recording = recordings[name]
@@ -40,6 +41,7 @@ def test_annotations_name_the_handles_of_their_objects(recordings, name):
     assert {(len(inputs), len(outputs)) for _, inputs, outputs in links} >= {(1, 1), (3, 3)}
 
 
+@pytest.mark.thorough
 def test_a_periodic_publication_is_made_of_the_latest_that_had_ended(recordings):
     recording = recordings["periodic_async"]
     ((count, right),) = recording.truth(

@@ -49,6 +49,7 @@ def test_a_crash_leaves_a_callback_without_an_end(restarted):
     assert 1_990 * MILLISECOND < open_instances[0][1] < 2_001 * MILLISECOND
 
 
+@pytest.mark.thorough
 def test_threads_get_ids_as_of_their_life(recordings):
     tids = {
         name: {e.tid for e in recordings[name].events if e.pid == 1201}

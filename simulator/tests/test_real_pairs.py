@@ -91,7 +91,7 @@ def simulated(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], set[P
     ("name", "layout"),
     few(
         REAL.items(),
-        *((name, REAL[name]) for name in ("real_intra", "real_container", "real_lifecycle")),
+        ("real_lifecycle", REAL["real_lifecycle"]),
     ),
 )
 def test_simulations_have_what_real_recordings_have(

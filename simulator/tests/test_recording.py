@@ -96,6 +96,7 @@ def perfect(bt2, made):
     return _events(bt2, made("perfect"))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", few(FAULTS, "brim", "last_snapshot"))
 def test_the_truth_names_exactly_what_is_missing(bt2, made, perfect, name):
     simulation = made(name)

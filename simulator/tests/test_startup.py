@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from itertools import pairwise
 
+import pytest
+
 from msgflow_sim.symbols import PARAMETER_SERVICES
 
 # Where objects get the addresses of others that were destroyed.
@@ -73,6 +75,7 @@ def _process(callback):
     return host, pid
 
 
+@pytest.mark.thorough
 def test_every_callback_has_one_symbol(recording):
     registered = [
         (e.host, e.pid, e.fields["callback"])
@@ -175,6 +178,7 @@ def test_gids_are_unique_in_their_first_sixteen_bytes(recording):
     assert {gid[:2] for gid in gids} == {b"\x01\x0f"}
 
 
+@pytest.mark.thorough
 def test_hosts_share_process_ids_and_handles(recordings):
     nodes = {
         (e.host, e.pid): e.fields["node_handle"]

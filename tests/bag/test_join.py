@@ -100,7 +100,7 @@ def join(path: Path, bag: Path) -> dict[str, Counter[str]]:
     return {row["topic_name"]: Counter(row) for row in rows}
 
 
-@pytest.mark.parametrize("plugin", ["SQLITE3", "MCAP"])
+@pytest.mark.parametrize("plugin", few(["SQLITE3", "MCAP"], "MCAP"))
 def test_messages_find_their_publications(database: Path, tmp_path: Path, plugin: str) -> None:
     jitter = random.Random(7)
     sent = published(database)

@@ -86,6 +86,7 @@ def test_offset_and_drift_are_recovered(drifting: Simulation, direct: Path) -> N
     assert back > 0
 
 
+@pytest.mark.thorough
 def test_a_database_is_corrected_and_restored(
     msgflow: Msgflow, drifting: Simulation, direct: Path, tmp_path: Path
 ) -> None:

@@ -297,6 +297,7 @@ def test_a_trace_that_is_not_there_has_code_3(msgflow: Msgflow) -> None:
     assert not Path("msgflow.duckdb").exists()
 
 
+@pytest.mark.thorough
 def test_a_report_goes_to_stdout(msgflow: Msgflow, small_database: Path) -> None:
     result = msgflow("report", "-o", "-", "--db", small_database)
     assert result.exit_code == 0, result.stderr

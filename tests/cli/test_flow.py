@@ -141,6 +141,7 @@ def test_an_option_that_cannot_be_names_what_can(msgflow: Msgflow, small_databas
         assert f"error: {error}" in result.stderr
 
 
+@pytest.mark.thorough
 def test_why_is_the_critical_path_of_the_flow(
     msgflow: Msgflow, simulated: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:

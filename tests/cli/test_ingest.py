@@ -23,6 +23,7 @@ def trace(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return simulate("pipeline", tmp_path_factory.mktemp("trace") / "robot", factor=0.1).directory
 
 
+@pytest.mark.thorough
 def test_two_commands_lead_to_the_answer_and_a_trace_is_ingested_once(
     msgflow: Msgflow, trace: Path
 ) -> None:

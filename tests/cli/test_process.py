@@ -150,6 +150,7 @@ def without(stream: str, *arguments: object) -> subprocess.CompletedProcess[byte
     return subprocess.run([*closing, *command(*arguments)], capture_output=True, check=False)
 
 
+@pytest.mark.thorough
 def test_a_closed_stdout_is_said_by_what_has_data(small_database: Path) -> None:
     for arguments in (("info",), ("sql", "FROM run")):
         done = without("1", *arguments, "--db", small_database)

@@ -74,6 +74,7 @@ def links(database: Path) -> list[tuple[Any, ...]]:
     )
 
 
+@pytest.mark.thorough
 def test_packets_tell_more_than_messages(make: Make, ingest: Ingest, tmp_path: Path) -> None:
     network = make(0.3)
     database = ingest(network.directory)

@@ -85,9 +85,9 @@ def test_functions_of_duckdb_keep_to_the_memory(small_database: Path) -> None:
 
 def test_a_late_call_is_killed_and_the_next_one_works(small_database: Path) -> None:
     asked = {"path": str(small_database), "memory_limit": None, "limit": None}
-    with ConfinedProcess("msgflow.cli.sql_process", seconds=4) as process:
+    with ConfinedProcess("msgflow.cli.sql_process", seconds=2) as process:
         begin = time.monotonic()
-        with pytest.raises(LateError, match="longer than 4 s"):
+        with pytest.raises(LateError, match="longer than 2 s"):
             process.call("answer", asked | {"text": SLOW})
         assert time.monotonic() - begin < 60
         assert b"one" in process.call("answer", asked | {"text": "SELECT 1 AS one"})

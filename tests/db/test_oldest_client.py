@@ -38,6 +38,7 @@ def old_client(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return target
 
 
+@pytest.mark.thorough
 def test_every_public_view_can_be_read(old_client: Path, tmp_path: Path) -> None:
     database = tmp_path / "new.duckdb"
     migration.create(database)

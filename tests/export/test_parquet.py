@@ -312,6 +312,7 @@ def test_equal_results_are_equal_in_csv(recorded: Database, tmp_path: Path) -> N
     assert (tmp_path / "out" / "take.csv").read_bytes() == (tmp_path / "sql.csv").read_bytes()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("write", [Database.export_parquet, thorough(Database.export_csv)])
 def test_a_view_of_somebody_else_becomes_no_file(
     small_database: Path, tmp_path: Path, write: Callable[..., object]

@@ -177,6 +177,7 @@ def in_bucket(night: Lake) -> Iterator[tuple[Lake, ObjectStore]]:
         yield lake, store
 
 
+@pytest.mark.thorough
 def test_a_bucket_answers_as_a_folder_does(
     night: Lake, in_bucket: tuple[Lake, ObjectStore], tmp_path: Path
 ) -> None:

@@ -56,6 +56,7 @@ def test_views_in_databases_are_those_in_files(
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.thorough
 def test_sql_fetches_the_databases_of_views_that_it_names(night: Lake, tmp_path: Path) -> None:
     lake = Lake.open(shutil.copytree(night.store.url, tmp_path / "lake"))
     expected = fleet_sql(lake, COUNT).table

@@ -116,6 +116,7 @@ def test_an_impatient_interrupt_leaves_the_database_as_it_was(
     assert os.listdir(database.parent) == [database.name]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("signals", few([1, 3], 3))
 def test_an_interrupt_that_comes_too_late_is_none(
     database: Path, other_trace: Path, signals: int

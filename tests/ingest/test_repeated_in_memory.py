@@ -39,6 +39,7 @@ def identities(con: duckdb.DuckDBPyConnection) -> dict[str, int]:
     return dict(rows)
 
 
+@pytest.mark.thorough
 def test_a_run_leaves_nothing_to_the_next(tmp_path: Path) -> None:
     calls = simulate("calls", tmp_path / "calls", factor=0.1, layout="rolling").directory
     pipeline = simulate("pipeline", tmp_path / "pipeline", factor=0.1).directory

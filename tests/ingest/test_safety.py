@@ -117,6 +117,7 @@ def start_and_kill(trace: Path, *databases: Path) -> None:
             process.communicate()
 
 
+@pytest.mark.thorough
 def test_a_killed_ingest_is_forgotten(
     database: Path, trace: Path, other_trace: Path, tmp_path: Path
 ) -> None:

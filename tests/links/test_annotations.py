@@ -62,6 +62,7 @@ def test_links_are_derived_anew(database: Path) -> None:
     assert rows(database, DECLARED) == [("periodic_async", "file", ["/a", "/b"], ["/c", "/d"])]
 
 
+@pytest.mark.thorough
 def test_another_file_replaces_the_former(database: Path) -> None:
     with Database(database) as opened:
         opened.apply_links(write(database, BOTH))
@@ -77,6 +78,7 @@ def test_another_file_replaces_the_former(database: Path) -> None:
     assert rows(database, KINDS) == [("direct", 4)]
 
 
+@pytest.mark.thorough
 def test_patterns(database: Path) -> None:
     """Of nodes and topics; ROS's own topics are none of them, and nodes without are left out.
 

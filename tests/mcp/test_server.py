@@ -99,6 +99,7 @@ def test_a_flow_is_a_tree(small_database: Path) -> None:
     assert text.startswith(f"publication {number}, /chatter")
 
 
+@pytest.mark.thorough
 def test_why_compare_and_verify(robot_database: Path) -> None:
     why = one(robot_database, "why")
     assert {"paths", "nodes"} <= {row["section"] for row in why["rows"]}

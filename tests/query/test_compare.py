@@ -142,6 +142,7 @@ def test_an_interval_of_a_mean_is_as_wide_as_theory_says(compared: list[dict[str
     _check_width(compared, VALUES)
 
 
+@pytest.mark.thorough
 def test_also_of_more_than_1000_values_which_are_not_drawn_at_once(fresh_database: Path) -> None:
     _fill(fresh_database, shift_ns=0, callbacks=2, values=2_000)
     with msgflow.open_db(fresh_database) as database:

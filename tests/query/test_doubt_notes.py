@@ -44,6 +44,7 @@ def test_only_flows_that_are_shown_count(database: Path) -> None:
         assert CAUSE not in " ".join(db.query("e2e-latency", end="+1.5us").notes)
 
 
+@pytest.mark.thorough
 def test_why_and_compare_say_so(database: Path) -> None:
     with msgflow.open_db(database) as db:
         assert CAUSE in " ".join(db.why().notes)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import duckdb
 import pytest
+from thorough import few
 
 from msgflow.cli.options import one_text
 from msgflow.database import Database
@@ -28,7 +29,7 @@ def odd(small_database: Path) -> Path:
     return small_database
 
 
-@pytest.mark.parametrize("given", [COMMA, [COMMA], [COMMA, "/talker"]])
+@pytest.mark.parametrize("given", few([COMMA, [COMMA], [COMMA, "/talker"]], COMMA))
 @pytest.mark.parametrize("word", ["from_", "to"])
 def test_a_name_of_the_run_is_not_split(odd: Path, given: Sequence[str], word: str) -> None:
     with Database(odd) as database:

@@ -27,6 +27,7 @@ def test_any_name_can_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     assert (found.pid, found.program) == (7, "a\ufffd\ufffdb")
 
 
+@pytest.mark.thorough
 def test_what_cannot_be_read_is_a_note(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """At the start, and while it is recorded."""
 

@@ -125,6 +125,7 @@ def test_what_a_program_prints_does_not_tear_the_screen(tmp_path: Path) -> None:
     assert f"sh ended with exit code 3: {log.name} has what it printed" in said
 
 
+@pytest.mark.thorough
 def test_a_recording_with_a_name_has_what_the_program_printed_beside_it(tmp_path: Path) -> None:
     """In a new file: not in one that is there, nor where a link leads to."""
     (tmp_path / "drive.log").write_text("matters")

@@ -49,6 +49,7 @@ def test_what_is_changed() -> None:
 
 
 # A rule stands on tables that a test makes up; a finding is part of a whole database.
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("file", "options", "tests", "changes", "survived"),
     [

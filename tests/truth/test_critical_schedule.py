@@ -39,6 +39,7 @@ def test_pieces_add_up_to_the_latency(traced: Ingested) -> None:
     assert traced.rows("SELECT count(DISTINCT flow_rank) > 100 FROM piece") == [(True,)]
 
 
+@pytest.mark.thorough
 def test_whole_callbacks_agree_with_their_schedule(traced: Ingested) -> None:
     """What is not a wait for another thread is the same as in the sums of the callback."""
     assert traced.rows("""

@@ -88,6 +88,7 @@ def test_no_take_is_an_orphan(decided: Ingested) -> None:
     assert decided.rows("SELECT reason FROM stat_orphan") == []
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", few(TRACES, "services"))
 def test_reasons_add_up(recordings: Callable[[str], Ingested], name: str) -> None:
     assert broken_rules(recordings(name).connection) == []

@@ -144,7 +144,7 @@ def witnessed(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Inges
     return get
 
 
-@pytest.mark.parametrize("name", few(SCENARIOS, "events_executors", "executors"))
+@pytest.mark.parametrize("name", few(SCENARIOS, "executors"))
 def test_inputs_arrive_within_their_bounds(name: str, witnessed: Callable[[str], Ingested]) -> None:
     ingested = witnessed(name)
     arrived, due = ingested.rows(_ARRIVED), ingested.rows(_DUE)

@@ -19,6 +19,7 @@ STALLED = Path(__file__).parent / "real_actions_stalled"
 KINDS = {"goal_accepted", "goal_rejected", "goal_result", "goal_message"}
 
 
+@pytest.mark.thorough
 def test_goals_of_a_simulation(tmp_path: Path) -> None:
     simulation = simulate("actions", tmp_path / "trace", factor=0.25)
     ingest([simulation.directory], tmp_path / "run.duckdb")

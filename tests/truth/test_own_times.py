@@ -41,6 +41,7 @@ def per_process(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ingested]:
         yield Ingested(connection, path)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("table", TIMES)
 def test_each_process_keeps_its_own_offset(per_process: Ingested, table: str) -> None:
     column, actual = TIMES[table]

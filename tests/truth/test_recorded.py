@@ -120,7 +120,7 @@ def checker(shared_traces: Path) -> Path:
 
 @pytest.mark.parametrize(
     "name",
-    few(TRUE_TRACES, "sync_1_1", "services"),
+    few(TRUE_TRACES, "sync_1_1"),
 )
 def test_scores(
     recordings: Callable[[str], Ingested],

@@ -96,6 +96,7 @@ def test_perf_gives_the_same_answers(traced: Traced, tmp_path: Path) -> None:
 
 
 # What the comparison notices in one run, it notices in all.
+@pytest.mark.thorough
 @pytest.mark.parametrize("traced", few(SYSTEMS, "real_time"), indirect=True, scope="module")
 @pytest.mark.parametrize(
     ("kind", "change"),

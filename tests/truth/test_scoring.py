@@ -132,6 +132,7 @@ def test_a_link_that_is_gone_is_missing(simulation, database):
     assert scores["direct"].missing == 2
 
 
+@pytest.mark.thorough
 def test_a_link_to_another_message_is_wrong(simulation, database):
     _change(
         database,

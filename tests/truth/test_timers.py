@@ -151,6 +151,7 @@ def fill(timers: dict[int, TrueTimer], runs: list[dict[str, Any]]) -> None:
         del true.dues[len(true.starts) :], true.skipped[len(true.starts) :]
 
 
+@pytest.mark.thorough
 def test_lateness_and_missed_calls_are_those_of_rcl(
     tmp_path: Path, timers: dict[int, TrueTimer]
 ) -> None:

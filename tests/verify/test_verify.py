@@ -118,8 +118,9 @@ targets:
             *words, option, identity = row["see"].split()
             assert words == ["msgflow", "flow"]
             kind = f"{option[2:].replace('-', '_')}_id"
+            if kind not in kinds:
+                assert str(database.flow(**{kind: int(identity)}))
             kinds.add(kind)
-            assert str(database.flow(**{kind: int(identity)}))
     assert kinds == {"take_id", "callback_instance_id", "request_id"}
 
 
@@ -172,6 +173,7 @@ def test_a_path_passes_every_topic_that_is_named(check: Check) -> None:
     assert [row["verdict"] for row in rows(check(text))] == ["no data"]
 
 
+@pytest.mark.thorough
 def test_every_metric_reads_columns_that_its_query_has(
     check: Check, system: Path, goals: Path
 ) -> None:
@@ -270,19 +272,17 @@ def test_a_suggestion_leaves_out_the_warm_up(
     ]
 
 
+@pytest.mark.parametrize("margin", few([0, 0.2], 0))
 @pytest.mark.parametrize("name", few(["demo", "services", "actions"], "services"))
 def test_a_run_meets_what_is_suggested_from_it(
-    name: str, simulated: Callable[..., Path], tmp_path: Path
+    name: str, margin: float, simulated: Callable[..., Path], tmp_path: Path
 ) -> None:
     targets = tmp_path / "targets.yaml"
     with Database(simulated(name, 0.5)) as database:
-        targets.write_text(database.suggest_targets(), encoding="utf-8")
+        targets.write_text(database.suggest_targets(margin=margin), encoding="utf-8")
         verification = database.verify(targets)
-        targets.write_text(database.suggest_targets(margin=0), encoding="utf-8")
-        closest = database.verify(targets)
     assert len(verification.result) > 4
     assert verification.count("passed") == len(verification.result)
-    assert closest.count("passed") == len(closest.result)
     kinds = {row["metric"] for row in rows(verification)}
     assert "rate" in kinds
     assert not any("/_action/" in row["target"] for row in rows(verification))

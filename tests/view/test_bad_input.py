@@ -13,7 +13,7 @@ import duckdb
 import pytest
 from hostile import HOSTILE, renamed
 from served import Page, Served
-from thorough import few
+from thorough import few, thorough
 
 from msgflow.cli.report import read_size
 from msgflow.database import open_db
@@ -65,12 +65,20 @@ def shown_as(way: str, path: Path, page: Page, **options: Any) -> Iterator[str]:
         server.close()
 
 
-@pytest.mark.parametrize("way", few(["served", "file"], "file"))
+@pytest.mark.parametrize(
+    ("way", "shown"),
+    [("file", "demo"), thorough("file", "systems"), thorough("served", "systems")],
+)
 def test_names_are_only_ever_text(
-    way: str, systems: Path, tmp_path: Path, page: Page, monkeypatch: pytest.MonkeyPatch
+    way: str,
+    shown: str,
+    request: pytest.FixtureRequest,
+    tmp_path: Path,
+    page: Page,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(report_module, "MOST_CRITICAL", 1)
-    path = renamed(systems, tmp_path / "hostile.duckdb", HOSTILE)
+    path = renamed(request.getfixturevalue(shown), tmp_path / "hostile.duckdb", HOSTILE)
     ((number,),) = _first_publication(path)
     with shown_as(way, path, page, **({"run": 1} if way == "file" else {})) as address:
         visit(page, address, None if way == "file" else 1)

@@ -50,17 +50,28 @@ def pick_on_canvas(page: Page, kind: int) -> tuple[str, int]:
     return name, number
 
 
-@pytest.mark.parametrize("way", few(["served", "file"], "served"))
+@pytest.mark.parametrize(
+    ("way", "shown", "run"),
+    [("served", "demo", 1), thorough("served", "systems", 3), thorough("file", "systems", 3)],
+)
 def test_picking_lights_up_exactly_the_flow(
-    way: str, systems: Path, read: Read, serve: Serve, report: Report, page: Page
+    way: str,
+    shown: str,
+    run: int,
+    request: pytest.FixtureRequest,
+    read: Read,
+    serve: Serve,
+    report: Report,
+    page: Page,
 ) -> None:
-    connection = read(systems)
-    number = a_publication(connection, 3)
+    database: Path = request.getfixturevalue(shown)
+    connection = read(database)
+    number = a_publication(connection, run)
     if way == "served":
-        page.open(serve(systems).address)
+        page.open(serve(database).address)
     else:
-        page.open(report(systems))
-    page.go(f"#/timeline?run=3&flow=publication:{number}")
+        page.open(report(database))
+    page.go(f"#/timeline?run={run}&flow=publication:{number}")
     wanted = flow_of(connection, "publication", number)
     assert len(wanted) > 10
     assert page.flow() == wanted
@@ -122,18 +133,27 @@ def require_critical_path_of_the_query(page: Page, database: Path, run: int) -> 
         thorough(2, "publication", "SELECT quantile_disc(publication_id, 0.5) FROM publication JOIN"
          " publisher USING (publisher_id) WHERE publication.run_id = 2"
          " AND topic_name = '/RayGroundFilter'"),
-        (1, "request", "SELECT quantile_disc(l.request_id, 0.5) FROM link_request AS l"
+        thorough(1, "request", "SELECT quantile_disc(l.request_id, 0.5) FROM link_request AS l"
          " JOIN callback_instance AS i USING (callback_instance_id)"
          " JOIN link_causal AS c USING (callback_instance_id) WHERE l.run_id = 1"),
     ],
 )  # fmt: skip
-def test_the_critical_path_is_that_of_the_query(
+def test_the_critical_path_of_any_vertex_is_that_of_the_query(
     run: int, kind: str, which: str, systems: Path, read: Read, serve: Serve, page: Page
 ) -> None:
     ((number,),) = read(systems).execute(which).fetchall()
     page.open(serve(systems).address)
     page.go(f"#/timeline?run={run}&flow={kind}:{number}")
     require_critical_path_of_the_query(page, systems, run)
+
+
+def test_the_critical_path_is_that_of_the_query(
+    demo: Path, read: Read, serve: Serve, page: Page
+) -> None:
+    number = a_publication(read(demo), 1)
+    page.open(serve(demo).address)
+    page.go(f"#/timeline?run=1&flow=publication:{number}")
+    require_critical_path_of_the_query(page, demo, 1)
 
 
 @pytest.mark.thorough
@@ -362,9 +382,9 @@ def test_a_topic_with_the_name_of_its_node_is_written_once(
 
 @pytest.mark.parametrize("is_together", [False, True])
 def test_durations_between_clocks_that_are_apart_are_marked(
-    is_together: bool, systems: Path, demo: Path, serve: Serve, page: Page
+    is_together: bool, simulated: Callable[..., Path], demo: Path, serve: Serve, page: Page
 ) -> None:
-    page.open(serve(demo if is_together else systems).address)
+    page.open(serve(demo if is_together else simulated("demo", 0.3)).address)
     page.go("#/paths")
     marked = page.page.locator("[data-path]:has(.doubt)").count()
     paths = page.page.locator("[data-path]").count()

@@ -18,12 +18,12 @@ Read = Callable[[Path], duckdb.DuckDBPyConnection]
 
 @pytest.mark.parametrize("direction", few(["both", "forward", "backward"], "both"))
 def test_the_file_has_exactly_the_flow(
-    direction: str, systems: Path, read: Read, tmp_path: Path, page: Page
+    direction: str, demo: Path, read: Read, tmp_path: Path, page: Page
 ) -> None:
-    connection = read(systems)
-    number = a_publication(connection, 3)
+    connection = read(demo)
+    number = a_publication(connection, 1)
     target = tmp_path / "flow.html"
-    with open_db(systems) as opened:
+    with open_db(demo) as opened:
         flow = opened.flow(publication_id=number, direction=direction)
         assert opened.flow_page(flow, target) == target.stat().st_size < 600_000
     page.open(target.as_uri())

@@ -51,6 +51,7 @@ def wait_for_another(page: Page, before: str) -> None:
     )
 
 
+@pytest.mark.thorough
 def test_pages_move_on_until_somebody_looks_closer(page: Page, followed: Followed) -> None:
     address, windows = followed
     page.open(address)

@@ -52,6 +52,7 @@ def traced(dropping: Path, tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.thorough
 def test_threads_and_cores_say_what_took_the_cpu(traced: Path, serve: Serve, page: Page) -> None:
     page.open(f"{serve(traced).address}#/timeline?from=0&to=100000000")
     assert {"schedule", "core"} <= set(page.page.evaluate(_KINDS))

@@ -54,6 +54,7 @@ def own_events(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return made_once(tmp_path_factory, "own_events", make)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("way", few(["served", "file"], "served"))
 def test_each_name_has_a_row_and_a_click_follows_the_callback(
     way: str,

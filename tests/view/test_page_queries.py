@@ -11,6 +11,7 @@ from typing import Any
 import duckdb
 import pytest
 from tables import decoded
+from thorough import thorough
 
 from msgflow.sql.statement import Statements
 from msgflow.view.page_query import DIRECTORY, page_query, run_page_query
@@ -118,15 +119,19 @@ def test_lanes_of_executors_are_what_their_threads_did(
     )
 
 
-def test_every_bar_has_a_row(systems: Path, demo: Path, read: Read) -> None:
-    for path, run in ((systems, 1), (systems, 2), (demo, 1)):
-        connection = read(path)
-        known = values(connection, Pages(), run)
-        bars = run_page_query(connection, "segments", known)
-        rows = run_page_query(connection, "row", {"run": run})
-        keys = rows["row_key"].to_pylist()
-        assert len(set(keys)) == len(keys)
-        assert set(bars["row_key"].to_pylist()) <= set(keys)
+@pytest.mark.parametrize(
+    ("name", "run"), [("demo", 1), thorough("systems", 1), thorough("systems", 2)]
+)
+def test_every_bar_has_a_row(
+    name: str, run: int, request: pytest.FixtureRequest, read: Read
+) -> None:
+    connection = read(request.getfixturevalue(name))
+    known = values(connection, Pages(), run)
+    bars = run_page_query(connection, "segments", known)
+    rows = run_page_query(connection, "row", {"run": run})
+    keys = rows["row_key"].to_pylist()
+    assert len(set(keys)) == len(keys)
+    assert set(bars["row_key"].to_pylist()) <= set(keys)
 
 
 def test_a_window_has_the_bars_that_overlap_it(demo: Path, read: Read) -> None:
@@ -241,6 +246,7 @@ def test_a_flow_is_what_flow_both_says(systems: Path, demo: Path, read: Read) ->
                 )
 
 
+@pytest.mark.thorough
 def test_arrows_are_the_links(systems: Path, read: Read) -> None:
     connection = read(systems)
     known = values(connection, Pages(), 3)
@@ -289,6 +295,7 @@ def test_arrows_of_a_window_are_those_that_overlap_it(demo: Path, read: Read) ->
             ]
 
 
+@pytest.mark.thorough
 def test_arrows_of_a_window_do_not_take_memory_for_what_is_far_from_it(
     systems: Path, read: Read
 ) -> None:
@@ -325,22 +332,22 @@ def test_arrows_of_a_window_do_not_take_memory_for_what_is_far_from_it(
 
 
 def test_what_a_finding_says_of_clocks_is_not_said_below_it_too(
-    systems: Path, demo: Path, read: Read
+    simulated: Callable[..., Path], demo: Path, read: Read
 ) -> None:
-    for path, run, said in ((systems, "3", False), (demo, "1", True)):
-        found = decoded(Pages().answer(read(path), "finding", {"run": run}))
+    for path, said in ((simulated("demo", 0.3), False), (demo, True)):
+        found = decoded(Pages().answer(read(path), "finding", {"run": "1"}))
         names = {row["name"] for row in found.rows}
         assert bool(names & {"clocks_apart", "clocks_not_together"}) != said
         assert bool(found.meta["notes"]) == said
 
 
 def test_paths_whose_hosts_have_clocks_that_are_apart_are_known(
-    systems: Path, demo: Path, read: Read
+    simulated: Callable[..., Path], demo: Path, read: Read
 ) -> None:
     together = run_page_query(read(demo), "path", {"run": 1}).to_pylist()
     assert {path["is_comparable"] for path in together} == {True}
-    connection = read(systems)
-    found = run_page_query(connection, "path", {"run": 3}).to_pylist()
+    connection = read(simulated("demo", 0.3))
+    found = run_page_query(connection, "path", {"run": 1}).to_pylist()
     host_of = {
         table: dict(
             connection.execute(

@@ -9,7 +9,7 @@ from typing import Any
 import duckdb
 import pytest
 from served import Page, Served, shown
-from thorough import few
+from thorough import few, thorough
 
 from msgflow.database import open_db
 
@@ -94,13 +94,30 @@ def test_a_point_of_the_latency_leads_to_its_flow(demo: Path, report: Report, pa
     assert page.flow()
 
 
-@pytest.mark.parametrize("way", few(["served", "file"], "served"))
-def test_graph(way: str, systems: Path, serve: Serve, report: Report, page: Page) -> None:
-    with open_db(systems) as opened:
-        rates = opened.query("topics-rate", run=3).to_arrow().to_pylist()
-        latency = opened.query("topics-latency", run=3).to_arrow().to_pylist()
-    page.open(serve(systems).address if way == "served" else report(systems))
-    page.go("#/graph?run=3")
+@pytest.mark.parametrize(
+    ("way", "shown_run", "indirect"),
+    [
+        ("served", ("demo", 1), 0),
+        thorough("served", ("systems", 3), 2),
+        thorough("file", ("systems", 3), 2),
+    ],
+)
+def test_graph(
+    way: str,
+    shown_run: tuple[str, int],
+    indirect: int,
+    request: pytest.FixtureRequest,
+    serve: Serve,
+    report: Report,
+    page: Page,
+) -> None:
+    name, run = shown_run
+    database: Path = request.getfixturevalue(name)
+    with open_db(database) as opened:
+        rates = opened.query("topics-rate", run=run).to_arrow().to_pylist()
+        latency = opened.query("topics-latency", run=run).to_arrow().to_pylist()
+    page.open(serve(database).address if way == "served" else report(database))
+    page.go(f"#/graph?run={run}")
     names = page.page.locator(".graph g[role=button]").evaluate_all(
         "all => all.map(one => one.getAttribute('aria-label'))"
     )
@@ -116,7 +133,7 @@ def test_graph(way: str, systems: Path, serve: Serve, report: Report, page: Page
         if row["median_ns"] is not None:
             said = f"{shown(row['median_ns'])} median, {shown(row['p95_ns'])} p95"
             assert any(said in title for title in titles), row
-    assert page.page.locator(".graph .stroke-indirect").count() >= 2
+    assert page.page.locator(".graph .stroke-indirect").count() >= indirect
     assert page.page.locator(".graph .group-box").count() >= 2
     first = rates[0]["topic_name"]
     page.page.locator(f".graph g[aria-label='{first}']").first.click()

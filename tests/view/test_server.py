@@ -182,23 +182,21 @@ def test_what_cannot_be_asked_is_refused(demo: Path, serve: Serve, place: str, s
     assert said in json.loads(content)["error"]
 
 
-def test_a_replaced_database_is_said(demo: Path, tmp_path: Path, systems: Path) -> None:
+def test_a_replaced_database_is_said(demo: Path, tmp_path: Path, small_database: Path) -> None:
     path = tmp_path / "copy.duckdb"
     shutil.copyfile(demo, path)
     server = Served(path)
     try:
         before = server.generation()
         assert server.get("/api/run", X_Generation=before)[0] == 200
-        other = tmp_path / "other.duckdb"
-        shutil.copyfile(systems, other)
-        other.replace(path)
+        small_database.replace(path)
         status, _, content = server.get("/api/run", X_Generation=before)
         assert status == 409
         assert json.loads(content)["code"] == "replaced"
         after = server.generation()
         status, _, content = server.get("/api/run", X_Generation=after)
         assert status == 200
-        assert len(decoded(content).rows) == 3
+        assert len(decoded(content).rows) == 2
         path.unlink()
         status, _, content = server.get("/api/run", X_Generation=after)
         assert status == 409
@@ -208,7 +206,7 @@ def test_a_replaced_database_is_said(demo: Path, tmp_path: Path, systems: Path) 
 
 
 def test_a_database_is_replaced_during_questions(
-    demo: Path, systems: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    demo: Path, small_database: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     is_asked = threading.Event()
 
@@ -226,25 +224,25 @@ def test_a_database_is_replaced_during_questions(
         with ThreadPoolExecutor(2) as pool:
             waiting = [pool.submit(server.get, "/api/wait", X_Generation=before) for _ in range(2)]
             assert is_asked.wait(30)
-            shutil.copyfile(systems, tmp_path / "other.duckdb").replace(path)
+            small_database.replace(path)
             status, _, content = server.get("/api/run", X_Generation=before)
             for answer in [(status, {}, content), *(one.result(60) for one in waiting)]:
                 assert answer[0] == 409, answer
                 assert json.loads(answer[2])["code"] == "replaced"
         status, _, content = server.get("/api/run", X_Generation=server.generation())
         assert status == 200
-        assert len(decoded(content).rows) == 3
+        assert len(decoded(content).rows) == 2
     finally:
         server.close()
 
 
 def test_a_page_that_is_loaded_is_that_of_the_new_database(
-    demo: Path, systems: Path, tmp_path: Path
+    demo: Path, small_database: Path, tmp_path: Path
 ) -> None:
     path = shutil.copyfile(demo, tmp_path / "copy.duckdb")
     server = Served(path)
     try:
-        shutil.copyfile(systems, tmp_path / "other.duckdb").replace(path)
+        small_database.replace(path)
         assert server.get("/api/run", X_Generation=server.generation())[0] == 200
     finally:
         server.close()

@@ -209,6 +209,7 @@ def completions(page: Page) -> list[str]:
     return found
 
 
+@pytest.mark.thorough
 def test_the_editor_completes_views_and_columns(demo: Path, serve: Serve, page: Page) -> None:
     page.open(serve(demo).address)
     page.go("#/sql")
@@ -258,6 +259,7 @@ def test_rows_are_those_of_msgflow_sql(demo: Path, serve: Serve, page: Page) -> 
     )
 
 
+@pytest.mark.thorough
 def test_a_link_carries_query_rows_and_chart(demo: Path, serve: Serve, page: Page) -> None:
     page.open(serve(demo).address)
     page.go("#/sql")
@@ -279,6 +281,7 @@ def test_a_link_carries_query_rows_and_chart(demo: Path, serve: Serve, page: Pag
     assert "range(1500)" in page.page.locator(".editor .cm-content").inner_text()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("drawing", "across", "upwards"),
     [
@@ -383,6 +386,7 @@ def test_a_query_can_be_stopped(demo: Path, serve: Serve, page: Page) -> None:
     assert not page.page.get_by_role("button", name="Stop").is_visible()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("text", "wanted"),
     [
@@ -449,6 +453,7 @@ def test_rows_without_a_place_on_the_timeline_are_no_buttons(
     assert page.page.locator(".sql-result .pick").count() == 0
 
 
+@pytest.mark.thorough
 def test_a_named_query_is_saved(
     demo: Path, serve: Serve, page: Page, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -143,8 +143,8 @@ def test_markdown_of_some_paths_is_about_these(dropping: Path, tmp_path: Path) -
             opened.report(output, through="/nowhere")
 
 
-def test_names_in_markdown_are_only_ever_text(systems: Path, tmp_path: Path) -> None:
-    path = renamed(systems, tmp_path / "hostile.duckdb", HOSTILE)
+def test_names_in_markdown_are_only_ever_text(dropping: Path, tmp_path: Path) -> None:
+    path = renamed(dropping, tmp_path / "hostile.duckdb", HOSTILE)
     output = tmp_path / "summary.md"
     with open_db(path) as opened:
         opened.report(output, run=1)

@@ -395,6 +395,7 @@ def test_charts_are_downloaded(place: str, demo: Path, serve: Serve, page: Page)
     assert Path(download.value.path()).read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("place", "titles"),
     [

@@ -76,6 +76,7 @@ def test_a_cross_leads_to_its_message(timeline: Page) -> None:
     assert f"flow=publication%3A{number}" in timeline.page.url or "flow=" in timeline.page.url
 
 
+@pytest.mark.thorough
 def test_sums_of_an_area_are_those_of_the_command(dropping: Path, timeline: Page) -> None:
     box = timeline.page.locator("canvas.timeline").bounding_box()
     mouse = timeline.page.mouse
@@ -116,6 +117,7 @@ def test_a_search_keeps_what_exchanges_messages_with_it(timeline: Page) -> None:
     assert len(found) < len(every)
 
 
+@pytest.mark.thorough
 def test_a_pinned_row_is_the_first(timeline: Page) -> None:
     lane = timeline.page.evaluate(
         "(({ y, height, label }) => ({ y, height, label }))("
@@ -150,6 +152,7 @@ def test_help_names_every_key(timeline: Page) -> None:
     assert not timeline.page.locator("dialog.help").is_visible()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("symbol", "said"),
     [

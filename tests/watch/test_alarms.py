@@ -338,7 +338,7 @@ def test_of_violations_the_oldest_goes_first(tmp_path: Path) -> None:
     (chunk,) = list(tmp_path.glob("trace/**/archives/*"))[:1]
     read = read_chunk(Chunk(0, chunk.parents[1], chunk), Continuation())
     assert read is not None
-    ends = [SECOND + number for number in range(5)]
+    ends = [SECOND + number for number in range(4)]
     for end_ns in ends:
         recorder.keep(end_ns, KeptTraces([], [read]), [chunk], None, None)
     recorder.close()

@@ -58,6 +58,7 @@ def test_what_most_windows_have_shown_counts_where_one_doubts_it() -> None:
     assert doubted(2) is None
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "of_user",
     [

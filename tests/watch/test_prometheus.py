@@ -9,6 +9,7 @@ import threading
 import urllib.error
 import urllib.request
 from collections import Counter
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -53,9 +54,8 @@ def exporter(recording: Path) -> Exporter:
     return exporter
 
 
-def test_each_flow_is_counted_once(exporter: Exporter, recording: Path, tmp_path: Path) -> None:
-    with Database(tmp_path / "whole.duckdb") as whole:
-        whole.ingest([recording])
+def test_each_flow_is_counted_once(exporter: Exporter, real: Callable[[str], Path]) -> None:
+    with Database(real("real_rotate")) as whole:
         rows = whole.query("flows").to_arrow().to_pylist()
     families = {family.name: family for family in exporter.collect()}
     found = Counter(

@@ -18,6 +18,7 @@ from msgflow.cli.show.window_line import window_line
 from msgflow.clocks import read_clock_sync
 from msgflow.database import Database
 from msgflow.errors import TraceError
+from msgflow.ingest import ingest
 from msgflow.links import LinksFile, read_links
 from msgflow.watch import Watcher, WindowReport, finished_chunks, watch_finished, watch_live
 from msgflow.watch import chunk as chunk_module
@@ -97,12 +98,17 @@ def require_equal(database: Database, report: WindowReport) -> None:
 
 
 def require_same_as_whole(directory: Path, database: Path, length: float) -> list[WindowReport]:
-    """Require that each window has the numbers of the whole, and each root is counted once."""
+    """Require that each window has the numbers of the whole, and each root is counted once.
+
+    Args:
+        directory: a recording.
+        database: one of its ingest as a whole.
+        length: of a window, in seconds.
+    """
     found = reports(directory, window=length, step=length)
     assert len(found) > 2
     roots: Counter[str] = Counter()
     with Database(database) as whole:
-        whole.ingest([directory])
         for report in found:
             require_equal(whole, report)
             roots.update({row["path"]: row["roots"] for row in report.paths})
@@ -111,10 +117,10 @@ def require_same_as_whole(directory: Path, database: Path, length: float) -> lis
     return found
 
 
-def test_a_real_recording(shared_traces: Path, tmp_path: Path) -> None:
+def test_a_real_recording(shared_traces: Path, real: Callable[[str], Path]) -> None:
     """It lost 12 events in its fourth chunk, which is no reason to call a border a gap."""
     directory = shared_traces / "real_rotate"
-    found = require_same_as_whole(directory, tmp_path / "whole.duckdb", 2)
+    found = require_same_as_whole(directory, real("real_rotate"), 3)
     assert sum(report.discarded_events for report in found) == 12
 
 
@@ -129,6 +135,7 @@ def simulated(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.thorough
 def test_a_simulated_recording(simulated: Path, tmp_path: Path) -> None:
+    ingest([simulated], tmp_path / "whole.duckdb")
     require_same_as_whole(simulated, tmp_path / "whole.duckdb", 0.5)
 
 
@@ -178,7 +185,7 @@ def test_a_clock_that_is_set_is_said_and_is_no_lag(
 ) -> None:
     """The tracer goes on with the clock that it began with."""
     notes: list[str] = []
-    watcher = watching(notes, 0.5, 0.5)
+    watcher = watching(notes, 1, 1)
     now = time.time_ns
     lags = []
     for number, chunk in enumerate(finished_chunks(simulated)):
@@ -336,6 +343,7 @@ def test_the_only_host_that_vanishes_and_a_clock_apart_are_said_once(
     assert said.startswith("the clock of robot is 1 s behind the others: windows wait as long as")
 
 
+@pytest.mark.thorough
 def test_a_session_created_anew_is_said_and_gone_on_with(
     simulated: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -364,6 +372,7 @@ def test_a_session_created_anew_is_said_and_gone_on_with(
     assert said.startswith(f"a new recording has begun in {tmp_path / 'live' / third.parts[-3]}: ")
 
 
+@pytest.mark.thorough
 def test_a_backlog_is_read_step_by_step(
     simulated: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -485,6 +494,7 @@ def test_windows_and_alarms_wait_for_nothing_that_takes_longer(hang: Path) -> No
     assert all(before.end_ns == after.start_ns for before, after in pairwise(counted))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("late", "is_late"),
     [thorough(0.6, False, id="within_late"), pytest.param(0.1, True, id="later")],

@@ -5,11 +5,13 @@ from __future__ import annotations
 import tracemalloc
 from pathlib import Path
 
+import pytest
 from ctf_writer import Event, Packet, TraceContent, write_trace
 
 import msgflow.trace
 
 
+@pytest.mark.thorough
 def test_longer_trace_takes_no_more(tmp_path: Path) -> None:
     def peak(trace: Path) -> int:
         with msgflow.trace.open([trace]) as traces:
