@@ -1,11 +1,10 @@
 -- name: action-latency
 -- title: Latency of actions by action and client
 -- description: How long goals of actions took, and by part: until the client had the answer, until
---     the first feedback, until the server had and sent the result, until the client had that. The
---     times to the answer and to the result are measured on the client's clock alone, those of the
---     server on its own. Every part is measured if both its ends were traced and are known to be of
---     one goal: the view goal says when they are. Before Kilted, ROS has no events of requests:
---     then there are no rows, and action_server and action_client list what there is.
+--     the first feedback, until the server had and sent the result, until the client had that.
+--     Times to the answer and the result are on the client's clock, those of the server on its own.
+--     Every part is measured if both its ends were traced and are known to be of one goal (view
+--     goal). Before Kilted, ROS has no events of requests: then there are no rows.
 -- grain: one row per action server and client
 -- column: run_id BIGINT              Run
 -- column: action_name VARCHAR        Action

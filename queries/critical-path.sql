@@ -34,12 +34,12 @@
 -- column: part VARCHAR             Part of the flow: 'callback', 'cache', 'request_to_take',
 --     'service', 'response_to_take', 'publish' or its layer, 'publish_to_take' or
 --     'take_to_callback'
--- column: activity VARCHAR         What happened: the part itself; up to a take 'network_or_idle',
---     'executor_busy' (it ran something else), 'all_threads_busy' (none of its threads was free),
---     'blocked' (a callback ran that excludes the waiting one) or 'undecided' (nothing shows when
---     the message arrived); in a cache 'timer' (not due yet), 'unpublished' (the message that was
---     waited for had not been published), or a part of that message's own flow; 'rest': pieces too
---     short for a line of their own
+-- column: activity VARCHAR  What happened: the part itself; up to a take 'network_or_idle',
+--     'executor_busy' (it ran something else), 'all_threads_busy', 'blocked' (a callback ran that
+--     excludes the waiting one) or 'undecided' (nothing shows when the message arrived); in a cache
+--     'timer' (not due yet), 'unpublished' (the message that was waited for had not been
+--     published), or a part of that message's own flow; 'rest': pieces too short for a line of
+--     their own
 -- column: state VARCHAR            What the thread did, as in thread_state, where the kernel was
 --     traced
 -- column: who VARCHAR              What took the CPU, or ended the sleep: thread or interrupt;

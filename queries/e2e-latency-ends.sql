@@ -1,11 +1,10 @@
 -- name: e2e-latency-ends
 -- title: End-to-end latency between two topics
 -- description: How long it took from the start of a flow (as for e2e-latency) to its end at a node,
---     over all paths between the topic of its first message and that of its last one. A root that
---     several messages reflect at the end arrives several times: its first arrival says how soon
---     the end reacted to it, its last one how long it had an effect. The newest root that an
---     arrival reflects says how old the data were. Give --from and --to: else there is a row for
---     each two topics between which a path leads.
+--     over all paths between the topic of its first message and that of its last one. The first
+--     arrival of a root says how soon the end reacted to it, its last one how long it had an
+--     effect. The newest root that an arrival reflects says how old the data were. Give --from and
+--     --to: else there is a row for each two topics between which a path leads.
 -- grain: one row per topic where flows start, topic where they end, and node that takes it
 -- param: from VARCHAR = NULL  Topics or nodes where flows start: globs, with commas between
 -- param: to VARCHAR = NULL  Topics or nodes where flows end, likewise

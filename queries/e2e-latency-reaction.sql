@@ -2,10 +2,10 @@
 -- title: Reaction time by path
 -- description: How long it takes at most until something that happens shows at the end of a path.
 --     What happens right after an input (the start of a flow) is seen by the next input at the
---     earliest. It shows in the first output that reflects that input or a later one. So the
---     reaction time of an interval between two inputs is from the earlier input to that output: the
---     longest for any event in the interval. If an input is lost, the reaction waits for an output
---     of a later one. The time window applies to the later input.
+--     earliest, and shows in the first output that reflects that input or a later one. So the
+--     reaction time of an interval between two inputs is from the earlier input to that output. If
+--     an input is lost, the reaction waits for an output of a later one. The time window applies to
+--     the later input.
 -- grain: one row per path
 -- param: from VARCHAR = NULL  Topics or nodes where flows start: globs, with commas between
 -- param: to VARCHAR = NULL  Topics or nodes where flows end, likewise

@@ -2,11 +2,11 @@
 -- title: Response time by path, as CARET counts it
 -- description: The four response times of CARET. An input that does not arrive is answered by the
 --     first output of a later one. The inputs that one output answers are its cycle. 'all' is from
---     every input to its output. The others have one value per output: 'best' from the newest input
---     of the cycle, 'worst' from the oldest, 'worst-with-external-latency' from the newest input of
---     the cycle before. As in CARET, the earliest output of a path is left out. The time window
---     applies to the input for 'all', else to the newest input of the cycle. With --from-event
---     publish --to-event callback_start the path is measured as CARET does.
+--     every input to its output; 'best' from the newest input of the cycle, 'worst' from the
+--     oldest, 'worst-with-external-latency' from the newest input of the cycle before. The earliest
+--     output of a path is left out. The time window applies to the input for 'all', else to the
+--     newest input of the cycle. CARET measures with --from-event publish --to-event
+--     callback_start.
 -- grain: one row per path and response time
 -- param: from VARCHAR = NULL  Topics or nodes where flows start: globs, with commas between
 -- param: to VARCHAR = NULL  Topics or nodes where flows end, likewise

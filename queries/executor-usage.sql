@@ -1,13 +1,11 @@
 -- name: executor-usage
 -- title: What executor threads spent their time on
 -- description: Time of each executor thread by what it did (executor_activity): wait for work, look
---     for what is ready, take messages, run callbacks, or stand blocked. A thread of a
---     multi-threaded executor is blocked after a callback, and after it looked in vain, until it
---     gets the lock of the executor and may look for work again. Meanwhile another thread may hold
---     the lock and wait for work: then the executor has nothing to do. These times add up to the
---     time for which the thread was seen. Only takes and callbacks are known of an executor without
---     events of its own (static executor, rclpy), or whose events the recording leaves out (finding
---     executor_events_left_out). A thread of an events executor waits while it sleeps, where the
+--     for what is ready, take messages, run callbacks, or stand blocked until it gets the lock of a
+--     multi-threaded executor. Meanwhile another thread may hold the lock and wait for work: then
+--     the executor has nothing to do. These times add up to the time for which the thread was seen.
+--     Only takes and callbacks are known of an executor without events of its own, or whose events
+--     the recording leaves out. A thread of an events executor waits while it sleeps, where the
 --     kernel was traced; else at least until the next message was published, or the next timer due,
 --     and perhaps in the time that is not known.
 -- grain: one row per executor thread

@@ -1,13 +1,12 @@
 -- name: links-suggested
 -- title: Links that the data suggest
--- description: Where messages seem to be kept for later: a timer, or messages on another topic,
---     lead to publications, while messages that the node receives lead nowhere (periodic_async), or
---     callbacks of several of a node's subscriptions publish only once each of them has had a
---     message (partial_sync), or later, when it is clear which messages are closest in time
---     (approximate_sync), or the node publishes outside of callbacks, a message for each that came
---     (queue). And where a node without traced callbacks seems to publish by itself, not
---     because of the message before (independent). Only the author of the node knows whether that
---     is so: review the candidates before you apply any.
+-- description: Where messages seem to be kept: they lead nowhere, while a timer, or messages on
+--     another topic, lead to publications (periodic_async); callbacks of several subscriptions
+--     publish only once each of them has had a message (partial_sync), or later, when it is clear
+--     which are closest in time (approximate_sync); or the node publishes outside of callbacks, a
+--     message for each that came (queue). And where a node without traced callbacks seems to
+--     publish by itself (independent). Only the author of the node knows: review the candidates
+--     before you apply any.
 -- grain: one row per candidate
 -- param: min_share DOUBLE = 0.95    Minimum share of publications that had a new message of a
 --     topic, for it to count as an input of a partial_sync candidate; and of those that did not

@@ -1,20 +1,15 @@
 -- name: path-breakdown
 -- title: What the latency of each path consists of
 -- description: End-to-end latency of every path, hop by hop, in the order of the path: --sort
---     share:desc puts the largest part first. The parts of a flow follow each other from its start
---     to its end and add up to its latency exactly. The parts of a hop are: the callback up to its
---     publication; the wait in a cache for other messages or a timer; calls of services; publishing
---     by layer, up to the last one; the time from there to the take; and the time from the take to
---     the callback. Flows with a stored message have no latency, and are left out here as in
---     e2e-latency. Publishing goes on behind the event of its last layer: it is not known how long,
---     and is part of the time up to the take. A trace does not say when a message arrived either,
---     so that time is three parts, with the bounds of waits: network_or_idle, executor_busy (with
---     other callbacks), and undecided (one or the other). Executors were busy at least for
---     executor_busy, at most for executor_busy and undecided together. Where a kernel trace or
---     CARET shows exactly when it arrived (main.arrival), the parts are until_arrival, run_queue
---     (the thread was woken, and waited for a CPU; CARET does not tell) and executor instead. A
---     part is negative if the next one began before it ended (overlaps), for example between hosts
---     whose clocks are apart.
+--     share:desc puts the largest part first. The parts add up to the latency: the callback up to
+--     its publication; the wait in a cache; calls of services; publishing by layer, up to the last
+--     one; the time from there to the take, in which publishing goes on; and the time from the take
+--     to the callback. Flows with a stored message are left out. A trace does not say when a
+--     message arrived: the time up to the take is network_or_idle, executor_busy (with other
+--     callbacks, at least), and undecided (one or the other). Where a kernel trace or CARET shows
+--     it exactly, the parts are until_arrival, run_queue (the thread was woken, and waited for a
+--     CPU) and executor instead. A part is negative if the next one began before it ended
+--     (overlaps).
 -- grain: one row per path, hop, part, and callback that it belongs to
 -- param: from VARCHAR = NULL  Topics or nodes where flows start: globs, with commas between
 -- param: to VARCHAR = NULL  Topics or nodes where flows end, likewise

@@ -2,10 +2,10 @@
 -- title: Latency of services by service and client
 -- description: How long service calls took, in total and by part. The round trip is measured on the
 --     client's clock alone, from the sending of the request to the take of the response. The times
---     there and back compare the clocks of client and service, and are negative if these are apart
---     (and by microseconds with Fast DDS, which reports a request after writing it). Every part is
---     measured if both its ends were traced. A request that no service was seen to take is counted
---     with the only service of that name, if there is one.
+--     there and back compare two clocks, and are negative if these are apart (by microseconds with
+--     Fast DDS, which reports a request after writing it). Every part is measured if both its ends
+--     were traced. A request that no service was seen to take is counted with the only service of
+--     that name, if there is one.
 -- grain: one row per service and client
 -- column: run_id BIGINT               Run
 -- column: service_name VARCHAR        Service

@@ -1,13 +1,12 @@
 -- name: timers
 -- title: Whether timers keep their period, how late they are called, and why
 -- description: Jitter is how far the time from one start of the callback to the next differs from
---     the period asked for (from the median, if the trace does not have the period). Lateness is
---     the time from the moment at which the timer was due to the start of the callback. It is due
---     at the first moment after its previous call that is a whole number of periods after its
---     creation. Lateness does not add up: a call that is a period late or more replaces those that
---     were due meanwhile (missed), and is followed by one sooner than usual (bunched). A timer
---     waits for what its executor runs, else for the executor itself, or for a CPU. Calls after a
---     gap of the trace are not counted in any of this.
+--     the period asked for (from the median, if the trace does not have it). Lateness is the time
+--     from when the timer was due to the start of the callback: it is due at the first moment after
+--     its previous call that is a whole number of periods after its creation. So a call that is a
+--     period late or more replaces those that were due meanwhile (missed), and is followed by one
+--     sooner than usual (bunched). A timer waits for what its executor runs, else for the executor
+--     itself, or for a CPU. Calls after a gap of the trace are not counted.
 -- grain: one row per timer, called or not; one for all timers that a node made of one function and
 --     period
 -- column: run_id BIGINT             Run

@@ -1,14 +1,13 @@
 -- name: topics-delivery
 -- title: Messages delivered, dropped and lost by topic and subscription
 -- description: What became of the messages published in the time window at each subscription of
---     their topic. Dropped: the queue was full, and newer messages took their place. Lost: they did
---     not arrive or could not be taken, though earlier and later ones were. Not connected: the two
---     were not connected yet, not any more, or never. Cut by the recording: it ended before they
---     could be taken. Unknown: events are lost, or the trace does not decide; such messages may
---     have been delivered. Together with delivered, these counts add up to what was published. The
---     shares are of messages whose fate is known: delivered, dropped or lost. Only the depth of the
---     queue decides whether a message counts as overwritten or as lost on the way; incompatible
---     QoS, lifespan and best effort do not show in a trace.
+--     their topic. Dropped: the queue was full. Lost: they did not arrive or could not be taken,
+--     though earlier and later ones were. Not connected: not yet, not any more, or never. Cut by
+--     the recording: it ended before they could be taken. Unknown: events are lost, or the trace
+--     does not decide. With delivered, these counts add up to what was published. The shares are of
+--     messages whose fate is known: delivered, dropped or lost. Only the depth of the queue tells
+--     overwriting from loss on the way; incompatible QoS, lifespan and best effort do not show in a
+--     trace.
 -- grain: one row per topic and subscription
 -- column: run_id BIGINT             Run
 -- column: topic_name VARCHAR [topic]  Topic

@@ -1,11 +1,10 @@
 -- name: topics-latency
 -- title: Latency from publication to take by topic and subscription
 -- description: How long messages took from the end of their publication to their take. That
---     includes the time for which the receiving executor was busy with other callbacks. A trace
---     does not say when a message arrived, so this time is given as bounds, those of waits; the
---     rest was the network or an idle executor. A negative latency means that the clocks of two
---     hosts are apart. Takes without a known publication are counted, but not measured, and neither
---     are messages that were stored until their subscription existed.
+--     includes the time for which the receiving executor was busy with other callbacks, given as
+--     bounds, those of waits; the rest was the network or an idle executor. A negative latency
+--     means that the clocks of two hosts are apart. Takes without a known publication are counted,
+--     but not measured, and neither are messages that were stored until their subscription existed.
 -- grain: one row per topic, receiving node and subscription
 -- column: run_id BIGINT             Run
 -- column: topic_name VARCHAR [topic]  Topic

@@ -19,14 +19,13 @@
 -- column: wait_ns BIGINT [ns]       From there to the start of the callback
 -- column: busy_min_ns BIGINT [ns]   Executor busy with others meanwhile, at least
 -- column: busy_max_ns BIGINT [ns]   Executor busy with others meanwhile, at most
--- column: held_max_ns BIGINT [ns]   No thread of an executor of several waited for work meanwhile,
---     though not all ran callbacks: they were blocked by its lock, or looked for work; or the
---     thread that ran this callback had picked it, and did not start it yet. Of one thread:
---     time between two waits without a callback, if that is a millisecond or more
--- column: reason VARCHAR            What took the most of the wait, if the message came at once:
---     'executor busy' (it ran others; its threads are one, or when they waited is not known), 'all
---     threads busy', 'excluded' (a callback ran that never runs beside this one) or 'network or
---     idle'. Where the kernel was traced also 'run queue' (its thread was woken or preempted, and
+-- column: held_max_ns BIGINT [ns]  No thread of an executor of several waited for work meanwhile,
+--     though not all ran callbacks; or the thread that ran this callback had picked it, and did not
+--     start it yet. Of one thread: time between two waits without a callback, if that is a
+--     millisecond or more
+-- column: reason VARCHAR  What took the most of the wait, if the message came at once: 'executor
+--     busy' (it ran others), 'all threads busy', 'excluded' (a callback ran that never runs beside
+--     this one) or 'network or idle'. Where the kernel was traced also 'run queue' (its thread
 --     waited for a CPU) and 'until arrival'
 -- column: rest_min_ns BIGINT [ns]   Network, idle or overhead, at least
 -- column: rest_max_ns BIGINT [ns]   Network, idle or overhead, at most

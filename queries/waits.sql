@@ -2,14 +2,12 @@
 -- title: How long callbacks waited, and what their executor ran meanwhile
 -- description: The time from the end of a publication (or from when a timer was due, or a request
 --     was sent) to the start of its callback, and how much of it the executor was busy with other
---     callbacks. A trace does not say when a message arrived, so the busy time is given as bounds.
---     At least: what ran after the executor had certainly found it ready. At most: what ran since
---     the earliest moment at which it can have been there. The rest of the wait was the network, an
---     idle executor or its overhead. Where the kernel was traced, the rest is divided: until the
---     message arrived, and for how long the thread then waited for a CPU. Totals are over the
---     callback instances in the time window. The callback that others kept waiting longest comes
---     first. With --by instance, the waits are listed one by one, with --by pair, the callbacks
---     that ran meanwhile.
+--     callbacks. A trace does not say when a message arrived, so the busy time is given as bounds:
+--     at least what ran after the executor had certainly found it ready, at most what ran since the
+--     earliest moment at which it can have been there. The rest was the network, an idle executor
+--     or its overhead, and where the kernel was traced the time until the message arrived and the
+--     wait for a CPU. The callback that others kept waiting longest comes first. With --by
+--     instance, the waits are listed one by one, with --by pair, the callbacks that ran meanwhile.
 -- grain: one row per callback object that ran; one for all timers that a node made of one function
 --     and period
 -- variant: by VARCHAR {callback|pair|instance} = 'callback'  What a row is: a callback that

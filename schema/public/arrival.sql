@@ -1,15 +1,12 @@
 -- name: main.arrival
--- description: When messages arrived, where the trace tells. A kernel trace: the last waking of the
---     thread before it took the message. Without one after the begin of the publication the thread
---     was awake when the message came, and there is no row. It is exact where the take is the first
---     thing that the thread did then, and a thread of the middleware (by its name), the publishing
---     thread, another ROS process or an interrupt woke it. Else the waking may have been for
---     something else: any other thread of its own process may hand over work, and the message wait
---     for that in the queue of its node. Where it is not exact, or there is no kernel trace, the
---     hook of CARET in the listener of Fast DDS tells when the reader had the message. It is exact
---     unless several readers of the process had it. The queue of an events executor has what its
---     own thread published when publish() returns; other messages came to its process when the
---     publishing thread woke the middleware's (some 10 to 100 us before they were in the queue).
+-- description: When messages arrived, where the trace tells. With a kernel trace: the last waking
+--     of the thread before it took the message. If it was awake when the message came, there is no
+--     row. Exact where the take is the first thing that it did then, and a thread of the middleware
+--     (by its name), the publishing thread, another ROS process or an interrupt woke it; any other
+--     thread may have woken it for something else. Otherwise the hook of CARET in Fast DDS tells:
+--     exact unless several readers of the process had the message. In an events executor, what its
+--     own thread published came when publish() returned, other messages when the publishing thread
+--     woke the middleware's (some 10 to 100 us before they were in the queue).
 -- grain: one row per take whose publication is known, and before which its thread was woken or the
 --     message seen to arrive
 -- column: run_id BIGINT  Run that the row belongs to

@@ -1,12 +1,11 @@
 -- name: main.critical_path
 -- kind: macro
 -- description: What one flow had to wait for, moment by moment: its parts (main.end_to_end_part),
---     with waits replaced by what they waited for, as far as the trace shows. While a message or
---     request waited for its callback: the callback instances that its executor was busy with, or
---     that exclude the callback. In a cache: the timer until it was due, or the message that
---     completed the set, from the callback that published it. Where the kernel was traced, what a
---     thread did is divided into its states. The pieces follow each other and add up to the latency
---     of the flow exactly. A negative part is one piece.
+--     with waits replaced by what they waited for, as far as the trace shows. Before a callback:
+--     what its executor was busy with, or what excludes the callback. In a cache: the timer until
+--     it was due, or the message that completed the set, from the callback that published it. Where
+--     the kernel was traced, what a thread did is divided into its states. The pieces add up to the
+--     latency. A negative part is one piece.
 -- grain: one row per piece of the flow
 -- param: runs BIGINT[]  Runs to look at
 -- param: from_topic VARCHAR = NULL  Topics or nodes where flows start: names or globs, separated by

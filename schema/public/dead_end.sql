@@ -1,15 +1,13 @@
 -- name: main.dead_end
 -- kind: macro
 -- description: Subscriptions at which flows end although their node publishes: at least three
---     messages came, and none of their callbacks led to anything, while timers of the node or other
---     messages led to publications, or the node published outside of callbacks. Either the node
---     only consumes these messages, or it keeps them, and what it publishes depends on them: then a
---     link has to be declared. A link is not likely if the messages descend from what the node
---     publishes itself, and end a loop. Nor is it if messages on another topic led to publications
---     before the first one came, or in callbacks that run shorter: to keep a message takes less
---     time than to use it. Topics of ROS itself, topics that the node also publishes on, and inputs
---     of annotations are left out. A thread of the node may publish by itself, so what comes
---     outside of callbacks makes a link likely only if it answers the messages one by one.
+--     messages came, and no callback of theirs led to anything, while timers, other messages or
+--     what is outside of callbacks led to publications. Either the node only consumes the messages,
+--     or it keeps them: then a link has to be declared. That is not likely if the messages descend
+--     from what the node publishes itself; if messages on another topic led to publications before
+--     the first one came, or in shorter callbacks, as keeping takes less time than using; or if
+--     what comes outside of callbacks does not answer them one by one. Topics of ROS, topics that
+--     the node also publishes on, and inputs of annotations are left out.
 -- grain: one row per such subscription, publisher of its node, and timer or subscription whose
 --     callbacks published; one row for what it published outside of callbacks
 -- param: runs BIGINT[]  Runs to look at

@@ -1,15 +1,14 @@
 -- name: main.end_to_end
 -- kind: macro
--- description: Roots of paths, and what became of them. A root that reached the sink has one row
---     per take there. Any other root has a single row with the reason. Roots are callback instances
---     of timers that published, or publications (always with from_event 'publish'), or takes of
---     messages whose publisher is not traced: these start with their stamp, if its clock is that of
---     the reader, else with the take. The time window
---     applies to roots. If a root ends at a message that was not taken, its status is that of the
---     message in main.stat_delivery. If the message was taken, the node may have ended the flow; or
---     the recording cut it: no later message passed the step, and the process was not recorded for
---     longer than any flow of the path took. It also cuts a root where the status of the message is
---     unknown, and no earlier or no later message passed the step.
+-- description: Roots of paths in the time window, and what became of them. One that reached the
+--     sink has a row per take there, any other a single row with the reason. Roots are callback
+--     instances of timers that published, or publications (always with from_event 'publish'), or
+--     takes of messages whose publisher is not traced: these start with their stamp, if its clock
+--     is that of the reader, else with the take. A root that ends at a message that was not taken
+--     has the status of the message in main.stat_delivery. If the message was taken, the node ended
+--     the flow; or the recording cut it: no later message passed the step, and the process was not
+--     recorded for longer than any flow of the path took. It also cuts a root whose message has an
+--     unknown status where no earlier or no later message passed the step.
 -- grain: one row per path, root and take at the sink; one per path and root that did not reach it
 -- param: runs BIGINT[]  Runs to look at
 -- param: from_topic VARCHAR = NULL  Topics or nodes where flows start: names or globs, separated by

@@ -2,10 +2,9 @@
 -- kind: macro
 -- description: Flows between two topics, whatever path they took: rows of main.end_to_end of
 --     several paths become rows of one. A root that arrived by any path has arrived, once for each
---     message that reflects it. One that arrived by none has the status that says most about it:
---     'cut_by_recording', since it may have arrived later, before 'lost', 'dropped', 'unknown',
---     'no_output', 'superseded' and 'not_connected'. What a link casts doubt on in one path only is
---     not ambiguous.
+--     message that reflects it. Another has the status that says most: 'cut_by_recording', then
+--     'lost', 'dropped', 'unknown', 'no_output', 'superseded' and 'not_connected'. A doubt about
+--     one path only does not make it ambiguous.
 -- grain: one row per pair of topics, receiving node, root and take there; one per pair of topics,
 --     receiving node and root that did not arrive
 -- param: arrivals VARCHAR  Name of rows of run_id, path, first_topic, last_topic, and all columns

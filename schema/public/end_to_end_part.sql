@@ -1,9 +1,8 @@
 -- name: main.end_to_end_part
 -- kind: macro
--- description: What the latency of each flow of each path (main.end_to_end) consists of. The parts
---     of a flow follow each other without a gap from its start to its end, so their durations add
---     up to its latency exactly. A part is negative if the next one began before it ended: clocks
---     of two hosts are apart, a message was taken before the publishing call returned, or a
+-- description: What the latency of each flow of each path (main.end_to_end) consists of: parts that
+--     follow each other and add up to it. A part is negative if the next one began before it ended:
+--     clocks of two hosts are apart, a message was taken before the publishing call returned, or a
 --     callback published for an input whose own callback was still running.
 -- grain: one row per flow that reached the sink and part
 -- param: runs BIGINT[]  Runs to look at

@@ -21,18 +21,12 @@
 --     the last for the callback at the end
 -- column: position BIGINT  Order within the flow, from 1
 -- column: rank BIGINT  Order within the hop, from 1
--- column: part VARCHAR  'callback' (from its start, or from the take where none shows, to what it
---     publishes or calls), 'cache' (from the end of the callback to the callback instance that
---     publishes for it),
---     'intra', 'rclcpp', 'rcl', 'rmw', 'dds' (publishing, from this layer to the next), 'publish'
---     (publishing, layer not known), 'stored' (from the last layer until the subscription existed,
---     of a message that was published before), 'publish_to_take' (from there, or from the last
---     layer, to the take: writing
---     the message, the network, an idle executor or a busy one, see main.executor_wait),
---     'take_to_callback', 'request_to_take' (from the sending of a request), 'service' (from the
---     start of the service callback to what it publishes or calls, or to the sending of the
---     response), 'response_to_take' (from there on; what the client does then is a 'callback'
---     again, from the take on)
+-- column: part VARCHAR  'callback' (from its start, or the take where none shows, to what it
+--     publishes or calls), 'cache' (until the callback instance that publishes for it), 'intra',
+--     'rclcpp', 'rcl', 'rmw', 'dds' (publishing, to the next layer), 'publish' (layer not known),
+--     'stored' (until the subscription existed), 'publish_to_take', 'take_to_callback',
+--     'request_to_take', 'service' (from the start of its callback to what it sends) or
+--     'response_to_take'
 -- column: from_ns BIGINT [epoch ns]  Begin
 -- column: to_ns BIGINT [epoch ns]  End
 -- column: duration_ns BIGINT [ns]  to_ns - from_ns

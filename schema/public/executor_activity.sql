@@ -1,14 +1,12 @@
 -- name: main.executor_activity
--- description: What executor threads did. Each state is divided where a callback begins or ends,
---     and where the thread takes a message. Before its callback, an executing thread takes the
---     message (for a timer there is none: it is still selecting). After the callback, and after it
---     looked in vain, a thread of a multi-threaded executor is blocked until it may look for work
---     again. If callbacks are nested, the innermost counts; inside a callback that spins, what it
---     does there. Threads have callbacks, services and takes only where their executor has no
+-- description: What executor threads did: each state, divided where a callback begins or ends, and
+--     where the thread takes a message. A thread of a multi-threaded executor is blocked after its
+--     callback, and after it looked in vain, until it may look for work again. Of nested callbacks
+--     the innermost counts. Only callbacks, services and takes are known where executors have no
 --     events, or the recording leaves out some; a thread of an events executor also waits and
---     selects, as far as that is known (derive.queue_activity). A callback without an end lasts
---     until the first event that cannot be inside it. Activities of a thread never overlap, add up
---     to its states, and never reach across a gap.
+--     selects, as far as that is known. A callback without an end lasts until the first event that
+--     cannot be inside it. Activities of a thread never overlap, add up to its states, and never
+--     reach across a gap.
 -- grain: one row per interval of a thread in which nothing changed
 -- column: run_id BIGINT  Run that the row belongs to
 -- column: executor_id BIGINT  Executor

@@ -1,10 +1,9 @@
 -- name: main.executor_wait
 -- description: How long callback instances waited in their executor, and what for. A trace does not
---     say when an input arrived, so that moment is given as bounds: it became ready between
---     earliest_ns and latest_ns. It could not start (the executor was busy) while all threads of
---     the executor ran callbacks, or one ran that excludes it. The rest of the time was the
---     network, an idle executor, or its own overhead. Callback instances nested in others are left
---     out: an executor inside a callback serves them.
+--     say when an input arrived: it became ready between earliest_ns and latest_ns. It could not
+--     start (the executor was busy) while all threads ran callbacks, or one ran that excludes it.
+--     The rest of the time was the network, an idle executor, or its own overhead. Callback
+--     instances nested in others are left out.
 -- grain: one row per callback instance that is not nested in another
 -- column: run_id BIGINT  Run that the row belongs to
 -- column: callback_instance_id BIGINT  Callback instance that waited

@@ -27,10 +27,9 @@
 --     picked this callback; NULL: not known
 -- column: is_loss_affected BOOLEAN  A gap of the trace lies in it
 -- column: held_max_ns BIGINT [ns]  From earliest_ns on, no thread of an executor of several waited
---     for work, though not all ran callbacks: they were blocked by its lock, or looked for work;
---     or the thread that ran this callback had picked it, and did not start it yet. Not part of
---     busy_max_ns. Of an executor of one thread: the time between two waits for which it ran no
---     callback, if that is a millisecond or more. NULL: not known, or less
+--     for work, though not all ran callbacks; or the thread that ran this callback had picked it,
+--     and did not start it yet. Not part of busy_max_ns. Of one thread: the time between two waits
+--     without a callback, if that is a millisecond or more. NULL: not known, or less
 -- column: meanwhile_callback_ids BIGINT[]  Callbacks that ran meanwhile, the longest first;
 --     NULL: none
 -- column: meanwhile_ns BIGINT[] [ns]  For how long each of them did, from earliest_ns on (from

@@ -1,12 +1,11 @@
 -- name: main.flow_path
 -- kind: macro
 -- description: Chains of publishers and subscriptions that flows can take, with all their
---     beginnings (prefixes). No subscription comes twice in a chain. Where the call of a service
---     led to a publication, the chain has the node that called and the services in between. The
---     publisher of a message that nothing traced published is named '(not traced)'. A chain
---     is a path if it ends at the topic asked for, or if nothing continues it. Chains longer than
---     max_depth and beyond max_paths are cut. is_cut marks each chain that has more to it, or all
---     chains of the run if it is not known which.
+--     beginnings. No subscription comes twice in a chain. Where a service led to a publication, the
+--     chain has the node that called and the services in between. A publisher that is not traced is
+--     '(not traced)'. A chain is a path if it ends at the topic asked for, or if nothing continues
+--     it. Chains are cut at max_depth and max_paths; is_cut marks each chain that has more to it,
+--     or all of the run if it is not known which.
 -- grain: one row per run and chain
 -- param: runs BIGINT[]  Runs to look at
 -- param: from_topic VARCHAR = NULL  Topics or nodes where flows start: names or globs, separated by

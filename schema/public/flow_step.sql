@@ -34,10 +34,10 @@
 -- column: symbol VARCHAR  Function of the callback
 -- column: thread VARCHAR  Name and id of the thread
 -- column: host VARCHAR  Machine or container
--- column: missing VARCHAR  What the trace does not show here: 'publication' that was taken, 'take'
---     of the message, 'callback' it was taken for, 'sending' of the request or response, 'response'
---     to the request, or the 'end' of the callback instance; 'copy': nothing is missing, the
---     message came through a ring buffer and this is its copy from the middleware
+-- column: missing VARCHAR  What the trace does not show: 'publication' that was taken, 'take' of
+--     the message, 'callback' it was taken for, 'sending' of the request or response, 'response' to
+--     the request, 'end' of the callback instance; 'copy': nothing, it is the middleware's copy of
+--     a message of a ring buffer
 -- column: reason VARCHAR  Why it is missing, as far as known
 -- column: cut_count BIGINT  Links that lead on from here beyond the limits
 -- column: internal_count BIGINT  Effects on ROS's own topics and services that are left out

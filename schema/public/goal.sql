@@ -1,10 +1,9 @@
 -- name: main.goal
 -- description: Goals of actions, from sending to result, as far as services and topics of the
---     action show it (events of requests: Kilted and later). The identity that ROS gives to a goal
---     is not in the trace, and neither is how it ended: succeeded, aborted or cancelled. So a
---     result is known to be of a goal if the client asked for it in the callback of the answer, or
---     if no other goal of that client was open that may have been accepted. Feedback and requests
---     to cancel are known to be of it if the server was concerned with no other goal at that time.
+--     action show it (Kilted and later). The identity of a goal is not in the trace, and neither is
+--     how it ended. So a result is known to be of a goal if the client asked for it in the callback
+--     of the answer, or if no other goal of that client was open that may have been accepted;
+--     feedback and requests to cancel if the server was concerned with no other goal at that time.
 -- grain: one row per goal and action server that took it; one per goal that none took
 -- column: run_id BIGINT  Run that the row belongs to
 -- column: goal_id BIGINT  Identity of the goal: that of the request that sent it

@@ -1,9 +1,8 @@
 -- name: main.message
--- description: Messages with the names of what they belong to: every message that was published,
---     once for each subscription that took it, with its topic, the node that published it and the
---     node that took it. A message that none took is a row without a take; why it did not arrive
---     is in main.stat_delivery. A message that was taken and whose publication is not known is a
---     row without a publication.
+-- description: Messages with the names of what they belong to: every published message, once for
+--     each subscription that took it. A message that none took is a row without a take
+--     (main.stat_delivery says why), one whose publication is not known a row without a
+--     publication.
 -- grain: one row per publication and take of it; one per publication or take without the other
 -- column: take_id BIGINT  Take; NULL: no subscription took the message
 -- column: run_id BIGINT  Run that the row belongs to

@@ -1,8 +1,8 @@
 -- name: main.node_state
 -- description: States of managed nodes (with a lifecycle). The state before the first change lasts
---     from the creation of the node, or from the first event of its process. The last one lasts
---     until the last event of the process. A state is left out where the next change leaves another
---     one: a change in between was not recorded. A node that never changed its state has none.
+--     from the creation of the node, or from the first event of its process, the last one until the
+--     last event of the process. A state is left out where the next change leaves another one. A
+--     node that never changed its state has none.
 -- grain: one row per stretch of a node in one state
 -- column: run_id BIGINT  Run that the row belongs to
 -- column: node_id BIGINT  Node

@@ -2,9 +2,8 @@
 -- kind: macro
 -- description: What threads did in intervals, piece by piece, as a kernel trace shows it. A sleep
 --     that another thread of a ROS process ended is replaced by what that thread did meanwhile, and
---     so on from waker to waker: what the thread waited for, if the waker did nothing else before.
---     An interrupt ends the chain, and so does a thread of a process without ROS. The pieces follow
---     each other and add up to the interval.
+--     so on from waker to waker, until an interrupt or a thread of a process without ROS ends the
+--     chain. The pieces add up to the interval.
 -- grain: one row per piece of an interval
 -- param: intervals VARCHAR  Name of rows of interval_id, thread_id, from_ns, to_ns: a table, or a
 --     part of the query

@@ -1,9 +1,8 @@
 -- name: main.stat_delivery
 -- description: What became of every message at every subscription of its topic. Only the depth of
---     the queue decides whether a message counts as overwritten or as lost on the way; incompatible
---     QoS, lifespan and best effort do not show in a trace. If the subscription of a ring buffer
---     was not traced, only what was taken from the buffer is listed. The middleware's copy of a
---     message that a ring buffer carries is not a delivery: no callback gets it.
+--     the queue tells overwriting from loss on the way; incompatible QoS, lifespan and best effort
+--     do not show in a trace. Of a ring buffer whose subscription was not traced, only what was
+--     taken is listed. The middleware's copy of a message in a ring buffer is not a delivery.
 -- grain: one row per publication and subscription of its topic
 -- column: run_id BIGINT  Run that the row belongs to
 -- column: publication_id BIGINT  The message
