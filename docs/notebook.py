@@ -26,12 +26,15 @@ With a recording of your own, begin with `msgflow ingest TRACE` and `open_db("ms
 This file is written by `python docs/notebook.py`, which runs it.""",
     [
         """%matplotlib inline
+from tempfile import mkdtemp
+
 import msgflow
 from msgflow_sim import simulate
 
-simulate("demo", "trace", factor=0.2)
-db = msgflow.open_db("robot.duckdb")
-db.ingest("trace", clock_sync="messages")
+robot = mkdtemp()  # a new one, so that the cells run as often as you like
+simulate("demo", f"{robot}/trace", factor=0.2)
+db = msgflow.open_db(f"{robot}/robot.duckdb")
+db.ingest(f"{robot}/trace", clock_sync="messages")
 db.query("info-hosts")"""
     ],
     """## A query is a table
@@ -75,7 +78,7 @@ executors were busy with others, at most, in all.""",
         """import duckdb
 
 db.close()
-con = duckdb.connect("robot.duckdb", read_only=True)
+con = duckdb.connect(f"{robot}/robot.duckdb", read_only=True)
 waits = con.sql(\"\"\"
     SELECT node || ' ' || label AS callback, sum(busy_max_ns) / 1e6 AS ms
     FROM executor_wait JOIN callback_label USING (callback_id)
@@ -87,7 +90,7 @@ waits.plot.barh("callback", "ms", figsize=(8, 3)).invert_yaxis()"""
 
 
 def written(path: Path) -> Any:
-    """Run the cells in an empty directory and write the notebook; return it."""
+    """Run the cells twice in an empty directory and write the notebook; return it."""
     notebook = nbformat.v4.new_notebook()
     for place, cell in enumerate(CELLS):
         if isinstance(cell, str):
@@ -103,7 +106,10 @@ def written(path: Path) -> Any:
             kernel_name="python3",
             resources={"metadata": {"path": directory}},
         )
-        client.execute()
+        with client.setup_kernel():
+            for is_last in (False, True):
+                for place, cell in enumerate(notebook.cells):
+                    client.execute_cell(cell, place, store_history=is_last)
     for cell in notebook.cells:
         cell.metadata.pop("execution", None)
     notebook.metadata = {"language_info": {"name": "python"}}
