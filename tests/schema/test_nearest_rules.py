@@ -953,6 +953,17 @@ def test_each_host_has_its_own_clock(rules: duckdb.DuckDBPyConnection) -> None:
     ]
 
 
+def test_a_stretch_has_enough_messages_of_its_own_clock(rules: duckdb.DuckDBPyConnection) -> None:
+    """Those of other hosts say nothing of it: 36 messages are three stretches, 24 are two."""
+    periodic(rules, [10_000] * 36, MILLISECOND)
+    periodic(rules, [10_000] * 24, MILLISECOND, since=20_000, topic="/b", first=100)
+    rules.execute("UPDATE published SET clock_id = 2 WHERE topic_name = '/b'")
+    rows = rules.execute(
+        "SELECT DISTINCT clock_id, stretch_ns FROM derive.stamp_pair(1) ORDER BY 1"
+    ).fetchall()
+    assert rows == [(1, 1 + 35 * PERIOD // 3), (2, 1 + 23 * PERIOD // 2)]
+
+
 def test_a_topic_that_two_hosts_publish(rules: duckdb.DuckDBPyConnection) -> None:
     """The clock of the second one explains hardly anything: what may be its own has no source."""
     clock(rules, (0, 100, 0), (0, 100, 0))

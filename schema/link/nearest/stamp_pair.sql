@@ -47,7 +47,13 @@ extent AS (
             p.run_id, p.clock_id, min(p.written_ns) AS start_ns, max(p.written_ns) AS end_ns,
             any_value(m.message_count) AS message_count
         FROM published AS p
-        CROSS JOIN (SELECT count(DISTINCT source_timestamp_ns) AS message_count FROM message) AS m
+        JOIN (
+            SELECT p.clock_id, count(DISTINCT m.source_timestamp_ns) AS message_count
+            FROM message AS m
+            JOIN (SELECT DISTINCT clock_id, topic_name FROM published) AS p
+                ON m.topic_name = p.topic_name
+            GROUP BY p.clock_id
+        ) AS m ON p.clock_id = m.clock_id
         GROUP BY p.run_id, p.clock_id
     )
 ),
