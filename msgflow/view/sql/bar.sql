@@ -4,6 +4,7 @@
 --     threads to the kernel, states of managed nodes, and, without a length, events of the user's own tracepoints and messages that
 --     were not taken. Threads have their states as recorded, but
 --     for the time in which they are blocked: main.executor_activity would take far longer for a window.
+--     Those of executors without states (events executors) have their callbacks.
 -- grain: one row per bar
 -- kind: inline
 -- column: run_id BIGINT  Run
@@ -85,6 +86,14 @@ FROM main.executor_state AS s
 JOIN main.executor AS e ON s.executor_id = e.executor_id
 JOIN main.callback_instance AS i ON s.callback_instance_id = i.callback_instance_id
 WHERE s.state = 'execute' AND i.end_ns < s.end_ns
+UNION ALL
+SELECT
+    i.run_id, 8 * i.thread_id + 6, 7, i.callback_instance_id, i.start_ns,
+    coalesce(i.end_ns, i.start_ns), (2 * (i.end_ns IS NULL)::UTINYINT)::UTINYINT
+FROM main.callback_instance AS i
+WHERE i.depth = 1
+    AND i.thread_id IN (FROM main.executor_thread SELECT thread_id)
+    AND i.thread_id NOT IN (FROM main.executor_state SELECT thread_id)
 UNION ALL
 SELECT
     u.run_id, r.row_key, 8, coalesce(u.callback_instance_id, -1), u.at_ns, u.at_ns,
