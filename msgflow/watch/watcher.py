@@ -11,6 +11,7 @@ from msgflow.clocks import ClockSync
 from msgflow.errors import TraceError, UsageError
 from msgflow.ingest.repeated_in_memory import database_in_memory, ingest_again, link_again
 from msgflow.run.window import Window
+from msgflow.sql.interrupt import interruptible
 from msgflow.trace import Continuation
 from msgflow.watch.history import History
 from msgflow.watch.kept_chunk import read_chunk
@@ -133,13 +134,18 @@ class Watcher:
     ) -> WindowReport | None:
         """Close the next window, and return what it shows; None until there is one.
 
+        Ctrl-C interrupts the statement that runs.
+
         Args:
             newest_ns: the newest time that was recorded.
             is_live: the recording goes on at this moment.
             is_last: nothing more comes.
         """
         window = self.history.next_window(newest_ns, is_last=is_last)
-        return None if window is None else self._report(window, newest_ns, is_live=is_live)
+        if window is None:
+            return None
+        work = partial(self._report, window, newest_ns, is_live=is_live)
+        return interruptible(self._con, work)
 
     def keep_violation(self) -> None:
         """Keep the chunks of the last report if it has a violation, once it has been told."""

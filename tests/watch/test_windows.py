@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+import signal
+import threading
 import time
 from collections import Counter
 from collections.abc import Callable
@@ -11,6 +14,7 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import Mock
 
+import duckdb
 import pytest
 from thorough import few, thorough
 
@@ -20,6 +24,7 @@ from msgflow.database import Database
 from msgflow.errors import TraceError
 from msgflow.ingest import ingest
 from msgflow.links import LinksFile, read_links
+from msgflow.sql.interrupt import until_interrupted
 from msgflow.watch import Watcher, WindowReport, finished_chunks, watch_finished, watch_live
 from msgflow.watch import chunk as chunk_module
 from msgflow.watch import history as history_module
@@ -131,6 +136,23 @@ def simulated(tmp_path_factory: pytest.TempPathFactory) -> Path:
     rotations = tuple(SECOND // 2 * number for number in (1, 2, 3))
     simulate("two_hosts", directory, factor=0.2, recording=Recording(rotations=rotations))
     return directory
+
+
+def test_an_interrupt_ends_the_statement_of_a_step(
+    simulated: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It does not wait for the end of the step, nor for the next one."""
+
+    def slow(con: duckdb.DuckDBPyConnection, *_: object, **__: object) -> None:
+        threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
+        con.execute("SELECT sum(hash(i)) FROM range(9_000_000_000) AS numbers (i)").fetchall()
+
+    monkeypatch.setattr("msgflow.watch.watcher.ingest_again", slow)
+    begin = time.process_time()
+    with until_interrupted():
+        reports(simulated, window=0.5, step=0.5)
+        raise AssertionError
+    assert time.process_time() - begin < 5
 
 
 @pytest.mark.thorough
