@@ -457,7 +457,8 @@ class Database:
             **part: what to read, see `msgflow.Slice`; one run.
 
         Raises:
-            UsageError: not exactly one run, no such place or time, or no flow arrives there.
+            UsageError: not exactly one run, or no such place or time.
+            NoFlowError: no flow arrives there.
         """
         from msgflow.query.why import explain
         from msgflow.query.why_functions import with_functions

@@ -54,6 +54,10 @@ class UsageError(MsgflowError):
     exit_code = ExitCode.USAGE
 
 
+class NoFlowError(UsageError):
+    """Data arrive nowhere in what is read, so that there is nothing to explain."""
+
+
 class TraceError(MsgflowError):
     """A trace is missing, unreadable, or holds nothing that msgflow can use."""
 

@@ -112,6 +112,7 @@ def _more(found: Explanation, part: SliceWords, database: Path) -> Iterator[str]
     if (more := len(found.paths) - _PATHS) > 0:
         ends = ("--to", found.place) if found.place else ()
         paths = "1 more path" if more == 1 else f"{more} more paths"
+        part = part | {"start": found.start}
         yield f"{paths}: {_command(('query', 'e2e-latency', *ends), part, database)}"
 
 

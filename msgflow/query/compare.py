@@ -345,8 +345,12 @@ def _warm_up(compared: Comparison) -> float:
     """Return the seconds after which no run has the longest values of its start; 0 if none has."""
     table = compared.result.table
     ends = [*table.column("a_warm_up_ns").to_pylist(), *table.column("b_warm_up_ns").to_pylist()]
-    end = max((end for end in ends if end is not None), default=None)
-    return 0.0 if end is None else (end // _STEP_NS + 1) * _STEP_NS / 1e9
+    return warm_up_seconds(max((end for end in ends if end is not None), default=None))
+
+
+def warm_up_seconds(last_ns: int | None) -> float:
+    """Return what leaves out a warm-up whose last long value lies so long after the start."""
+    return 0.0 if last_ns is None else (last_ns // _STEP_NS + 1) * _STEP_NS / 1e9
 
 
 def _slow_starts(compared: Comparison) -> Iterable[str]:

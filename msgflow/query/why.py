@@ -5,10 +5,14 @@ from __future__ import annotations
 import shlex
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from msgflow.errors import UsageError
+import duckdb
+
+from msgflow.errors import NoFlowError
 from msgflow.query.catalogue import load_query
+from msgflow.query.compare import warm_up_seconds
 from msgflow.query.path_numbers import only_path, with_path_numbers
 from msgflow.query.runner import run_query
 from msgflow.query.steps import Steps
@@ -66,6 +70,7 @@ class Explanation:
 
     Attributes:
         run: what was read.
+        start: begin of what was read, as of `msgflow.Slice`; as a rule a warm-up is left out.
         place: the topic or node at which flows end; None: wherever they end.
         verdict: a sentence for each culprit, the worst first; before them what is wrong with the
             recording, or the system. `who` and `kinds` say who does what.
@@ -80,6 +85,7 @@ class Explanation:
     """
 
     run: Run
+    start: str | int | None
     place: str | None
     verdict: QueryResult
     paths: QueryResult
@@ -112,33 +118,44 @@ def explain(
         place: a topic or node, or a glob; wherever flows end when None.
 
     Raises:
-        UsageError: there is no such place, or no flow arrives there.
+        UsageError: there is no such place or time.
+        NoFlowError: no flow arrives there.
     """
     with Steps(connection) as steps:
 
-        def ask(name: str, **given: Value) -> QueryResult:
-            result = run_query(connection, load_query(name), given, times, steps=steps, runs=(run,))
+        def ask(name: str, part: Slice, **given: Value) -> QueryResult:
+            result = run_query(connection, load_query(name), given, part, steps=steps, runs=(run,))
             # Only its paths have to be told apart.
             return with_path_numbers(connection, result) if name == "e2e-latency" else result
 
-        values = {"runs": [run.run_id], **times.window([run]).bindings}
-        return _explained(connection, ask, run, values, place)
+        return _explained(connection, ask, run, times, place)
 
 
 def _explained(
     connection: duckdb.DuckDBPyConnection,
-    ask: Ask,
+    ask_of: Ask,
     run: Run,
-    values: dict[str, Any],
+    asked: Slice,
     place: str | None,
 ) -> Explanation:
     ends = {} if place is None else {"to": place}
-    paths = ask("e2e-latency", **ends)
-    if not any(row["pairs"] for row in paths.table.to_pylist()):
-        raise _nothing(ask, place)
+    paths = ask_of("e2e-latency", asked, **ends)
+    if not _has_flows(paths):
+        raise _nothing(partial(ask_of, part=asked), place)
+    skipped = _warm_up(connection, run) if asked.start is None else 0.0
+    times = asked
+    if skipped:
+        later = replace(asked, start=f"{skipped:g}s")
+        warm = ask_of("e2e-latency", later, **ends)
+        # A recording may be shorter than the steps in which it is left out.
+        times, paths, skipped = (later, warm, skipped) if _has_flows(warm) else (asked, paths, 0.0)
+    ask = partial(ask_of, part=times)
+    values = {"runs": [run.run_id], **times.window([run]).bindings}
+    values["asked_ns"] = asked.window([run]).start_ns
     parts = ask("path-breakdown", **ends)
     waits = ask("waits-pair")
-    losses = ask("topics-delivery")
+    # What is lost while a system warms up is lost.
+    losses = ask_of("topics-delivery", asked)
     shown = paths.table["path"].to_pylist()
     verdict = _verdict(
         connection,
@@ -172,6 +189,7 @@ def _explained(
     paths = _worst_first(paths, path)
     return Explanation(
         run=run,
+        start=times.start,
         place=place,
         verdict=replace(paths, table=verdict, header=None, notes=[], path_numbers={}),
         paths=paths,
@@ -179,11 +197,12 @@ def _explained(
         slow_flow=_longest(connection, flow),
         waits=waits.first(_WAITS),
         losses=losses,
-        steps=tuple(dict.fromkeys(_steps(places, ends_here, pieces, losses))),
+        steps=tuple(dict.fromkeys(_steps(places, ends_here, pieces, losses, skipped))),
         notes=tuple(
             dict.fromkeys(
                 [
                     *_cures(verdict),
+                    *_without(skipped),
                     *ends_here,
                     *_outlier(run, paths.table.to_pylist()[0]),
                     *paths.notes,
@@ -227,6 +246,25 @@ def _cures(verdict: pa.Table) -> Iterator[str]:
             yield cure
 
 
+def _has_flows(paths: QueryResult) -> bool:
+    return any(row["pairs"] for row in paths.table.to_pylist())
+
+
+def _warm_up(connection: duckdb.DuckDBPyConnection, run: Run) -> float:
+    """Return for how many seconds the flows that were read warm up, as `compare` finds it."""
+    ((last_ns,),) = internal_sql().run(connection, "warm_up", {}).fetchall()
+    return warm_up_seconds(None if last_ns is None else last_ns - (run.start_ns or 0))
+
+
+def _without(skipped: float) -> Iterator[str]:
+    """Yield that a warm-up is left out."""
+    if skipped:
+        yield (
+            f"without the first {skipped:g} s, a warm-up: the longest latencies lie there"
+            " (--start 0s reads them, too)"
+        )
+
+
 def _outlier(run: Run, path: dict[str, Any]) -> Iterator[str]:
     """Yield when the slowest flow of a path began, if nearly all others took far less."""
     if path["max_ns"] > 2 * path["p95_ns"]:
@@ -237,7 +275,7 @@ def _outlier(run: Run, path: dict[str, Any]) -> Iterator[str]:
         )
 
 
-def _nothing(ask: Ask, place: str | None) -> UsageError:
+def _nothing(ask: Ask, place: str | None) -> NoFlowError:
     """Return what to say where no flow ends at a place: flows may begin there or pass."""
     if place is None:
         message = "no flow arrives at the end of a path"
@@ -246,13 +284,13 @@ def _nothing(ask: Ask, place: str | None) -> UsageError:
         for row in ask("e2e-latency").table.to_pylist()
         for step in row["path"].split(" → ")
     ):
-        return UsageError(
+        return NoFlowError(
             f"flows begin there or pass, none ends — {place}",
             shlex.join(["msgflow", "query", "e2e-latency", "--via", place]),
         )
     else:
         message = f"no flow arrives — {place}"
-    return UsageError(message, "msgflow check says where flows break off")
+    return NoFlowError(message, "msgflow check says where flows break off")
 
 
 def _ending(dead_ends: Sequence[tuple[str, str]], paths: Sequence[str]) -> Iterator[str]:
@@ -305,25 +343,27 @@ def _steps(
     dead_ends: Sequence[str],
     pieces: Sequence[dict[str, Any]],
     losses: QueryResult,
+    skipped: float,
 ) -> Iterator[tuple[str, ...]]:
     """Yield the commands that show more: of the longest piece, the flow, and lost messages.
 
     First comes what the path lacks: links, or names of topics.
     """
+    since = ("--start", f"{skipped:g}s") if skipped else ()
     if dead_ends or _UNNAMED in places:
         yield _LINKS
     longest = max(pieces, key=lambda row: row["duration_ns"])
     if of_state := _BY_STATE.get(longest["state"] or ""):
-        yield ("query", "scheduling", "--measure", of_state)
+        yield ("query", "scheduling", "--measure", of_state, *since)
     # What the trace has no name for cannot be asked for.
     elif (
         longest["node"] is not None
         and (of_node := _BY_NODE.get(longest["activity"]))
         and (longest["callback_instance_id"] is not None or of_node[0] not in _OF_CALLBACKS)
     ):
-        yield ("query", *of_node, "--node", longest["node"])
+        yield ("query", *of_node, "--node", longest["node"], *since)
     elif (of_topic := _BY_TOPIC.get(longest["activity"])) and longest["what"] not in _NO_NAMES:
-        yield ("query", *of_topic, "--topic", longest["what"])
+        yield ("query", *of_topic, "--topic", longest["what"], *since)
     yield ("flow", "--take", str(pieces[0]["take_id"]), "--why")
     if len(losses):
         topics = set(losses.table["topic_name"].to_pylist())

@@ -26,7 +26,7 @@ def with_functions(
     if slowest is None or not connection.execute(_SAMPLED, [run_id]).fetchall():
         return found
     asked = {"run_id": run_id, "node": slowest["node"], "callback": slowest["what"]}
-    asked |= times.window([found.run]).bindings
+    asked |= replace(times, start=found.start).window([found.run]).bindings
     rows = internal_sql().run(connection, "callback_function", asked).fetchall()
     if not rows:
         return found

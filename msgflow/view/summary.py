@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import pyarrow as pa
 
-from msgflow.errors import UsageError
+from msgflow.errors import NoFlowError, UsageError
 from msgflow.files.default_files import DEFAULT_PATHS
 from msgflow.query.catalogue import load_query
 from msgflow.query.runner import run_query
@@ -156,8 +156,7 @@ def why_section(connection: duckdb.DuckDBPyConnection, run: Run, part: Part) -> 
     command = shlex.join(["msgflow", "why", *part.options, "--run", run.name])
     try:
         return Section("why", explain(connection, run, part.slice).verdict, (command,))
-    # No flow arrives.
-    except UsageError:
+    except NoFlowError:
         return Section("why", QueryResult(pa.table({"sentence": pa.array([], pa.string())})), ())
 
 

@@ -216,21 +216,10 @@ centred AS MATERIALIZED (
     JOIN measured AS m ON s.side = m.side AND s.subject = m.subject
     WHERE s.value_ns IS NOT NULL AND m.number >= 20
 ),
--- By chance, three values are the longest and all of the first quarter in 1 of 64 cases.
 warm_up AS (
-    SELECT e.side, e.subject, max(e.at_ns) - any_value(s.start_ns) + skip_ns AS warm_up_ns
-    FROM centred AS e
-    JOIN (
-        SELECT side, subject, max(value_ns) AS longest_ns
-        FROM centred
-        WHERE 4 * position >= number
-        GROUP BY side, subject
-    ) AS later
-        ON e.side = later.side AND e.subject = later.subject
-    JOIN side AS s ON e.side = s.side
-    WHERE 4 * e.position < e.number AND e.value_ns > later.longest_ns
-    GROUP BY e.side, e.subject
-    HAVING count(*) >= 3
+    SELECT w.side, w.subject, w.last_ns - s.start_ns + skip_ns AS warm_up_ns
+    FROM derive.warm_up('centred') AS w
+    JOIN side AS s ON w.side = s.side
 ),
 block AS (
     FROM derive.block_length('centred')

@@ -4,7 +4,9 @@
 --     That costs CPU time, which callbacks may lack, and most of the events of the trace are about
 --     it. Nothing is wrong with the recording.
 -- cause: While a callback of a mutually exclusive group runs, other callbacks of the group that are
---     ready wake the MultiThreadedExecutor of rclcpp again and again, and it may not run them.
+--     ready wake the MultiThreadedExecutor of rclcpp again and again, and it may not run them. That
+--     of rclpy looks again and again until a thread of its pool begins a callback, and can keep
+--     that thread from running Python for hundreds of milliseconds.
 -- cure: Give callbacks that may run at once groups of their own or a reentrant group, or the nodes
 --     single-threaded executors. Where the events of looking for work fill the buffers, leave them
 --     out: msgflow record --without rclcpp_executor_wait_for_work,rclcpp_executor_get_next_ready

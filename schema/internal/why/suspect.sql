@@ -7,6 +7,7 @@
 -- param: runs BIGINT[]  Runs to look at
 -- param: start_ns BIGINT  Begin of the time window, epoch ns
 -- param: end_ns BIGINT  Its end, exclusive
+-- param: asked_ns BIGINT  Begin of what was asked for: with the warm-up, which start_ns leaves out
 -- column: kind VARCHAR  'callback', 'executor', 'cpu', 'service', 'queue', 'lost', 'late_start',
 --     'stale' or 'way'
 -- column: who VARCHAR  The culprit: a node, or a thread without ROS
@@ -107,7 +108,7 @@ flowing AS (
     JOIN main.stat_delivery AS d ON f.subscription_id = d.subscription_id
     JOIN main.publication AS b ON d.publication_id = b.publication_id
     WHERE d.status IN ('delivered', 'dropped', 'lost')
-        AND b.start_ns >= $start_ns AND b.start_ns < $end_ns
+        AND b.start_ns >= $asked_ns AND b.start_ns < $end_ns
     GROUP BY f.subscription_id
 ),
 failed AS (
@@ -147,7 +148,7 @@ late AS (
         ON c.full_name = d.subscriber
     -- A robot starts within seconds; of a long recording a short begin does not matter.
     WHERE c.created_ns - c.usual_ns > greatest(2_000_000_000, 0.02 * c.length_ns)
-        AND c.created_ns >= $start_ns AND c.created_ns < $end_ns
+        AND c.created_ns >= $asked_ns AND c.created_ns < $end_ns
 ),
 sampled AS (
     SELECT
@@ -168,6 +169,17 @@ sampled AS (
     JOIN why_callback AS c
         ON n.full_name = c.node AND c.label = 'Subscription(' || d.topic_name || ')'
     WHERE d.is_likely
+),
+-- Executors of several threads that look for work again and again.
+awake AS (
+    SELECT n.full_name AS node, any_value(f.detail) AS detail
+    FROM main.finding AS f
+    JOIN main.process AS p
+        ON f.run_id = p.run_id
+        AND starts_with(f.subject, printf('%s %d on ', coalesce(p.name, '?'), p.pid))
+    JOIN main.node AS n ON p.process_id = n.process_id
+    WHERE f.name = 'busy_waiting' AND list_contains($runs, f.run_id)
+    GROUP BY n.full_name
 ),
 moving AS (
     SELECT
@@ -288,17 +300,23 @@ SELECT
 FROM sampled
 UNION ALL
 SELECT
-    'way', coalesce(node, 'between nodes'), topic, path, cost_ns,
-    cost_ns >= 20_000_000 AND cost_ns >= 0.1 * path_ns,
+    CASE WHEN a.detail IS NULL THEN 'way' ELSE 'executor' END,
+    coalesce(m.node, 'between nodes'), m.topic, m.path, m.cost_ns,
+    m.cost_ns >= 20_000_000 AND m.cost_ns >= 0.1 * m.path_ns,
     printf(
         CASE
-            WHEN NOT is_traced
+            WHEN a.detail IS NOT NULL
+                THEN 'messages on %s wait for %s of %s, while its executor looks for work again and'
+                || ' again: '
+            WHEN NOT m.is_traced
                 THEN 'messages on %s are on the way, or wait in its queue, for %s of %s (not known'
                 || ' without its callbacks)'
-            WHEN has_kernel THEN 'messages on %s are on the way for %s of %s'
+            WHEN m.has_kernel THEN 'messages on %s are on the way for %s of %s'
             ELSE 'messages on %s are on the way, or its thread has no CPU, for %s of %s (not known'
                 || ' without a kernel trace)'
         END,
-        topic, main.duration_text(cost_ns), main.duration_text(path_ns)
+        m.topic, main.duration_text(m.cost_ns), main.duration_text(m.path_ns)
     )
-FROM moving
+    || coalesce(a.detail || ' (msgflow check)', '')
+FROM moving AS m
+LEFT JOIN awake AS a ON m.node = a.node
