@@ -15,7 +15,7 @@ from msgflow.query.clock_notes import clock_notes
 from msgflow.query.doubt_notes import AMBIGUOUS, doubt_notes
 from msgflow.query.names import require_places
 from msgflow.query.runner import bind
-from msgflow.query.schedule_notes import schedule_notes
+from msgflow.query.schedule_notes import function_notes, schedule_notes
 from msgflow.query.selection import CUT_COLUMN
 from msgflow.result.query_result import QueryResult
 from msgflow.run.choice import Run, choose_one, read_runs
@@ -333,6 +333,7 @@ def _compared(
     result = QueryResult(table, _header(), (first, second))
     if is_strict:
         result.notes.extend(_one_sided(result, what, first, second))
+        result.notes.extend(function_notes(connection, asked))
     if what == "callbacks":
         result.notes.extend(schedule_notes(connection, asked, result))
     result.notes.extend(_doubts(connection, result, what, first, second))

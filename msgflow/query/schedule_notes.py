@@ -1,4 +1,4 @@
-"""Notes of a comparison of callbacks: did they compute longer, or wait longer for a CPU?"""
+"""Notes of a comparison: did callbacks compute longer, in which functions, or wait for a CPU?"""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from msgflow.sql.value import Value
 
 _MOST = 3
+_SAMPLED = "SELECT count(DISTINCT run_id) FROM main.stack_sample WHERE run_id IN ($run_a, $run_b)"
 _ASKED = ("run_a", "run_b", "skip_first", "a_window", "b_window")
 _PARTS = {
     "running_ns": "CPU time",
@@ -36,6 +37,24 @@ def schedule_notes(
     found = internal_sql().run(connection, "callback_time", {**given, "subjects": sorted(changed)})
     for row in found.to_arrow_table().to_pylist()[:_MOST]:
         yield f"{row['subject']}, on average {_change(row, 'duration_ns')}: {_parts(row)}"
+
+
+def function_notes(
+    connection: duckdb.DuckDBPyConnection, asked: Mapping[str, Value]
+) -> Iterator[str]:
+    """Yield a sentence for each of the functions that changed most, where both runs have samples."""
+    runs = {name: asked[name] for name in ("run_a", "run_b")}
+    ((sampled,),) = connection.execute(_SAMPLED, runs).fetchall()
+    if sampled < len({*runs.values()}):
+        return
+    given = {name: asked[name] for name in (*_ASKED, "at_least")}
+    found = internal_sql().run(connection, "changed_function", given).to_arrow_table()
+    for row in found.to_pylist()[:_MOST]:
+        a, b = (format_duration(row[name]) for name in ("a_ns", "b_ns"))
+        yield (
+            f"{row['node']} · {row['callback']}: CPU time per call in {row['function']} {a} → {b}"
+            f" ({row['a_samples']:,} and {row['b_samples']:,} samples)"
+        )
 
 
 def _parts(row: Mapping[str, Any]) -> str:

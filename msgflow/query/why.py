@@ -8,8 +8,6 @@ from fnmatch import fnmatchcase
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-import duckdb
-
 from msgflow.errors import NoFlowError
 from msgflow.query.catalogue import load_query
 from msgflow.query.compare import warm_up_seconds

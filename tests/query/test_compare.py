@@ -352,6 +352,28 @@ def test_longer_callbacks_computed_or_waited(fresh_database: Path, waited: str, 
     assert told[0].endswith(said)
 
 
+def test_functions_that_computed_longer_are_named(fresh_database: Path) -> None:
+    """Only where both runs have samples."""
+    _fill(fresh_database, shift_ns=0, callbacks=1)
+    told = []
+    for run_id, samples in ((1, 1), (2, 40)):
+        with duckdb.connect(str(fresh_database)) as connection:
+            connection.execute(
+                f"INSERT INTO store.stack_frame VALUES ({run_id}, {run_id}, 'hog', '/lib/hog.so');"
+                f"INSERT INTO store.stack VALUES ({run_id}, {run_id}, {run_id}, 1);"
+                "INSERT INTO store.stack_sample BY NAME SELECT run_id, process_id, 1 AS tid,"
+                " start_ns AS at_ns, callback_instance_id, run_id AS stack_id, 10**6 AS cpu_ns"
+                f" FROM store.callback_instance, range({samples}) WHERE run_id = {run_id}"
+            )
+        with msgflow.open_db(fresh_database) as database:
+            notes = database.compare("before", "after", what="callbacks").result.notes
+        told.append([note for note in notes if "hog" in note])
+    (note,) = told.pop()
+    assert note.startswith("/n · ")
+    assert "CPU time per call in hog 1.000 ms → 40.000 ms" in note
+    assert told == [[]]
+
+
 def test_lost_events_are_told(fresh_database: Path) -> None:
     _fill(fresh_database, shift_ns=0, callbacks=2)
     with duckdb.connect(str(fresh_database)) as connection:

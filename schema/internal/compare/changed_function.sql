@@ -1,0 +1,73 @@
+-- name: internal.changed_function
+-- title: Functions whose CPU time changed
+-- description: In which functions a callback was more or less CPU time per call than in another
+--     run, what they call not counted. Only callbacks that samples of perf saw in both, and
+--     differences beyond what is chance in so few samples (three standard deviations).
+-- grain: one row per callback and function, the greatest difference first
+-- param: run_a BIGINT  Run that the other one is compared with
+-- param: run_b BIGINT  The other one
+-- param: at_least DOUBLE  Smallest difference that counts as one, as a share of A
+-- param: skip_first DOUBLE = 0.0  Skip the first seconds of each run
+-- param: a_window BIGINT[] = NULL  Begin and end of a time window of run A, epoch ns
+-- param: b_window BIGINT[] = NULL  The same for run B
+-- column: node VARCHAR [node]  Node of the callback
+-- column: callback VARCHAR [callback]  What triggers it
+-- column: function VARCHAR  The function
+-- column: a_ns BIGINT [ns]  CPU time in it, for each instance of the callback in run A
+-- column: b_ns BIGINT [ns]  The same in run B
+-- column: a_samples BIGINT  Samples of it in run A
+-- column: b_samples BIGINT  Samples of it in run B
+WITH instance AS (
+    SELECT w.side = 'a' AS is_a, l.node, l.label, i.callback_instance_id
+    FROM main.callback_instance AS i
+    JOIN main.callback_label AS l ON i.callback_id = l.callback_id
+    JOIN main.run AS r ON i.run_id = r.run_id
+    JOIN (
+        VALUES ('a', $run_a, $a_window::BIGINT[]), ('b', $run_b, $b_window::BIGINT[])
+    ) AS w (side, run_id, time_window)
+        ON i.run_id = w.run_id
+    WHERE i.start_ns >= greatest(w.time_window[1], r.start_ns) + $skip_first * 1e9
+        AND i.start_ns < coalesce(w.time_window[2], 9223372036854775807)
+),
+sample AS (
+    SELECT i.is_a, i.node, i.label, f.function, s.cpu_ns
+    FROM instance AS i
+    JOIN main.stack_sample AS s ON i.callback_instance_id = s.callback_instance_id
+    JOIN main.stack AS k ON s.stack_id = k.stack_id
+    JOIN main.stack_frame AS f ON k.stack_frame_id = f.stack_frame_id
+),
+call AS (
+    SELECT
+        node, label,
+        count(*) FILTER (WHERE is_a) AS a_calls,
+        count(*) FILTER (WHERE NOT is_a) AS b_calls
+    FROM instance
+    WHERE (node, label) IN (
+        SELECT (node, label) FROM sample GROUP BY node, label HAVING count(DISTINCT is_a) = 2
+    )
+    GROUP BY node, label
+),
+compared AS (
+    SELECT
+        c.node,
+        c.label,
+        s.function,
+        coalesce(sum(s.cpu_ns) FILTER (WHERE s.is_a), 0) / any_value(c.a_calls) AS a_ns,
+        coalesce(sum(s.cpu_ns) FILTER (WHERE NOT s.is_a), 0) / any_value(c.b_calls) AS b_ns,
+        count(*) FILTER (WHERE s.is_a) AS a_samples,
+        count(*) FILTER (WHERE NOT s.is_a) AS b_samples,
+        -- The number of samples in a function varies by its square root.
+        3 * sqrt(
+            a_samples * pow(avg(s.cpu_ns) / any_value(c.a_calls), 2)
+            + b_samples * pow(avg(s.cpu_ns) / any_value(c.b_calls), 2)
+        ) AS chance_ns
+    FROM call AS c
+    JOIN sample AS s ON c.node = s.node AND c.label = s.label
+    GROUP BY c.node, c.label, s.function
+)
+SELECT
+    node, label AS callback, function, round(a_ns)::BIGINT AS a_ns, round(b_ns)::BIGINT AS b_ns,
+    a_samples, b_samples
+FROM compared
+WHERE abs(b_ns - a_ns) > greatest(chance_ns, $at_least * a_ns)
+ORDER BY abs(b_ns - a_ns) DESC, node, callback, function
