@@ -68,6 +68,21 @@ def test_the_demo_is_that_of_the_readme_and_what_it_suggests_answers(tmp_path: P
         assert "note: no rows" not in answer
 
 
+@pytest.mark.thorough
+def test_commands_of_the_gallery_run(tmp_path: Path) -> None:
+    blocks = re.findall(r"```sh\n(.*?)```", (DOCS / "gallery.md").read_text("utf-8"), re.DOTALL)
+    assert len(blocks) == 6
+    for number, block in enumerate(blocks):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        (folder / "examples").symlink_to(DOCS.parent / "examples")
+        # The browser stays closed, and Graphviz may not be here.
+        lines = [line for line in block.splitlines() if not line.startswith("msgflow ui")]
+        commands = "".join(f"{line.partition(' |')[0]}\n" for line in lines)
+        answer = script().run(f"set -e\n{commands}echo good", folder)
+        assert answer.endswith("good\n"), answer
+
+
 def test_snippets_of_the_readme_run(small_database: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     text = (DOCS.parent / "README.md").read_text("utf-8")
     (snippet,) = re.findall(r"```python\n(import duckdb\n.*?)```", text, re.DOTALL)
