@@ -217,13 +217,16 @@ def trust() -> str:
     found = [header for phase in ("input", "recording") for header in kinds_of(phase)]
     for severity, title in _SEVERITIES.items():
         parts.append(f"\n### {title}\n\n")
-        # What is only worth knowing needs no cure.
-        parts += [
-            f"- `{short_name(header)}`: {header.title}."
-            f"{'' if severity == 'info' else f' {header.cure}'}\n"
-            for header in found
-            if header.severity == severity
-        ]
+        chosen = [header for header in found if header.severity == severity]
+        # What is only worth knowing needs no cure; what has the same cure stands together.
+        cures = ["" if severity == "info" else header.cure for header in chosen]
+        for cure in dict.fromkeys(cures):
+            named = [
+                f"`{short_name(header)}`: {header.title}."
+                for header, own in zip(chosen, cures, strict=True)
+                if own == cure
+            ]
+            parts += [f"- {' '.join(named)} {cure}\n"] if cure else [f"- {x}\n" for x in named]
     parts.append("\n### Rules that every database keeps: report a broken one\n\n")
     parts += [f"- `{short_name(header)}`: {header.title}.\n" for header in kinds_of("database")]
     return "".join(parts)
