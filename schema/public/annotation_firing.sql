@@ -1,8 +1,8 @@
 -- name: main.annotation_firing
 -- description: Publications that annotations explain. One is complete if every input has a message:
---     either an indirect link comes from it, or the publishing callback instance was called with
---     it. For partial_sync and approximate_sync: only publications from callback instances of
---     inputs. All publications of one such instance are one firing.
+--     an indirect link comes from it, or the publishing callback instance was called with it. For
+--     partial_sync and approximate_sync: only publications from callback instances of inputs; all
+--     of one instance are one firing.
 -- grain: one row per annotation and publication that it applies to
 -- column: run_id BIGINT  Run that the row belongs to
 -- column: annotation_id BIGINT  The annotation

@@ -39,19 +39,19 @@
 -- column: position BIGINT  Order within the flow, from 1
 -- column: part VARCHAR  Part of the flow, as in main.end_to_end_part
 -- column: activity VARCHAR  What happened: the part itself; up to a take 'network_or_idle',
---     'executor_busy' (it ran something else), 'all_threads_busy' (none of its threads was free),
---     'blocked' (a callback ran that excludes the waiting one) or 'undecided' (nothing shows when
---     the message arrived); in a cache 'timer' (not due yet), 'unpublished' (the message that was
---     waited for had not been published), or a part of that message's own flow
+--     'executor_busy' (it ran something else), 'all_threads_busy', 'blocked' (a callback ran that
+--     excludes the waiting one) or 'undecided' (nothing shows when the message arrived); in a cache
+--     'timer' (not due yet), 'unpublished' (the message that was waited for), or a part of that
+--     message's own flow
 -- column: from_ns BIGINT [epoch ns]  Begin
 -- column: to_ns BIGINT [epoch ns]  End
 -- column: duration_ns BIGINT [ns]  to_ns - from_ns
 -- column: is_certain BOOLEAN  For 'executor_busy', 'all_threads_busy' and 'blocked': what waited
---     was ready by then; false: it may have arrived during this piece. NULL for others
+--     was ready by then; false: it may have arrived meanwhile. NULL for others
 -- column: callback_instance_id BIGINT  Callback instance that it is, or that it waits for
 -- column: publication_id BIGINT  Message that is published, under way or waited for
--- column: state VARCHAR  State of the thread, as in main.schedule_piece: of the one that ran the
---     callback or published, or that waited. NULL: not traced by the kernel, or no thread's doing
+-- column: state VARCHAR  State of the thread, as in main.schedule_piece; NULL: not traced by the
+--     kernel, or no thread's doing
 -- column: wakers BIGINT  How many wakers lead to the thread: 0 for the one that the piece is of
 -- column: state_thread_id BIGINT  The thread in that state
 -- column: priority INTEGER  Its priority, as the kernel has it: 0 to 99 real-time, 100 to 139 nice

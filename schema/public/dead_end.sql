@@ -28,7 +28,7 @@
 -- column: publishing_run_ns BIGINT [ns]  Median run of the callbacks that published
 -- column: is_loop BOOLEAN  The messages descend from what the node publishes
 -- column: is_queue BOOLEAN  Outside of callbacks as much was published as messages came, each after
---     the message of its number: a queue fits (first in, first out)
+--     the message of its number
 -- column: is_likely BOOLEAN  Nothing speaks against a link
 CREATE OR REPLACE MACRO main.dead_end(runs) AS TABLE
 -- Logging is no effect.

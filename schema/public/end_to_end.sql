@@ -39,9 +39,8 @@
 --     'dropped', 'lost' or 'not_connected', as in main.stat_delivery; 'no_output' (the node did not
 --     publish); 'cut_by_recording' (too close to its start or end to know) or 'unknown'
 -- column: reason VARCHAR  Why it did not arrive: 'no_output' (a callback ended without any),
---     'node_inactive' (a managed node), 'not_published' (one or the other cannot be known),
---     'superseded', 'callback_not_finished', or a reason of main.stat_delivery for the message that
---     stopped it
+--     'node_inactive' (a managed node), 'not_published' (one or the other), 'superseded',
+--     'callback_not_finished', or the reason of main.stat_delivery
 -- column: is_first BOOLEAN  First arrival of the root; NULL: it did not arrive
 -- column: is_last BOOLEAN  Last arrival of the root; NULL: it did not arrive
 -- column: is_newest BOOLEAN  Newest root of the arrival; NULL: it did not arrive

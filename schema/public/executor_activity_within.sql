@@ -1,8 +1,8 @@
 -- name: main.executor_activity_within
 -- kind: macro
--- description: The rows of main.executor_activity that reach into a time window. To ask for a short
---     one takes far less time than to select its rows from all. What began before, and has no end
---     since a gap follows, is among them only if the gap ends in the window or later.
+-- description: The rows of main.executor_activity that reach into a time window, far sooner than
+--     selected from all. What began before, and has no end since a gap follows, is among them only
+--     if the gap ends in the window or later.
 -- grain: one row per interval of a thread in which nothing changed
 -- param: runs BIGINT[]  Runs to look at; NULL: all
 -- param: window_start_ns BIGINT  Begin of the window, epoch ns; NULL: from the first event

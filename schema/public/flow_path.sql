@@ -22,8 +22,8 @@
 -- column: publishers BIGINT[]  Publishers in order; below 0: not traced
 -- column: subscriptions BIGINT[]  Subscriptions in order
 -- column: topics VARCHAR[]  Topics in order
--- column: routes BIGINT[][]  For each topic, empty where no service led to it: the calling node
---     (negative: its process; 0: not known), then the services in order (0: not known)
+-- column: routes BIGINT[][]  For each topic the calling node (negative: its process; 0: not known),
+--     then the services in order (0: not known); empty: no service led to it
 -- column: path VARCHAR  Nodes and topics in order, services in brackets, for people
 -- column: publisher_id BIGINT  Last publisher; below 0: not traced
 -- column: subscription_id BIGINT  Last subscription

@@ -1,8 +1,8 @@
 -- name: main.flow_step
 -- kind: macro
 -- description: The picture of one message: what a publication, take, callback instance, request or
---     response caused, what it was caused by, or both, with times, names, and what is missing where
---     a branch ends. If a limit cuts the flow, the vertices nearest to the start are kept.
+--     response caused, what it was caused by, or both, with times, names, and what is missing. If a
+--     limit cuts the flow, the vertices nearest to the start are kept.
 -- grain: one row per vertex of the flow and link that leads to it (one without link where nothing
 --     does), and one per subscription that did not get a message
 -- param: start_kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or 'response'

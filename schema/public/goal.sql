@@ -16,35 +16,34 @@
 --     from then on it may execute it
 -- column: answer_taken_ns BIGINT [epoch ns]  The client took that answer
 -- column: is_accepted BOOLEAN  Whether the server accepted it: it published its status right after
---     its answer, or the client asked for the result, which near a gap may be that of another goal;
---     NULL: not known
+--     its answer, or the client asked for the result; NULL: not known
 -- column: result_asked_ns BIGINT [epoch ns]  The client asked for the result
 -- column: result_sent_ns BIGINT [epoch ns]  The server sent the result: when there was one, and
 --     the client had asked
 -- column: result_taken_ns BIGINT [epoch ns]  The client took the result
 -- column: result_request_id BIGINT  Request for the result
--- column: result_candidate_count BIGINT  0: nobody asked for the result; 1: its request is known;
---     2 or more: so many goals compete for the request, and the columns of the result are NULL;
---     NULL: not accepted, or the client got no answer
+-- column: result_candidate_count BIGINT  0: nobody asked for the result; 1: its request is known; 2
+--     or more: so many goals compete for it, and the columns of the result are NULL; NULL: not
+--     accepted, or no answer
 -- column: feedback_count BIGINT  Feedback messages published while the server was concerned with
 --     no other goal; NULL: the trace shows no such time
 -- column: first_feedback_ns BIGINT [epoch ns]  The first of them; NULL: none, or another goal was
 --     open meanwhile
 -- column: last_feedback_ns BIGINT [epoch ns]  The last of them, likewise
--- column: is_overlapping BOOLEAN  The server was concerned with another goal for a part of the
---     time: some feedback and requests to cancel may not be known
+-- column: is_overlapping BOOLEAN  The server had another goal meanwhile: some feedback and requests
+--     to cancel may not be known
 -- column: cancel_asked_ns BIGINT [epoch ns]  A client asked to cancel it, and the server accepted
 --     that
 -- column: cancel_accepted_ns BIGINT [epoch ns]  The server published that it cancels it
 -- column: accept_latency_ns BIGINT [ns]  From sending it to the take of the answer, on the client's
 --     clock
 -- column: execution_ns BIGINT [ns]  From the answer to the sending of the result, on the server's
---     clock; clients that ask late make it longer
+--     clock
 -- column: first_feedback_latency_ns BIGINT [ns]  From the answer to the first feedback, on the
 --     server's clock
 -- column: latency_ns BIGINT [ns]  From sending it to the take of its result, on the client's clock
--- column: is_loss_affected BOOLEAN  A gap of the client's host or the server's lies between the
---     first and the last of these moments: what is missing may have happened
+-- column: is_loss_affected BOOLEAN  A gap of the client's host or the server's lies between these
+--     moments
 WITH endpoint AS MATERIALIZED (FROM derive.action_endpoint),
 server AS MATERIALIZED (
     SELECT

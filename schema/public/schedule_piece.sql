@@ -14,8 +14,8 @@
 -- column: to_ns BIGINT [epoch ns]  End
 -- column: wakers BIGINT  How many wakers lead to the thread: 0 for that of the interval
 -- column: thread_id BIGINT  The thread that did it
--- column: state VARCHAR  Its state, as in main.thread_state; 'unknown' also where the kernel trace
---     does not cover it. NULL: nothing is known of the thread
+-- column: state VARCHAR  Its state, as in main.thread_state; 'unknown' also where the trace does
+--     not cover it. NULL: nothing is known of the thread
 -- column: priority INTEGER  Its priority, as the kernel has it
 -- column: by_kind VARCHAR  What took the CPU, or ended the sleep: 'thread', or 'timer', 'interrupt'
 --     or 'softirq'. NULL: not known, or the state needs none

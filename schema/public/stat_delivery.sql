@@ -9,10 +9,9 @@
 -- column: publisher_id BIGINT  Its publisher
 -- column: subscription_id BIGINT  Subscription that should have taken it
 -- column: take_id BIGINT  Take of the message; NULL: it was not taken, or that is not known
--- column: status VARCHAR  'delivered', 'dropped' (the queue was full: newer messages took its
---     place), 'lost' (between two that arrived), 'not_connected' (the two were not connected yet,
---     not any more, or never, as far as traced), 'cut_by_recording' (the recording ended before it
---     could be taken) or 'unknown' (the trace does not tell)
+-- column: status VARCHAR  'delivered', 'dropped' (the queue was full), 'lost' (between two that
+--     arrived), 'not_connected' (not yet, not any more, or never), 'cut_by_recording' (it ended
+--     before it could be taken) or 'unknown' (the trace does not tell)
 -- column: reason VARCHAR  Why it was not taken: 'before_subscription', 'subscription_ended',
 --     'reader_in_callback', 'receiver_gap', 'never_taken', 'before_discovery', 'no_longer_taken',
 --     'take_failed', 'not_delivered', 'overwritten', 'lost_in_transport', 'pending_at_end' or
