@@ -43,9 +43,6 @@ def build(con: duckdb.DuckDBPyConnection, *, keep: bool = False, findings: bool 
     staging.narrow(con, empty)
     last_uses = {} if keep else _last_uses(headers)
     for position, header in enumerate(headers):
-        if header.name == _FINDING:
-            kinds = [kind for kind in kinds_of("input") if may_have_rows(con, kind, empty)]
-            header = replace(header, body=statement(kinds))
         create(con, header, empty)
         for name, last_use in last_uses.items():
             # A table without rows is no burden.
@@ -58,6 +55,9 @@ def create(con: duckdb.DuckDBPyConnection, header: Header, empty: set[str]) -> N
 
     `empty` names the tables that exist and have no row. This function keeps it up to date.
     """
+    if header.name == _FINDING:
+        kinds = [kind for kind in kinds_of("input") if may_have_rows(con, kind, empty)]
+        header = replace(header, body=statement(kinds))
     if header.kind == "macro":
         con.execute(header.body)
     elif header.kind == "inline":

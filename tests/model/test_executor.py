@@ -174,7 +174,7 @@ def test_a_recording_without_an_event_that_delimits_states_is_named(
         run(system, MAIN, 0xC1)
     model = analyse(system)
     assert model.rows(
-        "SELECT count, detail FROM finding WHERE name = 'executor_events_left_out'"
+        "SELECT count, detail FROM store.finding WHERE name = 'executor_events_left_out'"
     ) == [(1, "nothing shows when its threads waited for work")]
     assert model.value("SELECT count(*) FROM executor_state WHERE end_ns IS NOT NULL") == 0
     assert model.rows("SELECT activity, count(*) FROM executor_activity GROUP BY ALL") == [

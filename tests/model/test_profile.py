@@ -211,7 +211,7 @@ def test_each_stack_is_stored_once(busy: RosSystem, analyse: Analyse) -> None:
 
 
 def details(model: Analysis) -> list[str]:
-    return model.column("SELECT detail FROM finding WHERE name LIKE 'samples_%' ORDER BY ALL")
+    return model.column("SELECT detail FROM store.finding WHERE name LIKE 'samples_%' ORDER BY ALL")
 
 
 def test_what_does_not_fit_is_said(busy: RosSystem, analyse: Analyse) -> None:

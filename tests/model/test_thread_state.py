@@ -261,7 +261,7 @@ def test_a_kernel_trace_that_contradicts_the_events_is_not_joined(
     model = analyse(system)
     assert model.rows(STATES) == []
     assert model.rows(
-        "SELECT trace_id, detail FROM finding WHERE name = 'kernel_trace_not_joined'"
+        "SELECT trace_id, detail FROM store.finding WHERE name = 'kernel_trace_not_joined'"
     ) == [
         (
             KERNEL + 1,
@@ -279,7 +279,7 @@ def test_a_kernel_trace_without_cpus_says_so(system: RosSystem, analyse: Analyse
     call(system, 1000, 2000)
     model = analyse(system)
     assert model.rows(STATES) == []
-    assert model.rows("SELECT detail FROM finding WHERE name = 'kernel_trace_not_joined'") == [
+    assert model.rows("SELECT detail FROM store.finding WHERE name = 'kernel_trace_not_joined'") == [
         ("the kernel trace does not say on which CPUs its events happened: not joined",)
     ]
 
@@ -416,7 +416,7 @@ def test_a_thread_that_nothing_tells_is_said(system: RosSystem, analyse: Analyse
     call(system, 800, 810, Thread(100, 101))
     model = analyse(system)
     assert model.rows(
-        "SELECT subject, count, detail FROM finding WHERE name = 'kernel_thread_unknown'"
+        "SELECT subject, count, detail FROM store.finding WHERE name = 'kernel_thread_unknown'"
     ) == [
         (
             "main",
@@ -477,7 +477,7 @@ def test_only_where_the_schedule_is_known_an_event_can_contradict_it(
     """
     without_switches_from_idle(system, Kernel(system, clock="perf", tracer="perf"), 4)
     model = analyse(system)
-    assert model.rows("SELECT name, count, detail FROM finding WHERE name LIKE 'kernel%'") == [
+    assert model.rows("SELECT name, count, detail FROM store.finding WHERE name LIKE 'kernel%'") == [
         (
             "kernel_switches_missing",
             4,
@@ -596,7 +596,7 @@ def test_a_wrong_clock_is_found_where_most_of_the_schedule_is_unknown(
     model = analyse(system)
     assert model.rows(STATES) == []
     assert model.rows(
-        "SELECT count, detail FROM finding WHERE name = 'kernel_trace_not_joined'"
+        "SELECT count, detail FROM store.finding WHERE name = 'kernel_trace_not_joined'"
     ) == [
         (
             50,
@@ -616,10 +616,10 @@ def test_two_threads_are_not_one_to_the_kernel(system: RosSystem, analyse: Analy
         call(system, begin, begin + 10, Thread(100, 100 + begin // 100 % 4))
     model = analyse(system)
     assert model.rows(STATES) == []
-    assert model.rows("SELECT count FROM finding WHERE name = 'kernel_trace_not_joined'") == [(60,)]
+    assert model.rows("SELECT count FROM store.finding WHERE name = 'kernel_trace_not_joined'") == [(60,)]
 
 
-NOT_JOINED = "SELECT detail FROM finding WHERE name = 'kernel_trace_not_joined'"
+NOT_JOINED = "SELECT detail FROM store.finding WHERE name = 'kernel_trace_not_joined'"
 IS_JOINED = "SELECT is_joined, event_count, agreeing_count FROM staging.schedule"
 
 
