@@ -15,6 +15,7 @@ from duckdb_engine import Dialect
 from sqlalchemy import Column, MetaData, create_engine, func, select
 from sqlalchemy.engine import Connection
 from sqlalchemy.exc import ProgrammingError
+from thorough import thorough
 
 from msgflow.schema import public, store
 
@@ -60,7 +61,9 @@ def test_it_is_what_a_database_has(empty_database: Path, metadata: MetaData, sch
     assert described == set(columns)
 
 
-@pytest.mark.parametrize("metadata", [public, store], ids=["public", "store"])
+@pytest.mark.parametrize(
+    "metadata", [thorough(public, id="public"), pytest.param(store, id="store")]
+)
 def test_relations_hold(connection: Connection, metadata: MetaData) -> None:
     relations = [
         relation

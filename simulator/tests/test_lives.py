@@ -16,6 +16,7 @@ def restarted(request, recordings):
     return recordings[request.param]
 
 
+@pytest.mark.thorough
 def test_lives_of_an_id_do_not_overlap(restarted):
     recording = restarted
     begin = recording.meta["hosts"]["alpha"]["begin_of_tracing_ns"]

@@ -13,6 +13,7 @@ def _overlaps(intervals):
     return sum(before[1] > after[0] for before, after in pairwise(ordered))
 
 
+@pytest.mark.thorough
 def test_a_reentrant_callback_runs_on_several_threads_at_once(recordings):
     rows = recordings["multi_threaded"].truth(
         "SELECT callback_handle, start_ns, end_ns, c.tid FROM callback_instance c "

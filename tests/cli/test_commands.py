@@ -228,6 +228,7 @@ def test_db_upgrade_of_a_current_database(msgflow: Msgflow, small_database: Path
     assert "is up to date" in msgflow("db", "upgrade", "--db", small_database).stderr
 
 
+@pytest.mark.thorough
 def test_db_upgrade_of_old_views(msgflow: Msgflow, small_database: Path) -> None:
     with duckdb.connect(str(small_database)) as connection:
         connection.execute("UPDATE store.definition SET hash = 'old' WHERE name = 'views'")

@@ -40,6 +40,7 @@ def test_a_table_and_the_runs(msgflow: Msgflow, database: Path) -> None:
     assert "-100 ns" in rows[-1]
 
 
+@pytest.mark.thorough
 def test_a_change_is_the_sum_of_those_of_its_parts(msgflow: Msgflow, database: Path) -> None:
     result = msgflow("compare", 1, 2, "--explain", "--format", "json", "--db", database)
     whole, *parts = json.loads(result.stdout)

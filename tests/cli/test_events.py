@@ -48,6 +48,7 @@ def test_counts_agree_with_the_listing(msgflow: Msgflow, trace: Path) -> None:
     assert [json.loads(line)["event_id"] for line in listed] == list(range(len(listed)))
 
 
+@pytest.mark.thorough
 def test_the_suffix_chooses_the_format(msgflow: Msgflow, trace: Path) -> None:
     expected = [
         json.loads(x) for x in msgflow("events", trace, "--format=jsonl").stdout.split("\n")[:-1]

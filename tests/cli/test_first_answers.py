@@ -43,6 +43,7 @@ def section(text: str, title: str) -> str:
     return text.partition(f"{title}\n")[2].partition("\n\n")[0]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", few(["real_py_mixed", "real_overload"], "real_overload"))
 def test_the_way_of_a_message_is_the_work_of_no_node(ask: Msgflow, name: str) -> None:
     """All commands say so of the time in which the reader was not busy."""
@@ -92,6 +93,7 @@ def paths_of(text: str) -> dict[int, str]:
     return {int(match[1]): match[2] for match in found if match and "(as " not in match[2]}
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "others",
     [

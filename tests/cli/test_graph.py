@@ -12,6 +12,7 @@ from msgflow import Database
 Msgflow = Callable[..., Result]
 
 
+@pytest.mark.thorough
 def test_the_suffix_or_the_option_chooses_the_format(
     msgflow: Msgflow, small_database: Path, tmp_path: Path
 ) -> None:

@@ -91,6 +91,7 @@ def undeclared(msgflow: Msgflow, tmp_path_factory: pytest.TempPathFactory) -> Pa
     return Path(shutil.copyfile(made, "msgflow.duckdb"))
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("undeclared")
 def test_suggestions_are_written_and_applied_in_one_go(msgflow: Msgflow) -> None:
     Path("links.yaml").write_text("mine")

@@ -222,6 +222,7 @@ def piped(*arguments: object) -> bytes:
     return done.stdout_bytes
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("form", few(["json", "csv", "markdown", "table --wide"], "csv"))
 def test_a_terminal_gets_the_same_bytes_as_a_pipe(small_database: Path, form: str) -> None:
     arguments = ("info", "--section", "runs", "--db", small_database, "--format", *form.split())
@@ -229,6 +230,7 @@ def test_a_terminal_gets_the_same_bytes_as_a_pipe(small_database: Path, form: st
     assert on_terminal(command(*arguments)) == pipe == piped(*arguments) != b""
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "arguments",
     [

@@ -65,6 +65,7 @@ def names(msgflow: Msgflow, database: Path) -> list[str]:
     return [row["name"] for row in json.loads(result.stdout)]
 
 
+@pytest.mark.thorough
 def test_remove_leaves_the_others_as_they_were(
     msgflow: Msgflow, database: Path, ingested: Path
 ) -> None:

@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 
 import duckdb
 import pytest
-from thorough import few
+from thorough import few, thorough
 from typer.testing import Result
 
 Msgflow = Callable[..., Result]
@@ -40,7 +40,7 @@ def test_from_a_suggestion_to_verdicts(demo: Msgflow, tmp_path: Path) -> None:
         ("rate: < 1000 Hz", 0, 0),
         ("rate: < 1 Hz", 1, 1),
         ("node: /planner\n    latency: p99 < 1 s", 5, 0),
-        ("rate: fast", 2, 2),
+        thorough("rate: fast", 2, 2),
     ],
 )
 def test_exit_codes(
@@ -125,6 +125,7 @@ def test_several_runs_are_refused(demo: Msgflow, tmp_path: Path) -> None:
     assert "a verification is of one run" in result.stderr
 
 
+@pytest.mark.thorough
 def test_an_empty_suggestion_leads_to_nothing(
     msgflow: Msgflow, small_database: Path, tmp_path: Path
 ) -> None:

@@ -13,6 +13,7 @@ from msgflow_sim import simulate
 from msgflow_sim.scenario.traffic import TRAFFIC
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("kind", few(TRAFFIC, *list(TRAFFIC)[:1]))
 def test_truth_lies_within_the_bound_that_messages_allow(kind: str, tmp_path: Path) -> None:
     outcome = judge(kind, 7, tmp_path)

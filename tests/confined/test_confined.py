@@ -58,6 +58,7 @@ def test_a_missing_database(tmp_path: Path) -> None:
         sql("SELECT 1", 1)
 
 
+@pytest.mark.thorough
 def test_an_answer_is_cut_by_bytes(sql: WarmSql) -> None:
     """Of 300 rows of 1 MB each; the first row alone is of half that size."""
     text = "SELECT repeat('x', if(i = 0, 500_000, 1_000_000)) AS x FROM range(300) t(i) ORDER BY i"

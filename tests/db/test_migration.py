@@ -489,6 +489,7 @@ def test_a_failing_view_leaves_the_old_ones(
     )
 
 
+@pytest.mark.thorough
 def test_an_upgrade_that_ends_early_changes_nothing(
     database: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

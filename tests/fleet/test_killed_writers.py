@@ -125,6 +125,7 @@ def test_a_replacement_that_is_killed_leaves_the_old_run(
     assert not left & paths(lake, "")
 
 
+@pytest.mark.thorough
 def test_of_two_writers_one_counts_whole(holding: tuple[Lake, Row, Row]) -> None:
     lake, first, other = holding
     lake.remove([other["run"]])

@@ -17,6 +17,7 @@ ORDER BY ALL
 COLUMNS = "from_kind, from_id, link_kind, kind, id"
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("seed", "every"), [(1, 31), thorough(1, 7), thorough(2, 7)])
 def test_the_picture_is_that_of_the_walkers(analysis: Analysis, seed: int, every: int) -> None:
     analysis.build(random_system(seed, actions=60))

@@ -46,6 +46,7 @@ def replace(root: Path, before: bytes, after: bytes) -> int:
     return count
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("stamp", few([-(1 << 63), (1 << 63) - 1, 1 << 62, -(1 << 62)], 1 << 62))
 def test_stamps(trace: Path, tmp_path: Path, database: Path, stamp: int) -> None:
     taken = "SELECT source_timestamp_ns FROM take WHERE source_timestamp_ns > 0 ORDER BY taken_ns"

@@ -167,6 +167,7 @@ def test_of_perf(shared_kernel: Path, tmp_path: Path, name: str) -> None:
     ).fetchall() == [(True,)]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", few(("pipeline", "autoware"), "pipeline"))
 def test_arrivals(by_lttng: ByLttng, named: ByLttng, name: str) -> None:
     """All that are exact have the waker that the truth has before their callback."""
@@ -187,6 +188,7 @@ def test_arrivals(by_lttng: ByLttng, named: ByLttng, name: str) -> None:
     assert exact > 0.45 * callbacks
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", few(("pipeline", "autoware"), "pipeline"))
 def test_waits(named: ByLttng, name: str) -> None:
     """Where the arrival is exact, the time in the run queue is that of the truth.

@@ -100,6 +100,7 @@ def test_what_was_ignored_is_told(make_trace: Make, new_database: Path) -> None:
     assert rows(new_database, "SELECT count(*) FROM finding WHERE name LIKE 'ignored_%'") == [(2,)]
 
 
+@pytest.mark.thorough
 def test_staging_can_be_kept_and_progress_is_told(
     trace: Path, new_database: Path, tmp_path: Path
 ) -> None:

@@ -54,6 +54,7 @@ def of_run(database: Path, run_id: int) -> dict[str, list[tuple[Any, ...]]]:
     return result
 
 
+@pytest.mark.thorough
 def test_a_second_run_has_the_ids_of_the_first_continued(
     database: Path, both: Path, new_database: Path, other_trace: Path
 ) -> None:

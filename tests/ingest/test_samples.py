@@ -64,6 +64,7 @@ def inside(report: IngestReport, database: Path) -> tuple[int, int]:
     return row
 
 
+@pytest.mark.thorough
 def test_the_text_of_perf_beside_a_trace_is_read(
     session: Path, text: str, new_database: Path
 ) -> None:

@@ -123,6 +123,7 @@ def test_nothing_else_to_load_is_told(make_trace: Make, new_database: Path) -> N
     assert detail.endswith("the traces have no others to load")
 
 
+@pytest.mark.thorough
 def test_what_is_ignored_is_not_loaded(make_trace: Make, new_database: Path) -> None:
     report = ingest(
         [make_trace(FIELDS, EVENTS)], new_database, events=["my_pkg:*"], ignore=["*:started"]

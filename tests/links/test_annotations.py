@@ -52,6 +52,7 @@ def write(path: Path, text: str) -> Path:
     return file
 
 
+@pytest.mark.thorough
 def test_links_are_derived_anew(database: Path) -> None:
     assert rows(database, KINDS) == [("direct", 4)]
     with Database(database) as opened:
@@ -140,6 +141,7 @@ WRONG = (
 )
 
 
+@pytest.mark.thorough
 @each(WRONG)
 def test_what_does_not_exist_changes_nothing(
     wrong: tuple[str, str, int, str, str], database: Path, untouched: Contents

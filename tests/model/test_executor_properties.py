@@ -67,6 +67,7 @@ class Run:
         return max(min(self.end, end) - max(self.start, start), 0)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("threads", "with_events"), few(KINDS, (3, True)))
 @pytest.mark.parametrize("seed", few(SEEDS, 0))
 def test_properties(analyse: Analyse, seed: int, threads: int, with_events: bool) -> None:

@@ -88,6 +88,7 @@ INDIRECT = (
 
 
 # The last of the few: only there a run ends between the cut of a publication and its reading.
+@pytest.mark.thorough
 @pytest.mark.parametrize("seed", few(range(30), 18))
 def test_links_are_those_of_the_definition(analysis: Analysis, seed: int) -> None:
     system, history = make_history(seed)

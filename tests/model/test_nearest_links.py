@@ -188,6 +188,7 @@ def test_two_publishers_at_once_are_ambiguous(unstamped: Unstamped, analyse: Ana
     assert model.column("SELECT DISTINCT reason FROM store.orphan_take") == ["ambiguous"]
 
 
+@pytest.mark.thorough
 def test_a_clock_that_drifts_and_jumps_is_followed(system: RosSystem, analyse: Analyse) -> None:
     """Links are right all the way; in the second around the jump there are none."""
     slewed = Slewed(system)
@@ -279,6 +280,7 @@ class Remote(Unstamped):
         return self.offset + (self.jump if time - _EPOCH > 4_000_000_000 else 0)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "offset", few([300_000, -200_000, 7_000_000, -10_000_000, 40_000_000], 40_000_000)
 )

@@ -279,9 +279,9 @@ def test_a_kernel_trace_without_cpus_says_so(system: RosSystem, analyse: Analyse
     call(system, 1000, 2000)
     model = analyse(system)
     assert model.rows(STATES) == []
-    assert model.rows("SELECT detail FROM store.finding WHERE name = 'kernel_trace_not_joined'") == [
-        ("the kernel trace does not say on which CPUs its events happened: not joined",)
-    ]
+    assert model.rows(
+        "SELECT detail FROM store.finding WHERE name = 'kernel_trace_not_joined'"
+    ) == [("the kernel trace does not say on which CPUs its events happened: not joined",)]
 
 
 def test_a_process_that_was_started_again_has_other_numbers(
@@ -477,7 +477,9 @@ def test_only_where_the_schedule_is_known_an_event_can_contradict_it(
     """
     without_switches_from_idle(system, Kernel(system, clock="perf", tracer="perf"), 4)
     model = analyse(system)
-    assert model.rows("SELECT name, count, detail FROM store.finding WHERE name LIKE 'kernel%'") == [
+    assert model.rows(
+        "SELECT name, count, detail FROM store.finding WHERE name LIKE 'kernel%'"
+    ) == [
         (
             "kernel_switches_missing",
             4,
@@ -616,7 +618,9 @@ def test_two_threads_are_not_one_to_the_kernel(system: RosSystem, analyse: Analy
         call(system, begin, begin + 10, Thread(100, 100 + begin // 100 % 4))
     model = analyse(system)
     assert model.rows(STATES) == []
-    assert model.rows("SELECT count FROM store.finding WHERE name = 'kernel_trace_not_joined'") == [(60,)]
+    assert model.rows("SELECT count FROM store.finding WHERE name = 'kernel_trace_not_joined'") == [
+        (60,)
+    ]
 
 
 NOT_JOINED = "SELECT detail FROM store.finding WHERE name = 'kernel_trace_not_joined'"

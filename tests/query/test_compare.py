@@ -138,6 +138,7 @@ def _check_width(rows: list[dict[str, Any]], values: int) -> None:
     assert 0.98 * expected <= sum(widths) / len(widths) <= 1.18 * expected
 
 
+@pytest.mark.thorough
 def test_an_interval_of_a_mean_is_as_wide_as_theory_says(compared: list[dict[str, Any]]) -> None:
     _check_width(compared, VALUES)
 
@@ -308,6 +309,7 @@ def test_a_run_does_not_differ_from_itself(fresh_database: Path) -> None:
     assert {row["difference_ns"] for row in rows} == {0}
 
 
+@pytest.mark.thorough
 def test_a_verdict_is_of_the_recordings_alone(fresh_database: Path) -> None:
     note = (
         "longer and shorter are said of these two recordings; the same system started again"

@@ -177,6 +177,7 @@ def test_values_that_no_recording_has_are_said(small_database: Path, value: int)
         database.flow("/chatter")
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("place", few([0, 1], 1))
 @pytest.mark.parametrize("table", few(store_tables(), "publication"))
 def test_extremes_in_all_columns_are_answered_or_said(

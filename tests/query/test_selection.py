@@ -380,6 +380,7 @@ def test_what_left_nothing_is_said(database: Database) -> None:
     assert missed.notes[-1] == "nothing fits --where 'count < 0': try with less"
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("start", "end", "why"),
     [

@@ -231,6 +231,7 @@ def test_columns_of_a_view_are_those_of_its_output(
         assert output == declared(file)
 
 
+@pytest.mark.thorough
 @each(MACROS)
 def test_parameters_and_columns_of_a_public_macro_are_declared(
     file: SqlFile, connection: duckdb.DuckDBPyConnection

@@ -84,6 +84,7 @@ def test_parts_of_recorded_flows_add_up(recordings: Callable[[str], Ingested], n
     assert check_flows(recordings(name)) > 0
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", few(scenarios(), "services"))
 def test_parts_of_simulated_flows_add_up(simulations: Callable[[str], Ingested], name: str) -> None:
     check_flows(simulations(name))

@@ -66,6 +66,7 @@ def reasons(ingested: Ingested, internal: str) -> list[tuple[str | None, str | N
     )
 
 
+@pytest.mark.thorough
 def test_reasons_of_the_application(decided: Ingested) -> None:
     """What was published before the subscription was there is undelivered to us alone."""
     found = reasons(decided, "false")

@@ -62,6 +62,7 @@ def test_real_events_executors(shared_traces: Path, tmp_path: Path) -> None:
     assert sum(waited.values()) < 4_000_000
 
 
+@pytest.mark.thorough
 def test_simulated_events_executors(simulations: Callable[[str], Ingested]) -> None:
     """They are found, and what they publish to themselves is there when publish() returns."""
     simulated = simulations("events_executors")

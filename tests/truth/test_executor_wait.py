@@ -144,6 +144,7 @@ def witnessed(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Inges
     return get
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", few(SCENARIOS, "executors"))
 def test_inputs_arrive_within_their_bounds(name: str, witnessed: Callable[[str], Ingested]) -> None:
     ingested = witnessed(name)
@@ -158,6 +159,7 @@ def test_inputs_arrive_within_their_bounds(name: str, witnessed: Callable[[str],
     assert sum(origin is None for _, origin, _, _ in due) <= 10
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", few(["demo", "executors", "overload"], "executors"))
 def test_the_breakdown_bounds_how_long_executors_were_busy(
     name: str, witnessed: Callable[[str], Ingested]

@@ -237,6 +237,7 @@ def test_what_follows_from_responses_and_polled_messages(
     assert {score.kind: score.found for score in scores}[kind] == count
 
 
+@pytest.mark.thorough
 def test_flows_go_on_from_responses_of_real_services(
     recordings: Callable[[str], Ingested], shared_traces: Path
 ) -> None:

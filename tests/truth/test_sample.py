@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 
+import pytest
 from truth import QUICK, RECORDINGS, Case, sample
 
 from msgflow_sim import scenarios
@@ -20,6 +21,7 @@ def _possible() -> list[Case]:
     ]
 
 
+@pytest.mark.thorough
 def test_each_system_is_sampled_with_several_seeds_short_and_long() -> None:
     lengths = defaultdict(list)
     for case in sample(_possible(), 20260131):
@@ -29,6 +31,7 @@ def test_each_system_is_sampled_with_several_seeds_short_and_long() -> None:
         assert of_seed == [[0.1, 1]] * 3
 
 
+@pytest.mark.thorough
 def test_a_day_is_repeated_and_another_differs() -> None:
     possible = _possible()
     drawn = list(sample(possible, 20260131))

@@ -113,6 +113,7 @@ def test_of_writes_that_go_on_at_the_same_time_none_is_decided(tmp_path):
     assert [drop for drop in drops if not drop.undecided and not drop.is_right] == []
 
 
+@pytest.mark.thorough
 def test_a_link_that_is_gone_is_missing(simulation, database):
     before = _scores(simulation, database)
     _change(

@@ -40,6 +40,7 @@ def test_stored_messages_are_counted_and_not_measured(overload: Ingested) -> Non
     assert topics["/map"]["max_ns"] is None
 
 
+@pytest.mark.thorough
 def test_the_time_up_to_the_subscription_is_a_part_of_its_own(overload: Ingested) -> None:
     """Of a flow that is asked for by its take."""
     stored = overload.rows("SELECT take_id FROM link_transport WHERE stored_ns IS NOT NULL")

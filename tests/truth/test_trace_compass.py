@@ -78,6 +78,7 @@ def trace(session: Session) -> Iterator[Ingested]:
     connection.close()
 
 
+@pytest.mark.thorough
 def test_the_two_commands(session: Session) -> None:
     """The answer, and not a byte of the trace changes."""
     (row,) = [row for row in session.answer if row["roots"] == 2_031]
@@ -91,6 +92,7 @@ def test_the_two_commands(session: Session) -> None:
     assert session.after == session.before
 
 
+@pytest.mark.thorough
 def test_objects(trace: Ingested) -> None:
     assert trace.rows("SELECT event_count FROM store.run") == [(99_338,)]
     assert trace.rows("SELECT event_count FROM trace") == [(99_338,)]
@@ -127,6 +129,7 @@ def test_objects(trace: Ingested) -> None:
     ]
 
 
+@pytest.mark.thorough
 def test_instances(trace: Ingested) -> None:
     assert trace.rows(
         "SELECT c.kind, count(*), count(i.end_ns) FROM callback_instance AS i "
@@ -146,6 +149,7 @@ def test_instances(trace: Ingested) -> None:
     ]
 
 
+@pytest.mark.thorough
 def test_links(trace: Ingested) -> None:
     assert trace.rows(
         "SELECT topic_name, method, candidate_count, count(*) FROM link_transport "
@@ -172,6 +176,7 @@ def test_links(trace: Ingested) -> None:
     ) == [("/topic_a", "/topic_b", 1_986), ("timer", "/topic_a", 2_031)]
 
 
+@pytest.mark.thorough
 def test_flows(trace: Ingested) -> None:
     """2,031 roots: what became of each, and how long those took that arrived."""
     assert trace.rows(
@@ -189,6 +194,7 @@ def test_flows(trace: Ingested) -> None:
     ) == [(131_601, 562_411, 45_601_667)]
 
 
+@pytest.mark.thorough
 def test_one_flow_to_the_nanosecond(trace: Ingested) -> None:
     """Forward from one timer callback; messages of the logger aside."""
     start = 1_649_361_413_615_271_699
@@ -228,6 +234,7 @@ def test_one_flow_to_the_nanosecond(trace: Ingested) -> None:
     ]
 
 
+@pytest.mark.thorough
 def test_executors(trace: Ingested) -> None:
     """For Trace Compass the last state of a thread lasts until the last event of all."""
     assert trace.rows(
@@ -255,6 +262,7 @@ def test_executors(trace: Ingested) -> None:
     ]
 
 
+@pytest.mark.thorough
 def test_nothing_is_wrong_with_the_input(trace: Ingested) -> None:
     assert trace.rows("SELECT * FROM gap") == []
     assert trace.rows("SELECT * FROM finding WHERE severity = 'error'") == []

@@ -380,15 +380,26 @@ def test_a_topic_with_the_name_of_its_node_is_written_once(
             assert all(one != other for one, other in itertools.pairwise(parts))
 
 
-@pytest.mark.parametrize("is_together", [False, True])
+@pytest.fixture
+def apart(simulated: Callable[..., Path]) -> Path:
+    """The robot on two hosts, as recorded: each of its paths passes both."""
+    return simulated("demo", 0.3)
+
+
+@pytest.mark.parametrize(
+    ("shown", "share"),
+    [("apart", 1), ("demo", 0), thorough("systems", None)],
+)
 def test_durations_between_clocks_that_are_apart_are_marked(
-    is_together: bool, simulated: Callable[..., Path], demo: Path, serve: Serve, page: Page
+    shown: str, share: int | None, request: pytest.FixtureRequest, serve: Serve, page: Page
 ) -> None:
-    page.open(serve(demo if is_together else simulated("demo", 0.3)).address)
+    is_together = share == 0
+    page.open(serve(request.getfixturevalue(shown)).address)
     page.go("#/paths")
     marked = page.page.locator("[data-path]:has(.doubt)").count()
     paths = page.page.locator("[data-path]").count()
-    assert (marked == 0) if is_together else (0 < marked < paths)
+    assert paths
+    assert (0 < marked < paths) if share is None else (marked == share * paths)
     page.go("#/overview")
     page.page.locator(".slow li").first.wait_for()
     assert (page.page.locator(".slow .doubt").count() == 0) == is_together

@@ -341,13 +341,28 @@ def test_what_a_finding_says_of_clocks_is_not_said_below_it_too(
         assert bool(found.meta["notes"]) == said
 
 
+@pytest.fixture
+def apart(simulated: Callable[..., Path]) -> Path:
+    """The robot on two hosts, as recorded: each of its paths passes both."""
+    return simulated("demo", 0.3)
+
+
+@pytest.mark.parametrize(
+    ("name", "run", "comparable"),
+    [("apart", 1, {False}), thorough("systems", 3, {True, False})],
+)
 def test_paths_whose_hosts_have_clocks_that_are_apart_are_known(
-    simulated: Callable[..., Path], demo: Path, read: Read
+    name: str,
+    run: int,
+    comparable: set[bool],
+    request: pytest.FixtureRequest,
+    demo: Path,
+    read: Read,
 ) -> None:
     together = run_page_query(read(demo), "path", {"run": 1}).to_pylist()
     assert {path["is_comparable"] for path in together} == {True}
-    connection = read(simulated("demo", 0.3))
-    found = run_page_query(connection, "path", {"run": 1}).to_pylist()
+    connection = read(request.getfixturevalue(name))
+    found = run_page_query(connection, "path", {"run": run}).to_pylist()
     host_of = {
         table: dict(
             connection.execute(
@@ -360,7 +375,7 @@ def test_paths_whose_hosts_have_clocks_that_are_apart_are_known(
         hosts = {host_of["publisher"][one] for one in path["publishers"]}
         hosts |= {host_of["subscription"][one] for one in path["subscriptions"]}
         assert path["is_comparable"] == (len(hosts) == 1)
-    assert {path["is_comparable"] for path in found} == {True, False}
+    assert {path["is_comparable"] for path in found} == comparable
 
 
 def test_flows_of_paths_are_those_that_e2e_latency_counts(demo: Path, read: Read) -> None:
@@ -396,6 +411,7 @@ def test_flows_of_paths_are_those_that_e2e_latency_counts(demo: Path, read: Read
         )[:10]
 
 
+@pytest.mark.thorough
 def test_executors_over_time_add_up(simulated: Callable[..., Path], read: Read) -> None:
     connection = read(simulated("multi_threaded", 0.3))
     pages = Pages()

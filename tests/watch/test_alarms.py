@@ -327,6 +327,7 @@ def test_paths_of_one_target_are_told_apart(monkeypatch) -> None:
     ]  # fmt: skip
 
 
+@pytest.mark.thorough
 def test_of_violations_the_oldest_goes_first(tmp_path: Path) -> None:
     """Not by name: a name that became free is taken again."""
     recorder = FlightRecorder(

@@ -202,6 +202,7 @@ def test_a_chunk_without_any_file_is_no_damage(simulated: Path, tmp_path: Path) 
     assert notes == []
 
 
+@pytest.mark.thorough
 def test_a_clock_that_is_set_is_said_and_is_no_lag(
     simulated: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
