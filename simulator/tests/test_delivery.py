@@ -18,6 +18,7 @@ def _reasons(recording, topic):
     )
 
 
+@pytest.mark.thorough
 def test_a_full_queue_drops_its_oldest_message(recordings):
     recording = recordings["overload"]
     assert _reasons(recording, "/points")["overwritten"] > 30

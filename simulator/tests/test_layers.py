@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from msgflow_sim import simulate
 
 
@@ -70,6 +72,7 @@ def test_older_releases_do_not_trace_every_kind(tmp_path, read):
     ) == [(True,)]
 
 
+@pytest.mark.thorough
 def test_stamps_are_equal_on_one_topic_and_on_two(recordings):
     recording = recordings["equal_stamps"]
     twins = recording.truth(

@@ -62,6 +62,7 @@ def test_result_names_what_was_written(tmp_path):
     assert {*simulation.truth.values(), simulation.meta} < written
 
 
+@pytest.mark.thorough
 def test_factor_multiplies_the_length(tmp_path):
     counts = {}
     for factor in (0.1, 0.2, 0.4):

@@ -73,6 +73,7 @@ def test_executors_of_a_process_have_threads_of_their_own(recordings):
     assert with_events == {1201, 1203, 1204}
 
 
+@pytest.mark.thorough
 def test_callbacks_run_nested_also_in_themselves(recordings):
     recording = recordings["nested"]
     rows = recording.truth(

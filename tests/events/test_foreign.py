@@ -102,6 +102,7 @@ class TestShapes:
         assert "s={a=0.5, A=7}" in listing(path)
         assert listed(path)[0]["fields"]["s"] == {"a": 0.5, "A": 7}
 
+    @pytest.mark.thorough
     def test_many_fields(self, listing: Listing, listed: Listed, tmp_path: Path) -> None:
         fields = "".join(f"{BYTE} _f{n};" for n in range(600))
         inner = "".join(f"{BYTE} _g{n};" for n in range(600))
@@ -111,6 +112,7 @@ class TestShapes:
         assert "g599=7}" in line
         assert listed(path)[0]["fields"]["f599"] == 7
 
+    @pytest.mark.thorough
     def test_deep_fields(self, listing: Listing, listed: Listed, tmp_path: Path) -> None:
         path = one_event(tmp_path / "t", f"{BYTE} _a{'[1]' * 28};", b"\x07")
         assert f"a={'[' * 28}7{']' * 28}" in listing(path)

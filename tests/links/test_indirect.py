@@ -12,6 +12,7 @@ from pathlib import Path
 from random import Random
 
 import duckdb
+import pytest
 from annotated_history import History, Publication, Run, reference
 from golden import insert
 
@@ -111,6 +112,7 @@ def rows(histories: list[History]) -> dict[str, list[dict[str, int | str | None]
     return tables
 
 
+@pytest.mark.thorough
 def test_links_are_those_of_the_definition(fresh_database: Path) -> None:
     moments = count(1)
     histories = [make_history(number, moments) for number in range(HISTORIES)]
