@@ -65,10 +65,7 @@ def names(msgflow: Msgflow, database: Path) -> list[str]:
     return [row["name"] for row in json.loads(result.stdout)]
 
 
-@pytest.mark.thorough
-def test_remove_leaves_the_others_as_they_were(
-    msgflow: Msgflow, database: Path, ingested: Path
-) -> None:
+def test_remove_leaves_the_others_as_they_were(msgflow: Msgflow, database: Path) -> None:
     kept = of_run(database, 2)
     result = msgflow("runs", "remove", "before", "--db", database)
     assert result.exit_code == 0
@@ -82,6 +79,13 @@ def test_remove_leaves_the_others_as_they_were(
             {"run_id": 2}
         ]
         assert broken_rules(opened.connection, 2) == []
+
+
+@pytest.mark.thorough
+def test_what_was_removed_can_be_ingested_again(
+    msgflow: Msgflow, database: Path, ingested: Path
+) -> None:
+    assert msgflow("runs", "remove", "before", "--db", database).exit_code == 0
     assert msgflow("ingest", ingested.parent / "before", "--db", database).exit_code == 0
     assert names(msgflow, database) == ["after", "before"]
 

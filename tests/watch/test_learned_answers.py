@@ -53,6 +53,9 @@ def test_what_most_windows_have_shown_counts_where_one_doubts_it() -> None:
     assert ([each.value for each in link.inputs], [each.value for each in link.outputs]) == (
         ["/scan"], ["/filtered"]
     )  # fmt: skip
+    of_user = "links: [{kind: direct, node: /filter, inputs: [/scan], outputs: [/rosout]}]"
+    both = with_learned(read_links(Path("links.yaml"), of_user), learned).links
+    assert [each.outputs[0].value for each in both] == ["/rosout", "/filtered"]
     # As many windows doubt it now as have shown it.
     assert doubted(2) is not None
     assert doubted(2) is None
