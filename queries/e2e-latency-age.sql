@@ -34,6 +34,9 @@
 -- brief: path, outputs, median_ns, p99_ns, max_ns, peak_max_ns, ambiguous, loss_affected, p95_ns,
 --     peak_median_ns, peak_p95_ns, mean_ns
 -- note: clocks
+CREATE OR REPLACE TEMP TABLE path_chain AS
+FROM main.flow_chain($runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths);
+
 WITH output AS (
     SELECT
         path_id,
@@ -45,8 +48,7 @@ WITH output AS (
         lead(sink_ns) OVER (PARTITION BY path_id ORDER BY sink_ns, take_id) - root_ns AS peak_ns
     FROM main.end_to_end(
         $runs, $from, $to, $from_event, $to_event,
-        -9223372036854775807::BIGINT, 9223372036854775807::BIGINT,
-        max_depth := $max_depth, max_paths := $max_paths
+        -9223372036854775807::BIGINT, 9223372036854775807::BIGINT, chains := 'path_chain'
     )
     WHERE status = 'reached' AND is_newest
 ),
@@ -89,8 +91,6 @@ SELECT
     m.sink_event,
     p.is_cut,
     p.path
-FROM main.flow_path(
-    $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths, only_paths := true
-) AS p
+FROM main.flow_path($runs, only_paths := true, chains := 'path_chain') AS p
 LEFT JOIN measured AS m ON p.path_id = m.path_id
 ORDER BY p.run_id, p.path, p.path_id

@@ -64,19 +64,19 @@
 --     not_connected, unknown, cut_by_recording
 -- answer: reached
 -- note: clocks
+CREATE OR REPLACE TEMP TABLE path_chain AS
+FROM main.flow_chain($runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths);
+
 CREATE OR REPLACE TEMP TABLE named_path AS
 SELECT run_id, path_id, path, topics[1] AS first_topic, topics[-1] AS last_topic, is_cut
-FROM main.flow_path(
-    $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths, only_paths := true
-);
+FROM main.flow_path($runs, only_paths := true, chains := 'path_chain');
 
 WITH flow AS (
     SELECT
         p.path, p.first_topic, p.last_topic, e.run_id, e.root_kind, e.root_id, e.root_ns,
         e.take_id, e.sink_ns, e.latency_ns, e.status, e.is_loss_affected, e.is_ambiguous
     FROM main.end_to_end(
-        $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns,
-        max_depth := $max_depth, max_paths := $max_paths
+        $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns, chains := 'path_chain'
     ) AS e
     JOIN named_path AS p ON e.path_id = p.path_id
 ),

@@ -32,6 +32,9 @@
 -- column: path VARCHAR [path]  Nodes and topics
 -- brief: path, response, count, median_ns, p99_ns, max_ns, ambiguous, p95_ns, mean_ns, min_ns
 -- note: clocks
+CREATE OR REPLACE TEMP TABLE path_chain AS
+FROM main.flow_chain($runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths);
+
 WITH input AS (
     SELECT
         path_id,
@@ -43,8 +46,7 @@ WITH input AS (
         arg_min(is_ambiguous, sink_ns) AS is_ambiguous
     FROM main.end_to_end(
         $runs, $from, $to, $from_event, $to_event,
-        -9223372036854775807::BIGINT, 9223372036854775807::BIGINT,
-        max_depth := $max_depth, max_paths := $max_paths
+        -9223372036854775807::BIGINT, 9223372036854775807::BIGINT, chains := 'path_chain'
     )
     GROUP BY path_id, root_kind, root_id
 ),
@@ -123,8 +125,6 @@ SELECT
     m.sink_event,
     p.is_cut,
     p.path
-FROM main.flow_path(
-    $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths, only_paths := true
-) AS p
+FROM main.flow_path($runs, only_paths := true, chains := 'path_chain') AS p
 JOIN measured AS m ON p.path_id = m.path_id
 ORDER BY p.run_id, p.path, p.path_id, m.response

@@ -59,20 +59,20 @@
 --     min_ns, pairs, stored
 -- answer: roots
 -- note: clocks
+CREATE OR REPLACE TEMP TABLE path_chain AS
+FROM main.flow_chain($runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths);
+
 CREATE OR REPLACE TEMP TABLE path_outcome AS
 SELECT
     run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns, status,
     reason, is_first, is_last, is_newest, is_loss_affected, is_ambiguous
 FROM main.end_to_end(
-    $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns,
-    max_depth := $max_depth, max_paths := $max_paths
+    $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns, chains := 'path_chain'
 );
 
 CREATE OR REPLACE TEMP TABLE named_path AS
 SELECT run_id, path_id, subscription_id, is_path, is_cut, path, topics, publishers, subscriptions
-FROM main.flow_path(
-    $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths, only_paths := true
-);
+FROM main.flow_path($runs, only_paths := true, chains := 'path_chain');
 
 WITH flow AS (
     SELECT

@@ -49,20 +49,20 @@
 --     total_ns, flows, overlaps
 -- zero: total_ns
 -- note: clocks
+CREATE OR REPLACE TEMP TABLE path_chain AS
+FROM main.flow_chain($runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths);
+
 CREATE OR REPLACE TEMP TABLE path_outcome AS
 SELECT
     run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns, status,
     reason, is_first, is_last, is_newest, is_loss_affected, is_ambiguous
 FROM main.end_to_end(
-    $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns,
-    max_depth := $max_depth, max_paths := $max_paths
+    $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns, chains := 'path_chain'
 );
 
 CREATE OR REPLACE TEMP TABLE named_path AS
 SELECT run_id, path_id, subscription_id, is_path, is_cut, path, topics, publishers, subscriptions
-FROM main.flow_path(
-    $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths, only_paths := true
-);
+FROM main.flow_path($runs, only_paths := true, chains := 'path_chain');
 
 CREATE OR REPLACE TEMP TABLE breakdown_flow AS
 SELECT
@@ -72,9 +72,12 @@ FROM main.chosen_flow('path_outcome', $case);
 
 CREATE OR REPLACE TEMP TABLE breakdown_trail AS
 SELECT flow_id, hop, take_id, publication_id, previous_take_id, next_take_id
-FROM main.end_to_end_trail(
-    'breakdown_flow', $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths
-);
+FROM main.end_to_end_trail('breakdown_flow', $runs, chains := 'path_chain');
+
+CREATE OR REPLACE TEMP TABLE breakdown_wait AS
+SELECT callback_instance_id, executor_id, busy_min_ns, busy_max_ns, held_max_ns
+FROM main.executor_wait
+WHERE list_contains($runs, run_id);
 
 -- Every callback instance, and how long its executor was busy before it.
 CREATE OR REPLACE TEMP TABLE breakdown_callback AS
@@ -84,15 +87,19 @@ SELECT
     w.busy_max_ns + CASE WHEN e.kind LIKE 'multi_threaded%' THEN 0
         ELSE coalesce(w.held_max_ns, 0) END AS busy_max_ns
 FROM main.callback_instance AS i
-LEFT JOIN main.executor_wait AS w ON i.callback_instance_id = w.callback_instance_id
+LEFT JOIN breakdown_wait AS w ON i.callback_instance_id = w.callback_instance_id
 LEFT JOIN main.executor AS e ON w.executor_id = e.executor_id
 WHERE list_contains($runs, i.run_id);
+
+CREATE OR REPLACE TEMP TABLE exact_arrival AS
+SELECT take_id, until_arrival_ns, run_queue_ns, executor_ns
+FROM main.arrival
+WHERE list_contains($runs, run_id) AND is_exact AND executor_ns IS NOT NULL;
 
 CREATE OR REPLACE TEMP TABLE breakdown_arrival AS
 SELECT h.flow_id, h.hop, a.run_queue_ns, a.executor_ns
 FROM breakdown_trail AS h
-JOIN main.arrival AS a ON h.take_id = a.take_id
-WHERE a.is_exact AND a.executor_ns IS NOT NULL;
+JOIN exact_arrival AS a ON h.take_id = a.take_id;
 
 -- Between clocks that are apart the time that they show may be shorter than the executor was busy.
 WITH piece AS (

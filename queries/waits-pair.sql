@@ -25,13 +25,17 @@
 -- column: is_internal BOOLEAN       The callback that waited is infrastructure of ROS
 -- brief: node, meanwhile_node, worst_ns, share, meanwhile_thread, callback, meanwhile_callback,
 --     waits, overlap_max_ns, overlap_min_ns, instances
+CREATE OR REPLACE TEMP TABLE exact_arrival AS
+SELECT take_id, until_arrival_ns, run_queue_ns, executor_ns
+FROM main.arrival
+WHERE list_contains($runs, run_id) AND is_exact AND executor_ns IS NOT NULL;
+
 CREATE OR REPLACE TEMP TABLE explained_wait AS
 SELECT
-    run_id, callback_instance_id, callback_id, busy_max_ns, run_queue_ns, preempted_ns,
-    meanwhile_callback_ids, meanwhile_ns, meanwhile_certain_ns, meanwhile_thread_ns,
-    meanwhile_instances, cpu_taken_by, cpu_taken_ns
-FROM main.executor_wait_explained($runs)
-WHERE start_ns >= $start_ns AND start_ns < $end_ns;
+    run_id, callback_instance_id, executor_id, callback_id, start_ns, busy_min_ns, busy_max_ns,
+    held_max_ns, run_queue_ns, preempted_ns, meanwhile_callback_ids, meanwhile_ns,
+    meanwhile_certain_ns, meanwhile_thread_ns, meanwhile_instances, cpu_taken_by, cpu_taken_ns
+FROM main.executor_wait_explained($runs, arrivals := 'exact_arrival');
 
 WITH pair AS (
     SELECT
@@ -43,10 +47,12 @@ WITH pair AS (
         unnest(meanwhile_ns) AS overlap_max_ns,
         unnest(meanwhile_thread_ns) AS thread_max_ns
     FROM explained_wait
+    WHERE start_ns >= $start_ns AND start_ns < $end_ns
 ),
 taken AS (
     SELECT run_id, callback_id, unnest(cpu_taken_by) AS name, unnest(cpu_taken_ns) AS length_ns
     FROM explained_wait
+    WHERE start_ns >= $start_ns AND start_ns < $end_ns
 ),
 measured AS (
     SELECT

@@ -16,11 +16,13 @@ if TYPE_CHECKING:
     from msgflow.result.query_result import QueryResult
     from msgflow.run.choice import Run
 
-_ALL = "SELECT DISTINCT path FROM main.flow_path($runs, NULL, NULL, only_paths := true)"
+_ALL = "main.flow_path($runs, only_paths := true)"
 _UNNAMED = ("?", "(not traced)")
 
 
-def with_path_numbers(connection: duckdb.DuckDBPyConnection, result: QueryResult) -> QueryResult:
+def with_path_numbers(
+    connection: duckdb.DuckDBPyConnection, result: QueryResult, known: str = _ALL
+) -> QueryResult:
     """Return a result with the numbers of its paths, if it has several.
 
     A query may ask for flows that end in the middle of a path. What they pass is no path of the
@@ -29,13 +31,14 @@ def with_path_numbers(connection: duckdb.DuckDBPyConnection, result: QueryResult
     Args:
         connection: to the database with the runs.
         result: of a named query.
+        known: a table with all paths of the runs, where there is one.
     """
     if PATH not in result.columns:
         return result
     own = {path for path in result.table[PATH].to_pylist() if path is not None}
     if len(own) < 2:
         return result
-    every = _every_path(connection, result.runs)
+    every = _every_path(connection, result.runs, known)
     texts = [*every, *sorted(own.difference(every))]
     return replace(result, path_numbers={text: n for n, text in enumerate(texts, start=1)})
 
@@ -64,8 +67,11 @@ def only_path(path: str, every: Iterable[str]) -> dict[str, list[str]]:
     return {"via": via, "without": sorted(others.difference(via))}
 
 
-def _every_path(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run]) -> list[str]:
-    rows = connection.execute(_ALL, {"runs": [run.run_id for run in runs]}).fetchall()
+def _every_path(
+    connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], known: str = _ALL
+) -> list[str]:
+    chosen = {"runs": [run.run_id for run in runs]} if known is _ALL else {}
+    rows = connection.execute(f"SELECT DISTINCT path FROM {known}", chosen).fetchall()
     return sorted(path for (path,) in rows)
 
 

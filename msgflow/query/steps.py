@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Self
 
 import duckdb
@@ -21,10 +22,17 @@ class Steps:
 
     Args:
         connection: on which the queries run.
+        known: by the name of a table the query that has its rows at less cost, from tables that are
+            there by then.
     """
 
-    def __init__(self, connection: duckdb.DuckDBPyConnection) -> None:
+    def __init__(
+        self,
+        connection: duckdb.DuckDBPyConnection,
+        known: Mapping[str, str] = MappingProxyType({}),
+    ) -> None:
         self._connection = connection
+        self._known = known
         self._made: dict[str, tuple[str, dict[str, Any]]] = {}
 
     def __enter__(self) -> Self:
@@ -52,5 +60,8 @@ class Steps:
                 # What was made of the old rows has to be made again.
                 self._made = dict.fromkeys(self._made, ("", {}))
             self._made[step.table] = "", {}
-            self._connection.execute(*wanted)
+            if known := self._known.get(step.table):
+                self._connection.execute(f"CREATE OR REPLACE TEMP TABLE {step.table} AS {known}")
+            else:
+                self._connection.execute(*wanted)
             self._made[step.table] = wanted

@@ -50,6 +50,11 @@ _LINKS = ("suggest", "links")
 _DEAD_ENDS = (
     "SELECT subject, detail FROM main.finding WHERE name = 'dead_end' AND list_contains(?, run_id)"
 )
+# The waits explained are those of the breakdown, and more.
+_KNOWN = {
+    "breakdown_wait": "SELECT callback_instance_id, executor_id, busy_min_ns, busy_max_ns,"
+    " held_max_ns FROM explained_wait"
+}
 # How to know what a sentence says is not known.
 _UNKNOWN = {
     "not known without a kernel trace": "msgflow record --kernel shows what had the CPU",
@@ -119,12 +124,14 @@ def explain(
         UsageError: there is no such place or time.
         NoFlowError: no flow arrives there.
     """
-    with Steps(connection) as steps:
+    with Steps(connection, _KNOWN) as steps:
 
         def ask(name: str, part: Slice, **given: Value) -> QueryResult:
             result = run_query(connection, load_query(name), given, part, steps=steps, runs=(run,))
             # Only its paths have to be told apart.
-            return with_path_numbers(connection, result) if name == "e2e-latency" else result
+            if name != "e2e-latency":
+                return result
+            return with_path_numbers(connection, result, *([] if given else ["named_path"]))
 
         return _explained(connection, ask, run, times, place)
 
@@ -150,8 +157,8 @@ def _explained(
     ask = partial(ask_of, part=times)
     values = {"runs": [run.run_id], **times.window([run]).bindings}
     values["asked_ns"] = asked.window([run]).start_ns
-    parts = ask("path-breakdown", **ends)
     waits = ask("waits-pair")
+    parts = ask("path-breakdown", **ends)
     # What is lost while a system warms up is lost.
     losses = ask_of("topics-delivery", asked)
     shown = paths.table["path"].to_pylist()

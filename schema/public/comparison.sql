@@ -69,19 +69,21 @@ CREATE OR REPLACE MACRO main.comparison(
     skip_ns := 0, a_window := NULL, b_window := NULL, confidence := 0.95, at_least := 0.05,
     resamples := 1000, seed := 0, internal := false, max_depth := 32, max_paths := 1000
 ) AS TABLE
-WITH flow AS (
+WITH path_chain AS MATERIALIZED (
+    FROM main.flow_chain(
+        [run_a, run_b], from_topic, to_topic, max_depth := max_depth, max_paths := max_paths
+    )
+),
+flow AS (
     SELECT
         e.run_id, p.path, p.topics[1] AS first_topic, p.topics[-1] AS last_topic, e.root_kind,
         e.root_id, e.root_ns, e.take_id, e.sink_ns, e.latency_ns, e.status, e.is_first, e.is_last,
         e.is_newest, e.is_loss_affected, e.is_ambiguous, p.is_cut
     FROM main.end_to_end(
         [run_a, run_b], from_topic, to_topic, 'callback_start', 'callback_end',
-        (-9223372036854775808)::BIGINT, 9223372036854775807,
-        max_depth := max_depth, max_paths := max_paths
+        (-9223372036854775808)::BIGINT, 9223372036854775807, chains := 'path_chain'
     ) AS e
-    JOIN main.flow_path(
-        [run_a, run_b], from_topic, to_topic, max_depth := max_depth, max_paths := max_paths
-    ) AS p
+    JOIN main.flow_path([run_a, run_b], chains := 'path_chain') AS p
         ON e.path_id = p.path_id
     WHERE what IN ('paths', 'ends')
 ),

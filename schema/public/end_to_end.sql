@@ -24,6 +24,8 @@
 -- param: max_depth INTEGER = 32  Longest chain, in topics
 -- param: max_paths INTEGER = 1000  Maximum number of paths, shortest first; also the limit on
 --     chains of each length
+-- param: chains VARCHAR = 'chain_here'  Name of a table with the rows of main.flow_chain for the
+--     same arguments, where there is one
 -- column: run_id BIGINT  Run
 -- column: path_id BIGINT  Path, as main.flow_path numbers it for the same arguments
 -- column: root_kind VARCHAR  'callback_instance', 'publication' or 'take'
@@ -51,15 +53,21 @@
 CREATE OR REPLACE MACRO main.end_to_end(
     runs, from_topic := NULL, to_topic := NULL, from_event := 'callback_start',
     to_event := 'callback_end', window_start_ns := NULL, window_end_ns := NULL, max_depth := 32,
-    max_paths := 1000
+    max_paths := 1000, chains := 'chain_here'
 ) AS TABLE
-WITH RECURSIVE chain AS MATERIALIZED (
+WITH RECURSIVE chain_here AS MATERIALIZED (
     SELECT
         run_id, path_id, parent_path_id, depth, publisher_id, subscription_id,
         first_publisher_id, first_route, route, is_cached, is_path
-    FROM derive.flow_chain(
+    FROM main.flow_chain(
         runs, from_topic, to_topic, max_depth := max_depth, max_paths := max_paths
     )
+),
+chain AS NOT MATERIALIZED (
+    SELECT
+        run_id, path_id, parent_path_id, depth, publisher_id, subscription_id,
+        first_publisher_id, first_route, route, is_cached, is_path
+    FROM query_table(chains)
     WHERE derive.known_word('from_event', from_event, ['callback_start', 'publish'])
         AND derive.known_word('to_event', to_event, ['take', 'callback_start', 'callback_end'])
 ),

@@ -11,6 +11,8 @@
 -- param: max_depth INTEGER = 32  Longest chain, in topics
 -- param: max_paths INTEGER = 1000  Maximum number of paths, shortest first; also the limit on
 --     chains of each length
+-- param: chains VARCHAR = 'chain_here'  Name of a table with the rows of main.flow_chain for the
+--     same arguments, where there is one
 -- column: flow_id BIGINT  Number of the flow
 -- column: hop BIGINT  Number of the message on the path
 -- column: take_id BIGINT  Take of the message
@@ -18,17 +20,19 @@
 -- column: previous_take_id BIGINT  Take of the message before it; NULL: none
 -- column: next_take_id BIGINT  Take of the message after it; NULL: none
 CREATE OR REPLACE MACRO main.end_to_end_trail(
-    flows, runs, from_topic := NULL, to_topic := NULL, max_depth := 32, max_paths := 1000
+    flows, runs, from_topic := NULL, to_topic := NULL, max_depth := 32, max_paths := 1000,
+    chains := 'chain_here'
 ) AS TABLE
 WITH RECURSIVE flow AS NOT MATERIALIZED (
     SELECT flow_id, path_id, root_kind, root_id, take_id FROM query_table(flows)
 ),
-chain AS MATERIALIZED (
+chain_here AS MATERIALIZED (
     SELECT path_id, parent_path_id, depth, publisher_id, subscription_id, route
-    FROM derive.flow_chain(
+    FROM main.flow_chain(
         runs, from_topic, to_topic, max_depth := max_depth, max_paths := max_paths
     )
 ),
+chain AS NOT MATERIALIZED (FROM query_table(chains)),
 -- Before each message of a path but the first: the message that led to it, and how.
 link AS MATERIALIZED (
     SELECT

@@ -6,6 +6,8 @@
 --     when a message arrived (main.arrival), it was ready then: the bounds are one.
 -- grain: one row per callback instance that is not nested in another
 -- param: runs BIGINT[]  Runs to look at
+-- param: arrivals VARCHAR = 'arrival_here'  Name of a table with take_id, until_arrival_ns,
+--     run_queue_ns and executor_ns of the exact rows of main.arrival, where there is one
 -- column: run_id BIGINT  Run that the row belongs to
 -- column: callback_instance_id BIGINT  Callback instance that waited
 -- column: executor_id BIGINT  Its executor
@@ -44,20 +46,26 @@
 -- column: preempted_ns BIGINT [ns]  Likewise, another thread had the CPU that its thread had lost
 -- column: cpu_taken_by VARCHAR[]  Threads that had the CPU in both, the longest first; NULL: none
 -- column: cpu_taken_ns BIGINT[] [ns]  For how long each of them did
-CREATE OR REPLACE MACRO main.executor_wait_explained(runs) AS TABLE
+CREATE OR REPLACE MACRO main.executor_wait_explained(
+    runs, arrivals := 'arrival_here'
+) AS TABLE
 WITH executor AS (
     SELECT executor_id, NULL::BIGINT AS until_ns
     FROM derive.executor_size
     WHERE list_contains(runs, run_id)
 ),
+arrival_here AS MATERIALIZED (
+    SELECT take_id, until_arrival_ns, run_queue_ns, executor_ns
+    FROM main.arrival
+    WHERE list_contains(runs, run_id) AND is_exact AND executor_ns IS NOT NULL
+),
 arrived AS (
     SELECT
         i.callback_instance_id, a.until_arrival_ns,
         t.taken_ns - coalesce(a.run_queue_ns, 0) - a.executor_ns AS arrived_ns
-    FROM main.arrival AS a
+    FROM query_table(arrivals) AS a
     JOIN store.take AS t ON a.take_id = t.take_id
     JOIN store.callback_instance AS i ON a.take_id = i.take_id
-    WHERE list_contains(runs, a.run_id) AND a.is_exact AND a.executor_ns IS NOT NULL
 ),
 ready AS MATERIALIZED (
     SELECT

@@ -15,6 +15,8 @@
 -- param: max_paths INTEGER = 1000  Maximum number of paths, shortest first; also the limit on
 --     chains of each length
 -- param: only_paths BOOLEAN = false  Leave out chains that are not paths
+-- param: chains VARCHAR = 'chain_here'  Name of a table with the rows of main.flow_chain for the
+--     same arguments, where there is one
 -- column: run_id BIGINT  Run
 -- column: path_id BIGINT  Number of the chain in this result
 -- column: parent_path_id BIGINT  The chain without its last step; NULL: it has one step
@@ -32,16 +34,17 @@
 -- column: is_cut BOOLEAN  The chain goes on, or has siblings, beyond the limits
 CREATE OR REPLACE MACRO main.flow_path(
     runs, from_topic := NULL, to_topic := NULL, max_depth := 32, max_paths := 1000,
-    only_paths := false
+    only_paths := false, chains := 'chain_here'
 ) AS TABLE
-WITH RECURSIVE chain AS MATERIALIZED (
+WITH RECURSIVE chain_here AS MATERIALIZED (
     SELECT
         run_id, path_id, parent_path_id, depth, publisher_id, subscription_id, route, is_cached,
         is_path, is_cut
-    FROM derive.flow_chain(
+    FROM main.flow_chain(
         runs, from_topic, to_topic, max_depth := max_depth, max_paths := max_paths
     )
 ),
+chain AS NOT MATERIALIZED (FROM query_table(chains)),
 called AS (
     SELECT
         r.route,

@@ -50,7 +50,7 @@ def test_chains_are_no_more_than_their_limits(
     """Else DuckDB keeps tables of all takes for a few roots, and needs twice the memory."""
     con = connect(empty_database, read_only=True)
     chains = arguments.replace("[1]", "[1], NULL, NULL").replace("[1, 2]", "[1, 2], NULL, NULL")
-    explain = f"EXPLAIN (FORMAT json) SELECT path_id FROM derive.flow_chain({chains})"
+    explain = f"EXPLAIN (FORMAT json) SELECT path_id FROM main.flow_chain({chains})"
     (plan,) = json.loads(con.execute(explain).fetchall()[0][1])
     con.close()
     (limit,) = [node["extra_info"] for node in nodes(plan) if "LIMIT" in node["name"].upper()]

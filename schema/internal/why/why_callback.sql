@@ -49,6 +49,7 @@ meanwhile AS (
         unnest(w.meanwhile_ns) AS overlap_ns
     FROM explained_wait AS w
     JOIN chosen AS c ON w.callback_id = c.callback_id
+    WHERE w.start_ns >= $start_ns AND w.start_ns < $end_ns
 ),
 ran AS MATERIALIZED (
     SELECT
