@@ -101,6 +101,9 @@ def parameters_of(
 
 def escape(text: str) -> str:
     """Return a text without markup: Rich prints it as it is."""
+    # Loading that takes longer than all texts, and hardly one has any.
+    if "[" not in text and not text.endswith("\\"):
+        return text
     from rich import markup
 
     return markup.escape(text)

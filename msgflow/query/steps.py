@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Self
 
 import duckdb
@@ -29,10 +28,10 @@ class Steps:
     def __init__(
         self,
         connection: duckdb.DuckDBPyConnection,
-        known: Mapping[str, str] = MappingProxyType({}),
+        known: Mapping[str, str] | None = None,
     ) -> None:
         self._connection = connection
-        self._known = known
+        self._known = known or {}
         self._made: dict[str, tuple[str, dict[str, Any]]] = {}
 
     def __enter__(self) -> Self:
@@ -60,8 +59,7 @@ class Steps:
                 # What was made of the old rows has to be made again.
                 self._made = dict.fromkeys(self._made, ("", {}))
             self._made[step.table] = "", {}
-            if known := self._known.get(step.table):
-                self._connection.execute(f"CREATE OR REPLACE TEMP TABLE {step.table} AS {known}")
-            else:
-                self._connection.execute(*wanted)
+            known = self._known.get(step.table)
+            table = (f"CREATE OR REPLACE TEMP TABLE {step.table} AS {known}",)
+            self._connection.execute(*(table if known else wanted))
             self._made[step.table] = wanted

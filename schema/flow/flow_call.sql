@@ -4,6 +4,7 @@
 --     got the response. Each has the callback instance that called first, and the message that this
 --     instance was for, if any.
 -- grain: one row per publication, callback instance that called for it, and way it did so
+-- when: store.link_request
 
 -- What a join looks up stays in memory until the query ends, and how often services were called is
 -- hard to guess. So only callback instances that called, and publications of services, are looked
