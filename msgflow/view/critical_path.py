@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from typing import TYPE_CHECKING
 
 import pyarrow as pa
@@ -10,6 +9,7 @@ import pyarrow as pa
 from msgflow.query.catalogue import load_query
 from msgflow.query.runner import run_query
 from msgflow.run.slice import Slice
+from msgflow.text.shell import shell_joined
 from msgflow.view.page_query import run_page_query
 from msgflow.view.table_encoding import encode
 
@@ -64,7 +64,7 @@ def critical_path(
                 for column in header.columns
                 if column.name != "path"
             },
-            "command": shlex.join([*command, "--from", first, "--detail", "full"]),
+            "command": shell_joined([*command, "--from", first, "--detail", "full"]),
         },
         origin_ns=origin_ns,
         units=result.units,

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import shlex
 from typing import TYPE_CHECKING
 
+from msgflow.text.shell import shell_joined
 from msgflow.view.table_encoding import encode
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ def encoded_comparison(comparison: Comparison, what: str, *, is_quick: bool = Fa
             "b": comparison.run_b.name,
             "is_quick": is_quick,
             "columns": _descriptions(result),
-            "command": shlex.join(
+            "command": shell_joined(
                 ["msgflow", "compare", comparison.run_a.name, comparison.run_b.name]
                 + ["--what", what] * (what != "paths")
             ),

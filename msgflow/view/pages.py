@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shlex
 import threading
 from collections import OrderedDict
 from dataclasses import asdict, dataclass, replace
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
 
-from msgflow.db.finding import next_command, read_findings
+from msgflow.db.finding import read_findings
 from msgflow.errors import UsageError
 from msgflow.query.catalogue import load_query
 from msgflow.query.clock_notes import clock_notes
@@ -19,6 +18,7 @@ from msgflow.query.compare import compare, warm_up
 from msgflow.query.runner import run_query
 from msgflow.run.slice import Slice
 from msgflow.run.window import WHOLE, Window
+from msgflow.text.shell import shell_joined
 from msgflow.view.critical_path import critical_path
 from msgflow.view.encoded import encoded_comparison, encoded_section
 from msgflow.view.page_query import page_query, run_page_query
@@ -51,8 +51,8 @@ NAMED = (
     "e2e-latency", "path-breakdown", "e2e-latency-reaction", "e2e-latency-age",
     "executor-usage",
     "waits", "waits-pair", "topics-rate", "topics-latency", "service-latency",
-    "action-latency", "links", "topics-delivery", "info-hosts", "info-processes", "topics",
-    "clocks", "topics-summary", "callbacks", "timers", "info-nodes",
+    "action-latency", "links", "topics-delivery", "info-hosts", "info-processes", "topics-summary",
+    "callbacks", "timers", "info-nodes",
 )  # fmt: skip
 # A window with more bars than this is drawn in bins, in so many at the most.
 MOST_BARS = 40_000
@@ -271,10 +271,8 @@ class Pages:
         # A note does not repeat what a finding says.
         is_said = any(found["name"] in _OF_CLOCKS for found in findings)
         notes = [] if is_said else clock_notes(connection, [extent.run])
-        return encode(table, meta={
-            "notes": notes, "command": f"msgflow check --run {shlex.quote(extent.run.name)}",
-            "next": f"{next_command(listed)} --run {shlex.quote(extent.run.name)}",
-        })  # fmt: skip
+        command = shell_joined(["msgflow", "check", "--run", extent.run.name])
+        return encode(table, meta={"notes": notes, "command": command})
 
     def _compare(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
         extent = self.extent(connection, params)
@@ -396,7 +394,7 @@ SUMMARY = ("why", "paths", "blame", "drops", "threads")
 _PLAIN = (
     "row", "gap", "path", "executor_share", "executor_node", "neighbour", "rate", "callback",
     "callback_point", "callback_slowest", "topic_point", "topic_slowest", "service_point",
-    "service_slowest", "loss", "loss_point", "thread_name", "place",
+    "service_slowest", "loss", "loss_point", "thread_name", "place", "run_before",
 )  # fmt: skip
 # Named queries that list one by one what a page query counts.
 _LISTED_BY = {"loss": "topics-unmatched"}
@@ -420,7 +418,7 @@ def _is_set(params: Params, name: str) -> bool:
 def _command(name: str, extent: Extent, part: Slice, *, internal: bool) -> str:
     """Return the command that prints the rows of a named query, as the page shows them."""
     words = [*load_query(name).command.split(), "--run", extent.run.name]
-    return shlex.join(words + _window_options(extent, part) + ["--internal"] * internal)
+    return shell_joined(words + _window_options(extent, part) + ["--internal"] * internal)
 
 
 def _window_options(extent: Extent, part: Slice) -> list[str]:

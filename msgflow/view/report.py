@@ -252,25 +252,15 @@ class _Maker:
 
     def absent(self, other: Run | None) -> list[str]:
         """Return the pages that would show nothing."""
-        needed = {
-            "paths": "path", "executors": "executor_node", "graph": "row", "timeline": "row",
-            "losses": "loss", "nodes": "callback",
-        }  # fmt: skip
+        needed = {"paths": "path", "graph": "row", "timeline": "row"}
+        run = {"run": self.extent.run.run_id}
         empty = [
             page
             for page, name in needed.items()
-            if not run_page_query(self.connection, name, {"run": self.extent.run.run_id}).num_rows
+            if not run_page_query(self.connection, name, run).num_rows
         ]
-        named = {
-            "topics": ("topics-summary",),
-            "timers": ("timers",),
-            "services": ("service-latency", "action-latency"),
-        }
-        empty += [
-            page
-            for page, names in named.items()
-            if not any(len(self.named[name]) for name in names)
-        ]
+        named = {"nodes": "info-nodes", "topics": "topics-summary"}
+        empty += [page for page, name in named.items() if not len(self.named[name])]
         return [*empty, *([] if other else ["compare"])]
 
     def panels(self) -> None:

@@ -6,7 +6,6 @@ the command line have the same numbers.
 
 from __future__ import annotations
 
-import shlex
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -20,6 +19,7 @@ from msgflow.query.selection import Selection
 from msgflow.query.why import explain
 from msgflow.result.query_result import QueryResult
 from msgflow.sql.quoting import literal
+from msgflow.text.shell import shell_joined
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -147,13 +147,13 @@ def query_section(
     result = run_query(connection, header, {}, part.slice, selection=selection)
     words = [*header.command.split(), "--where", selection.where or ""]
     words += ["--sort", *selection.sort, "--limit", str(selection.limit)]
-    command = shlex.join([*words, *part.options, "--run", run.name])
+    command = shell_joined([*words, *part.options, "--run", run.name])
     return Section(name, result, (command,))
 
 
 def why_section(connection: duckdb.DuckDBPyConnection, run: Run, part: Part) -> Section:
     """Return the verdict of `msgflow why`: a sentence for each culprit, the worst first."""
-    command = shlex.join(["msgflow", "why", *part.options, "--run", run.name])
+    command = shell_joined(["msgflow", "why", *part.options, "--run", run.name])
     try:
         return Section("why", explain(connection, run, part.slice).verdict, (command,))
     except NoFlowError:
@@ -178,7 +178,7 @@ def area_section(
     selection = Selection(where=where, sort=(sort,))
     result = run_query(connection, header, {}, part.slice, selection=selection)
     words = [*header.command.split(), "--where", where, "--sort", sort]
-    command = shlex.join([*words, *part.options, "--run", run.name])
+    command = shell_joined([*words, *part.options, "--run", run.name])
     return Section(name, result, (command,))
 
 
@@ -198,7 +198,7 @@ def blame_section(
         ranks = pa.array([rank] * len(result), pa.int64())
         results.append(table.set_column(table.column_names.index("rank"), "rank", ranks))
         command = ["msgflow", "flow", "--take", str(take), "--why", "--from", first]
-        commands.append(shlex.join([*command, "--case", "first", "--by", "node"]))
+        commands.append(shell_joined([*command, "--case", "first", "--by", "node"]))
     if not results:
         return Section("blame", QueryResult(pa.table({"rank": pa.array([], pa.int64())})), ())
     return Section("blame", replace(result, table=pa.concat_tables(results)), tuple(commands))
@@ -213,7 +213,7 @@ def verdict_section(verification: Verification, part: Part) -> Section:
     words = ["msgflow", "verify", verification.file, *part.options]
     if verification.paths != DEFAULT_PATHS:
         words += ["--paths", verification.paths]
-    command = shlex.join([*words, "--run", verification.run.name])
+    command = shell_joined([*words, "--run", verification.run.name])
     return Section("verdicts", verification.result, (command,), ", ".join(numbers))
 
 
@@ -221,7 +221,7 @@ def change_section(comparison: Comparison) -> Section:
     """Return the paths that differ between two runs."""
     a, b = comparison.run_a.name, comparison.run_b.name
     changes = comparison.changes()
-    command = shlex.join(["msgflow", "compare", a, b, "--only-different"])
+    command = shell_joined(["msgflow", "compare", a, b, "--only-different"])
     reading = f"{b} compared with {a}"
     if not len(changes):
         reading = changes.when_empty

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import shlex
 from itertools import groupby
 from typing import TYPE_CHECKING
 
 from msgflow.result.cells import cells
 from msgflow.text.markdown import code, code_lines, markdown_line, rule_line
+from msgflow.text.shell import shell_joined
 from msgflow.text.values import format_cell
 
 if TYPE_CHECKING:
@@ -106,5 +106,5 @@ def _findings(run: Run, findings: Sequence[Finding]) -> Iterator[str]:
         if len(places) > _MOST_PLACES:
             yield f"  - and {len(places) - _MOST_PLACES} more"
         yield f"  - Cure: {first.cure}"
-    command = shlex.join(["msgflow", "check", "--run", run.name])
+    command = shell_joined(["msgflow", "check", "--run", run.name])
     yield from ("", *code_lines([command]), "")

@@ -23,8 +23,7 @@ from msgflow.view import report as report_module
 from msgflow.view.pages import Pages
 
 PAGES = (
-    "overview", "paths", "timeline", "graph", "nodes", "topics", "timers", "services", "losses",
-    "executors", "compare",
+    "overview", "paths", "timeline", "graph", "nodes", "topics", "compare",
 )  # fmt: skip
 
 
@@ -115,9 +114,8 @@ def test_names_in_the_address_are_only_ever_text(
             f"timeline?from={text}&to=1&hide={text}",
             f"graph?q={text}",
             f"paths?path={text}",
-            f"nodes?q={text}&callback={text}",
+            f"nodes?q={text}&callback={text}&call={text}&section={text}",
             f"topics?topic={text}&start={text}",
-            f"services?q={text}&call={text}",
             f"losses?topic={text}&internal={text}",
             f"compare?other={text}&what={text}",
         ):

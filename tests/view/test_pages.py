@@ -186,9 +186,11 @@ def test_executors(way: str, demo: Path, serve: Serve, report: Report, page: Pag
         usage = opened.query("executor-usage").to_arrow().to_pylist()
         blame = opened.query("waits-pair").to_arrow().to_pylist()
     page.open(serve(demo).address if way == "served" else report(demo))
+    # The address of the page that is a section now.
     page.go("#/executors")
+    page.page.locator("canvas.strip").first.wait_for()
     assert page.page.locator("canvas.strip").count() == len(usage)
-    page.page.locator("details.beside summary").first.click()
+    page.page.locator("[data-section=executors] details.beside summary").first.click()
     durations = (
         "seen_ns", "wait_ns", "select_ns", "take_ns", "callback_ns", "blocked_ns", "unknown_ns",
     )  # fmt: skip
@@ -294,6 +296,26 @@ def test_compare_overlays_a_path(systems: Path, report: Report, page: Page) -> N
     labels = page.page.locator(".u-legend").inner_text()
     assert "A: autoware_two_threads" in labels
     assert "B: autoware" in labels
+
+
+def test_compare_opens_on_the_run_before_and_the_selector_follows(
+    systems: Path, serve: Serve, page: Page
+) -> None:
+    page.open(serve(systems).address)
+    choice, other = page.page.get_by_label("run", exact=True), "run to compare with"
+    assert choice.input_value() == "3"
+    page.page.route("**/api/compare*", lambda route: route.abort())
+    page.page.evaluate("location.hash = '#/compare?run=2&x=1'")
+    # Run 1 is of another system, and stands before it: there is no better one.
+    page.page.wait_for_url("**other=1*")
+    assert choice.input_value() == "2"
+    page.page.evaluate("location.hash = '#/compare?run=3'")
+    page.page.wait_for_url("**other=2*")
+    assert page.page.get_by_label(other).input_value() == "2"
+    page.page.evaluate("history.go(-1)")
+    page.page.wait_for_url("**run=2*")
+    assert choice.input_value() == "2"
+    page.errors.clear()
 
 
 def test_compare_needs_two(demo: Path, serve: Serve, page: Page) -> None:

@@ -227,7 +227,15 @@ def test_the_editor_completes_views_and_columns(demo: Path, serve: Serve, page: 
     page.page.keyboard.type("d > 0 orde")
     assert completions(page)[0] == "ORDER"
     page.page.keyboard.press("Enter")
-    page.page.keyboard.type(" BY start_ns LIMIT 3")
+    page.page.keyboard.type(" BY ")
+    # A click on a name beside the text writes it there.
+    page.page.get_by_label("show views with this text").fill("callback_instance")
+    names = page.page.get_by_label("views and columns").locator("details").filter(
+        has=page.page.get_by_role("button", name="callback_instance", exact=True)
+    )  # fmt: skip
+    names.locator("summary").first.click(position={"x": 5, "y": 8})
+    names.get_by_role("button", name="start_ns", exact=True).first.click()
+    page.page.keyboard.type(" LIMIT 3")
     page.page.keyboard.press("Escape")
     page.page.keyboard.press("Control+Enter")
     assert len(shown_rows(page)) == 3

@@ -1,4 +1,4 @@
-"""Nodes, Topics, Timers, Services and Losses: their numbers are those that commands print."""
+"""Nodes and Topics, with their sections: their numbers are those that commands print."""
 
 from __future__ import annotations
 
@@ -167,6 +167,8 @@ def test_topics(way: str, demo: Path, serve: Serve, report: Report, page: Page, 
         assert row["jitter"] == shown(wanted["period_deviation_ns"])
         assert row["latency max"] == shown(wanted["latency_max_ns"])
         assert row["dropped"] == f"{wanted['dropped']:,}"
+        assert row["publishers"] == f"{wanted['publisher_count']:,}"
+        assert row["subscriptions"] == f"{wanted['subscription_count']:,}"
         assert row["reasons"] == (wanted["reasons"] or "")
     slow = max(topics, key=lambda row: row["latency_max_ns"] or 0)
     name = slow["topic_name"]
@@ -229,7 +231,7 @@ def test_processes_without_callbacks_are_named(
     page.open(serve(database).address)
     page.go("#/nodes")
     assert note in page.page.locator("main").inner_text()
-    page.page.get_by_text("No callback ran of").wait_for()
+    page.page.get_by_text("No callback of /filter_image was recorded.").wait_for()
 
 
 @pytest.mark.thorough

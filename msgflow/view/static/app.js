@@ -1,19 +1,15 @@
 // The application: it chooses where data come from, and shows the page of the address.
 
 import { clear, color, h } from "./dom.js";
-import { address, current, go, onChange, pageAddress } from "./address.js";
+import { address, current, go, onChange, pageAddress, replace } from "./address.js";
 import { embedded } from "./report_data.js";
 import { decode, records } from "./table_decoding.js";
 import { OverviewPage } from "./overview.js";
 import { PathsPage } from "./paths.js";
 import { TimelinePage } from "./timeline.js";
 import { GraphPage } from "./graph.js";
-import { ExecutorsPage } from "./executors.js";
 import { NodesPage } from "./nodes.js";
 import { TopicsPage } from "./topics.js";
-import { TimersPage } from "./timers.js";
-import { ServicesPage } from "./services.js";
-import { LossesPage } from "./losses.js";
 import { Bar } from "./bar.js";
 import { ComparePage } from "./compare.js";
 import { LakePage } from "./lake.js";
@@ -28,13 +24,16 @@ const PAGES = {
   graph: ["Graph", GraphPage],
   nodes: ["Nodes", NodesPage],
   topics: ["Topics", TopicsPage],
-  timers: ["Timers", TimersPage],
-  services: ["Services", ServicesPage],
-  losses: ["Losses", LossesPage],
-  executors: ["Executors", ExecutorsPage],
   compare: ["Compare", ComparePage],
   sql: ["SQL", SqlPage],
   lake: ["Lake", LakePage],
+};
+// Pages that are sections of others: where their addresses lead, and what their own words are there.
+const MOVED = {
+  timers: ({ callback }) => ({ page: "nodes", callback: null, timer: callback }),
+  services: () => ({ page: "nodes" }),
+  executors: () => ({ page: "nodes" }),
+  losses: ({ topic }) => ({ page: "topics", topic: null, lost: topic }),
 };
 // Of a lake, which is no database; and what only a server answers.
 const OTHER_PAGES = ["lake"];
@@ -193,7 +192,7 @@ class App {
 
   header() {
     this.runName = h("span", { className: "run-name" }, this.run?.name ?? "no run");
-    const runs = this.runs.length > 1
+    this.runChoice = this.runs.length > 1
       ? h(
         "select",
         {
@@ -208,9 +207,7 @@ class App {
             },
           },
         },
-        this.runs.map((run) =>
-          h("option", { value: String(run.run_id), selected: run === this.run }, run.name)
-        ),
+        this.runs.map((run) => h("option", { value: String(run.run_id) }, run.name)),
       )
       : this.runName;
     this.tabs = Object.entries(this.pages).map(([page, [title]]) => ({
@@ -227,7 +224,7 @@ class App {
     clear(
       this.nav,
       h("span", { className: "brand" }, "msgflow"),
-      runs,
+      this.runChoice,
       h("span", { className: "tabs" }, this.tabs.map(({ link }) => link)),
       theme,
     );
@@ -248,6 +245,7 @@ class App {
   linksMoved() {
     const { page } = current();
     this.bar?.update();
+    if (this.runs.length > 1) this.runChoice.value = String(this.run.run_id);
     for (const { page: name, link } of this.tabs) {
       link.href = name === page ? address({}) : pageAddress(name);
       if (name === page) {
@@ -259,8 +257,9 @@ class App {
   }
 
   async show(isNext = false) {
-    const asked = current();
-    const [title, Page] = this.pages[asked.page] ?? [];
+    const { page: name } = current();
+    if (Object.keys(MOVED).includes(name)) replace({ ...MOVED[name](current()), section: name });
+    const [title, Page] = this.pages[current().page] ?? [];
     if (!Page) {
       go({ page: Object.keys(this.pages)[0] });
       return;

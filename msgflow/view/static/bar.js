@@ -2,7 +2,7 @@
 
 import { breakable, clear, color, h } from "./dom.js";
 import { current, go, pageAddress } from "./address.js";
-import { duration, momentOf, secondsText } from "./labels.js";
+import { duration, momentOf, secondsText, usualMost } from "./labels.js";
 import { INTERNAL } from "./notice.js";
 
 // A shorter drag on the curve is a click.
@@ -14,7 +14,7 @@ const FOUND_ON = {
   node: ["nodes", "q"],
   namespace: ["nodes", "q"],
   topic: ["topics", "topic"],
-  service: ["services", "q"],
+  service: ["nodes", "q"],
 };
 
 export class Bar {
@@ -216,9 +216,9 @@ export class Bar {
         end: Math.max(this.drag.from, this.drag.to),
       }
       : app.extent;
-    const most = Math.max(...rate.count, 1);
+    const most = usualMost(rate.count);
     for (let row = 0; row < rate.rows; row++) {
-      const high = Math.max((rate.count[row] / most) * (box.height - 3), 1);
+      const high = Math.max(Math.min(rate.count[row] / most, 1) * (box.height - 3), 1);
       const isInside = rate.start_at[row] + rate.length[row] > chosen.start &&
         rate.start_at[row] < chosen.end;
       context.fillStyle = color(isInside ? "timer" : "faint");

@@ -68,8 +68,8 @@ export class ComparePage {
       return;
     }
     const asked = current();
-    this.other = others.find((run) => String(run.run_id) === asked.other) ??
-      others[others.length - 1];
+    const given = others.find((run) => String(run.run_id) === asked.other);
+    this.other = given ?? (await this.before(others));
     this.what = asked.what in KINDS_OF ? asked.what : "paths";
     const choice = h(
       "select",
@@ -133,6 +133,16 @@ export class ComparePage {
       ),
     );
     await this.show();
+  }
+
+  // The run before, of the same system; else the one that stands before it in the list.
+  async before(others) {
+    if (others.length > 1) {
+      const { run_id: found } = await this.app.fetch("run_before");
+      const before = others.find((run) => run.run_id === found[0]);
+      if (before) return before;
+    }
+    return others[Math.max(this.app.runs.indexOf(this.app.run) - 1, 0)];
   }
 
   // What was measured first; intervals, and with them verdicts, take longer.

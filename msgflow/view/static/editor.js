@@ -4,7 +4,7 @@ import { h } from "./dom.js";
 
 const NO_NAMES = ["QuotedIdentifier", "String", "LineComment", "BlockComment"];
 
-// Returns { root, text(), set(text), mark(line) }. The library is that of codemirror.min.js; words is
+// Returns { root, text(), set(text), insert(text), mark(line) }. The library is that of codemirror.min.js; words is
 // the table of the views, columns, macros, functions, types and keywords. Options: text, run(),
 // changed().
 export function sqlEditor(library, words, { text, run, changed }) {
@@ -69,6 +69,11 @@ export function sqlEditor(library, words, { text, run, changed }) {
     text: () => view.state.doc.toString(),
     set: (value) =>
       view.dispatch({ changes: { from: 0, to: view.state.doc.length, insert: value } }),
+    // In place of what is selected.
+    insert(value) {
+      view.dispatch(view.state.replaceSelection(value));
+      view.focus();
+    },
     // Marks a line, counted from 1; none when it is null.
     mark(line) {
       const { doc } = view.state;

@@ -1,12 +1,11 @@
 // Executors: what their threads did over time, and who kept whom waiting.
 
-import { clear, color, h } from "./dom.js";
-import { count, duration, moment, percent } from "./labels.js";
+import { color, h } from "./dom.js";
+import { duration, percent } from "./labels.js";
 import { pageAddress } from "./address.js";
 import { besides, dataTable, filled } from "./table.js";
 import { downloads } from "./download.js";
-import { command, failed, notes, waiting } from "./notice.js";
-import { fill, section } from "./overview.js";
+import { command, notes } from "./notice.js";
 
 // What a thread did, its colour, and what it is called.
 const ACTIVITIES = [
@@ -16,198 +15,193 @@ const ACTIVITIES = [
   ["wait", "wait", "wait: for work"],
 ];
 
-export class ExecutorsPage {
-  constructor(app, root) {
-    this.app = app;
-    this.root = root;
-    this.ready = this.build();
-  }
+const OF_THREADS = [
+  "host",
+  "nodes",
+  "process",
+  "pid",
+  "tid",
+  "executor_kind",
+  "seen_ns",
+  "wait_ns",
+  "select_ns",
+  "take_ns",
+  "callback_ns",
+  "blocked_ns",
+  "unknown_ns",
+  "callbacks",
+  "callback_share",
+];
 
-  async build() {
-    const { app } = this;
-    const over = section("What executor threads did");
-    const blame = section("Who kept whom waiting");
-    const waits = section("How long callbacks waited");
-    clear(this.root, over.root, blame.root, waits.root);
-    await Promise.all([
-      fill(over, async () => {
-        const [usage, shares] = await Promise.all([
-          app.query("executor-usage"),
-          app.inWindow("executor_share"),
-        ]);
-        this.strips = { usage, shares, places: [] };
-        if (!usage.rows) return h("p", {}, "No executor is known: the trace has no callbacks.");
-        const { extent } = app;
-        const ticks = [0, 0.25, 0.5, 0.75, 1].map((share) =>
-          h("span", {}, duration(extent.start + share * (extent.end - extent.start)))
-        );
-        const list = h(
-          "div",
-          { className: "strips" },
-          h(
-            "div",
-            { className: "strip-row strip-axis" },
-            h("div", {}, "since the begin of the run"),
-            h("div", { className: "axis" }, ticks),
-          ),
-        );
-        for (let row = 0; row < usage.rows; row++) {
-          const canvas = h("canvas", {
-            className: "strip",
-            role: "img",
-            "aria-label": `what thread ${usage.tid[row]} did over time`,
-          });
-          this.strips.places.push({ canvas, thread: usage.thread_id[row] });
-          const busy = usage.seen_ns[row] ? usage.callback_ns[row] / usage.seen_ns[row] : NaN;
-          list.append(
-            h(
-              "div",
-              { className: "strip-row" },
-              h(
-                "div",
-                {},
-                h("b", {}, `${usage.nodes[row]} ${usage.tid[row]}`),
-                h(
-                  "div",
-                  { className: "soft" },
-                  `${usage.host[row]} · ${String(usage.executor_kind[row]).replace("_", "-")} · ${
-                    percent(busy)
-                  } in callbacks`,
-                ),
-              ),
-              canvas,
-            ),
-          );
-        }
-        requestAnimationFrame(() => this.drawStrips());
-        return [
-          h(
-            "p",
-            { className: "soft" },
-            "Each column is a piece of the run, filled with the share of time that went to each: a full column is 100 %. Click to see it in the timeline.",
-          ),
-          h(
-            "div",
-            { className: "legend" },
-            ACTIVITIES.map(([, shade, text]) =>
-              h(
-                "span",
-                { className: "legend-item" },
-                h("span", { className: `swatch color-${shade}` }),
-                text,
-              )
-            ),
-          ),
-          list,
-          downloads({
-            name: "what executor threads did",
-            canvases: () => this.strips.places.map(({ canvas }) => canvas),
-            columns: () => [
-              ["thread_id", shares.thread_id],
-              ["start_at [ns since begin of run]", shares.start_at],
-              ["length [ns]", shares.length],
-              ["activity", shares.activity],
-              ["busy [ns]", shares.busy],
-            ],
-          }),
-          besides(
-            "as a table",
-            dataTable(usage, {
-              label: "executor threads",
-              columns: [
-                "host",
-                "nodes",
-                "process",
-                "pid",
-                "tid",
-                "executor_kind",
-                "seen_ns",
-                "wait_ns",
-                "select_ns",
-                "take_ns",
-                "callback_ns",
-                "blocked_ns",
-                "unknown_ns",
-                "callbacks",
-                "callback_share",
-              ],
-            }),
-          ),
-          notes(usage.meta.notes),
-          command(usage.meta.command),
-        ];
-      }),
-      fill(blame, async () => {
-        const table = await app.query("waits-pair");
-        return [
-          h(
-            "p",
-            { className: "soft" },
-            "Callbacks that were ready while another one ran on their executor, and how long that ran: shorter callbacks, other callback groups or more threads help here.",
-          ),
-          dataTable(table, {
-            label: "interference",
-            sort: { name: "overlap_max_ns", down: true },
-            shown: 20,
-            nothing: "No callback waited for another one.",
-            columns: [
-              "node",
-              "callback",
-              "meanwhile_node",
-              "meanwhile_callback",
-              ...filled(table, ["meanwhile_thread"]),
-              "waits",
-              "instances",
-              "overlap_min_ns",
-              "overlap_max_ns",
-              "worst_ns",
-              "share",
-            ],
-          }),
-          notes(table.meta.notes),
-          command(table.meta.command),
-        ];
-      }),
-      fill(waits, async () => {
-        const table = await app.query("waits");
-        return [
-          h(
-            "p",
-            { className: "soft" },
-            "From the moment at which a callback could have run to its start. At least and at most: when a message came to the host is not recorded, only when it was taken.",
-          ),
-          dataTable(table, {
-            label: "waits",
-            sort: { name: "busy_worst_ns", down: true },
-            shown: 20,
-            nothing: "No callback is known to have waited.",
-            columns: [
-              "node",
-              "callback",
-              "count",
-              "delayed_min",
-              "delayed_max",
-              "wait_median_ns",
-              "wait_max_ns",
-              "busy_worst_ns",
-              "busy_total_min_ns",
-              "busy_total_max_ns",
-              "meanwhile",
-              ...filled(table, ["run_queue_worst_ns", "preempted_worst_ns", "cpu_taken_by"]),
-              "unknown",
-              "loss_affected",
-            ],
-          }),
-          notes(table.meta.notes),
-          command(table.meta.command),
-        ];
-      }),
-    ]);
-    this.onResize = () => this.drawStrips();
+export class Executors {
+  constructor(app) {
+    this.app = app;
+    this.onResize = () => this.draw();
     addEventListener("resize", this.onResize);
   }
 
-  drawStrips() {
+  async build() {
+    return (await Promise.all([this.threads(), this.blame(), this.waits()])).filter(Boolean);
+  }
+
+  async threads() {
+    const { app } = this;
+    const [usage, shares] = await Promise.all([
+      app.query("executor-usage"),
+      app.inWindow("executor_share"),
+    ]);
+    if (!usage.rows) return null;
+    this.strips = { shares, places: [] };
+    const { extent } = app;
+    const ticks = [0, 0.25, 0.5, 0.75, 1].map((share) =>
+      h("span", {}, duration(extent.start + share * (extent.end - extent.start)))
+    );
+    const list = h(
+      "div",
+      { className: "strips" },
+      h(
+        "div",
+        { className: "strip-row strip-axis" },
+        h("div", {}, "since the begin of the run"),
+        h("div", { className: "axis" }, ticks),
+      ),
+    );
+    for (let row = 0; row < usage.rows; row++) {
+      const canvas = h("canvas", {
+        className: "strip",
+        role: "img",
+        "aria-label": `what thread ${usage.tid[row]} did over time`,
+      });
+      this.strips.places.push({ canvas, thread: usage.thread_id[row] });
+      const busy = usage.seen_ns[row] ? usage.callback_ns[row] / usage.seen_ns[row] : NaN;
+      list.append(
+        h(
+          "div",
+          { className: "strip-row" },
+          h(
+            "div",
+            {},
+            h("b", {}, `${usage.nodes[row]} ${usage.tid[row]}`),
+            h(
+              "div",
+              { className: "soft" },
+              `${usage.host[row]} · ${String(usage.executor_kind[row]).replace("_", "-")} · ${
+                percent(busy)
+              } in callbacks`,
+            ),
+          ),
+          canvas,
+        ),
+      );
+    }
+    requestAnimationFrame(() => this.draw());
+    return h(
+      "section",
+      {},
+      h("h2", {}, "What executor threads did"),
+      h(
+        "p",
+        { className: "soft" },
+        "Each column is a piece of the run, filled with the share of time that went to each: a full column is 100 %. Click to see it in the timeline.",
+      ),
+      h(
+        "div",
+        { className: "legend" },
+        ACTIVITIES.map(([, shade, text]) =>
+          h(
+            "span",
+            { className: "legend-item" },
+            h("span", { className: `swatch color-${shade}` }),
+            text,
+          )
+        ),
+      ),
+      list,
+      downloads({
+        name: "what executor threads did",
+        canvases: () => this.strips.places.map(({ canvas }) => canvas),
+        columns: () => [
+          ["thread_id", shares.thread_id],
+          ["start_at [ns since begin of run]", shares.start_at],
+          ["length [ns]", shares.length],
+          ["activity", shares.activity],
+          ["busy [ns]", shares.busy],
+        ],
+      }),
+      besides("as a table", dataTable(usage, { label: "executor threads", columns: OF_THREADS })),
+      notes(usage.meta.notes),
+      command(usage.meta.command),
+    );
+  }
+
+  async blame() {
+    const table = await this.app.query("waits-pair");
+    return this.table(
+      table,
+      "Who kept whom waiting",
+      "Callbacks that were ready while another one ran on their executor, and how long that ran: shorter callbacks, other callback groups or more threads help here.",
+      {
+        label: "interference",
+        sort: { name: "overlap_max_ns", down: true },
+        columns: [
+          "node",
+          "callback",
+          "meanwhile_node",
+          "meanwhile_callback",
+          ...filled(table, ["meanwhile_thread"]),
+          "waits",
+          "instances",
+          "overlap_min_ns",
+          "overlap_max_ns",
+          "worst_ns",
+          "share",
+        ],
+      },
+    );
+  }
+
+  async waits() {
+    const table = await this.app.query("waits");
+    return this.table(
+      table,
+      "How long callbacks waited",
+      "From the moment at which a callback could have run to its start. At least and at most: when a message came to the host is not recorded, only when it was taken.",
+      {
+        label: "waits",
+        sort: { name: "busy_worst_ns", down: true },
+        columns: [
+          "node",
+          "callback",
+          "count",
+          "delayed_min",
+          "delayed_max",
+          "wait_median_ns",
+          "wait_max_ns",
+          "busy_worst_ns",
+          "busy_total_min_ns",
+          "busy_total_max_ns",
+          "meanwhile",
+          ...filled(table, ["run_queue_worst_ns", "preempted_worst_ns", "cpu_taken_by"]),
+          "unknown",
+          "loss_affected",
+        ],
+      },
+    );
+  }
+
+  table(table, title, help, options) {
+    return table.rows > 0 && h(
+      "section",
+      {},
+      h("h2", {}, title),
+      h("p", { className: "soft" }, help),
+      dataTable(table, { shown: 20, ...options }),
+      notes(table.meta.notes),
+      command(table.meta.command),
+    );
+  }
+
+  draw() {
     if (!this.strips) return;
     const { shares, places } = this.strips;
     const byThread = new Map();
@@ -252,10 +246,7 @@ export class ExecutorsPage {
     }
   }
 
-  recolor() {
-    this.drawStrips();
-  }
   leave() {
-    if (this.onResize) removeEventListener("resize", this.onResize);
+    removeEventListener("resize", this.onResize);
   }
 }

@@ -16,6 +16,8 @@ const MOST_VERTICES = 260;
 const LEAST_SCALE = 0.8;
 // Names that are longer are cut; the panel has all of them.
 const LONGEST_NAME = 60;
+// Of the small letters, in pixels.
+const WIDTH_OF_LETTER = 6.6;
 // Two lines above the nodes of an executor.
 const GROUP_HEAD = 24;
 // Of the edge with the most messages.
@@ -473,8 +475,19 @@ export class GraphPage {
       ),
     );
     const names = [];
+    // Behind what is written lies its ground, so that no line goes through it.
+    const write = (x, y, name, text, title, host = null) => {
+      const width = text.length * WIDTH_OF_LETTER + 6;
+      const left = host === null ? x - width / 2 : x - 3;
+      names.push(
+        svg("rect", { x: left, y: y - 11, width, height: 15, class: `ground ${host ?? ""}` }),
+        svg("text", { x, y, class: name }, text, svg("title", {}, title)),
+      );
+    };
     for (const key of used) {
       const box = graph.node(key);
+      const { host: name, lines } = groups.get(key);
+      const host = `host-${hosts.indexOf(name) % HOSTS}`;
       root.append(
         svg("rect", {
           x: box.x - box.width / 2,
@@ -482,22 +495,17 @@ export class GraphPage {
           width: box.width,
           height: box.height + GROUP_HEAD,
           rx: 8,
-          class: `group-box host-${hosts.indexOf(groups.get(key).host) % HOSTS}`,
+          class: `group-box ${host}`,
         }),
       );
-      const { lines } = groups.get(key);
       lines.forEach((line, place) =>
-        names.push(
-          svg(
-            "text",
-            {
-              x: box.x - box.width / 2 + 8,
-              y: box.y - box.height / 2 - 10 + 14 * place,
-              class: "group-text",
-            },
-            cut(line, LONGEST_NAME),
-            svg("title", {}, lines.join(": ")),
-          ),
+        write(
+          box.x - box.width / 2 + 8,
+          box.y - box.height / 2 - 10 + 14 * place,
+          "group-text",
+          cut(line, LONGEST_NAME),
+          lines.join(": "),
+          host,
         )
       );
     }
@@ -519,13 +527,12 @@ export class GraphPage {
       arrow.style.strokeWidth = `${1 + (WIDEST - 1) * Math.sqrt((edge.count || 0) / most)}px`;
       root.append(arrow);
       if (edge.label) {
-        names.push(
-          svg(
-            "text",
-            { x: line.x, y: line.y - 4, class: `edge-text${edge.missing ? " missing-text" : ""}` },
-            edge.missing ? `${edge.label} ✕${edge.missing.toLocaleString("en-US")}` : edge.label,
-            svg("title", {}, edge.title),
-          ),
+        write(
+          line.x,
+          line.y - 4,
+          `edge-text${edge.missing ? " missing-text" : ""}`,
+          edge.missing ? `${edge.label} ✕${edge.missing.toLocaleString("en-US")}` : edge.label,
+          edge.title,
         );
       }
     });

@@ -1,6 +1,7 @@
 // The whole run in a strip below the timeline: how busy it was, and where the window lies.
 
 import { color, h } from "./dom.js";
+import { usualMost } from "./labels.js";
 
 const HEIGHT = 34;
 
@@ -40,7 +41,7 @@ export class Minimap {
     }
   }
 
-  // Bars of callbacks, in as many pieces as the strip is wide; the busiest piece is as high as it.
+  // Bars of callbacks, in as many pieces as the strip is wide; a busy piece is as high as it.
   fill(table) {
     const pieces = 600;
     const shares = new Float64Array(pieces);
@@ -54,8 +55,8 @@ export class Minimap {
       );
       for (let piece = first; piece <= last; piece++) shares[piece] += busy / (last - first + 1);
     }
-    const most = Math.max(...shares);
-    this.shares = most > 0 ? shares.map((share) => share / most) : shares;
+    const most = usualMost(shares);
+    this.shares = shares.map((share) => Math.min(share / most, 1));
     this.canvas.dataset.filled = "1";
     this.draw(this.view);
   }

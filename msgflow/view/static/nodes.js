@@ -1,10 +1,15 @@
-// Nodes: their callbacks, how often and how long these ran, how long they waited, what they missed.
+// Nodes: their callbacks, timers, services and executors; how often and how long these ran and waited.
 
 import { clear, h } from "./dom.js";
 import { count } from "./labels.js";
 import { besides, dataTable } from "./table.js";
-import { commands, failed, notes, waiting } from "./notice.js";
-import { callbackPanel, Chooser } from "./panel.js";
+import { redrawCharts } from "./chart.js";
+import { commands, notes } from "./notice.js";
+import { callbackPanel, Chooser, searchField } from "./panel.js";
+import { Sections } from "./sections.js";
+import { timers } from "./timers.js";
+import { actions, services } from "./services.js";
+import { Executors } from "./executors.js";
 
 const COLUMNS_OF_CALLBACKS = [
   "node",
@@ -22,27 +27,26 @@ export class NodesPage {
   constructor(app, root) {
     this.app = app;
     this.root = root;
+    this.choosers = [];
+    this.executors = new Executors(app);
     this.ready = this.build();
   }
 
   async build() {
     const { app } = this;
-    const [callbacks, nodes, objects] = await Promise.all([
+    const [callbacks, nodes, processes] = await Promise.all([
       app.query("callbacks"),
       app.query("info-nodes"),
-      app.fetch("callback"),
+      app.query("info-processes"),
     ]);
-    this.chooser = new Chooser(app, {
+    const chooser = this.chooser(callbacks, {
       key: "callback",
       label: "callbacks",
+      columns: [...COLUMNS_OF_CALLBACKS],
       sort: { name: "max_ns", down: true },
       identity: (table, row) => String(table.callback_id[row]),
-      nothing: "No callback ran.",
-      search: {
-        placeholder: "node, callback …",
-        label: "show callbacks with this text",
-        texts: (table, row) => [table.node[row], table.callback[row], table.symbol[row]],
-      },
+      nothing: "No callback was recorded.",
+      texts: (table, row) => [table.node[row], table.callback[row], table.symbol[row]],
       panel: (table, row) =>
         callbackPanel(
           app,
@@ -50,109 +54,87 @@ export class NodesPage {
           `${table.node[row] ?? ""} ${table.callback[row]}`,
         ),
     });
-    this.under = h("div");
-    this.later = h("div", {}, waiting("looking for what callbacks waited for …"));
-    this.table = { ...callbacks };
-    this.columns = [...COLUMNS_OF_CALLBACKS];
-    const silent = this.silent(callbacks, nodes);
-    clear(
-      this.root,
-      h(
-        "section",
-        {},
-        h("h2", {}, "Callbacks of the nodes"),
-        h(
-          "p",
-          { className: "soft" },
-          "A click on a row shows the callback over time, and leads to its longest instance.",
-        ),
-        h("div", { className: "tools" }, this.chooser.search),
-        this.chooser.list,
-        this.later,
-        this.under,
-      ),
-      this.chooser.detail,
-      h(
-        "section",
-        {},
-        silent.length > 0 && h("p", {}, `No callback ran of ${silent.join(", ")}.`),
-        besides(count(nodes.rows, "node"), dataTable(nodes, { label: "nodes" }), commands([nodes])),
-      ),
-    );
-    this.show();
-    this.said([callbacks]);
-    // These take longest: the page does not wait for them.
-    this.more = this.join(callbacks, objects);
-  }
-
-  show() {
-    this.chooser.options.columns = this.columns;
-    this.chooser.show(this.table);
-  }
-
-  said(tables) {
-    clear(
-      this.under,
-      notes([...new Set(tables.flatMap((table) => table.meta.notes ?? []))]),
-      commands(tables),
-    );
-  }
-
-  // Nodes without a row above.
-  silent(callbacks, nodes) {
+    const under = h("div", {}, notes(callbacks.meta.notes), commands([callbacks]));
     const known = new Set(callbacks.node);
-    return [...new Set(nodes.node)].filter((node) => !known.has(node));
-  }
-
-  async join(callbacks, objects) {
-    const { app } = this;
-    try {
-      const [waits, delivery] = await Promise.all([
-        app.query("waits"),
-        app.query("topics-delivery"),
-      ]);
-      const subscription = new Map(
-        Array.from(
-          objects.callback_id,
-          (callback, row) => [callback, objects.subscription_id[row]],
+    const silent = [...new Set(nodes.node)].filter((node) => !known.has(node));
+    // These take longest: the page does not wait for them.
+    const choose = (table, options) => this.chooser(table, options);
+    const joined = this.join(chooser, under, callbacks);
+    const sections = new Sections({
+      Callbacks: () => [
+        chooser.section(
+          "Callbacks of the nodes",
+          "A click on a row shows the callback over time, and leads to its longest instance.",
+          silent.length > 0 && h("p", {}, `No callback of ${silent.join(", ")} was recorded.`),
+          under,
+          besides(
+            count(nodes.rows, "node"),
+            dataTable(nodes, { label: "nodes" }),
+            commands([nodes]),
+          ),
+          besides(
+            `${processes.rows} ${processes.rows === 1 ? "process" : "processes"}`,
+            dataTable(processes, { label: "processes" }),
+            commands([processes]),
+          ),
         ),
-      );
-      this.add(waits, OF_WAITS, "callback_id", (row) => callbacks.callback_id[row]);
-      this.add(
-        delivery,
-        OF_DELIVERY,
-        "subscription_id",
-        (row) => subscription.get(callbacks.callback_id[row]),
-      );
-      clear(this.later);
-      this.said([callbacks, waits, delivery]);
-      this.show();
-    } catch (error) {
-      if (error.name !== "AbortError") clear(this.later, failed(error));
-    }
+      ],
+      Timers: () => timers(app, choose),
+      Services: () => services(app, choose),
+      Actions: () => actions(app),
+      Executors: () => joined.then(() => this.executors.build()),
+    });
+    const search = searchField(app, "node, callback, service", () => this.choosers);
+    clear(this.root, h("div", { className: "tools" }, search, sections.links), sections.places);
+    this.complete = sections.complete;
   }
 
-  // Columns of another table, beside those at hand: from the row with the same identity.
-  add(other, names, key, identity) {
-    const place = new Map(Array.from(other[key], (id, row) => [id, row]));
-    const { table } = this;
-    for (const name of names) {
-      const column = other.columns.find((one) => one.name === name);
-      table[name] = Array.from({ length: table.rows }, (_, row) => {
-        const at = place.get(identity(row));
-        return at === undefined ? null : other[name][at];
-      });
-      table.columns = [...table.columns, column];
-      table.meta = {
-        ...table.meta,
-        columns: { ...table.meta.columns, [name]: other.meta.columns[name] },
-      };
-      this.columns.push(name);
-    }
+  // A table whose rows open a panel, below the field that searches all of them.
+  chooser(table, options) {
+    const made = new Chooser(this.app, options).show(table);
+    this.choosers.push(made);
+    return made;
+  }
+
+  // How long callbacks waited, and what their subscriptions missed, in columns of their own.
+  async join(chooser, under, callbacks) {
+    const { app } = this;
+    const [waits, delivery, objects] = await Promise.all([
+      app.query("waits"),
+      app.query("topics-delivery"),
+      app.fetch("callback"),
+    ]);
+    const subscription = new Map(
+      Array.from(objects.callback_id, (id, row) => [id, objects.subscription_id[row]]),
+    );
+    const { columns } = chooser.options;
+    const table = { ...callbacks };
+    // Columns of another table: from the row with the same identity.
+    const add = (other, names, key, identity) => {
+      const place = new Map(Array.from(other[key], (id, row) => [id, row]));
+      for (const name of names) {
+        table[name] = Array.from(
+          callbacks.callback_id,
+          (id) => other[name][place.get(identity(id))] ?? null,
+        );
+        table.columns = [...table.columns, other.columns.find((one) => one.name === name)];
+        const described = { ...table.meta.columns, [name]: other.meta.columns[name] };
+        table.meta = { ...table.meta, columns: described };
+        columns.push(name);
+      }
+    };
+    add(waits, OF_WAITS, "callback_id", (id) => id);
+    add(delivery, OF_DELIVERY, "subscription_id", (id) => subscription.get(id));
+    const tables = [callbacks, waits, delivery];
+    clear(under, notes(tables.flatMap((one) => one.meta.notes ?? [])), commands(tables));
+    chooser.show(table);
   }
 
   recolor() {
-    this.chooser?.recolor();
+    redrawCharts();
+    this.executors.draw();
   }
-  leave() {}
+  leave() {
+    this.executors.leave();
+  }
 }

@@ -21,22 +21,31 @@ export function failed(error) {
 // What a page calls the option of commands that shows ROS's own rows.
 export const INTERNAL = "what ROS does for itself";
 
+// What a note of the command line says to type there: its last clause, or all of it.
+const TYPED = /(?:[;:] | \()[^;:(]*(?:\bmsgflow |--\w)[^;]*$/;
+const IS_TYPED = /(?:^| )(?:msgflow |--)\w/;
+
 export function notes(list) {
-  if (!list?.length) return null;
-  const named = document.querySelector("input.internal")
-    ? (text) => text.replace("--internal", `“${INTERNAL}”`)
-    : (text) => text;
-  return h("ul", { className: "notes" }, list.map((text) => h("li", {}, named(text))));
+  const texts = (list ?? []).map((text) =>
+    (document.querySelector("input.internal") ? text.replace("--internal", `“${INTERNAL}”`) : text)
+      .replace(TYPED, "")
+  ).filter((text) => !IS_TYPED.test(text));
+  return texts.length > 0 &&
+    h("ul", { className: "notes" }, [...new Set(texts)].map((text) => h("li", {}, text)));
 }
 
-export function command(text) {
-  return text ? h("p", { className: "command" }, "the same numbers: ", h("code", {}, text)) : null;
+// The commands that print the numbers beside them.
+export function command(...texts) {
+  const codes = texts.filter(Boolean).map((text) => h("code", {}, text));
+  return codes.length > 0 && h(
+    "p",
+    { className: "command" },
+    "the same numbers: ",
+    codes.map((code, at) => [at > 0 && " · ", code]),
+  );
 }
 
-// The commands of several tables, those that the numbers of a page come from.
-export function commands(tables) {
-  return tables.map((table) => command(table.meta.command));
-}
+export const commands = (tables) => command(...tables.map((table) => table.meta.command));
 
 // A text in SQL.
 export const sqlText = (text) => `'${text.replaceAll("'", "''")}'`;

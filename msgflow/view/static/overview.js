@@ -3,7 +3,6 @@
 import { breakable, clear, h } from "./dom.js";
 import { address } from "./address.js";
 import { count, duration, PATH_HELP, pathText, wallClock } from "./labels.js";
-import { besides, dataTable } from "./table.js";
 import { command, doubt, doubtHelp, failed, notes, waiting } from "./notice.js";
 import { blame, summary, verdict, withoutRepeated } from "./summary.js";
 
@@ -19,67 +18,46 @@ export class OverviewPage {
     const { run } = app;
     const facts = h("dl", { className: "facts" });
     const fact = (name, value) => facts.append(h("div", {}, h("dt", {}, name), h("dd", {}, value)));
-    fact(
-      "recorded",
-      run.start_text
-        ? wallClock(run.start_text, 0).replace("T", " ").replace(/\.\d+Z$/, " UTC")
-        : "no events",
-    );
+    fact("recorded", wallClock(run.start_text, 0).replace("T", " ").replace(/\.\d+Z$/, " UTC"));
     fact("length", duration(run.length));
     fact("events", (run.event_count ?? 0).toLocaleString("en-US"));
-    const places = h("section", {}, h("h2", {}, "What was recorded"), facts);
     // Requirements and changes: a report has them where it was given a file, or another run.
     const given = (app.source.summary ?? []).filter((part) =>
       part === "verdicts" || part === "change"
     )
       .map((part) => ({ part, ...section(part === "verdicts" ? "Requirements" : "What changed") }));
-    const next = h("p", { className: "command" });
     const why = section("What makes data late, or lets them get lost");
-    const wrong = section("What is wrong with it");
+    const wrong = section("What is wrong with the recording");
     const slow = section("The slowest paths");
     const nodes = section("Where the time of the slowest flows went");
     const drops = section("What was dropped or lost, and why");
     const threads = section("Busiest threads");
-    const topics = section("Topics");
-    const processes = section("Processes");
     clear(
       root,
-      places,
-      given.map((one) => one.root),
-      why.root,
-      wrong.root,
-      slow.root,
-      nodes.root,
-      drops.root,
-      threads.root,
-      topics.root,
-      processes.root,
+      [why, ...given, wrong].map((one) => one.root),
+      h("section", {}, h("h2", {}, "What was recorded"), facts),
+      [slow, nodes, drops, threads].map((one) => one.root),
     );
-    places.append(next);
     const hosts = app.query("info-hosts").then((table) => {
       const list = Array.from({ length: table.rows }, (_, row) => table.hostname[row]);
       fact(list.length === 1 ? "host" : "hosts", list.join(", "));
-    }).catch((error) => places.append(failed(error)));
+    }).catch((error) => facts.after(failed(error)));
     const findings = fill(wrong, async () => {
       const table = await app.fetch("finding");
-      clear(next, "next: ", h("code", {}, table.meta.next));
       const kinds = new Map();
-      for (let row = 0; row < table.rows; row++) {
-        const name = table.name[row];
-        if (!kinds.has(name)) kinds.set(name, []);
-        kinds.get(name).push(row);
-      }
+      table.name.forEach((name, row) => kinds.set(name, [...(kinds.get(name) ?? []), row]));
       const list = [...kinds.values()].map((rows) => {
         const first = rows[0];
+        const more = rows.length > 1 ? ` and ${rows.length - 1} more` : "";
         return h(
-          "article",
+          "details",
           { className: `finding ${table.severity[first]}` },
           h(
-            "h3",
+            "summary",
             {},
             h("span", { className: "severity" }, table.severity[first]),
-            " ",
-            table.title[first],
+            ` ${table.title[first]} `,
+            h("span", { className: "soft" }, `${table.subject[first]}${more}`),
           ),
           h(
             "ul",
@@ -195,24 +173,6 @@ export class OverviewPage {
       ...[[drops, "drops"], [threads, "threads"]].map(([place, part]) =>
         fill(place, async () => summary(await app.inWindow("summary", { part })))
       ),
-      fill(topics, async () => {
-        const table = await app.query("topics");
-        return [
-          dataTable(table, { label: "topics", shown: 12, nothing: "no topics" }),
-          notes(table.meta.notes),
-          command(table.meta.command),
-        ];
-      }),
-      fill(processes, async () => {
-        const table = await app.query("info-processes");
-        return [
-          besides(
-            `${count(table.rows, "process")}`.replace("processs", "processes"),
-            dataTable(table, { label: "processes" }),
-            command(table.meta.command),
-          ),
-        ];
-      }),
     ];
     // The page stands without what takes longest.
     this.complete = Promise.all([
@@ -231,12 +191,12 @@ function bar(share, name) {
   return element;
 }
 
-export function section(title) {
+function section(title) {
   const body = h("div", {}, waiting());
   return { root: h("section", {}, h("h2", {}, title), body), body };
 }
 
-export async function fill(place, make) {
+async function fill(place, make) {
   try {
     clear(place.body, await make());
   } catch (error) {

@@ -4,42 +4,53 @@ import { clear, h } from "./dom.js";
 import { current, pageAddress, replace } from "./address.js";
 import { duration, momentAxis } from "./labels.js";
 import { besides, dataTable } from "./table.js";
-import { chart, redrawCharts } from "./chart.js";
+import { chart } from "./chart.js";
 import { failed, waiting } from "./notice.js";
 
 export const onTimeline = (kind, id) => pageAddress("timeline", { flow: `${kind}:${id}` });
 
+// A field: only rows that have its text are shown in the tables of some choosers. The address keeps
+// the text.
+export function searchField(app, label, choosers) {
+  const field = h("input", {
+    type: "search",
+    placeholder: `${label} …`,
+    "aria-label": `show only what has this text: ${label}`,
+    value: current().q ?? "",
+    on: {
+      input: () => {
+        replace({ q: field.value });
+        app.linksMoved();
+        for (const chooser of choosers()) chooser.fill();
+      },
+    },
+  });
+  return field;
+}
+
 // A table whose rows open a panel below it. The address keeps the chosen row under `key`, by the
 // text that `identity` returns for it.
 export class Chooser {
-  // Options: those of dataTable, and key, identity(row), panel(row): what is in the panel. And what
-  // is searched: search.placeholder, search.label, search.texts(table, row).
+  // Options: those of dataTable, and key, identity(table, row), panel(table, row): what is in the
+  // panel; texts(table, row): what is searched.
   constructor(app, options) {
     this.app = app;
     this.options = options;
     this.order = {};
     this.list = h("div");
     this.detail = h("div", { className: "panel" });
-    this.search = options.search &&
-      h("input", {
-        type: "search",
-        placeholder: options.search.placeholder,
-        "aria-label": options.search.label,
-        value: current().q ?? "",
-        on: {
-          input: () => {
-            replace({ q: this.search.value });
-            app.linksMoved();
-            this.show(this.table);
-          },
-        },
-      });
+  }
+
+  // The section of the table, and the panel below it.
+  section(title, help, ...under) {
+    const soft = h("p", { className: "soft" }, help);
+    return [h("section", {}, h("h2", {}, title), soft, this.list, under), this.detail];
   }
 
   isFound(row) {
-    const text = this.search?.value.trim().toLowerCase();
+    const text = (current().q ?? "").trim().toLowerCase();
     return !text ||
-      this.options.search.texts(this.table, row).some((one) => one?.toLowerCase().includes(text));
+      this.options.texts(this.table, row).some((one) => one?.toLowerCase().includes(text));
   }
 
   show(table) {
@@ -52,6 +63,7 @@ export class Chooser {
       : Array.from({ length: table.rows }, (_, row) => identity(table, row)).indexOf(asked);
     this.fill();
     if (isFirst && this.row >= 0) this.open();
+    return this;
   }
 
   fill() {
@@ -76,10 +88,6 @@ export class Chooser {
     this.fill();
     this.list.querySelector("[aria-selected=true]")?.scrollIntoView({ block: "nearest" });
     this.open().then(() => this.detail.scrollIntoView({ block: "nearest", behavior: "smooth" }));
-  }
-
-  recolor() {
-    redrawCharts();
   }
 
   async open() {

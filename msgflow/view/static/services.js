@@ -1,10 +1,9 @@
 // Services and actions: how long calls and goals took, and which were not answered.
 
-import { clear, h } from "./dom.js";
+import { h } from "./dom.js";
 import { dataTable } from "./table.js";
 import { commands, notes } from "./notice.js";
-import { fill, section } from "./overview.js";
-import { Chooser, onTimeline, overTime, ratesOverTime, slowestOnes } from "./panel.js";
+import { onTimeline, overTime, ratesOverTime, slowestOnes } from "./panel.js";
 
 const COLUMNS_OF_SERVICES = [
   "service_name",
@@ -45,113 +44,82 @@ const OF_ACTIONS = [
   "doubtful",
 ];
 
-export class ServicesPage {
-  constructor(app, root) {
-    this.app = app;
-    this.root = root;
-    this.ready = this.build();
-  }
+export async function services(app, choose) {
+  const table = await app.query("service-latency");
+  return table.rows > 0 && choose(table, {
+    key: "call",
+    label: "services",
+    columns: COLUMNS_OF_SERVICES,
+    sort: { name: "round_trip_max_ns", down: true },
+    texts: (rows, row) => [rows.service_name[row], rows.client[row], rows.server[row]],
+    identity: (rows, row) => `${rows.service_id[row]}:${rows.client_id[row]}`,
+    panel: (rows, row) => callPanel(app, rows, row),
+  }).section(
+    "Services",
+    "From the request that the client sends to the response that it takes, on its own clock. A click on a row shows the calls over time, and leads to the longest.",
+    notes(table.meta.notes),
+    commands([table]),
+  );
+}
 
-  async build() {
-    const { app } = this;
-    const table = await app.query("service-latency");
-    this.chooser = new Chooser(app, {
-      key: "call",
-      label: "services",
-      columns: COLUMNS_OF_SERVICES,
-      sort: { name: "round_trip_max_ns", down: true },
-      nothing: "No call of a service was recorded.",
-      search: {
-        placeholder: "service, node …",
-        label: "show services with this text",
-        texts: (rows, row) => [rows.service_name[row], rows.client[row], rows.server[row]],
-      },
-      identity: (rows, row) => `${rows.service_id[row]}:${rows.client_id[row]}`,
-      panel: (rows, row) => this.panel(rows, row),
-    });
-    const actions = section("Actions");
-    clear(
-      this.root,
-      h(
-        "section",
-        {},
-        h("h2", {}, "Services"),
-        h(
-          "p",
-          { className: "soft" },
-          "From the request that the client sends to the response that it takes, on its own clock. A click on a row shows the calls over time, and leads to the longest.",
-        ),
-        h("div", { className: "tools" }, this.chooser.search),
-        this.chooser.list,
-        notes(table.meta.notes),
-        commands([table]),
-      ),
-      this.chooser.detail,
-      actions.root,
-    );
-    this.chooser.show(table);
-    await fill(actions, async () => {
-      const rows = await app.query("action-latency");
-      const table = rows.rows
-        ? dataTable(rows, {
-          label: "actions",
-          columns: OF_ACTIONS,
-          sort: { name: "result_max_ns", down: true },
-        })
-        : h("p", {}, "No goal of an action was recorded.");
-      return [table, notes(rows.meta.notes), commands([rows])];
-    });
-  }
+export async function actions(app) {
+  const table = await app.query("action-latency");
+  return table.rows > 0 && h(
+    "section",
+    {},
+    h("h2", {}, "Actions"),
+    dataTable(table, {
+      label: "actions",
+      columns: OF_ACTIONS,
+      sort: { name: "result_max_ns", down: true },
+    }),
+    notes(table.meta.notes),
+    commands([table]),
+  );
+}
 
-  async panel(rows, row) {
-    const { app } = this;
-    const asked = { client: Number.isNaN(rows.client_id[row]) ? null : rows.client_id[row] };
-    const [points, slowest] = await Promise.all(
-      ["service_point", "service_slowest"].map((name) => app.inWindow(name, asked)),
-    );
-    const target = (table) => (at) => onTimeline("request", table.request_id[at]);
-    const head = h(
-      "h2",
-      { className: "path-title" },
-      `${rows.service_name[row] ?? "service not known"}, called by ${
-        rows.client[row] ?? "a client not known"
-      }`,
-    );
-    if (!points.rows) return [head, h("p", {}, "No call began in the window of time.")];
-    return [
-      head,
-      h(
-        "div",
-        { className: "charts" },
-        slowest.rows > 0 &&
-          overTime(points, {
-            title: "round trip over time",
-            values: "duration",
-            median: "median",
-            target: target(points),
-          }),
-        ratesOverTime(points, "calls over time", [{
-          label: "calls",
-          color: "call",
-          values: Array.from(points.count),
-        }, {
-          label: "answered",
-          color: "service",
-          values: Array.from(points.answered),
-          dash: [4, 3],
-        }]),
-        slowestOnes(slowest, {
-          title: "Longest calls",
+async function callPanel(app, rows, row) {
+  const asked = { client: Number.isNaN(rows.client_id[row]) ? null : rows.client_id[row] };
+  const [points, slowest] = await Promise.all(
+    ["service_point", "service_slowest"].map((name) => app.inWindow(name, asked)),
+  );
+  const target = (table) => (at) => onTimeline("request", table.request_id[at]);
+  const head = h(
+    "h2",
+    { className: "path-title" },
+    `${rows.service_name[row] ?? "service not known"}, called by ${
+      rows.client[row] ?? "a client not known"
+    }`,
+  );
+  if (!points.rows) return [head, h("p", {}, "No call began in the window of time.")];
+  return [
+    head,
+    h(
+      "div",
+      { className: "charts" },
+      slowest.rows > 0 &&
+        overTime(points, {
+          title: "round trip over time",
           values: "duration",
-          target: target(slowest),
-          columns: ["start_at", "duration", "request_id"],
+          median: "median",
+          target: target(points),
         }),
-      ),
-    ];
-  }
-
-  recolor() {
-    this.chooser?.recolor();
-  }
-  leave() {}
+      ratesOverTime(points, "calls over time", [{
+        label: "calls",
+        color: "call",
+        values: Array.from(points.count),
+      }, {
+        label: "answered",
+        color: "service",
+        values: Array.from(points.answered),
+        dash: [4, 3],
+      }]),
+      slowestOnes(slowest, {
+        title: "Longest calls",
+        values: "duration",
+        target: target(slowest),
+        columns: ["start_at", "duration", "request_id"],
+      }),
+    ),
+  ];
 }

@@ -85,22 +85,87 @@ export class SqlPage {
           { className: "soft" },
           "One query on the public views. It can change nothing and reach no other file. Ctrl and Enter runs it; Ctrl and Space completes names.",
         ),
-        this.editor.root,
         h(
           "div",
-          { className: "tools sql-tools" },
-          this.runButton,
-          button("EXPLAIN", () => this.run("EXPLAIN ")),
-          this.stopButton,
-          example,
-          h("label", {}, "at most ", this.rows),
-          button("Save as named query", () => this.save()),
+          { className: "stage" },
+          h(
+            "div",
+            { className: "written" },
+            this.editor.root,
+            h(
+              "div",
+              { className: "tools sql-tools" },
+              this.runButton,
+              button("EXPLAIN", () => this.run("EXPLAIN ")),
+              this.stopButton,
+              example,
+              h("label", {}, "at most ", this.rows),
+              button("Save as named query", () => this.save()),
+            ),
+          ),
+          this.names(),
         ),
       ),
       this.result,
     );
     // Who has opened a link sees its rows. Only this page's own links come here: others have no cookie.
     if (asked.text !== undefined) await this.run();
+  }
+
+  // The views with their columns; a click writes a name into the text.
+  names() {
+    const { words } = this;
+    const of = (kind) => [...words.kind.keys()].filter((row) => words.kind[row] === kind);
+    const columns = of("column");
+    const views = of("view").map((row) => [
+      row,
+      ...columns.filter((column) => words.view[column] === words.name[row]),
+    ]);
+    const button = (row) =>
+      h("button", {
+        type: "button",
+        className: "pick",
+        title: words.description[row] ?? "",
+        on: {
+          click: (event) => {
+            event.preventDefault();
+            this.editor.insert(words.name[row]);
+          },
+        },
+      }, words.name[row]);
+    const list = h("div", { className: "names-list" });
+    const show = (text) =>
+      clear(
+        list,
+        views.filter((rows) => rows.some((row) => words.name[row].includes(text)))
+          .map(([view, ...own]) =>
+            h(
+              "details",
+              {},
+              h("summary", {}, button(view)),
+              h(
+                "ul",
+                {},
+                own.map((row) =>
+                  h(
+                    "li",
+                    {},
+                    button(row),
+                    h("span", { className: "soft" }, ` ${words.detail[row]}`),
+                  )
+                ),
+              ),
+            )
+          ),
+      );
+    show("");
+    const field = h("input", {
+      type: "search",
+      placeholder: "view, column …",
+      "aria-label": "show views with this text",
+      on: { input: () => show(field.value.trim().toLowerCase()) },
+    });
+    return h("aside", { className: "side names", "aria-label": "views and columns" }, field, list);
   }
 
   // Asks the server; what is wrong with the query is shown and marked. Returns the rows, or null.

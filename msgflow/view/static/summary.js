@@ -12,7 +12,7 @@ export function summary(table, options = {}) {
     return [
       h("p", {}, reading ? `${reading}.` : nothing),
       notes(table.meta.notes),
-      commands.map(command),
+      command(...commands),
     ];
   }
   const columns = shown.filter((name) =>
@@ -22,7 +22,7 @@ export function summary(table, options = {}) {
     reading && h("p", {}, `${reading}.`),
     dataTable(table, { columns, label: table.meta.title, ...options }),
     notes(table.meta.notes),
-    commands.map(command),
+    command(...commands),
   ];
 }
 
@@ -33,7 +33,7 @@ export function verdict(table) {
       ? Array.from(table.sentence, (sentence) => h("p", {}, breakable(sentence)))
       : h("p", {}, table.meta.when_empty),
     notes(table.meta.notes),
-    table.meta.commands.map(command),
+    command(...table.meta.commands),
   ];
 }
 

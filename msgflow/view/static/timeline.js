@@ -834,10 +834,11 @@ export class TimelinePage {
     // Below the row or above it, never over its bars; where neither has room, beside the pointer.
     const row = AXIS + hit.lane.y - this.renderer.scroll;
     const [above, below] = [row - box.height - 4, row + hit.lane.height + 4];
-    const isBelow = below + box.height <= this.renderer.tall || above < 0;
-    const left = Math.max(Math.min(x + 14, this.renderer.width - box.width - 6), 2);
-    this.tooltip.style.left = `${left}px`;
-    this.tooltip.style.top = `${isBelow ? below : above}px`;
+    const frame = this.canvas.getBoundingClientRect();
+    const isBelow = frame.top + below + box.height <= innerHeight || frame.top + above < 0;
+    const within = (at, room, size) => `${Math.max(Math.min(at, room - size - 6), 2)}px`;
+    this.tooltip.style.left = within(frame.left + x + 14, document.body.clientWidth, box.width);
+    this.tooltip.style.top = within(frame.top + (isBelow ? below : above), innerHeight, box.height);
   }
 
   describePiece(row) {

@@ -4,7 +4,10 @@ import { clear, h } from "./dom.js";
 import { shellQuoted } from "./labels.js";
 import { dataTable } from "./table.js";
 import { commands, failed, notes, sqlText, waiting } from "./notice.js";
-import { Chooser, onTimeline, overTime, ratesOverTime, slowestOnes } from "./panel.js";
+import { redrawCharts } from "./chart.js";
+import { losses } from "./losses.js";
+import { Chooser, onTimeline, overTime, ratesOverTime, searchField, slowestOnes } from "./panel.js";
+import { Sections } from "./sections.js";
 
 const COLUMNS_OF_TOPICS = [
   "topic_name",
@@ -70,39 +73,29 @@ export class TopicsPage {
   async build() {
     const { app } = this;
     const table = await app.query("topics-summary");
-    this.chooser = new Chooser(app, {
+    const chooser = new Chooser(app, {
       key: "topic",
       label: "topics",
       columns: COLUMNS_OF_TOPICS,
       sort: { name: "publication_count", down: true },
       nothing: "No topic is known.",
-      search: {
-        placeholder: "topic …",
-        label: "show topics with this text",
-        texts: (rows, row) => [rows.topic_name[row]],
-      },
+      texts: (rows, row) => [rows.topic_name[row]],
       identity: (rows, row) => rows.topic_name[row] ?? "",
       panel: (rows, row) => this.panel(rows.topic_name[row]),
-    });
-    clear(
-      this.root,
-      h(
-        "section",
-        {},
-        h("h2", {}, "Topics"),
-        h(
-          "p",
-          { className: "soft" },
+    }).show(table);
+    const sections = new Sections({
+      Topics: () =>
+        chooser.section(
+          "Topics",
           "Messages are counted at each subscription. A click on a row shows the topic over time, who publishes and who receives it, and leads to its slowest message.",
+          notes(table.meta.notes),
+          commands([table]),
         ),
-        h("div", { className: "tools" }, this.chooser.search),
-        this.chooser.list,
-        notes(table.meta.notes),
-        commands([table]),
-      ),
-      this.chooser.detail,
-    );
-    this.chooser.show(table);
+      Losses: () => losses(app),
+    });
+    const search = searchField(app, "topic", () => [chooser]);
+    clear(this.root, h("div", { className: "tools" }, search, sections.links), sections.places);
+    this.complete = sections.complete;
   }
 
   async panel(topic) {
@@ -167,7 +160,7 @@ export class TopicsPage {
   }
 
   recolor() {
-    this.chooser?.recolor();
+    redrawCharts();
   }
   leave() {}
 }

@@ -1,0 +1,28 @@
+"""Commands as a person types them into a shell."""
+
+from __future__ import annotations
+
+import shlex
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+# What has a meaning between double quotes.
+_MEANT = frozenset('"$`\\!')
+
+
+def shell_joined(words: Iterable[str]) -> str:
+    """Return a command of these words, which a shell takes apart again.
+
+    A word with ' in it stands between double quotes where these change nothing: `shlex.join` would
+    write each ' as five signs.
+    """
+    return " ".join(map(shell_quoted, words))
+
+
+def shell_quoted(word: str) -> str:
+    """Return a word that a shell takes as it is."""
+    if "'" in word and not _MEANT & set(word):
+        return f'"{word}"'
+    return shlex.quote(word).replace("'\"'\"'", "'\\''")
