@@ -21,7 +21,7 @@ ENTRY = "app.js"
 SCRIPTS = ("uPlot.iife.min.js", "dagre.min.js")
 SHEETS = ("uPlot.min.css",)
 # Libraries that a page of the server imports when it is opened; a report has none of them.
-IMPORTED = ("codemirror.min.js",)
+IMPORTED = ("codemirror.min.js", "flamegraph.min.js")
 _IMPORT = re.compile(r'^import\s+\{[^}]*\}\s+from\s+"\./([\w-]+\.js)";\n', re.MULTILINE)
 _EXPORT = re.compile(r"^export (?=(?:async function|function|class|const|let)\b)", re.MULTILINE)
 _SOURCE_MAP = re.compile(r"^//# sourceMappingURL=.*$", re.MULTILINE)

@@ -18,6 +18,7 @@ from msgflow.query.compare import compare, warm_up
 from msgflow.query.runner import run_query
 from msgflow.run.slice import Slice
 from msgflow.run.window import WHOLE, Window
+from msgflow.sql.statement import internal_sql
 from msgflow.text.shell import shell_joined
 from msgflow.view.critical_path import critical_path
 from msgflow.view.encoded import encoded_comparison, encoded_section
@@ -60,6 +61,8 @@ MOST_BINS = 2_000
 # Bins of the whole run; wider bins are sums of these.
 LEVEL_BINS = 8_192
 MOST_LINKS = 20_000
+# Different stacks of a flame graph, those with most samples.
+MOST_STACKS = 5_000
 _KEPT_BYTES = 32 * 2**20
 _OF_CLOCKS = ("clocks_apart", "clocks_not_together")
 _KINDS = ("publication", "take", "callback_instance", "request", "response")
@@ -274,6 +277,19 @@ class Pages:
         command = shell_joined(["msgflow", "check", "--run", extent.run.name])
         return encode(table, meta={"notes": notes, "command": command})
 
+    def _stack(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
+        extent = self.extent(connection, params)
+        window = {"run_id": extent.run.run_id, **self.window(extent, params).bindings}
+        table = internal_sql().run(connection, "folded_stack", window).to_arrow_table()
+        table = table.sort_by([("samples", "descending"), ("stack", "ascending")])
+        part = self._slice(extent, params)
+        words = ["msgflow", "export", "folded", "-o", "robot.folded", "--run", extent.run.name]
+        meta = {
+            "left_out": max(table.num_rows - MOST_STACKS, 0),
+            "command": shell_joined(words + _window_options(extent, part)),
+        }
+        return encode(table.slice(0, MOST_STACKS), meta=meta)
+
     def _compare(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
         extent = self.extent(connection, params)
         # Intervals take longest: the page first shows what was measured, then asks for them.
@@ -380,6 +396,7 @@ ANSWERS: dict[str, Callable[[Pages, duckdb.DuckDBPyConnection, Params], bytes]] 
     "finding": Pages._finding,
     "summary": Pages._summary,
     "area": Pages._area,
+    "stack": Pages._stack,
     "compare": Pages._compare,
     "segments": Pages._segments,
     "links": Pages._links,

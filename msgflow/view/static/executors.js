@@ -36,8 +36,6 @@ const OF_THREADS = [
 export class Executors {
   constructor(app) {
     this.app = app;
-    this.onResize = () => this.draw();
-    addEventListener("resize", this.onResize);
   }
 
   async build() {
@@ -94,7 +92,7 @@ export class Executors {
         ),
       );
     }
-    requestAnimationFrame(() => this.draw());
+    new ResizeObserver(() => this.draw()).observe(list);
     return h(
       "section",
       {},
@@ -244,9 +242,5 @@ export class Executors {
         });
       };
     }
-  }
-
-  leave() {
-    removeEventListener("resize", this.onResize);
   }
 }

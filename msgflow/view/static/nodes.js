@@ -10,6 +10,7 @@ import { Sections } from "./sections.js";
 import { timers } from "./timers.js";
 import { actions, services } from "./services.js";
 import { Executors } from "./executors.js";
+import { functions } from "./functions.js";
 
 const COLUMNS_OF_CALLBACKS = [
   "node",
@@ -82,6 +83,7 @@ export class NodesPage {
       Timers: () => timers(app, choose),
       Services: () => services(app, choose),
       Actions: () => actions(app),
+      Functions: () => functions(app),
       Executors: () => joined.then(() => this.executors.build()),
     });
     const search = searchField(app, "node, callback, service", () => this.choosers);
@@ -134,7 +136,5 @@ export class NodesPage {
     redrawCharts();
     this.executors.draw();
   }
-  leave() {
-    this.executors.leave();
-  }
+  leave() {}
 }
