@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +10,7 @@ from msgflow.files.atomic import replacing
 from msgflow.fleet.lake_connection import Reading, choose, lake_errors
 from msgflow.fleet.lake_query import fleet_query, header_of, statements
 from msgflow.fleet.listing import list_failures
+from msgflow.text.shell import shell_quoted
 from msgflow.view.single_page import Parts, single_page
 from msgflow.view.table_encoding import encode
 
@@ -50,8 +50,8 @@ def lake_page(lake: Lake, *, where: str | None = None) -> LakePage:
     if len(choice.runs) < choice.total:
         notes.append(f"{len(choice.runs):,} of {choice.total:,} runs: {where}")
     parts = Parts()
-    option = f"--lake {shlex.quote(lake.store.url)}"
-    option += f" --where {shlex.quote(where)}" if where else ""
+    option = f"--lake {shell_quoted(lake.store.url)}"
+    option += f" --where {shell_quoted(where)}" if where else ""
     with Reading(choice, ["flow"]) as reading, lake_errors(lake, is_query=True):
         tables = {
             name: statements().run(reading.connection, name, {"count": 10}).to_arrow_table()
@@ -78,7 +78,7 @@ def lake_page(lake: Lake, *, where: str | None = None) -> LakePage:
             encode(
                 table,
                 units=result.units,
-                meta={"command": f"{command} --group-by {shlex.quote(column)}"},
+                meta={"command": f"{command} --group-by {shell_quoted(column)}"},
             ),
         )
     wrong = {"where": "severity <> 'info'"}
@@ -86,7 +86,7 @@ def lake_page(lake: Lake, *, where: str | None = None) -> LakePage:
     command = f"msgflow fleet query {header_of(_FINDINGS).words} {option}"
     parts.add("page_finding?", _encoded(result, command))
     failures = list_failures(lake).table
-    failed = f"msgflow fleet failures --lake {shlex.quote(lake.store.url)}"
+    failed = f"msgflow fleet failures --lake {shell_quoted(lake.store.url)}"
     parts.add("page_failure?", encode(_with_time(failures), meta={"command": failed}))
     parts.add("run", encode(_frame(lake, tables["page_run"])))
     head: dict[str, Any] = {
@@ -94,7 +94,7 @@ def lake_page(lake: Lake, *, where: str | None = None) -> LakePage:
         "pages": ["lake"],
         "address": "#/lake",
         "lake": lake.store.url,
-        "open": f"--lake {shlex.quote(lake.store.url)}",
+        "open": f"--lake {shell_quoted(lake.store.url)}",
         "labels": labels,
     }
     return LakePage(single_page(parts, head), len(choice.runs), tuple(notes))

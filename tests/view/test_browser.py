@@ -286,6 +286,10 @@ def test_numbers_of_the_overview_are_those_of_the_queries(
                     f"{row['p99_ns'] / 1e6:.3f}".rstrip("0").rstrip(".") in text
                     or row["p99_ns"] < 1e6
                 )
+        # Notes leave out what is typed on a command line.
+        notes = page.page.locator(".notes").all_inner_texts()
+        assert any("are known to" in note for note in notes)
+        assert not any("msgflow " in note or "--" in note for note in notes)
 
 
 def test_a_histogram_has_bins_without_flows_too(

@@ -135,6 +135,9 @@ def test_graph(
             assert any(said in title for title in titles), row
     assert page.page.locator(".graph .stroke-indirect").count() >= indirect
     assert page.page.locator(".graph .group-box").count() >= 2
+    # No line goes through what is written.
+    written = page.page.locator(".graph .edge-text, .graph .group-text").count()
+    assert page.page.locator(".graph .ground").count() == written > 0
     first = rates[0]["topic_name"]
     page.page.locator(f".graph g[aria-label='{first}']").first.click()
     # The graph stays, beside what goes in and out.

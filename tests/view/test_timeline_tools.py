@@ -71,6 +71,11 @@ def test_a_cross_leads_to_its_message(timeline: Page) -> None:
     box, frame = tooltip.bounding_box(), canvas.bounding_box()
     # It does not cover the row that it speaks of.
     assert box["y"] > frame["y"] + y or box["y"] + box["height"] < frame["y"] + y
+    # Nor does it leave the screen.
+    room = timeline.page.viewport_size
+    assert box["x"] >= 0 <= box["y"]
+    assert box["x"] + box["width"] <= room["width"]
+    assert box["y"] + box["height"] <= room["height"]
     canvas.click(position={"x": x, "y": y})
     timeline.page.locator(".steps tbody tr").first.wait_for()
     assert f"flow=publication%3A{number}" in timeline.page.url or "flow=" in timeline.page.url

@@ -207,14 +207,13 @@ export function pathText(path) {
   );
 }
 
-// A word of a command for a shell.
 // What a small curve is scaled to: few outliers, as those of a start, do not press the rest down.
 export function usualMost(values) {
   const own = Array.from(values).filter((value) => value > 0).sort((a, b) => a - b);
   return Math.min(own[own.length - 1] ?? 1, 1.25 * (own[Math.floor(own.length * 0.97)] ?? 1));
 }
 
-// As msgflow/text/shell.py does.
+// A word of a command for a shell, as msgflow/text/shell.py writes it.
 export function shellQuoted(text) {
   if (/^[\w@%+=:,./-]+$/.test(text)) return text;
   const isPlain = text.includes("'") && !/["$`\\!]/.test(text);
