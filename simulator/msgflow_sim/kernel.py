@@ -211,12 +211,13 @@ class Kernel:
             else:
                 latest.is_preempted = True
         self._free_at[cpu] = time
-        if latest is not None and latest is self._runs[cpu][-1] and waking is None:
+        runs = self._runs[cpu]
+        if latest is not None and runs and latest is runs[-1] and waking is None:
             # Nothing else had the CPU.
             latest.is_preempted, latest.end = False, time
             return
         run = Run(thread, cpu, time, time, waking)
-        self._runs[cpu].append(run)
+        runs.append(run)
         self._latest[thread] = run
         thread.move(cpu)
 

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from collections import defaultdict
 from itertools import pairwise
+from types import SimpleNamespace
 
 import pytest
+
+from msgflow_sim.kernel import Kernel
+from msgflow_sim.system import KernelTrace
 
 
 def _overlaps(intervals):
@@ -103,3 +107,26 @@ def test_a_callback_waits_for_the_response_that_it_has_asked_for(recordings):
     )
     assert len(rows) > 3
     assert all(list(row) == sorted(row) for row in rows)
+
+
+class _Scheduled:
+    """A thread of a process that may have any CPU."""
+
+    def __init__(self, tid):
+        self.tid, self.cpu, self.priority, self.computing = tid, 1, 120, (0, 0)
+        self.description = SimpleNamespace(cpus=(), pid=1)
+
+    def move(self, cpu):
+        self.cpu = cpu
+
+
+def test_a_thread_whose_cpu_is_taken_leaves_it_before_it_has_another():
+    kernel, first, second = Kernel(KernelTrace(), 2), _Scheduled(1), _Scheduled(2)
+    assert kernel.take(first, 0) == 0
+    kernel.keep(first, 1_000)
+    # The other one was first to ask for the CPU at that moment.
+    assert kernel.take(second, 1_000) == 0
+    kernel.keep(second, 9_000)
+    second.computing = (1_000, 9_000)
+    assert (kernel.take(first, 1_000), first.cpu) == (5_000, 1)
+    assert (kernel.take(first, 5_000), first.cpu) == (0, 0)
