@@ -48,7 +48,8 @@ def load_samples(
         try:
             if file.name == DATA:
                 text = workspace / TEXT
-                write_script(file, text)
+                if (cut := write_script(file, text)) is not None:
+                    warnings.append(cut)
             with transaction(con):
                 for part in read_script(text):
                     interrupts.check()

@@ -75,7 +75,8 @@ def recorded_samples(
     # Half a text would stand before all of the data.
     part = directory / f"{TEXT}.part"
     try:
-        write_script(data, part)
+        if (cut := write_script(data, part)) is not None:
+            note(cut)
         part.replace(directory / TEXT)
         data.unlink()
     except TraceError as error:

@@ -25,8 +25,9 @@ _SCRIPT = ("perf", "script", "--header", "--ns", "--no-inline")
 # perf writes no field that it was not asked to record: the CPU and the period.
 _FIELDS = ("pid,tid,cpu,time,event,period,ip,sym,dso", "pid,tid,time,event,ip,sym,dso")
 _SECONDS = 600.0
-# What a damaged file may have perf write.
+# What a damaged file may have perf write, and take of memory.
 _MOST_BYTES = 1 << 32
+_MOST_MEMORY = 1 << 32
 _LONGEST_LINE = 1 << 16
 _MOST_LINES = 1 << 10
 
@@ -60,8 +61,11 @@ def sample_files(paths: Sequence[str | Path]) -> list[Path]:
     return sorted(found)
 
 
-def write_script(data: Path, text: Path) -> None:
+def write_script(data: Path, text: Path) -> str | None:
     """Have perf write the samples of a `perf.data` as text, with the names of their functions.
+
+    Returns:
+        What was left out, as a sentence; None where all is there.
 
     Raises:
         TraceError: perf is missing or fails, or the file is none of perf.
@@ -81,7 +85,9 @@ def write_script(data: Path, text: Path) -> None:
     for fields in _FIELDS:
         reason = _why_not_written(data, text, fields)
         if reason is None:
-            return
+            return None
+        if text.exists() and text.stat().st_size == _MOST_BYTES:
+            return f"samples after the first {_MOST_BYTES:,} bytes of text are left out — {data}"
     raise _unread(data, str(reason))
 
 
@@ -91,7 +97,7 @@ def _why_not_written(data: Path, text: Path, fields: str) -> str | None:
     try:
         with text.open("wb") as output:
             run = subprocess.run(
-                ["prlimit", f"--fsize={_MOST_BYTES}", *command],
+                ["prlimit", f"--fsize={_MOST_BYTES}", f"--data={_MOST_MEMORY}", *command],
                 env=environment,
                 stdin=subprocess.DEVNULL,
                 stdout=output,

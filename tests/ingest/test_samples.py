@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import os
 import random
 import shutil
 import subprocess
@@ -17,6 +18,7 @@ from thorough import examples
 from msgflow import trace as trace_package
 from msgflow.errors import TraceError
 from msgflow.ingest import IngestReport, ingest
+from msgflow.trace import perf_script
 from msgflow.trace.perf_script import DATA, TEXT, read_script, write_script
 
 STACK = "\t    11a8 hog (/lib/libhog.so)\n\t     279 main (/bin/robot)\n"
@@ -144,6 +146,23 @@ def test_without_perf_its_recording_is_not_read(
     with pytest.raises(TraceError, match="perf is not installed") as raised:
         write_script(tmp_path / DATA, tmp_path / TEXT)
     assert raised.value.hint == "apt-get install linux-perf"
+
+
+def test_perf_has_bounds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """On memory, and on what it writes: of that, the begin is used."""
+    (tmp_path / DATA).write_bytes(b"PERFILE2")
+    perf = tmp_path / "perf"
+    perf.write_text("#!/bin/sh\nexec python3 -c 'bytearray(5 << 30)'\n")
+    perf.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
+    with pytest.raises(TraceError, match="MemoryError"):
+        write_script(tmp_path / DATA, tmp_path / TEXT)
+    perf.write_text("#!/bin/sh\nexec yes '1/1 1.000000: cpu-clock:'\n")
+    monkeypatch.setattr(perf_script, "_MOST_BYTES", 1000)
+    said = write_script(tmp_path / DATA, tmp_path / TEXT)
+    assert said == f"samples after the first 1,000 bytes of text are left out — {tmp_path / DATA}"
+    (samples,) = read_script(tmp_path / TEXT)
+    assert len(samples.heads) == 40
 
 
 HOSTILE = [
