@@ -6,7 +6,7 @@ import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from msgflow.errors import UsageError
+from msgflow.errors import DatabaseError, UsageError
 from msgflow.files.atomic import replacing
 from msgflow.sql.statement import internal_sql
 
@@ -77,6 +77,7 @@ def write_perfetto(connection: duckdb.DuckDBPyConnection, path: Path, part: Slic
     Raises:
         UsageError: not exactly one run, a time that cannot be read, a file that cannot be written,
             or the package perfetto is not installed.
+        DatabaseError: it has values that no recording has.
     """
     run = part.one_run(connection, "a Perfetto trace")
     window = part.window([run])
@@ -87,15 +88,22 @@ def write_perfetto(connection: duckdb.DuckDBPyConnection, path: Path, part: Slic
             "the package that writes Perfetto traces is not installed — perfetto",
             "pip install perfetto; or in a checkout of msgflow: uv tool install '.[perfetto]'",
         ) from None
-    with replacing(path) as temporary, temporary.open("wb") as file:
-        writer = _Writer(StreamingTraceProtoBuilder(file), connection, run, window)
-        writer.describe()
-        slices, arrows = writer.slices()
-        values = writer.values()
-        gaps = writer.gaps()
-        events = writer.user_events()
-        states = writer.states()
-        samples = writer.samples()
+    try:
+        with replacing(path) as temporary, temporary.open("wb") as file:
+            writer = _Writer(StreamingTraceProtoBuilder(file), connection, run, window)
+            writer.describe()
+            slices, arrows = writer.slices()
+            values = writer.values()
+            gaps = writer.gaps()
+            events = writer.user_events()
+            states = writer.states()
+            samples = writer.samples()
+    except (AttributeError, TypeError, ValueError, RecursionError) as error:
+        # The format has no place for them, or they are no JSON.
+        raise DatabaseError(
+            f"the database has values that no recording has: {error} — run {run.name}",
+            "ingest the traces into a new one",
+        ) from error
     return PerfettoTrace(path, run, slices, arrows, values, gaps, events, states, samples)
 
 

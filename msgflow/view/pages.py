@@ -250,7 +250,7 @@ class Pages:
         extent = self.extent(connection, params)
         try:
             of = json.loads(str(params.get("of")))
-        except ValueError:
+        except (ValueError, RecursionError):
             of = None
         if not of or not isinstance(of, list) or not all(isinstance(one, str | int) for one in of):
             raise UsageError(f"sums are of a list of names or identities — {params.get('of')}")

@@ -18,6 +18,7 @@ import threading
 from contextlib import contextmanager, suppress
 from functools import partial
 from typing import TYPE_CHECKING, Any, Protocol
+from urllib.parse import urlsplit
 
 import anyio
 import anyio.to_thread
@@ -353,9 +354,11 @@ def is_local(host: str) -> bool:
     if match is None:
         return False
     name = match[1].lower()
-    if name in _LOCAL_NAMES:
-        return True
     try:
+        # The address of the request is made of it.
+        _ = urlsplit(f"//{host}").port
+        if name in _LOCAL_NAMES:
+            return True
         return ipaddress.ip_address(name.strip("[]")).is_loopback
     except ValueError:
         return False

@@ -15,7 +15,7 @@ import duckdb
 import pytest
 from thorough import few
 
-from msgflow import Database, UsageError
+from msgflow import Database, DatabaseError, UsageError
 from msgflow.clocks import apply_clocks, read_clock_sync
 from msgflow.database import open_db
 
@@ -387,6 +387,12 @@ def test_events_of_the_user_are_instants_on_their_thread(
         "no": "null", "l": "[1]",
     }  # fmt: skip
     assert written.events == 1
+    # A database that no ingest has made may have any text there.
+    for forged in ("no JSON", "[1]", "[" * 100_000):
+        with duckdb.connect(str(path)) as connection:
+            connection.execute("UPDATE store.user_event SET fields = $text", {"text": forged})
+        with open_db(path) as database, pytest.raises(DatabaseError, match="that no recording has"):
+            database.export_perfetto(tmp_path / "run.pftrace", end=begin + 900)
 
 
 def test_states_of_threads_and_cores_have_tracks(

@@ -50,6 +50,9 @@ Serve = Callable[[Path], Served]
         ("10.0.0.1", False),
         ("", False),
         ("127.0.0.1:8642@evil", False),
+        ("127.0.0.1:99999", False),
+        ("localhost:99999", False),
+        ("[127.0.0.1]", False),
     ],
 )
 def test_only_this_machine_is_meant(host: str, is_ours: bool) -> None:
