@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from msgflow.errors import UsageError
 from msgflow.files.atomic import replacing
+from msgflow.sql.failure import format_errors
 from msgflow.sql.statement import internal_sql
 from msgflow.version import __version__
 
@@ -98,6 +99,7 @@ def write_mcap(
     Raises:
         UsageError: not exactly one run, a time that cannot be read, a file that cannot be written,
             or the package mcap-ros2-support is not installed.
+        DatabaseError: it has values that no recording has.
     """
     run = part.one_run(connection, "an MCAP file")
     bindings = {"runs": [run.run_id], **part.window([run]).bindings}
@@ -111,7 +113,11 @@ def write_mcap(
     topics: set[str] = set()
     values = losses = 0
     end_ns = run.start_ns or 0
-    with replacing(path) as temporary, temporary.open("wb") as file:
+    with (
+        format_errors(f"run {run.name}"),
+        replacing(path) as temporary,
+        temporary.open("wb") as file,
+    ):
         writer: Any = Writer(file)
         writer.add_metadata("msgflow", {"run": run.name, "version": __version__})
         schema = writer.register_msgdef(*_VALUE)

@@ -6,8 +6,9 @@ import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from msgflow.errors import DatabaseError, UsageError
+from msgflow.errors import UsageError
 from msgflow.files.atomic import replacing
+from msgflow.sql.failure import format_errors
 from msgflow.sql.statement import internal_sql
 
 if TYPE_CHECKING:
@@ -88,22 +89,19 @@ def write_perfetto(connection: duckdb.DuckDBPyConnection, path: Path, part: Slic
             "the package that writes Perfetto traces is not installed — perfetto",
             "pip install perfetto; or in a checkout of msgflow: uv tool install '.[perfetto]'",
         ) from None
-    try:
-        with replacing(path) as temporary, temporary.open("wb") as file:
-            writer = _Writer(StreamingTraceProtoBuilder(file), connection, run, window)
-            writer.describe()
-            slices, arrows = writer.slices()
-            values = writer.values()
-            gaps = writer.gaps()
-            events = writer.user_events()
-            states = writer.states()
-            samples = writer.samples()
-    except (AttributeError, TypeError, ValueError, RecursionError) as error:
-        # The format has no place for them, or they are no JSON.
-        raise DatabaseError(
-            f"the database has values that no recording has: {error} — run {run.name}",
-            "ingest the traces into a new one",
-        ) from error
+    with (
+        format_errors(f"run {run.name}"),
+        replacing(path) as temporary,
+        temporary.open("wb") as file,
+    ):
+        writer = _Writer(StreamingTraceProtoBuilder(file), connection, run, window)
+        writer.describe()
+        slices, arrows = writer.slices()
+        values = writer.values()
+        gaps = writer.gaps()
+        events = writer.user_events()
+        states = writer.states()
+        samples = writer.samples()
     return PerfettoTrace(path, run, slices, arrows, values, gaps, events, states, samples)
 
 

@@ -6,6 +6,7 @@ import errno
 import re
 import shlex
 import shutil
+import struct
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -74,12 +75,21 @@ def out_of_memory(
     return QueryError(f"more memory is needed than the database may take — {what}", hint)
 
 
-def out_of_range(error: duckdb.OutOfRangeException, path: Path) -> DatabaseError:
+def out_of_range(error: Exception, what: object) -> DatabaseError:
     """Return the error of a database that no ingest has made, with whose values SQL calculates."""
     return DatabaseError(
-        f"the database has values that no recording has: {first_line(error)} — {path}",
+        f"the database has values that no recording has: {first_line(error)} — {what}",
         "ingest the traces into a new one",
     )
+
+
+@contextmanager
+def format_errors(what: str) -> Iterator[None]:
+    """Turn what a file's format cannot have into the same error, such as times before its first."""
+    try:
+        yield
+    except (AttributeError, TypeError, ValueError, RecursionError, struct.error) as error:
+        raise out_of_range(error, what) from error
 
 
 @contextmanager

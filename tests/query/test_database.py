@@ -200,6 +200,8 @@ def test_extremes_in_all_columns_are_answered_or_said(
     with msgflow.open_db(path) as database:
         asked: list[Callable[[], object]] = [database.check, database.findings, database.why]
         asked += [partial(database.query, each) for each in ("info", "e2e-latency", "callbacks")]
+        writers = database.export_perfetto, database.export_mcap, database.export_folded
+        asked += [partial(write, tmp_path / "written") for write in writers]
         for ask in asked:
             with suppress(msgflow.MsgflowError):
                 ask()
