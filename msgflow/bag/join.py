@@ -48,8 +48,7 @@ def join_bag(
         path: the database.
         bag: directory of a rosbag2, or one of its files (.mcap, .db3).
         run: a name or an id; the latest run when None.
-        memory_limit: most memory that the database takes, and the process that reads the bag
-            (and a quarter more), such as '2GB'.
+        memory_limit: most memory of the database, and of what reads the bag, such as '2GB'.
 
     Returns:
         A row per topic of the bag: how many messages were joined, and why others were not.

@@ -61,17 +61,10 @@ def read_bag(bag: Path, *, memory_limit: str | None = None) -> Iterator[pa.Recor
         size += file.stat().st_size
     with tempfile.TemporaryDirectory(prefix="msgflow-") as place:
         target = Path(place, "messages")
+        bounds = {"memory_limit": memory_limit or default_limit(), "most_bytes": limit_of(size)}
         with ConfinedProcess(__name__) as process:
             try:
-                process.call(
-                    "write_messages",
-                    {
-                        "bag": str(bag),
-                        "target": str(target),
-                        "memory_limit": memory_limit or default_limit(),
-                        "most_bytes": limit_of(size),
-                    },
-                )
+                process.call("write_messages", {"bag": str(bag), "target": str(target)} | bounds)
             except QueryError as error:  # it has ended
                 raise _unread(bag, error) from error
         with pa.OSFile(str(target)) as file, pa.ipc.open_stream(file) as messages:
@@ -103,8 +96,8 @@ def write_messages(
                 rows.write_table(table)
     except MemoryError:
         raise TraceError(
-            f"the bag takes more memory unpacked than {memory_limit} and a quarter — {bag}",
-            "--memory-limit=20GB reads it, if you know who made it",
+            f"the bag takes more memory unpacked than {memory_limit} — {bag}",
+            "MSGFLOW_MEMORY_LIMIT=20GB msgflow … reads it, if you know who made it",
         ) from None
     except Exception as error:  # what its parsers raise in a damaged file has no common class
         if isinstance(error, OSError) and error.errno == errno.EFBIG:
@@ -134,8 +127,7 @@ def _tables(reader: Any, most_bytes: int) -> Iterator[pa.Table]:
     number = 0
     left = most_bytes
     for number, (connection, received_ns, data) in enumerate(reader.messages(), 1):
-        # They may be compressed one by one.
-        left -= len(data)
+        left -= len(data)  # they may be compressed one by one
         if left < 0:
             raise OSError(errno.EFBIG, "messages are too large")
         stamp_ns = frame_id = None

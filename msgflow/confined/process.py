@@ -1,9 +1,9 @@
 """Confined processes: what others made is read in a child with bounds on memory and time.
 
-DuckDB's memory limit does not count what functions of a query take, and an interrupt waits until
-such a function returns. What a bag takes unpacked is known only then. The system's bounds hold
-always: an allocation beyond them fails (`msgflow.db.memory.bound_process`), and a child that is
-late is killed. The connection in the child is in the sandbox of `msgflow.db.sandbox` as any other.
+DuckDB's memory limit does not count what functions of a query take, an interrupt waits until such
+a function returns, and what a bag unpacks to is known only then. The system's bounds hold always:
+an allocation beyond them fails (`msgflow.db.memory.bound_process`), and a child that is late is
+killed. The connection in the child is in the sandbox of `msgflow.db.sandbox` as any other.
 
 The child is `python -P -m msgflow.confined.process MODULE`. It reads a request per line from stdin,
 writes an empty answer (it has begun), calls a function of the module, and writes its answer: parts,

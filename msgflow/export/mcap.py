@@ -113,11 +113,7 @@ def write_mcap(
     topics: set[str] = set()
     values = losses = 0
     end_ns = run.start_ns or 0
-    with (
-        format_errors(f"run {run.name}"),
-        replacing(path) as temporary,
-        temporary.open("wb") as file,
-    ):
+    with format_errors(run.name), replacing(path) as temporary, temporary.open("wb") as file:
         writer: Any = Writer(file)
         writer.add_metadata("msgflow", {"run": run.name, "version": __version__})
         schema = writer.register_msgdef(*_VALUE)

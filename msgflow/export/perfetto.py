@@ -89,11 +89,7 @@ def write_perfetto(connection: duckdb.DuckDBPyConnection, path: Path, part: Slic
             "the package that writes Perfetto traces is not installed — perfetto",
             "pip install perfetto; or in a checkout of msgflow: uv tool install '.[perfetto]'",
         ) from None
-    with (
-        format_errors(f"run {run.name}"),
-        replacing(path) as temporary,
-        temporary.open("wb") as file,
-    ):
+    with format_errors(run.name), replacing(path) as temporary, temporary.open("wb") as file:
         writer = _Writer(StreamingTraceProtoBuilder(file), connection, run, window)
         writer.describe()
         slices, arrows = writer.slices()

@@ -84,12 +84,12 @@ def out_of_range(error: Exception, what: object) -> DatabaseError:
 
 
 @contextmanager
-def format_errors(what: str) -> Iterator[None]:
+def format_errors(run: str) -> Iterator[None]:
     """Turn what a file's format cannot have into the same error, such as times before its first."""
     try:
         yield
     except (AttributeError, TypeError, ValueError, RecursionError, struct.error) as error:
-        raise out_of_range(error, what) from error
+        raise out_of_range(error, f"run {run}") from error
 
 
 @contextmanager

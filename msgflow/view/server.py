@@ -355,8 +355,7 @@ def is_local(host: str) -> bool:
         return False
     name = match[1].lower()
     try:
-        # The address of the request is made of it.
-        _ = urlsplit(f"//{host}").port
+        _ = urlsplit(f"//{host}").port  # as the application reads it
         if name in _LOCAL_NAMES:
             return True
         return ipaddress.ip_address(name.strip("[]")).is_loopback

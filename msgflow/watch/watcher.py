@@ -134,8 +134,6 @@ class Watcher:
     ) -> WindowReport | None:
         """Close the next window, and return what it shows; None until there is one.
 
-        Ctrl-C interrupts the statement that runs.
-
         Args:
             newest_ns: the newest time that was recorded.
             is_live: the recording goes on at this moment.
@@ -144,8 +142,7 @@ class Watcher:
         window = self.history.next_window(newest_ns, is_last=is_last)
         if window is None:
             return None
-        work = partial(self._report, window, newest_ns, is_live=is_live)
-        return interruptible(self._con, work)
+        return interruptible(self._con, partial(self._report, window, newest_ns, is_live=is_live))
 
     def keep_violation(self) -> None:
         """Keep the chunks of the last report if it has a violation, once it has been told."""
