@@ -6,8 +6,10 @@ from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from msgflow.errors import NoFlowError
 from msgflow.query.catalogue import load_query
 from msgflow.query.runner import run_query
+from msgflow.query.why import explain
 from msgflow.run.slice import Slice
 from msgflow.text.values import format_duration
 from msgflow.verify import Verdict, take_of, verify
@@ -133,6 +135,9 @@ class Alarm:
             if told is None or told.is_surpassed(row["worst_ns"], row["worst_at_ns"]):
                 found.append(self._violation(con, row, part, final_ns))
             failing[key] = _Told.of(row["worst_ns"], window.end_ns, told)
+        if found:
+            told = _told(con, part)
+            found = [row | {"verdict": _sentence(told, row["path"])} for row in found]
         self._failing = failing
         self._note_silence(rows)
         return found, Counter(row["verdict"] for row in rows)
@@ -178,6 +183,22 @@ def _key(row: Row) -> tuple[str, str, str]:
     return row["target"], row["metric"], row["condition"]
 
 
+def _told(con: duckdb.DuckDBPyConnection, part: Slice) -> list[Row]:
+    """Return what `msgflow why` says first of a window."""
+    try:
+        return explain(con, part.one_run(con, "an alarm"), part).verdict.table.to_pylist()
+    except NoFlowError:
+        return []
+
+
+def _sentence(told: Sequence[Row], path: str | None) -> str | None:
+    """Return the sentence of the worst culprit on a path, which may be part of a longer one."""
+    for row in told:
+        if path and row["cost_ns"] is not None and f" → {path} → " in f" → {row['path']} → ":
+            return str(row["sentence"])
+    return None
+
+
 def violation_line(violation: Row) -> str:
     """Return a violation in one line: what, how much, and what was to blame."""
     worst = violation["worst_ns"]
@@ -189,6 +210,8 @@ def violation_line(violation: Row) -> str:
     )
     if violation["culprit"]:
         words += f": {violation['culprit']}"
+    if violation["verdict"]:
+        words += f"; why: {violation['verdict']}"
     if violation["path"] and violation["path"] != violation["subject"]:
         words += f" — {violation['path']}"
     return words if violation["is_final"] else f"{words} (provisional)"
