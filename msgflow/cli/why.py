@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
@@ -43,6 +44,23 @@ _SHOWN = {
         "messages not delivered",
         "topic_name subscriber published dropped lost reasons",
     ),
+}
+# Parts and activities as an engineer says them; docs/glossary.md explains each.
+_WORDS = {
+    "network_or_idle": "on the way",
+    "until_arrival": "on the way",
+    "undecided": "way or queue",
+    "executor_busy": "in the queue",
+    "executor": "in the executor",
+    "all_threads_busy": "no free thread",
+    "blocked": "group is busy",
+    "run_queue": "waits for a CPU",
+    "take_to_callback": "taken, not begun",
+    "response_to_take": "answer on its way",
+    "timer": "waits for timer",
+    "unpublished": "waits for input",
+    "cache": "in the cache",
+    **dict.fromkeys(("intra", "rclcpp", "rcl", "rmw", "dds", "publish"), "publishes"),
 }
 
 
@@ -104,8 +122,19 @@ def _shown(found: Explanation) -> dict[str, QueryResult]:
         result = found.sections[name]
         title = title.format(place)
         rows = result.first(_PATHS) if name == "paths" else result
-        shown[title] = rows.with_columns(columns.split())
+        shown[title] = _in_words(rows.with_columns(columns.split()))
     return shown
+
+
+def _in_words(rows: QueryResult) -> QueryResult:
+    import pyarrow as pa
+
+    table = rows.table
+    for place, name in enumerate(table.column_names):
+        if name in ("part", "activity"):
+            words = [_WORDS.get(word, word) for word in table[name].to_pylist()]
+            table = table.set_column(place, name, pa.array(words, pa.string()))
+    return replace(rows, table=table)
 
 
 def _more(found: Explanation, part: SliceWords, database: Path) -> Iterator[str]:

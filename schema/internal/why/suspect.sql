@@ -46,11 +46,11 @@ computing AS (
     SELECT
         node, label, path, path_ns, limit_ns, is_unusual, usual_ns,
         greatest(least(p95_ns, computed_ns), 0) + own_ns AS cost_ns,
-        own_ns
+        own_ns, true AS is_traced
     FROM callback
     UNION ALL
     -- Callbacks that are not traced: from a take to what is published.
-    SELECT node, what, path, path_ns, 20_000_000, false, NULL, p95_ns, 0
+    SELECT node, what, path, path_ns, 20_000_000, false, NULL, p95_ns, 0, false
     FROM place
     WHERE part = 'callback' AND (node, what) NOT IN (SELECT (node, label) FROM why_callback)
 ),
@@ -201,8 +201,11 @@ SELECT
     'callback' AS kind, node AS who, label AS what, path, cost_ns,
     cost_ns >= limit_ns AND cost_ns >= 0.1 * path_ns AS matters,
     printf(
-        'its callback %s takes %s of %s', label, main.duration_text(cost_ns - own_ns),
-        main.duration_text(path_ns)
+        CASE
+            WHEN is_traced THEN 'its callback %s takes %s of %s'
+            ELSE 'what it does with a message on %s takes %s of %s'
+        END,
+        label, main.duration_text(cost_ns - own_ns), main.duration_text(path_ns)
     )
     || CASE WHEN own_ns > 0.2 * cost_ns
         THEN printf(', and further messages wait for it for %s', main.duration_text(own_ns))
