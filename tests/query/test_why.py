@@ -10,8 +10,9 @@ import pytest
 from golden import fill_case
 
 import msgflow
-from msgflow.errors import UsageError
+from msgflow.errors import NoFlowError
 
+SECOND = 1_000_000_000
 CASES = Path(__file__).parent / "cases"
 PATHS = {path.relative_to(CASES).as_posix(): path for path in CASES.glob("*/*.case")}
 
@@ -19,7 +20,7 @@ PATHS = {path.relative_to(CASES).as_posix(): path for path in CASES.glob("*/*.ca
 def why(database: Path, case: Path) -> msgflow.Explanation | None:
     with duckdb.connect(str(database)) as connection:
         fill_case(connection, case)
-    with msgflow.open_db(database) as db, suppress(UsageError):
+    with msgflow.open_db(database) as db, suppress(NoFlowError):
         return db.why(run=1)
     return None
 
@@ -39,3 +40,40 @@ def test_every_system_is_explained_or_has_no_flow(name: str, fresh_database: Pat
     found = why(fresh_database, PATHS[name])
     if found is not None:
         assert None not in found.verdict.table["sentence"].to_pylist()
+
+
+def test_a_warm_up_stays_out_and_is_said(fresh_database: Path, tmp_path: Path) -> None:
+    """Three of the first four of twenty flows, one each second, take 300 ms; the others 10 ms."""
+    case = tmp_path / "slow_at_first.case"
+    moments = [(n, n * SECOND, 300 if n in (1, 2, 4) else 10) for n in range(1, 21)]
+    tables = {
+        "node": ["node_id,full_name", "1,/a", "2,/b"],
+        "publisher": ["publisher_id,node_id,topic_name", "1,1,/t"],
+        "subscription": ["subscription_id,node_id,topic_name", "1,2,/t"],
+        "publication": [
+            "publication_id,publisher_id,start_ns",
+            *(f"{n},1,{at}" for n, at, _ in moments),
+        ],
+        "take": [
+            "take_id,subscription_id,taken_ns",
+            *(f"{n},1,{at + latency * SECOND // 1000}" for n, at, latency in moments),
+        ],
+        "link_transport": [
+            "publication_id,take_id,publisher_id,subscription_id,method",
+            *(f"{n},{n},1,1,exact" for n, *_ in moments),
+        ],
+    }
+    case.write_text(
+        "".join(f"== {name}\n" + "\n".join(rows) + "\n" for name, rows in tables.items())
+    )
+    with duckdb.connect(str(fresh_database)) as connection:
+        fill_case(connection, case)
+    with msgflow.open_db(fresh_database) as db:
+        warm, whole = db.why(run=1), db.why(run=1, start="0s")
+    said = "without the first 4.5 s, a warm-up"
+    assert [why.start for why in (warm, whole)] == ["4.5s", "0s"]
+    assert [why.paths.table["max_ns"][0].as_py() for why in (warm, whole)] == [
+        SECOND // 100, 3 * SECOND // 10,
+    ]  # fmt: skip
+    assert [any(said in note for note in why.notes) for why in (warm, whole)] == [True, False]
+    assert all("--start" in step for step in warm.steps if step[0] == "query")
