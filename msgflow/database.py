@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -143,6 +144,52 @@ class Database:
             raise out_of_memory(str(self.path)) from error
         except duckdb.OutOfRangeException as error:
             raise out_of_range(error, self.path) from error
+
+    def record(
+        self,
+        program: Sequence[str] = (),
+        *,
+        directory: str | Path,
+        seconds: float | None = None,
+        kernel: bool = False,
+        profile: str | None = None,
+        note: Callable[[str], None] = warnings.warn,
+    ) -> IngestReport:
+        """Record a ROS 2 system with LTTng, and ingest it as the run with the directory's name.
+
+        It records until the program ends, so many seconds, or until Ctrl-C. Nodes that run before
+        have no names; `msgflow.testing` records a block of a test.
+
+        Args:
+            program: to start when all is ready, and to end afterwards; with its arguments.
+            directory: to write to; it must not exist, or be empty.
+            seconds: how long to record.
+            kernel: also record what the scheduler does.
+            profile: also sample functions: '99' times a second, or '99:dwarf'.
+            note: gets sentences about what is wrong with the recording.
+
+        Raises:
+            RecordingError: LTTng is missing or refuses, the directory is in use, or the disk full.
+            UsageError: there is no such program, or no such rate.
+            TraceError: nothing of ROS 2 was recorded.
+        """
+        from msgflow.record import Channel, read_rate, record
+
+        place = Path(directory).absolute()
+        recorded = record(
+            place,
+            name=place.name,
+            channel=Channel(),
+            program=program,
+            seconds=seconds,
+            kernel=kernel,
+            profile=None if profile is None else read_rate(profile),
+            note=note,
+            show=lambda status: None,
+        )
+        if recorded.exit_code:
+            note(f"{program[0]} ended with exit code {recorded.exit_code}")
+        return self.ingest(place)
 
     def ingest(
         self,

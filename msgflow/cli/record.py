@@ -18,9 +18,6 @@ if TYPE_CHECKING:
 
     from msgflow.record import Status
 
-# Of ROS 2; of an instrumented DDS; of CARET; of Agnocast.
-EVENTS = ("ros2:*", "dds:*", "ros2_caret:*", "agnocast:*")
-"""The events that a recording has."""
 _SECONDS_BETWEEN_LINES = 10.0
 
 
@@ -70,7 +67,7 @@ def command(
     from msgflow.cli.output import print_note, print_status
     from msgflow.clocks import read_clock_sync
     from msgflow.links import read_links
-    from msgflow.record import PYTHON_NODES, Channel, read_rate, record
+    from msgflow.record import EVENTS, PYTHON_NODES, Channel, read_rate, record
     from msgflow.run.choice import require_run_name
 
     if print_python_path:

@@ -18,7 +18,6 @@ from typer.core import TyperCommand
 
 from msgflow.cli.operation import operation
 from msgflow.cli.options import path_of
-from msgflow.cli.record import EVENTS
 from msgflow.errors import ExitCode, TraceError, UsageError
 from msgflow.files.default_files import DEFAULT_PATHS
 
@@ -26,7 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from msgflow.record import Status
-    from msgflow.watch import Alarm, WindowDatabase, WindowReport
+    from msgflow.watch import Alarm, Diagnostics, WindowDatabase, WindowReport
 
 _START = "starts, records and watches a program"
 
@@ -62,6 +61,7 @@ def command(
     keep_before: str | None = None,
     keep_most: Annotated[int, typer.Option(min=1)] = 20,
     prometheus: str | None = None,
+    diagnostics: bool = False,
     ui: Annotated[int | None, typer.Option(min=0, max=65535)] = None,
     json: bool = False,
     output: Path | None = None,
@@ -86,6 +86,7 @@ def command(
             5min.
         keep_most: Most violations that are kept, the last ones.
         prometheus ([ADDRESS:]PORT): Serve metrics for Prometheus, on 127.0.0.1 without an address.
+        diagnostics: Publish the verdicts on --targets on /diagnostics, by rclpy.
         ui (PORT): Show the window in the browser, like `msgflow ui`, at this port of 127.0.0.1; 0
             takes any that is free.
         json: Print one JSON object per window.
@@ -102,6 +103,7 @@ def command(
     from msgflow.text.values import printable
     from msgflow.verify import Verdict
     from msgflow.watch import (
+        Diagnostics,
         Exporter,
         FlightRecorder,
         WatchedSessions,
@@ -124,7 +126,9 @@ def command(
             "--keep-before is about violations that are kept",
             f"--keep-on-violation DIR --keep-before {keep_before}",
         )
-    alarm = None if targets is None else _alarm(targets, paths)
+    if diagnostics and targets is None:
+        raise UsageError("--diagnostics tells the verdicts on targets", "--targets targets.yaml")
+    alarm = None if targets is None else _alarm(targets, paths, with_flows=diagnostics)
     # Where stdout is closed, nothing starts.
     on_screen = is_screen() and not json
     exporter = None
@@ -157,8 +161,11 @@ def command(
             database=database,
         )
         stack.callback(watcher.close)
+        publisher = stack.enter_context(closing(Diagnostics())) if diagnostics else None
 
         def show(reports: Iterator[WindowReport]) -> None:
+            if publisher is not None:
+                reports = _published(reports, publisher)
             if json:
                 for report in reports:
                     print_lines([report.to_json()])
@@ -264,7 +271,13 @@ def _pages(port: int | None, clock_sync: str) -> Iterator[WindowDatabase | None]
             yield database
 
 
-def _alarm(targets: Path, paths: Path) -> Alarm:
+def _published(reports: Iterator[WindowReport], publisher: Diagnostics) -> Iterator[WindowReport]:
+    for report in reports:
+        publisher.show(report)
+        yield report
+
+
+def _alarm(targets: Path, paths: Path, *, with_flows: bool) -> Alarm:
     """Return the alarm of a file of targets."""
     from msgflow.cli.output import print_note
     from msgflow.paths import read_paths
@@ -281,7 +294,7 @@ def _alarm(targets: Path, paths: Path) -> Alarm:
         places[name.value] = {
             word: [text.value for text in texts] for word, texts in path.places.items()
         }
-    return Alarm(file, places, print_note)
+    return Alarm(file, places, print_note, with_flows=with_flows)
 
 
 def _free(name: str) -> Path:
@@ -328,7 +341,7 @@ def _record(
             recorded = record(
                 target,
                 name=name,
-                channel=Channel(EVENTS, "1M", 4, rotation_ns=step_ns),
+                channel=Channel(rotation_ns=step_ns),
                 program=words,
                 log=log,
                 note=print_note,

@@ -42,7 +42,7 @@ def schedule_notes(
 def function_notes(
     connection: duckdb.DuckDBPyConnection, asked: Mapping[str, Value]
 ) -> Iterator[str]:
-    """Yield a sentence for each of the functions that changed most, where both runs have samples."""
+    """Yield a sentence for each function that changed most, where both runs have samples."""
     runs = {name: asked[name] for name in ("run_a", "run_b")}
     ((sampled,),) = connection.execute(_SAMPLED, runs).fetchall()
     if sampled < len({*runs.values()}):

@@ -19,6 +19,9 @@ from msgflow.record.lttng import is_daemon_running, lttng, sessions
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+# Of ROS 2; of an instrumented DDS; of CARET; of Agnocast.
+EVENTS = ("ros2:*", "dds:*", "ros2_caret:*", "agnocast:*")
+"""The events that a recording has."""
 CONTEXTS = ("vpid", "vtid", "procname")
 KERNEL_CONTEXTS = ("pid", "vpid", "vtid", "procname")
 # LTTng has it since 2.12.
@@ -41,9 +44,9 @@ class Channel:
         without: names of events, or patterns of them, that are left out.
     """
 
-    events: tuple[str, ...]
-    sub_buffer_size: str
-    sub_buffers: int
+    events: tuple[str, ...] = EVENTS
+    sub_buffer_size: str = "1M"
+    sub_buffers: int = 4
     rotation_ns: int | None = None
     without: tuple[str, ...] = ()
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from msgflow.watch.alarm import Alarm, violation_line
 from msgflow.watch.chunk import finished_chunks, remove_chunk
+from msgflow.watch.diagnostics import Diagnostics
 from msgflow.watch.flight_recorder import FlightRecorder
 from msgflow.watch.follow import watch_finished, watch_live
 from msgflow.watch.prometheus import Exporter
@@ -14,6 +15,7 @@ from msgflow.watch.window_report import WindowReport
 
 __all__ = [
     "Alarm",
+    "Diagnostics",
     "Exporter",
     "FlightRecorder",
     "WatchedSessions",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +12,7 @@ from msgflow.query.why import explain
 from msgflow.run.slice import Slice
 from msgflow.text.values import format_duration
 from msgflow.verify import Verdict, take_of, verify
+from msgflow.verify.metrics import ENDS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -61,14 +61,17 @@ class _Told:
     Attributes:
         worst_ns: the worst case so far; 0 of requirements that have no worst case.
         until_ns: until when all was judged.
+        culprit: what was to blame when it was told.
     """
 
     worst_ns: int
     until_ns: int
+    culprit: str | None
 
     @classmethod
-    def of(cls, worst_ns: int | None, until_ns: int, before: _Told | None) -> _Told:
-        return cls(max(worst_ns or 0, 0 if before is None else before.worst_ns), until_ns)
+    def of(cls, row: Row, until_ns: int, before: _Told | None) -> _Told:
+        worst_ns = max(row["worst_ns"] or 0, 0 if before is None else before.worst_ns)
+        return cls(worst_ns, until_ns, row["culprit"])
 
     def is_surpassed(self, worst_ns: int | None, at_ns: int | None) -> bool:
         is_later = at_ns is not None and at_ns >= self.until_ns
@@ -83,6 +86,8 @@ class Alarm:
         targets: TargetsFile,
         paths: Mapping[str, Mapping[str, Sequence[str]]],
         note: Callable[[str], None],
+        *,
+        with_flows: bool = False,
     ) -> None:
         """Start without a verdict.
 
@@ -90,8 +95,15 @@ class Alarm:
             targets: the requirements.
             paths: places of the named paths of the requirements, as `verify` takes them.
             note: gets a sentence about each requirement that had data and has none any more.
+            with_flows: also ask what became of the flows of paths.
         """
         self._targets = targets
+        self._with_flows = with_flows
+        self._places = {
+            target.name: {field: text.value for field, text in target.chosen.items()}
+            for target in targets.targets
+            if target.kind == ENDS
+        }
         self._paths = paths
         self._say = note
         # By (target, metric, condition).
@@ -111,7 +123,7 @@ class Alarm:
 
     def judge(
         self, con: duckdb.DuckDBPyConnection, window: Window, final_ns: int
-    ) -> tuple[list[Row], Counter[str]]:
+    ) -> tuple[list[Row], list[Row]]:
         """Verify a window.
 
         Args:
@@ -120,7 +132,8 @@ class Alarm:
             final_ns: where this part begins.
 
         Returns:
-            What is violated there and was not before, and how many verdicts there are of each kind.
+            What is violated there and was not before; and the rows of `verify`, each with the
+            `culprit` of what fails, and as `flows` the row of `e2e-latency` of a path if asked for.
         """
         part = Slice(start=window.start_ns, end=window.end_ns)
         rows = verify(con, self._targets, part, paths=self._paths).result.table.to_pylist()
@@ -128,19 +141,41 @@ class Alarm:
         failing = {}
         for row in rows:
             self._note(row)
+            row |= {"culprit": None, "flows": self._flows(con, row, part)}
             if row["verdict"] != Verdict.FAILED:
                 continue
             key = tuple(row[name] for name in ("target", "metric", "condition", "subject", "path"))
             told = self._failing.get(key)
             if told is None or told.is_surpassed(row["worst_ns"], row["worst_at_ns"]):
                 found.append(self._violation(con, row, part, final_ns))
-            failing[key] = _Told.of(row["worst_ns"], window.end_ns, told)
+                row["culprit"] = found[-1]["culprit"]
+            else:
+                row["culprit"] = told.culprit
+            failing[key] = _Told.of(row, window.end_ns, told)
         if found:
-            told = _told(con, part)
-            found = [row | {"verdict": _sentence(told, row["path"])} for row in found]
+            said = _told(con, part)
+            found = [row | {"verdict": _sentence(said, row["path"])} for row in found]
         self._failing = failing
         self._note_silence(rows)
-        return found, Counter(row["verdict"] for row in rows)
+        return found, rows
+
+    def _flows(self, con: duckdb.DuckDBPyConnection, row: Row, part: Slice) -> Row | None:
+        """Return `median_ns`, `p99_ns`, `lost` and `dropped` of a path, or between two topics."""
+        if not self._with_flows or row["subject"] is None:
+            return None
+        if row["path"] is not None:
+            query, subject, prefix, ends = "e2e-latency", row["path"], "", _ends(row["path"])
+        else:
+            query, subject, prefix = "e2e-latency-ends", row["subject"], "first_"
+            ends = self._places.get(row["target"], {})
+        if not ends:
+            return None
+        for each in run_query(con, load_query(query), ends, part).table.to_pylist():
+            between = each.get("path") or f"{each['first_topic']} → {each['last_topic']}"
+            if subject in (between, f"{between} → {each.get('node')}"):
+                numbers = {name: each[f"{prefix}{name}"] for name in ("median_ns", "p99_ns")}
+                return numbers | {name: each[name] for name in ("lost", "dropped")}
+        return None
 
     def _note(self, row: Row) -> None:
         key, verdict = _key(row), Verdict(row["verdict"])

@@ -227,8 +227,8 @@ class Watcher:
         report = replace(report_of(self._con, window), late_events=self._late_events)
         self._late_events = 0
         if self._alarm is not None:
-            found, verdicts = self._alarm.judge(self._con, judged, window.end_ns)
-            report = replace(report, violations=found, verdicts=verdicts)
+            found, rows = self._alarm.judge(self._con, judged, window.end_ns)
+            report = replace(report, violations=found, judged=rows)
         if self._exporter is not None:
             self._exporter.count(self._con, Window(history.closed_ns, window.end_ns))
         if self._database is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +13,7 @@ from msgflow.run.slice import Slice
 from msgflow.text.json_value import json_value
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     import duckdb
 
@@ -50,7 +51,7 @@ class WindowReport:
         discarded_events: events that the tracer lost.
         late_events: events that have come since the last window, but belong to closed ones.
         violations: what is not as the targets demand.
-        verdicts: how many verdicts on the targets there are of each kind, as `verify` names them.
+        judged: rows of `verify`, as `Alarm.judge` returns them.
     """
 
     window: Window
@@ -60,8 +61,13 @@ class WindowReport:
     discarded_events: int
     late_events: int = 0
     violations: Sequence[Row] = field(default=())
-    verdicts: Mapping[str, int] = field(default_factory=dict)
+    judged: Sequence[Row] = field(default=())
     lag_s: float | None = None
+
+    @property
+    def verdicts(self) -> Counter[str]:
+        """How many verdicts on the targets there are of each kind, as `verify` names them."""
+        return Counter(row["verdict"] for row in self.judged)
 
     def to_json(self) -> str:
         """Return it as one line of JSON."""

@@ -298,3 +298,54 @@ def test_ctrl_c_ends_the_view_and_not_the_session(watch: Watch, session: Path) -
     # The watcher has switched off the rotation, as nobody reads the chunks now.
     assert "rotat" not in lttng("list", "drive").stdout
     assert os.path.isdir(session)
+
+
+LISTENER = """
+import sys
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.node import Node
+
+def heard(message):
+    for status in message.status:
+        print(status.level[0], status.name, status.message, sorted(v.key for v in status.values))
+    sys.stdout.flush()
+
+rclpy.init()
+node = Node("monitor")
+node.create_subscription(DiagnosticArray, "/diagnostics", heard, 10)
+rclpy.spin(node)
+"""
+
+
+@pytest.mark.thorough
+def test_a_node_hears_verdicts_with_their_culprit(robot: list[str], tmp_path: Path) -> None:
+    """The Python of ROS 2 runs the command, as it does where ROS 2 is installed."""
+    environment = dict(word.split("=", 1) for word in robot[1 : robot.index("-c") - 1])
+    environment.pop("LD_PRELOAD")
+    python = robot[robot.index("-c") - 1]
+    if subprocess.run([python, "-c", "import diagnostic_msgs.msg"], env=environment).returncode:
+        pytest.skip("no diagnostic_msgs")
+    (tmp_path / "targets.yaml").write_text(
+        "targets:\n  - {from: /image, to: /detector, latency: p99 < 1 us}\n"
+    )
+    packages = [*(path for path in sys.path if path.endswith("-packages")), *sys.path]
+    heard = tmp_path / "heard"
+    words = [
+        "-m", "msgflow", "watch", "--window", "4s", "--step", "4s", "--targets", "targets.yaml",
+        "--diagnostics", "--json", "--", "timeout", "-s", "INT", "30", *robot, "0.1",
+    ]  # fmt: skip
+    with heard.open("w") as file:
+        listener = subprocess.Popen([python, "-c", LISTENER], env=environment, stdout=file)
+    try:
+        subprocess.run(
+            [python, *words], cwd=tmp_path, capture_output=True,
+            env=os.environ | environment | {"PYTHONPATH": os.pathsep.join(packages)},
+        )  # fmt: skip
+    finally:
+        listener.kill()
+        listener.wait()
+    (line, *_) = heard.read_text().splitlines()
+    assert line.startswith("2 msgflow: /image → /detector /image → /image → /detector: latency ")
+    assert "required p99 < 1 us: " in line
+    assert line.endswith("['lag', 'lost', 'p50', 'p99']")
