@@ -7,8 +7,10 @@ Five messages lead from a source over four nodes to a sink, each node in a proce
 but the source waits for 50 ms before it sends its message on. The first one's time is in all of
 them: the sink knows the latency without a trace. In each round, messages go at 10 Hz with nothing
 recorded, with LTTng, with LTTng and the tracer of Python nodes (`msgflow record`), with that tracer
-and nothing recorded, and with the kernel where LTTng can trace it; in an order that is drawn. Nodes
-with the tracer are others than those without; both run all the time.
+and nothing recorded, with samples of functions at 99 Hz where perf may, and with the kernel where
+LTTng can trace it; in an order that is drawn. Nodes with the tracer are others than those without;
+both run all the time. CPU time is that of the nodes: with samples it has their interrupts, and not
+what perf itself takes to write them.
 
 Differences are to nothing recorded; intervals hold 95 % of what drawing rounds anew gives. PYTHON
 has the wheels of ROS 2 (`make ros`).
@@ -32,7 +34,9 @@ from recording.recorder import one_at_a_time, require, ros_environment
 from recording.tracetools import build_tracetools
 
 from msgflow import trace
+from msgflow.record import perf
 from msgflow.record.daemon import session_daemon
+from msgflow.record.profile import Rate, recorded_samples
 from msgflow.record.python_path import PYTHON_NODES
 from msgflow.record.session import Channel, can_trace_kernel, recording_session
 from msgflow.record.written import recorded_bytes
@@ -44,6 +48,7 @@ _CHAIN = Path(__file__).parent / "recording" / "chain.py"
 _HOPS = 5
 _DRAWS = 2000
 _NOTHING = "nothing"
+_SAMPLED = "LTTng, and functions at 99 Hz"
 
 
 @dataclass(frozen=True)
@@ -137,6 +142,10 @@ def measure(given: argparse.Namespace) -> dict[str, list[Block]]:
             "LTTng and Python": (traced, True, False),
             "the tracer, nothing recorded": (traced, False, False),
         }
+        if (reason := perf.why_not(["--all-cpus"])) is None:
+            kinds[_SAMPLED] = (plain, True, False)
+        else:
+            print(f"no samples of functions: {reason}")
         if can_trace_kernel():
             kinds["LTTng, Python and kernel"] = (traced, True, True)
         else:
@@ -147,7 +156,15 @@ def measure(given: argparse.Namespace) -> dict[str, list[Block]]:
             for kind in order.sample(list(kinds), len(kinds)):
                 chain, is_recorded, with_kernel = kinds[kind]
                 place = directory / f"{number}-{kind}"
-                with _recorded(place, is_recorded=is_recorded, with_kernel=with_kernel):
+                with contextlib.ExitStack() as recording:
+                    recording.enter_context(
+                        _recorded(place, is_recorded=is_recorded, with_kernel=with_kernel)
+                    )
+                    if kind == _SAMPLED:
+                        rate = Rate(99, "fp")
+                        recording.enter_context(
+                            recorded_samples(place, rate, is_ours=False, note=print)
+                        )
                     latencies, cpu_ns = chain.send(given.messages, given.rate)
                 events, size = _size(place) if is_recorded else (0, 0)
                 blocks[kind].append(

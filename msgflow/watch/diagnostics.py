@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import socket
-from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -14,8 +12,6 @@ from msgflow.verify import Verdict
 from msgflow.watch.alarm import violation_line
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from msgflow.watch.window_report import WindowReport
 
 TOPIC = "/diagnostics"
@@ -27,7 +23,6 @@ _LEVELS = {
     Verdict.NO_DATA: "STALE",
     Verdict.PASSED: "OK",
 }
-_APP_PATH = "LTTNG_UST_APP_PATH"
 
 
 @dataclass(frozen=True)
@@ -81,7 +76,7 @@ def _sentence(row: dict[str, Any]) -> str:
 class Diagnostics:
     """A node that publishes what windows say of targets.
 
-    LTTng does not see it: it is no part of what it measures.
+    It is no part of what it measures: `read_chunk` leaves out what this process does.
     """
 
     def __init__(self) -> None:
@@ -90,28 +85,25 @@ class Diagnostics:
         Raises:
             UsageError: rclpy or diagnostic_msgs cannot be imported.
         """
-        with untraced():
-            try:
-                import rclpy
-                from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-                from rclpy.duration import Duration
-                from rclpy.node import Node
-                from rclpy.signals import SignalHandlerOptions
-            except ImportError as error:
-                raise UsageError(
-                    f"--diagnostics needs rclpy and diagnostic_msgs: {error}",
-                    "source /opt/ros/DISTRO/setup.bash, with the Python of that distribution",
-                ) from None
-            self._array, self._status, self._pair = DiagnosticArray, DiagnosticStatus, KeyValue
-            self._longest_wait = Duration(seconds=1)
-            self._context = rclpy.Context()
-            # Ctrl-C is ours.
-            rclpy.init(
-                args=[], context=self._context, signal_handler_options=SignalHandlerOptions.NO
-            )
-            self._node = Node(
-                NODE, context=self._context, enable_rosout=False, start_parameter_services=False
-            )
+        try:
+            import rclpy
+            from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+            from rclpy.duration import Duration
+            from rclpy.node import Node
+            from rclpy.signals import SignalHandlerOptions
+        except ImportError as error:
+            raise UsageError(
+                f"--diagnostics needs rclpy and diagnostic_msgs: {error}",
+                "source /opt/ros/DISTRO/setup.bash, with the Python of that distribution",
+            ) from None
+        self._array, self._status, self._pair = DiagnosticArray, DiagnosticStatus, KeyValue
+        self._longest_wait = Duration(seconds=1)
+        self._context = rclpy.Context()
+        # Ctrl-C is ours.
+        rclpy.init(args=[], context=self._context, signal_handler_options=SignalHandlerOptions.NO)
+        self._node = Node(
+            NODE, context=self._context, enable_rosout=False, start_parameter_services=False
+        )
         self._publisher = self._node.create_publisher(DiagnosticArray, TOPIC, 10)
 
     def show(self, report: WindowReport) -> None:
@@ -135,20 +127,3 @@ class Diagnostics:
         self._publisher.wait_for_all_acked(self._longest_wait)
         self._node.destroy_node()
         self._context.shutdown()
-
-
-@contextmanager
-def untraced() -> Iterator[None]:
-    """Have LTTng's library, if the block loads it, look for session daemons where none is.
-
-    Programs that are started later are traced: they do not inherit that.
-    """
-    before = os.environ.get(_APP_PATH)
-    os.environ[_APP_PATH] = os.devnull
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ[_APP_PATH]
-        else:
-            os.environ[_APP_PATH] = before

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import socket
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -94,7 +96,8 @@ class KeptChunk:
 def read_chunk(chunk: Chunk, after: Continuation) -> KeptChunk | None:
     """Read a chunk into memory; None if nothing was recorded in it.
 
-    `after` holds the chunks read before, and takes this one in: a chunk can be read only once.
+    `after` holds the chunks read before, and takes this one in: a chunk can be read only once. What
+    this process itself did is left out: it may have a node.
     """
     # LTTng also cuts the time before the first program, into chunks without any file.
     if not any(path.is_file() for path in chunk.path.rglob("*")):
@@ -106,7 +109,8 @@ def read_chunk(chunk: Chunk, after: Continuation) -> KeptChunk | None:
             if batch.name == PACKET:
                 packets.append(batch.batch)
             else:
-                events.setdefault(batch.name, []).append(batch.batch)
+                rows = _of_others(batch.batch, traces.traces)
+                events.setdefault(batch.name, []).append(rows)
         begins = [trace.begin_ns for trace in traces.traces if trace.begin_ns is not None]
         ends = [trace.end_ns for trace in traces.traces if trace.end_ns is not None]
         if not begins or not ends:
@@ -125,6 +129,17 @@ def read_chunk(chunk: Chunk, after: Continuation) -> KeptChunk | None:
             end_ns=end_ns,
             **_renumbered({name: joined(batches) for name, batches in events.items()}),
         )
+
+
+def _of_others(batch: pa.RecordBatch, traces: Sequence[TraceInfo]) -> pa.RecordBatch:
+    """Return the events that this process did not record."""
+    here = socket.gethostname()
+    ours = [one.index for one in traces if one.domain == "ust" and one.hostname == here]
+    is_own = pc.and_(
+        pc.equal(batch["vpid"], os.getpid()),
+        pc.is_in(batch["trace_index"], pa.array(ours, pa.int32())),
+    )
+    return batch.filter(pc.invert(is_own)) if pc.any(is_own).as_py() else batch
 
 
 def _last_packets(packets: list[pa.RecordBatch], end_ns: int) -> pa.RecordBatch:

@@ -31,6 +31,11 @@ _EXECUTOR = (
     "seen_ns", "callback_ns", "blocked_ns", "longest_callback", "longest_ns",
 )  # fmt: skip
 _LOSS = ("topic", "subscriber", "published", "delivered", "dropped", "lost", "reasons")
+_TOPIC = (
+    "topic", "publication_count", "rate_hz", "period_median_ns", "period_deviation_ns",
+    "delivered", "dropped", "lost", "reasons", "latency_median_ns", "latency_p95_ns",
+    "latency_max_ns",
+)  # fmt: skip
 _DISCARDED = """
 SELECT coalesce(sum(event_count), 0)::BIGINT
 FROM main.gap
@@ -49,6 +54,7 @@ class WindowReport:
         executors: rows of `executor-usage`, the busiest first.
         losses: rows of `topics --measure delivery` with messages that were dropped or lost.
         discarded_events: events that the tracer lost.
+        topics: rows of `topics --measure summary`.
         late_events: events that have come since the last window, but belong to closed ones.
         violations: what is not as the targets demand.
         judged: rows of `verify`, as `Alarm.judge` returns them.
@@ -59,6 +65,7 @@ class WindowReport:
     executors: Sequence[Row]
     losses: Sequence[Row]
     discarded_events: int
+    topics: Sequence[Row] = field(default=())
     late_events: int = 0
     violations: Sequence[Row] = field(default=())
     judged: Sequence[Row] = field(default=())
@@ -77,6 +84,7 @@ class WindowReport:
             "paths": self.paths,
             "executors": self.executors,
             "losses": self.losses,
+            "topics": self.topics,
             "discarded_events": self.discarded_events,
             "late_events": self.late_events,
             "violations": self.violations,
@@ -104,6 +112,7 @@ def report_of(con: duckdb.DuckDBPyConnection, window: Window) -> WindowReport:
         paths=paths,
         executors=sorted(executors, key=lambda row: -(row["callback_share"] or 0)),
         losses=[row for row in losses if row["dropped"] or row["lost"]],
+        topics=ask("topics-summary", _TOPIC),
         discarded_events=discarded_events(con, window),
     )
 

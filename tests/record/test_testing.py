@@ -4,26 +4,14 @@ from __future__ import annotations
 
 import os
 import subprocess
-import sys
-import time
 from pathlib import Path
 
 import pytest
-from lttng_program import lttng
-from recording.tracetools import build_tracetools
 
 from msgflow import Database
 from msgflow.testing import Recording, ms, msgflow_recorded
 
 __all__ = ["msgflow_recorded"]
-
-LOADED = """
-import ctypes, sys, time
-from msgflow.watch.diagnostics import untraced
-with untraced():
-    ctypes.CDLL(sys.argv[1], ctypes.RTLD_GLOBAL)
-time.sleep(30)
-"""
 
 
 @pytest.mark.thorough
@@ -48,28 +36,3 @@ def test_python_records_a_program(robot: list[str], tmp_path: Path) -> None:
         )
         assert report.run_name == "drive"
         assert database.query("e2e-latency", to="/detector").to_arrow()["reached"][0].as_py() > 10
-
-
-@pytest.mark.thorough
-@pytest.mark.usefixtures("daemon")
-def test_what_publishes_diagnostics_is_not_traced(tmp_path: Path) -> None:
-    library = build_tracetools(tmp_path)
-    loads = [sys.executable, "-c", LOADED, str(library)]
-    traced = subprocess.Popen(
-        [*loads[:2], LOADED.replace("untraced()", "open('/dev/null')"), library]
-    )
-    untraced = subprocess.Popen(loads)
-    try:
-        end = time.monotonic() + 30
-        while (listed := lttng("list", "--userspace").stdout) and time.monotonic() < end:
-            if f"PID: {traced.pid} " in listed:
-                break
-            time.sleep(0.2)
-        time.sleep(1)
-        listed = lttng("list", "--userspace").stdout
-        assert f"PID: {traced.pid} " in listed
-        assert f"PID: {untraced.pid} " not in listed
-    finally:
-        for process in (traced, untraced):
-            process.kill()
-            process.wait()

@@ -300,6 +300,10 @@ def test_ctrl_c_ends_the_view_and_not_the_session(watch: Watch, session: Path) -
     assert os.path.isdir(session)
 
 
+TARGETS = """
+targets:
+  - {from: /image, to: /detector, latency: p99 < 1 us}
+"""
 LISTENER = """
 import sys
 import rclpy
@@ -326,10 +330,7 @@ def test_a_node_hears_verdicts_with_their_culprit(robot: list[str], tmp_path: Pa
     python = robot[robot.index("-c") - 1]
     if subprocess.run([python, "-c", "import diagnostic_msgs.msg"], env=environment).returncode:
         pytest.skip("no diagnostic_msgs")
-    (tmp_path / "targets.yaml").write_text(
-        "targets:\n  - {from: /image, to: /detector, latency: p99 < 1 us}\n"
-    )
-    packages = [*(path for path in sys.path if path.endswith("-packages")), *sys.path]
+    (tmp_path / "targets.yaml").write_text(TARGETS)
     heard = tmp_path / "heard"
     words = [
         "-m", "msgflow", "watch", "--window", "4s", "--step", "4s", "--targets", "targets.yaml",
@@ -340,7 +341,7 @@ def test_a_node_hears_verdicts_with_their_culprit(robot: list[str], tmp_path: Pa
     try:
         subprocess.run(
             [python, *words], cwd=tmp_path, capture_output=True,
-            env=os.environ | environment | {"PYTHONPATH": os.pathsep.join(packages)},
+            env=os.environ | environment | {"PYTHONPATH": os.pathsep.join(sys.path)},
         )  # fmt: skip
     finally:
         listener.kill()

@@ -6,6 +6,7 @@ from functools import reduce
 from pathlib import Path
 
 import pyarrow as pa
+import pytest
 
 from msgflow.trace import Continuation
 from msgflow.watch import finished_chunks
@@ -51,3 +52,25 @@ def test_what_lasts_of_several_chunks_is_one_part(tmp_path: Path) -> None:
         for lasting in (parts, [one])
     )
     assert single == whole
+
+
+def test_what_this_process_recorded_is_left_out(
+    shared_traces: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not what another machine's process of the same number recorded."""
+    chunk = finished_chunks(shared_traces / "real_rotate")[0]
+
+    def pids() -> set[int]:
+        kept = read_chunk(chunk, Continuation())
+        assert kept is not None
+        return {pid for batch in kept.events.values() for pid in batch["vpid"].to_pylist()}
+
+    kept = read_chunk(chunk, Continuation())
+    assert kept is not None
+    (hostname,) = {trace.hostname for trace in kept.traces}
+    every = pids()
+    monkeypatch.setattr("os.getpid", lambda: min(every))
+    monkeypatch.setattr("socket.gethostname", lambda: "another")
+    assert pids() == every
+    monkeypatch.setattr("socket.gethostname", lambda: hostname)
+    assert pids() == every - {min(every)}

@@ -28,12 +28,14 @@ def test_names_are_text_and_all_fits() -> None:
     """A program may call itself what it likes: no markup, no control characters."""
     times = {"median_ns": 1_000_000, "p99_ns": 2_000_000, "max_ns": 2_000_000}
     thread = {"nodes": "[/x] \x1b[31m", "tid": 7, "callback_share": 0.5, "longest_ns": 48_100_000}
-    loss = {"topic": "[/y]", "subscriber": "/s" * 40, "dropped": 4, "lost": 0, "reasons": None}
+    topic = {"topic": "[/y]" * 40, "dropped": 4, "lost": 0, "reasons": "[r] " * 40}
+    topic |= {"rate_hz": 1e4, "period_deviation_ns": 123_400_000, "latency_p95_ns": 123_400_000}
     report = WindowReport(
         window=Window(0, 2_000_000_000),
         paths=[{"path": "[/z] → \x1b[2J", "reached": 20, **FATES, **times}],
         executors=[{**thread, "blocked_ns": 0, "longest_callback": "Subscription(/[b])"}],
-        losses=[loss],
+        losses=(),
+        topics=[topic],
         discarded_events=0,
     )
     text = shown(report)

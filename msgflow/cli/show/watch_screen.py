@@ -30,11 +30,12 @@ Row = dict[str, Any]
 _TIME = slice(11, 19)
 _SPARKS = "▁▂▃▄▅▆▇█"
 _STEPS = 10
-_THREADS, _LOSSES, _VIOLATIONS = 5, 5, 5
+_THREADS, _TOPICS, _VIOLATIONS = 5, 5, 5
 # Violations before the last one have no more than this part of the screen.
 _PART_OF_VIOLATIONS = 3
-_PATH_WIDTH, _CALLBACK_WIDTH = 26, 27
+_PATH_WIDTH, _CALLBACK_WIDTH, _REASON_WIDTH = 26, 27, 14
 _MISSING = ("dropped", "lost", "no_output", "unknown")
+_MISSED = ("dropped", "lost")
 _FATES = ("reached", "superseded", *_MISSING, "not_connected", "cut_by_recording")
 # By the title of the column that they sort by; what is worst comes first.
 _ORDERS: dict[str, Callable[[Row], Any]] = {
@@ -113,14 +114,14 @@ class WatchScreen:
         keys = Text(_KEYS, style="dim")
         room = self._console.height - sum(self._height(part) for part in (*above, keys))
         # Each table has a line of titles.
-        room -= 3 if report.losses else 2
-        threads, losses = min(len(report.executors), _THREADS), min(len(report.losses), _LOSSES)
-        paths = _share(room, len(report.paths), threads + losses)
-        losses = _share(room - paths, losses, threads)
-        threads = _share(room - paths - losses, threads, 0)
+        room -= 3 if report.topics else 2
+        threads, topics = min(len(report.executors), _THREADS), min(len(report.topics), _TOPICS)
+        paths = _share(room, len(report.paths), threads + topics)
+        topics = _share(room - paths, topics, threads)
+        threads = _share(room - paths - topics, threads, 0)
         tables = [self._paths(report, paths), _threads(report, threads)]
-        if report.losses:
-            tables.append(_losses(report, losses))
+        if report.topics:
+            tables.append(_topics(report, topics))
         return Group(*above, *tables, keys)
 
     def _height(self, text: Text) -> int:
@@ -234,13 +235,23 @@ def _threads(report: WindowReport, rows: int) -> Table:
     return table
 
 
-def _losses(report: WindowReport, most: int) -> Table:
-    table = _table("topic", "dropped", "lost", "why")
-    rows = sorted(report.losses, key=lambda row: -(row["dropped"] + row["lost"]))
+def _topics(report: WindowReport, most: int) -> Table:
+    """Return topics: first those that lost messages, then those with the oldest data."""
+    table = _table("topic", "/s", "jitter", "age", "dropped", "lost", "why")
+    rows = sorted(
+        report.topics,
+        key=lambda row: (-(row["dropped"] + row["lost"]), -(row["latency_p95_ns"] or 0)),
+    )
     for row in rows[:most]:
-        place = f"{row['topic']} → {row['subscriber']}"
-        reasons = _short(row["reasons"] or "", _PATH_WIDTH)
-        table.add_row(_short(place, _PATH_WIDTH), str(row["dropped"]), str(row["lost"]), reasons)
+        missed = (Text(str(row[name]), "bold red" * bool(row[name])) for name in _MISSED)
+        table.add_row(
+            _short(row["topic"] or NULL, _PATH_WIDTH),
+            f"{row['rate_hz'] or 0:.0f}",
+            _duration(row["period_deviation_ns"]),
+            _duration(row["latency_p95_ns"]),
+            *missed,
+            _short(row["reasons"] or "", _REASON_WIDTH),
+        )
     return table
 
 
