@@ -41,6 +41,25 @@ def test_no_message_is_taken_for_the_next(tmp_path: Path, system: str, recording
 
 
 @pytest.mark.thorough
+def test_a_small_step_shows_in_the_messages_beside_it(tmp_path: Path) -> None:
+    """One of 7 us, in the first of three stretches until a large one: the others outvote it."""
+    simulation = simulate(
+        "bursts_two_hosts",
+        tmp_path / "trace",
+        factor=0.4,
+        seed=101,
+        layout="humble",
+        recording=Recording(realtime_steps=((SECOND // 5, 7_000), (SECOND // 2, -40_000_000))),
+        clock_offset_ns=350_000_000,
+    )
+    path = tmp_path / "run.duckdb"
+    ingest_one(simulation.directory, path).connection.close()
+    score = {score.kind: score for score in compare_simulated(path, simulation.truth)[0]}
+    assert score["transport"].wrong == 0
+    assert score["transport"].found > 2_500
+
+
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("offset_ns", "slew_ppm", "factor", "least"),
     [

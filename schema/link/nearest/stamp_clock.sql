@@ -103,6 +103,20 @@ chosen AS MATERIALIZED (
 standing AS MATERIALIZED (
     FROM derive.standing_difference('close', 'chosen')
 ),
+-- Beside a small step, most of several stretches outvote what the messages of one say themselves.
+agreeing AS (
+    SELECT
+        s.clock_id, s.stretch, s.drift_ppb, s.is_sharp AND s.is_own AS is_sharp,
+        CASE WHEN s.is_own THEN s.offset_ns END AS offset_ns
+    FROM (
+        SELECT
+            s.*,
+            s.offset_ns BETWEEN c.least_ns - derive.clock_limit().slack_ns
+                AND c.greatest_ns + derive.clock_limit().slack_ns AS is_own
+        FROM sharp AS s
+        JOIN chosen AS c ON s.clock_id = c.clock_id AND s.stretch = c.stretch
+    ) AS s
+),
 -- Between two stretches in which the clocks stood alike, they stood so.
 placed AS (
     SELECT
@@ -148,7 +162,7 @@ SELECT
         AS is_sharp
 FROM placed AS f
 JOIN extent AS x ON f.clock_id = x.clock_id
-LEFT JOIN sharp AS s ON f.clock_id = s.clock_id AND f.stretch = s.stretch
+LEFT JOIN agreeing AS s ON f.clock_id = s.clock_id AND f.stretch = s.stretch
 WINDOW nearby AS (
     PARTITION BY f.clock_id, f.segment
     ORDER BY f.stretch
