@@ -231,8 +231,8 @@ twin AS (
     GROUP BY a.publication_id
 ),
 -- Or it was stamped while another thread wrote as well, as far as the trace shows: threads of rclpy
--- have no event until they look for the next message. Of a look in vain the truth knows nothing: the
--- last publication of a thread may go on for as long as its process.
+-- have no event until they look for the next message. Of a look in vain the truth knows nothing:
+-- the last publication of a thread may go on for as long as its process.
 rivalled AS (
     SELECT DISTINCT a.publication_id
     FROM simulated_publication AS a
