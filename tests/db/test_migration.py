@@ -93,7 +93,7 @@ def before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
     objects.known_revisions.cache_clear()
 
 
-@pytest.fixture(params=[BEFORE, HEAD])
+@pytest.fixture(params=[BEFORE, thorough(HEAD)])
 def revision(request: pytest.FixtureRequest) -> str:
     """Each revision that can be upgraded, and one before."""
     if request.param == BEFORE:
