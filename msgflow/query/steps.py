@@ -56,8 +56,9 @@ class Steps:
             if self._made.get(step.table) == wanted:
                 continue
             if step.table in self._made:
-                # What was made of the old rows has to be made again.
-                self._made = dict.fromkeys(self._made, ("", {}))
+                # What was made of the old rows has to be made again: that stands behind it.
+                made = list(self._made)
+                self._made |= dict.fromkeys(made[made.index(step.table) :], ("", {}))
             self._made[step.table] = "", {}
             known = self._known.get(step.table)
             table = (f"CREATE OR REPLACE TEMP TABLE {step.table} AS {known}",)

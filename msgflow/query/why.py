@@ -198,8 +198,8 @@ def _explained(
         place=place,
         verdict=replace(paths, table=verdict, header=None, notes=[], path_numbers={}),
         paths=paths,
-        nodes=_by_node(connection, parts, path),
-        slow_flow=_longest(connection, flow),
+        nodes=_told(connection, "node_share", "breakdown", parts, path=path),
+        slow_flow=_told(connection, "longest_piece", "slow_flow", flow, count=_PIECES),
         waits=waits.first(_WAITS),
         losses=losses,
         steps=tuple(dict.fromkeys(_steps(places, ends_here, pieces, losses, skipped))),
@@ -329,18 +329,13 @@ def _worst_first(paths: QueryResult, first: str) -> QueryResult:
     return _taken(paths, places)
 
 
-def _by_node(connection: duckdb.DuckDBPyConnection, parts: QueryResult, path: str) -> QueryResult:
-    """Return the share of each node in the time of a path, and the largest of its parts."""
-    with registered(connection, breakdown=parts.table):
-        found = internal_sql().run(connection, "node_share", {"path": path})
-        return replace(parts, table=found.to_arrow_table())
-
-
-def _longest(connection: duckdb.DuckDBPyConnection, flow: QueryResult) -> QueryResult:
-    """Return the longest pieces, in order, and last the sum of the others."""
-    with registered(connection, slow_flow=flow.table):
-        found = internal_sql().run(connection, "longest_piece", {"count": _PIECES})
-        return replace(flow, table=found.to_arrow_table())
+def _told(
+    connection: duckdb.DuckDBPyConnection, name: str, rows: str, of: QueryResult, **values: Value
+) -> QueryResult:
+    """Return what a statement makes of a result, whose rows it reads by this name."""
+    with registered(connection, **{rows: of.table}):
+        found = internal_sql().run(connection, name, values)
+        return replace(of, table=found.to_arrow_table())
 
 
 def _steps(
