@@ -532,13 +532,39 @@ def test_queries_share_their_steps(connection: duckdb.DuckDBPyConnection) -> Non
     assert not connection.execute("SELECT * FROM duckdb_tables() WHERE temporary").fetchall()
 
 
+def test_a_step_made_again_leaves_those_before_it(connection: duckdb.DuckDBPyConnection) -> None:
+    asked = header(STEPS)
+
+    def topics(least: str) -> list[str]:
+        table = run_query(connection, asked, {"least": least}, Slice("first"), steps=steps)
+        return table.to_arrow()["topic"].to_pylist()
+
+    with Steps(connection) as steps:
+        assert topics("/a") == ["/a", "/b", "/c"]
+        connection.execute("DELETE FROM message WHERE topic = '/b'")
+        assert topics("/b") == ["/b", "/c"]
+        assert topics("/a") == ["/a", "/b", "/c"]
+
+
+def test_a_step_is_made_of_what_is_known(connection: duckdb.DuckDBPyConnection) -> None:
+    known = {"example_message": "SELECT 1::BIGINT AS run_id, '/known' AS topic"}
+    with Steps(connection, known) as steps:
+        found = run_query(connection, header(STEPS), {}, Slice("first"), steps=steps)
+    assert found.to_arrow()["topic"].to_pylist() == ["/known"]
+
+
 def test_the_queries_of_flows_make_their_tables_alike() -> None:
     """Else they could not share them."""
     names = ("critical-path", "e2e-latency", "flows", "path-breakdown")
-    for table in ("path_outcome", "named_path"):
+    for table in ("path_chain", "path_outcome", "named_path"):
         steps = [step for name in names for step in load_query(name).steps if step.table == table]
         assert len(steps) == len(names)
         assert len({step.sql for step in steps}) == 1
+    arrivals = [
+        {step.sql for step in load_query(name).steps if step.table == "exact_arrival"}
+        for name in ("path-breakdown", "waits-pair")
+    ]
+    assert arrivals[0] == arrivals[1] != set()
 
 
 def test_a_step_that_fails_leaves_nothing(connection: duckdb.DuckDBPyConnection) -> None:
