@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import pyarrow as pa
 
 from msgflow.confined.process import ConfinedProcess
-from msgflow.db.memory import bound_process, default_limit, set_memory_limit
+from msgflow.db.memory import bound, bound_process, default_limit, set_memory_limit
 from msgflow.errors import QueryError, TraceError, UsageError
 from msgflow.trace.extraction import LIMIT_VARIABLE, limit_of
 from msgflow.trace.regular_file import irregular
@@ -81,7 +81,7 @@ def write_messages(
 
     path = Path(bag)
     tempfile.tempdir = str(Path(target).parent)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, resource.RLIM_INFINITY))
+    bound(resource.RLIMIT_FSIZE, most_bytes)
     with duckdb.connect() as con:
         set_memory_limit(con, memory_limit)
         bound_process(con)
@@ -117,12 +117,11 @@ def _unread(bag: Path, error: Exception) -> TraceError:
 
 
 def _tables(reader: Any, most_bytes: int) -> Iterator[pa.Table]:
-    with_header = {
-        connection.msgtype
-        for connection in reader.connections
-        if connection.msgtype in reader.typestore.fielddefs
-        and ("header", _HEADER) in _named_fields(reader, connection.msgtype)
-    }
+    from rosbags.interfaces import Nodetype
+
+    types = reader.typestore.fielddefs
+    header = ("header", (Nodetype.NAME, _HEADER))
+    with_header = {name for name, (_, fields) in types.items() if header in fields}
     rows: list[tuple[Any, ...]] = []
     number = 0
     left = most_bytes
@@ -148,14 +147,6 @@ def _tables(reader: Any, most_bytes: int) -> Iterator[pa.Table]:
         )
     if rows or not number:
         yield _table(rows)
-
-
-def _named_fields(reader: Any, type_name: str) -> set[tuple[str, str]]:
-    """Return name and type of the fields of a message that are messages themselves."""
-    from rosbags.interfaces import Nodetype
-
-    _, fields = reader.typestore.fielddefs[type_name]
-    return {(name, detail) for name, (kind, detail) in fields if kind is Nodetype.NAME}
 
 
 def _table(rows: list[tuple[Any, ...]]) -> pa.Table:

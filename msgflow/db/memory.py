@@ -76,7 +76,13 @@ def bound_process(con: duckdb.DuckDBPyConnection) -> None:
     with contextlib.suppress(OSError), open("/proc/self/statm", encoding="ascii") as file:
         used = int(file.read().split()[5]) * resource.getpagesize()
         most = used + limit + max(round(limit * _SHARE_BESIDE), _LEAST_BESIDE)
-        resource.setrlimit(resource.RLIMIT_DATA, (most, resource.RLIM_INFINITY))
+        bound(resource.RLIMIT_DATA, most)
+
+
+def bound(kind: int, most: int) -> None:
+    """Bound what this process takes of a resource, which it may have less of already."""
+    _, hard = resource.getrlimit(kind)
+    resource.setrlimit(kind, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
 
 
 @contextlib.contextmanager
