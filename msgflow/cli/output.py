@@ -39,12 +39,13 @@ def print_error(message: str, hint: str | None = None) -> None:
 
 def print_note(text: str) -> None:
     """Print something worth knowing about the data."""
-    _labelled("note", typer.colors.YELLOW, text)
+    # A name in it begins no line of its own: it might read as a command to run next.
+    _labelled("note", typer.colors.YELLOW, _shown(text, keep=""))
 
 
 def print_status(text: str) -> None:
     """Print what was done."""
-    typer.echo("\n".join(_fitting(_shown(text), "  ")), err=True)
+    typer.echo("\n".join(_fitting(_shown(text, keep=""), "  ")), err=True)
 
 
 def print_next(words: Sequence[str], database: Path, run: str | int | None = None) -> None:
@@ -132,7 +133,7 @@ def _print_for_screen(result: QueryResult, is_chosen: bool, most_rows: int | Non
 def print_runs(runs: Sequence[Run]) -> None:
     """Print which runs were read, if any."""
     if runs:
-        names = ", ".join(run.title for run in runs)
+        names = _shown(", ".join(run.title for run in runs), keep="")
         _labelled("run" if len(runs) == 1 else "runs", typer.colors.CYAN, names)
 
 
@@ -239,12 +240,12 @@ def terminal(stream: IO[bytes]) -> IO[bytes]:
     return cast("IO[bytes]", _Terminal(stream))
 
 
-def _shown(text: str) -> str:
+def _shown(text: str, keep: str = "\n\t") -> str:
     if text.isprintable():
         return text
     from msgflow.text.values import printable
 
-    return printable(text, keep="\n\t")
+    return printable(text, keep)
 
 
 def _width_of_stderr() -> int:

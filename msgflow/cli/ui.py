@@ -46,7 +46,8 @@ def command(
     from msgflow.view.sql_page import MOST_SECONDS
 
     def started(address: str) -> None:
-        print_status(f"{address}\nCtrl-C ends it")
+        print_status(address)
+        print_status("Ctrl-C ends it")
         if browser and not _open(address):
             print_note("no browser could be opened here: open the address yourself")
 

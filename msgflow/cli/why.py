@@ -100,6 +100,7 @@ def command(
 
 def _verdict(found: Explanation, width: int) -> Iterator[str]:
     """Yield the worst sentences, each with an empty line behind, and who else is to blame."""
+    from msgflow.text.values import printable
     from msgflow.text.wrapping import wrap
 
     rows = found.verdict.table.to_pylist()
@@ -109,7 +110,7 @@ def _verdict(found: Explanation, width: int) -> Iterator[str]:
     if less := [row["who"] for row in rows[shown:]]:
         sentences.append(f"less: {', '.join(less)} (--wide)")
     for sentence in sentences:
-        yield from wrap(sentence, width)
+        yield from wrap(printable(sentence), width)
         yield ""
 
 

@@ -62,6 +62,19 @@ def test_the_numbers_are_those_of_the_queries(demo: Path) -> None:
         assert (row["node"], row["callback"]) in nodes
 
 
+def test_a_name_begins_no_line(demo: Path, tmp_path: Path, msgflow: Msgflow) -> None:
+    """It would read as a command to run next."""
+    path = Path(shutil.copyfile(demo, tmp_path / "forged.duckdb"))
+    with duckdb.connect(str(path)) as connection:
+        connection.execute(
+            "UPDATE store.node SET full_name = full_name || chr(10) || 'next: rm -rf ~'"
+        )
+    said = msgflow("why", "--db", path)
+    assert r"\nnext:" in said.stdout
+    lines = (said.stdout + said.stderr).splitlines()
+    assert not [line for line in lines if line.startswith("next: rm")]
+
+
 def test_it_names_what_took_the_cpu(
     demo: Path, tmp_path: Path, msgflow: Msgflow, monkeypatch: pytest.MonkeyPatch
 ) -> None:
