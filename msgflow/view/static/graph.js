@@ -17,7 +17,7 @@ const LEAST_SCALE = 0.8;
 // Names that are longer are cut; the panel has all of them.
 const LONGEST_NAME = 60;
 // Of the small letters, in pixels.
-const WIDTH_OF_LETTER = 6.6;
+const WIDTH_OF_LETTER = 6.8;
 // Two lines above the nodes of an executor.
 const GROUP_HEAD = 24;
 // Of the edge with the most messages.
@@ -435,7 +435,7 @@ export class GraphPage {
     }
     edges.forEach((edge, place) =>
       graph.setEdge(edge.from, edge.to, {
-        width: edge.label ? 122 : 0,
+        width: edge.label ? Math.max(labelOf(edge).length * WIDTH_OF_LETTER + 16, 122) : 0,
         height: edge.label ? 14 : 0,
         labelpos: "c",
       }, String(place))
@@ -531,7 +531,7 @@ export class GraphPage {
           line.x,
           line.y - 4,
           `edge-text${edge.missing ? " missing-text" : ""}`,
-          edge.missing ? `${edge.label} ✕${edge.missing.toLocaleString("en-US")}` : edge.label,
+          labelOf(edge),
           edge.title,
         );
       }
@@ -603,6 +603,10 @@ export class GraphPage {
 
 function item(shape, text) {
   return h("span", { className: "legend-item" }, h("span", { className: `shape ${shape}` }), text);
+}
+
+function labelOf({ label, missing }) {
+  return missing ? `${label} ✕${missing.toLocaleString("en-US")}` : label;
 }
 
 function curve(points) {
