@@ -326,7 +326,8 @@ rclpy.spin(node)
 def test_a_node_hears_verdicts_with_their_culprit(robot: list[str], tmp_path: Path) -> None:
     """The Python of ROS 2 runs the command, as it does where ROS 2 is installed."""
     environment = dict(word.split("=", 1) for word in robot[1 : robot.index("-c") - 1])
-    environment.pop("LD_PRELOAD")
+    environment = os.environ | environment
+    del environment["LD_PRELOAD"]
     python = robot[robot.index("-c") - 1]
     if subprocess.run([python, "-c", "import diagnostic_msgs.msg"], env=environment).returncode:
         pytest.skip("no diagnostic_msgs")
@@ -341,7 +342,7 @@ def test_a_node_hears_verdicts_with_their_culprit(robot: list[str], tmp_path: Pa
     try:
         subprocess.run(
             [python, *words], cwd=tmp_path, capture_output=True,
-            env=os.environ | environment | {"PYTHONPATH": os.pathsep.join(sys.path)},
+            env=environment | {"PYTHONPATH": os.pathsep.join(sys.path)},
         )  # fmt: skip
     finally:
         listener.kill()
