@@ -1,8 +1,8 @@
 -- name: derive.warm_up
 -- kind: macro
--- description: Systems that warm up: their longest values lie at the start. `parts` is the name of a
---     table with a row per value: side, subject, how many values these have, the place of the value
---     among them, when it was, and the value.
+-- description: Systems that warm up: their longest values lie at the start. `parts` is the name of
+--     a table with a row per value: side, subject, how many values these have, the place of the
+--     value among them, when it was, and the value.
 -- grain: one row per side and subject with three values of the first quarter that exceed all later
 --     ones
 CREATE OR REPLACE MACRO derive.warm_up(parts) AS TABLE
