@@ -94,10 +94,10 @@ def require_equal(database: Database, report: WindowReport) -> None:
     assert Counter((row["tid"], row["callbacks"], row["callback_ns"]) for row in executors) == (
         Counter((row["tid"], row["callbacks"], row["callback_ns"]) for row in report.executors)
     )
-    topics = asked(database, "topics-summary", report)
-    rows = [row | {"topic": row["topic_name"]} for row in topics]
-    pairs = zip(rows, report.topics, strict=True)
-    assert all(row[name] == value for row, found in pairs for name, value in found.items())
+    topics = {row["topic_name"]: row for row in asked(database, "topics-summary", report)}
+    for shown in report.topics:
+        row = topics[shown["topic"]] | {"topic": shown["topic"]}
+        assert shown == {name: row[name] for name in shown}
     losses = asked(database, "topics-delivery", report)
     assert [(row["topic"], row["dropped"], row["lost"]) for row in report.losses] == [
         (row["topic_name"], row["dropped"], row["lost"])
