@@ -60,7 +60,8 @@ class Steps:
                 made = list(self._made)
                 self._made |= dict.fromkeys(made[made.index(step.table) :], ("", {}))
             self._made[step.table] = "", {}
-            known = self._known.get(step.table)
-            table = (f"CREATE OR REPLACE TEMP TABLE {step.table} AS {known}",)
-            self._connection.execute(*(table if known else wanted))
+            if known := self._known.get(step.table):
+                self._connection.execute(f"CREATE OR REPLACE TEMP TABLE {step.table} AS {known}")
+            else:
+                self._connection.execute(*wanted)
             self._made[step.table] = wanted
