@@ -90,7 +90,7 @@ def run_query(
             f"the query has no time window — {header.words}",
             "leave out --start and --end",
         )
-    runs = part.runs(connection) if runs is None else runs
+    runs = part.runs(connection) if runs is None else tuple(runs)
     window = part.window(runs)
     reserved: dict[str, Value] = {"runs": [run.run_id for run in runs], **window.bindings}
     own = bind(header, parameters)

@@ -221,9 +221,11 @@ def _key(row: Row) -> tuple[str, str, str]:
 def _told(con: duckdb.DuckDBPyConnection, part: Slice) -> list[Row]:
     """Return what `msgflow why` says first of a window."""
     try:
-        return explain(con, part.one_run(con, "an alarm"), part).verdict.table.to_pylist()
+        verdict = explain(con, part.one_run(con, "an alarm"), part).verdict.table
     except NoFlowError:
         return []
+    rows: list[Row] = verdict.to_pylist()
+    return rows
 
 
 def _sentence(told: Sequence[Row], path: str | None) -> str | None:
