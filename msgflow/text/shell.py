@@ -3,16 +3,9 @@
 from __future__ import annotations
 
 import shlex
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-# What has a meaning between double quotes.
-_MEANT = frozenset('"$`\\!')
 
 
-def shell_joined(words: Iterable[str]) -> str:
+def shell_joined(words: list[str]) -> str:
     """Return a command of these words, which a shell takes apart again.
 
     A word with ' in it stands between double quotes where these change nothing: `shlex.join` would
@@ -23,6 +16,6 @@ def shell_joined(words: Iterable[str]) -> str:
 
 def shell_quoted(word: str) -> str:
     """Return a word that a shell takes as it is."""
-    if "'" in word and not _MEANT & set(word):
+    if "'" in word and not set('"$`\\!') & set(word):
         return f'"{word}"'
     return shlex.quote(word).replace("'\"'\"'", "'\\''")
