@@ -66,7 +66,7 @@ def run_query(
     internal: bool = False,
     selection: Selection | None = None,
     steps: Steps | None = None,
-    runs: Sequence[Run] | None = None,
+    runs: tuple[Run, ...] | None = None,
 ) -> QueryResult:
     """Run the query of `header`.
 
