@@ -30,7 +30,7 @@ _PATHS = 3
 _CULPRITS = 3
 # Titles, and the columns that answer the question.
 _SHOWN = {
-    "paths": ("paths", "path reached roots ambiguous median_ns p95_ns max_ns reasons"),
+    "paths": ("paths", "path roots reached ambiguous median_ns p95_ns max_ns reasons"),
     "nodes": ("time by node, on {}", "node share part what median_ns max_ns"),
     "slow_flow": (
         "one of its slow flows (95 of 100 take no longer)",
