@@ -98,7 +98,7 @@ def recorded(directory: str | Path, name: str = "test") -> Iterator[RecordedData
     place = Path(directory).absolute()
     trace = place / "trace"
     trace.mkdir(parents=True)
-    session = f"msgflow-{name}-{os.getpid()}-{time.monotonic_ns()}"
+    session = f"msgflow-test-{os.getpid()}-{time.monotonic_ns()}"
     database = RecordedDatabase(place / "msgflow.duckdb")
     with (
         session_daemon(with_kernel=False, note=warnings.warn),

@@ -124,9 +124,10 @@ def _tables(reader: Any, most_bytes: int) -> Iterator[pa.Table]:
     with_header = {name for name, (_, fields) in types.items() if header in fields}
     rows: list[tuple[Any, ...]] = []
     number = 0
+    packed = any(getattr(each, "compression_mode", None) == "message" for each in reader.readers)
     left = most_bytes
     for number, (connection, received_ns, data) in enumerate(reader.messages(), 1):
-        left -= len(data)  # they may be compressed one by one
+        left -= len(data) if packed else 0
         if left < 0:
             raise OSError(errno.EFBIG, "messages are too large")
         stamp_ns = frame_id = None

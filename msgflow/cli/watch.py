@@ -159,6 +159,7 @@ def command(
             recorder=recorder,
             exporter=exporter,
             database=database,
+            has_node=diagnostics,
         )
         stack.callback(watcher.close)
         publisher = stack.enter_context(closing(Diagnostics())) if diagnostics else None

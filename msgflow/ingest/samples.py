@@ -49,7 +49,7 @@ def load_samples(
             if file.name == DATA:
                 text = workspace / TEXT
                 if (cut := write_script(file, text)) is not None:
-                    warnings.append(cut)
+                    warnings.append(cut.replace(str(file), str(shown)))
             with transaction(con):
                 for part in read_script(text):
                     interrupts.check()

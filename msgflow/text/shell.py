@@ -16,6 +16,8 @@ def shell_joined(words: list[str]) -> str:
 
 def shell_quoted(word: str) -> str:
     """Return a word that a shell takes as it is."""
+    if shlex.quote(word) == word:
+        return word
     if "'" in word and not set('"$`\\!') & set(word):
         return f'"{word}"'
-    return shlex.quote(word).replace("'\"'\"'", "'\\''")
+    return "'" + word.replace("'", "'\\''") + "'"

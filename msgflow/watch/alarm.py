@@ -154,7 +154,7 @@ class Alarm:
             failing[key] = _Told.of(row, window.end_ns, told)
         if found:
             said = _told(con, part)
-            found = [row | {"verdict": _sentence(said, row["path"])} for row in found]
+            found = [row | {"why": _sentence(said, row["path"])} for row in found]
         self._failing = failing
         self._note_silence(rows)
         return found, rows
@@ -247,8 +247,8 @@ def violation_line(violation: Row) -> str:
     )
     if violation["culprit"]:
         words += f": {violation['culprit']}"
-    if violation["verdict"]:
-        words += f"; why: {violation['verdict']}"
+    if violation["why"]:
+        words += f"; why: {violation['why']}"
     if violation["path"] and violation["path"] != violation["subject"]:
         words += f" — {violation['path']}"
     return words if violation["is_final"] else f"{words} (provisional)"

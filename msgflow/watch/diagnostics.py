@@ -70,7 +70,7 @@ def _sentence(row: dict[str, Any]) -> str:
     subject = row["subject"] or row["target"]
     if row["value"] is None:
         return f"{subject}: {row['metric']} {row['condition']}: {row['reason']}"
-    return violation_line(row | {"subject": subject, "is_final": True})
+    return violation_line(row | {"subject": subject, "is_final": True, "why": None})
 
 
 class Diagnostics:

@@ -93,11 +93,11 @@ class KeptChunk:
         )
 
 
-def read_chunk(chunk: Chunk, after: Continuation) -> KeptChunk | None:
+def read_chunk(chunk: Chunk, after: Continuation, *, without_own: bool = False) -> KeptChunk | None:
     """Read a chunk into memory; None if nothing was recorded in it.
 
-    `after` holds the chunks read before, and takes this one in: a chunk can be read only once. What
-    this process itself did is left out: it may have a node.
+    `after` holds the chunks read before, and takes this one in: a chunk can be read only once.
+    `without_own` leaves out what this process did: it has a node.
     """
     # LTTng also cuts the time before the first program, into chunks without any file.
     if not any(path.is_file() for path in chunk.path.rglob("*")):
@@ -109,7 +109,9 @@ def read_chunk(chunk: Chunk, after: Continuation) -> KeptChunk | None:
             if batch.name == PACKET:
                 packets.append(batch.batch)
             else:
-                rows = _of_others(batch.batch, traces.traces)
+                rows = batch.batch
+                if without_own:
+                    rows = _of_others(rows, traces.traces)
                 events.setdefault(batch.name, []).append(rows)
         begins = [trace.begin_ns for trace in traces.traces if trace.begin_ns is not None]
         ends = [trace.end_ns for trace in traces.traces if trace.end_ns is not None]

@@ -58,6 +58,7 @@ class Watcher:
         recorder: FlightRecorder | None = None,
         exporter: Exporter | None = None,
         database: WindowDatabase | None = None,
+        has_node: bool = False,
     ) -> None:
         """Start before the first chunk.
 
@@ -72,6 +73,7 @@ class Watcher:
             recorder: keeps the chunks around a violation.
             exporter: counts each moment once.
             database: gets each window, for pages.
+            has_node: this process has a node, which the windows leave out.
         """
         self.history = History(window_ns, step_ns, late_ns)
         self._links = links
@@ -82,6 +84,7 @@ class Watcher:
         self._earlier_ns = 0 if recorder is None else recorder.earlier_ns
         self._exporter = exporter
         self._database = database
+        self._has_node = has_node
         self.on_passed: Callable[[Path], None] | None = None
         self._said: set[str] = set()
         # Since the last report.
@@ -108,7 +111,7 @@ class Watcher:
                 f" {chunk.number - before - 1}"
             )
         try:
-            kept = read_chunk(chunk, self._after)
+            kept = read_chunk(chunk, self._after, without_own=self._has_node)
         except TraceError as error:
             self._note(f"a chunk cannot be read: {error.message}")
             return

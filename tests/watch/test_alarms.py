@@ -73,7 +73,7 @@ def test_a_violation_names_the_culprit_and_is_kept(watched, tmp_path: Path) -> N
         assert "/filter ran 48.084 ms" in violation["culprit"]
     # The first sentence of `why` on that window.
     said = "/filter: its callback Subscription(/scan) takes 46.9 ms of 70.2 ms"
-    assert first["violations"][0]["verdict"].startswith(said)
+    assert first["violations"][0]["why"].startswith(said)
     assert not any(window["violations"] for window in others)
     (directory,) = kept.glob("violation-2*")
     assert len(list(directory.glob("archives/*/*"))) > 2

@@ -135,7 +135,7 @@ export class ComparePage {
     await this.show();
   }
 
-  // The run before, of the same system; else the one that stands before it in the list.
+  // The run before, of the same system; else the one before it in the list.
   async before(others) {
     if (others.length > 1) {
       const { run_id: found } = await this.app.fetch("run_before");
