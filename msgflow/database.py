@@ -1145,7 +1145,7 @@ def _places(
 
 def _path_and_others(path: str) -> UsageError:
     return UsageError(
-        f"a path with a name goes without others — {path}",
+        f"--path says where flows begin and end — {path}",
         "leave out --from, --to, --via and --without",
     )
 

@@ -29,16 +29,21 @@
 -- column: callback_id BIGINT       Identity of the callback, of the first of several
 -- column: is_internal BOOLEAN      Infrastructure of ROS
 -- brief: callback, function, self_share, total_share, per_call_ns, node, self_ns, samples, file
--- note: clocks
+-- note: samples
+CREATE OR REPLACE TEMP TABLE path_chain AS
+FROM main.flow_chain($runs, $from, $to);
+
 CREATE OR REPLACE TEMP TABLE function_outcome AS
 SELECT
     run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns, status,
     reason, is_first, is_last, is_newest, is_loss_affected, is_ambiguous
-FROM main.end_to_end($runs, $from, $to, 'callback_start', 'callback_end', $start_ns, $end_ns)
+FROM main.end_to_end(
+    $runs, $from, $to, 'callback_start', 'callback_end', $start_ns, $end_ns, chains := 'path_chain'
+)
 WHERE coalesce($from, $to, $via, $without) IS NOT NULL
     AND path_id IN (
         SELECT path_id
-        FROM main.flow_path($runs, $from, $to, only_paths := true)
+        FROM main.flow_path($runs, only_paths := true, chains := 'path_chain')
         WHERE main.path_visits(path, $via, $without)
     );
 
@@ -50,7 +55,7 @@ FROM main.chosen_flow('function_outcome', most_flows := $slowest);
 
 CREATE OR REPLACE TEMP TABLE function_trail AS
 SELECT flow_id, hop, take_id, publication_id, previous_take_id, next_take_id
-FROM main.end_to_end_trail('function_flow', $runs, $from, $to);
+FROM main.end_to_end_trail('function_flow', $runs, chains := 'path_chain');
 
 CREATE OR REPLACE TEMP TABLE function_instance AS
 SELECT DISTINCT callback_instance_id

@@ -112,6 +112,8 @@ def read_paths(path: Path) -> PathsFile:
 def _path(file: YamlFile, node: Any) -> NamedPath:
     fields = file.mapping(node, "a path", ("name",), WORDS)
     name = file.text(fields["name"], "name", "a name")
+    if name.value.isdecimal():
+        file.fail(name.line, f"a number is that of a path of a query — {name.value}", _EXAMPLE)
     places = {word: file.texts(fields[word], word) for word in WORDS if word in fields}
     if not places:
         file.fail(name.line, f"nothing says which path it is — {name.value}", _EXAMPLE)

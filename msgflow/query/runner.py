@@ -90,7 +90,7 @@ def run_query(
             f"the query has no time window — {header.words}",
             "leave out --start and --end",
         )
-    runs = part.runs(connection) if runs is None else tuple(runs)
+    runs = part.runs(connection) if runs is None else runs
     window = part.window(runs)
     reserved: dict[str, Value] = {"runs": [run.run_id for run in runs], **window.bindings}
     own = bind(header, parameters)
@@ -129,7 +129,7 @@ def run_query(
             why = _missing_way(connection, runs, own) or "try with less"
             notes.append(f"nothing fits {' '.join(narrowing)}: {why}")
     notes += doubt_notes(connection, runs, table)
-    if header.note in {"clocks", "requests"} and table.num_rows:
+    if header.note in {"clocks", "requests", "samples"} and table.num_rows:
         notes += clock_notes(connection, runs)
         notes += untraced_notes(connection, runs, table)
     if header.note == "callbacks":
@@ -251,6 +251,8 @@ def _untraced(
     """Return notes on missing events, if the rows would have come from them."""
     if note == "kernel" and not _kernel_was_traced(connection, runs):
         return ["the kernel was not traced: msgflow record --kernel, see docs/scheduling.md"]
+    if note == "samples" and not _were_sampled(connection, runs):
+        return ["no functions were sampled: msgflow record --profile 99, see docs/functions.md"]
     return _without_layer(connection, runs, note) if note in {"requests", "goals"} else []
 
 
@@ -260,6 +262,14 @@ def _kernel_was_traced(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run
         {"runs": [run.run_id for run in runs]},
     ).fetchall()
     return bool(known)
+
+
+def _were_sampled(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run]) -> bool:
+    sampled = connection.execute(
+        "SELECT 1 FROM main.stack_sample WHERE list_contains(?, run_id) LIMIT 1",
+        [[run.run_id for run in runs]],
+    )
+    return bool(sampled.fetchall())
 
 
 def _without_callbacks(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run]) -> list[str]:

@@ -32,5 +32,7 @@ def with_functions(
         return found
     shares = ", ".join(f"{function} {100 * share:.0f} %" for function, share, _ in rows)
     said = f"CPU time of {slowest['node']} {slowest['what']}: {shares} (of {rows[0][2]:,} samples)"
-    step = ("query", "functions", "--node", slowest["node"], "--callback", slowest["what"])
-    return replace(found, notes=(*found.notes, said), steps=(*found.steps, step))
+    step = ["query", "functions", "--node", slowest["node"], "--callback", slowest["what"]]
+    if times.start is None and found.start is not None:
+        step += ["--start", str(found.start)]
+    return replace(found, notes=(*found.notes, said), steps=(*found.steps, tuple(step)))

@@ -26,6 +26,7 @@ The header ends at the first line that is not a `--` comment. Two spaces end a p
 - `note: kernel`: rows are made of the kernel's events, so the runner says where there are none.
 - `note: requests`: likewise of requests to services. The rows compare times of hosts as well.
 - `note: goals`: likewise of goals of actions.
+- `note: samples`: likewise of samples of functions. The rows compare times of hosts as well.
 - `brief`: the columns that a narrow terminal shows, the most important first.
 - `answer`: columns that stay where they are 0 in all rows, since people ask for them.
 - `heading`: columns that stand above a table on a terminal, once for each value of the first one,
@@ -91,7 +92,7 @@ _SINGLE = (
     "also", "unites", "brief", "answer", "heading", "slowest", "zero",
 )  # fmt: skip
 _KINDS = ("view", "inline", "macro")
-_NOTES = ("clocks", "callbacks", "kernel", "requests", "goals")
+_NOTES = ("clocks", "callbacks", "kernel", "requests", "goals", "samples")
 
 
 class HeaderError(ValueError):

@@ -237,7 +237,7 @@ def test_flows_are_chosen_by_their_paths(simulated: Callable[..., Path], tmp_pat
         written = database.export_otlp(tmp_path / "traces.json", path="drive", paths=named)
         some = database.export_otlp(tmp_path / "some.json", path="drive", paths=named, start="0.5")
         assert 0 < some.traces < written.traces
-        with pytest.raises(UsageError, match="a path with a name goes without others — drive"):
+        with pytest.raises(UsageError, match="--path says where flows begin and end — drive"):
             database.export_otlp(tmp_path / "traces.json", path="drive", paths=named, to="/x")
         with pytest.raises(UsageError, match="/nowhere"):
             database.export_otlp(tmp_path / "traces.json", to="/nowhere")

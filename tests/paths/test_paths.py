@@ -67,6 +67,7 @@ def test_a_number_stands_for_a_path(database: Database) -> None:
         ("path: []\n", "line 1: the file has no path", "it has paths"),
         ("paths:\n  - from: /a\n", "line 2: a path lacks name", "paths: ["),
         ("paths:\n  - name: a\n", "line 2: nothing says which path it is — a", "paths: ["),
+        ("paths:\n  - {name: '3', from: /a}\n", "line 2: a number is that of a path", "paths: ["),
         ("paths:\n  - {name: a, form: /a}\n", "line 2: a path has no form", "it has name, from"),
         ("paths:\n  - {name: a, from: /a, from: /b}\n", "line 2: from is given twice", None),
         ("paths:\n  - {name: a, from: '/a,/b'}\n", "line 2: several names are a list", "[/a, /b]"),
@@ -119,7 +120,7 @@ def test_names_that_are_not_there(
 def test_a_name_goes_without_other_words(database: Database, tmp_path: Path) -> None:
     file = tmp_path / "paths.yaml"
     file.write_text(GOOD, encoding="utf-8")
-    with pytest.raises(UsageError, match="a path with a name goes without others — motors"):
+    with pytest.raises(UsageError, match="--path says where flows begin and end — motors"):
         database.query("e2e-latency", path="motors", paths=file, from_="/camera/image")
     with pytest.raises(UsageError, match="info --section nodes has no paths — --path motors"):
         database.query("info-nodes", path="motors", paths=file)

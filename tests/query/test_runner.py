@@ -398,16 +398,28 @@ def test_a_layer_that_was_not_traced_is_the_reason_for_no_rows(
     assert notes("first") == ["nothing fits --where 'start_ns < 0': try with less"]
 
 
-def test_an_empty_answer_about_the_kernel_says_whether_it_was_traced(
-    connection: duckdb.DuckDBPyConnection,
+@pytest.mark.parametrize(
+    ("note", "table", "missing"),
+    [
+        (
+            "kernel", "thread_state",
+            "the kernel was not traced: msgflow record --kernel, see docs/scheduling.md",
+        ),
+        (
+            "samples", "stack_sample",
+            "no functions were sampled: msgflow record --profile 99, see docs/functions.md",
+        ),
+    ],
+)  # fmt: skip
+def test_an_empty_answer_says_whether_what_it_reads_was_recorded(
+    connection: duckdb.DuckDBPyConnection, note: str, table: str, missing: str
 ) -> None:
-    connection.execute("CREATE TABLE thread_state AS SELECT 2 AS run_id")
-    noted = header(QUERY.replace("-- param", "-- note: kernel\n-- param"))
+    connection.execute(f"CREATE TABLE {table} AS SELECT 2 AS run_id")
+    noted = header(QUERY.replace("-- param", f"-- note: {note}\n-- param"))
 
     def notes(run: str, channel: str) -> list[str]:
         return run_query(connection, noted, {"channel": channel}, Slice(run=run)).notes
 
-    missing = "the kernel was not traced: msgflow record --kernel, see docs/scheduling.md"
     assert notes("first", "/nowhere") == [missing]
     assert notes("second", "/nowhere") == []
     assert missing not in notes("first", "/a")

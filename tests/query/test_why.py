@@ -42,10 +42,9 @@ def test_every_system_is_explained_or_has_no_flow(name: str, fresh_database: Pat
         assert None not in found.verdict.table["sentence"].to_pylist()
 
 
-def test_a_warm_up_stays_out_and_is_said(fresh_database: Path, tmp_path: Path) -> None:
-    """Three of the first four of twenty flows, one each second, take 300 ms; the others 10 ms."""
-    case = tmp_path / "slow_at_first.case"
-    moments = [(n, n * SECOND, 300 if n in (1, 2, 4) else 10) for n in range(1, 21)]
+def slow_at_first(database: Path, case: Path, period_ns: int) -> None:
+    """Three of the first four of twenty flows take 0.3 periods, the others a hundredth."""
+    moments = [(n, n * period_ns, 300 if n in (1, 2, 4) else 10) for n in range(1, 21)]
     tables = {
         "node": ["node_id,full_name", "1,/a", "2,/b"],
         "publisher": ["publisher_id,node_id,topic_name", "1,1,/t"],
@@ -56,7 +55,7 @@ def test_a_warm_up_stays_out_and_is_said(fresh_database: Path, tmp_path: Path) -
         ],
         "take": [
             "take_id,subscription_id,taken_ns",
-            *(f"{n},1,{at + latency * SECOND // 1000}" for n, at, latency in moments),
+            *(f"{n},1,{at + latency * period_ns // 1000}" for n, at, latency in moments),
         ],
         "link_transport": [
             "publication_id,take_id,publisher_id,subscription_id,method",
@@ -66,8 +65,21 @@ def test_a_warm_up_stays_out_and_is_said(fresh_database: Path, tmp_path: Path) -
     case.write_text(
         "".join(f"== {name}\n" + "\n".join(rows) + "\n" for name, rows in tables.items())
     )
-    with duckdb.connect(str(fresh_database)) as connection:
+    with duckdb.connect(str(database)) as connection:
         fill_case(connection, case)
+
+
+def test_a_warm_up_behind_the_end_of_what_is_asked_for_stays(
+    fresh_database: Path, tmp_path: Path
+) -> None:
+    """It ends with half a second."""
+    slow_at_first(fresh_database, tmp_path / "slow_at_first.case", SECOND // 50)
+    with msgflow.open_db(fresh_database) as db:
+        assert [db.why(run=1, end=end).start for end in ("0.45s", "0.5s")] == [None, None]
+
+
+def test_a_warm_up_stays_out_and_is_said(fresh_database: Path, tmp_path: Path) -> None:
+    slow_at_first(fresh_database, tmp_path / "slow_at_first.case", SECOND)
     with msgflow.open_db(fresh_database) as db:
         warm, whole = db.why(run=1), db.why(run=1, start="0s")
     said = "without the first 4.5 s, a warm-up"

@@ -273,7 +273,7 @@ def test_a_link_carries_query_rows_and_chart(demo: Path, serve: Serve, page: Pag
     page.go("#/sql")
     written(page, "SELECT i AS x, i * i AS y FROM range(1500) AS t (i) -- <b>")
     page.page.get_by_label("most rows").select_option("10000")
-    page.page.get_by_role("button", name="Run").click()
+    page.page.get_by_role("button", name="Run", exact=True).click()
     shown_rows(page)
     page.page.get_by_role("button", name="line", exact=True).click()
     page.page.locator(".chart canvas").wait_for()
@@ -374,7 +374,7 @@ def test_an_error_is_in_duckdbs_words_and_marks_its_line(
     page.page.keyboard.type("x")
     assert page.page.locator(".editor .wrong").count() == 0
     written(page, " ")
-    page.page.get_by_role("button", name="Run").click()
+    page.page.get_by_role("button", name="Run", exact=True).click()
     assert "no SQL to run" in said.inner_text()
     page.go(f"#/sql?text={'x' * 60_000}")
     assert "too long" in said.inner_text()
@@ -385,11 +385,11 @@ def test_a_query_can_be_stopped(demo: Path, serve: Serve, page: Page) -> None:
     page.open(serve(demo).address)
     page.go("#/sql")
     written(page, SLOW)
-    page.page.get_by_role("button", name="Run").click()
+    page.page.get_by_role("button", name="Run", exact=True).click()
     page.page.get_by_role("button", name="Stop").click()
     page.page.get_by_text("stopped", exact=True).wait_for()
     written(page, "SELECT 1 AS one")
-    page.page.get_by_role("button", name="Run").click()
+    page.page.get_by_role("button", name="Run", exact=True).click()
     assert shown_rows(page) == [["1"]]
     assert not page.page.get_by_role("button", name="Stop").is_visible()
 

@@ -30,6 +30,14 @@ place AS MATERIALIZED (
     FROM breakdown AS b
     JOIN path_row AS e ON b.path = e.path AND b.run_id = e.run_id
     JOIN span AS s ON b.run_id = s.run_id
+    -- Below 0 where clocks are apart: nobody makes such a path late.
+    WHERE (e.p95_ns > 0) IS NOT FALSE
+),
+-- A short window may have no instance of one.
+traced AS (
+    SELECT node, label FROM main.callback_label WHERE list_contains($runs, run_id)
+    UNION ALL
+    SELECT node, label FROM why_callback
 ),
 callback AS MATERIALIZED (
     SELECT
@@ -52,7 +60,7 @@ computing AS (
     -- Callbacks that are not traced: from a take to what is published.
     SELECT node, what, path, path_ns, 20_000_000, false, NULL, p95_ns, 0, false
     FROM place
-    WHERE part = 'callback' AND (node, what) NOT IN (SELECT (node, label) FROM why_callback)
+    WHERE part = 'callback' AND (node, what) NOT IN (SELECT (node, label) FROM traced)
 ),
 other AS (
     SELECT
@@ -82,7 +90,7 @@ calling AS (
             SELECT quantile_disc(i.end_ns - i.start_ns, 0.5)
             FROM main.callback AS k
             JOIN main.callback_instance AS i ON k.callback_id = i.callback_id
-            WHERE k.service_id = c.service_id
+            WHERE k.service_id = c.service_id AND i.start_ns >= $start_ns AND i.start_ns < $end_ns
         ) AS served_ns
     FROM callback AS c
     JOIN main.service AS v ON c.service_id = v.service_id
@@ -172,7 +180,7 @@ sampled AS (
 ),
 -- Executors of several threads that look for work again and again.
 awake AS (
-    SELECT n.full_name AS node, any_value(f.detail) AS detail
+    SELECT n.full_name AS node, min(f.detail) AS detail
     FROM main.finding AS f
     JOIN main.process AS p
         ON f.run_id = p.run_id
@@ -195,7 +203,7 @@ moving AS (
     -- Where no callbacks are traced.
     SELECT what, path, path_ns, has_kernel, false, node, p95_ns
     FROM place
-    WHERE part = 'undecided' AND (node, what) NOT IN (SELECT (node, label) FROM why_callback)
+    WHERE part = 'undecided' AND (node, what) NOT IN (SELECT (node, label) FROM traced)
 )
 SELECT
     'callback' AS kind, node AS who, label AS what, path, cost_ns,
