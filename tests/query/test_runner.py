@@ -415,6 +415,7 @@ def test_an_empty_answer_says_whether_what_it_reads_was_recorded(
     connection: duckdb.DuckDBPyConnection, note: str, table: str, missing: str
 ) -> None:
     connection.execute(f"CREATE TABLE {table} AS SELECT 2 AS run_id")
+    connection.execute("CREATE TABLE clock AS SELECT 1 AS run_id")
     noted = header(QUERY.replace("-- param", f"-- note: {note}\n-- param"))
 
     def notes(run: str, channel: str) -> list[str]:
