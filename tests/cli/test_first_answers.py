@@ -81,7 +81,7 @@ def test_why_keeps_its_columns(ask: Msgflow, name: str, columns: int) -> None:
     if name == "real_overload":
         paths = section(shown, "PATHS")
         assert paths.splitlines()[0].split() == [
-            "path", "reached", "roots", "median", "p95", "max", "reasons",
+            "path", "roots", "reached", "median", "p95", "max", "reasons",
         ]  # fmt: skip
         assert "overwritten 438" in paths
 

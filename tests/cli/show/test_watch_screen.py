@@ -96,7 +96,7 @@ def test_a_violation_stays_on_the_screen() -> None:
     violation = {
         "subject": "/cmd", "path": None, "metric": "latency", "condition": "max < 80 ms",
         "measured": "182.000 ms", "worst_ns": 182 * MS, "is_final": False,
-        "culprit": "/detector ran 141.000 ms", "verdict": None,
+        "culprit": "/detector ran 141.000 ms", "why": None,
     }  # fmt: skip
     screen = new_screen()
     lines(screen, report(violations=[violation]))
@@ -145,7 +145,7 @@ VIOLATION = {
     "metric": "latency", "condition": "max < 80 ms", "measured": "182.000 ms",
     "worst_ns": 182 * MS, "is_final": False,
     "culprit": "/filter ran 141.000 ms, /scan was on its way for 40.762 ms",
-    "verdict": "/filter: its callback Subscription(/scan) takes 139 ms of 180 ms",
+    "why": "/filter: its callback Subscription(/scan) takes 139 ms of 180 ms",
 }  # fmt: skip
 
 
