@@ -22,7 +22,7 @@
 --     the client had asked
 -- column: result_taken_ns BIGINT [epoch ns]  The client took the result
 -- column: result_request_id BIGINT  Request for the result
--- column: result_candidate_count BIGINT  0: nobody asked for the result; 1: its request is known; 2
+-- column: result_candidate_count BIGINT  0: no request for the result; 1: its request is known; 2
 --     or more: so many goals compete for it, and the columns of the result are NULL; NULL: not
 --     accepted, or no answer
 -- column: feedback_count BIGINT  Feedback messages published while the server was concerned with
