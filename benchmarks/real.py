@@ -23,6 +23,9 @@ from truth import Judged, show
 
 from msgflow.ingest import ingest
 
+# Executors in C++, which call what a node has without any Python between. The tracer sees nothing.
+UNTRACED = {"events"}
+
 
 def main() -> None:
     """Record, ingest and compare each system."""
@@ -43,7 +46,9 @@ def main() -> None:
     judged: list[Judged] = []
     try:
         require(arguments.python)
-        for system in arguments.system or systems(arguments.python):
+        known = systems(arguments.python)
+        traced = known.keys() - (UNTRACED if arguments.python_nodes else set())
+        for system in arguments.system or (name for name in known if name in traced):
             directory = arguments.to.resolve() / system
             judged += show(_judged(arguments, system, directory))
     except NotPossibleError as error:

@@ -233,7 +233,9 @@ class Judged:
         is_complete = self.score.recall >= least
         unmarked = self.score.wrong - self.score.loss_affected
         most = MOST_LOSS_AFFECTED.get(self.system, 0) * self.score.found
-        faults = (unmarked, self.score.repeated, self.score.doubted)
+        # Without callbacks a pair is a guess, and the timing of a run may allow others.
+        is_guess = self.layout == "rclpy" and self.score.kind == "take_adjacent"
+        faults = (unmarked, self.score.repeated, 0 if is_guess else self.score.doubted)
         return is_complete and self.score.loss_affected <= most and not any(faults)
 
 

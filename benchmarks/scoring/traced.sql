@@ -19,23 +19,32 @@ CROSS JOIN (
 ) AS r
 WHERE c.t0 BETWEEN r.first_ns AND r.last_ns;
 
--- The time of each thread of an executor, from its first event of that to its last, by what it did:
--- without holes, and as long in callbacks as the callbacks themselves took.
+-- The time of each thread of an executor by what it did, without holes and as long in callbacks as
+-- the callbacks themselves took: from the first time that it waits or selects to its last event. A
+-- process that was there before its session looks for one when it waits.
 CREATE OR REPLACE TEMP TABLE traced_thread AS
-WITH spent AS (
+WITH begun AS (
+    SELECT thread_id, min(start_ns) AS begin_ns
+    FROM analysed.main.executor_activity
+    WHERE activity NOT IN ('take', 'callback', 'service')
+    GROUP BY thread_id
+),
+spent AS (
     SELECT
         thread_id, min(start_ns) AS start_ns, max(end_ns) AS end_ns,
         sum(end_ns - start_ns) AS known_ns,
         coalesce(sum(end_ns - start_ns) FILTER (activity IN ('callback', 'service')), 0)
             AS callback_ns
     FROM analysed.main.executor_activity
-    WHERE end_ns IS NOT NULL
+    JOIN begun USING (thread_id)
+    WHERE end_ns IS NOT NULL AND start_ns >= begin_ns
     GROUP BY thread_id
 ),
 run AS (
     SELECT thread_id, sum(end_ns - start_ns) AS callback_ns
     FROM analysed.store.callback_instance
-    WHERE depth = 1
+    JOIN begun USING (thread_id)
+    WHERE depth = 1 AND start_ns >= begin_ns
     GROUP BY thread_id
 )
 SELECT
