@@ -48,7 +48,9 @@ class Robot:
             "FAKE_SESSION": str(self.session),
         }
 
-    def run(self, code: str, *, traced: bool = True) -> tuple[int, str, str]:
+    def run(
+        self, code: str, *, traced: bool = True, first: Callable[[], None] | None = None
+    ) -> tuple[int, str, str]:
         """Run a program, and return its exit code, its output and its errors."""
         program = self.directory / "robot.py"
         code = textwrap.indent(textwrap.dedent(code), "    ")
@@ -61,6 +63,7 @@ class Robot:
             capture_output=True,
             text=True,
             timeout=60,
+            preexec_fn=first,
         )
         return ended.returncode, ended.stdout, ended.stderr
 
@@ -375,6 +378,14 @@ def test_interpreters_within_a_process_run(robot: Robot) -> None:
     """)
     assert (code, out) == (0, "inside\noutside\nover\n")
     assert robot.traced().count("callback_start 7") == 1
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root may take another real user")
+def test_a_program_with_rights_that_its_user_lacks_is_not_traced(robot: Robot) -> None:
+    assert robot.run(ONE_MESSAGE, first=lambda: os.setresuid(1, 0, 0)) == (0, "hello\nover\n", "")
+    assert robot.traced() == []
+    assert robot.run(ONE_MESSAGE)[0] == 0
+    assert robot.traced() != []
 
 
 def test_programs_without_rclpy_see_nothing(tmp_path: Path) -> None:

@@ -78,7 +78,9 @@ def _begin():
     """Leave the search path as it would be without this folder, and wait for rclpy."""
     folder = os.path.dirname(os.path.abspath(__file__))
     sys.path[:] = [entry for entry in sys.path if not entry or os.path.abspath(entry) != folder]
-    sys.meta_path.insert(0, _Finder(folder))
+    # With rights that its user lacks, a program runs nothing that this user's environment names.
+    if (os.getuid(), os.getgid()) == (os.geteuid(), os.getegid()):
+        sys.meta_path.insert(0, _Finder(folder))
 
 
 def _run_other():
