@@ -355,6 +355,20 @@ def _steps(
     since = ("--start", f"{skipped:g}s") if skipped else ()
     if dead_ends or _UNNAMED in places:
         yield _LINKS
+    # A name that no trace has, such as a blank, may lead to no flow.
+    if pieces:
+        yield from _into(pieces, since)
+    if len(losses):
+        topics = set(losses.table["topic_name"].to_pylist())
+        named = (
+            []
+            if None in topics
+            else [word for topic in sorted(topics) for word in ("--topic", topic)]
+        )
+        yield ("query", "topics", "--measure", "unmatched", *named)
+
+
+def _into(pieces: Sequence[dict[str, Any]], since: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
     longest = max(pieces, key=lambda row: row["duration_ns"])
     if of_state := _BY_STATE.get(longest["state"] or ""):
         yield ("query", "scheduling", "--measure", of_state, *since)
@@ -368,11 +382,3 @@ def _steps(
     elif (of_topic := _BY_TOPIC.get(longest["activity"])) and longest["what"] not in _NO_NAMES:
         yield ("query", *of_topic, "--topic", longest["what"], *since)
     yield ("flow", "--take", str(pieces[0]["take_id"]), "--why")
-    if len(losses):
-        topics = set(losses.table["topic_name"].to_pylist())
-        named = (
-            []
-            if None in topics
-            else [word for topic in sorted(topics) for word in ("--topic", topic)]
-        )
-        yield ("query", "topics", "--measure", "unmatched", *named)

@@ -57,12 +57,14 @@ def words(text: str) -> list[str]:
 
 def longest_word(text: str) -> int:
     """Return the cells of the longest word of `text`."""
-    return max(map(cell_len, words(text)))
+    return max(map(cell_len, words(text)), default=0)
 
 
 def longest_piece(text: str) -> int:
     """Return the cells of the longest part of a name in `text`."""
-    return max(cell_len(piece) for word in words(text) for piece in _PIECE.findall(word))
+    return max(
+        (cell_len(piece) for word in words(text) for piece in _PIECE.findall(word)), default=0
+    )
 
 
 def _head(word: str, width: int) -> str:

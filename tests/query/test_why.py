@@ -34,6 +34,18 @@ def test_a_path_may_pass_services(fresh_database: Path) -> None:
     assert found.slow_flow.table["duration_ns"].to_pylist()
 
 
+def test_a_blank_name_of_a_topic_stops_no_answer(fresh_database: Path) -> None:
+    case = CASES / "critical-path" / "services.case"
+    with duckdb.connect(str(fresh_database)) as connection:
+        fill_case(connection, case)
+        connection.execute("UPDATE store.publisher SET topic_name = ' '")
+        connection.execute("UPDATE store.subscription SET topic_name = ' '")
+    with msgflow.open_db(fresh_database) as db:
+        found = db.why(run=1)
+    assert found.paths.table["path"].to_pylist()
+    assert not found.slow_flow.table.num_rows
+
+
 @pytest.mark.thorough
 @pytest.mark.parametrize("name", PATHS)
 def test_every_system_is_explained_or_has_no_flow(name: str, fresh_database: Path) -> None:
