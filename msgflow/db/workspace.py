@@ -48,7 +48,8 @@ def workspace(beside: Path) -> Iterator[Path]:
 
 def remove_abandoned_workspaces(parent: Path) -> None:
     """Remove the workspaces of killed commands from a directory."""
-    for abandoned in parent.glob(f"{_PREFIX}*{_LOCK}") if fcntl else ():
+    # Only names that we give: directories of users may begin so, too.
+    for abandoned in parent.glob(f"{_PREFIX}{'[0-9a-f]' * 32}{_LOCK}") if fcntl else ():
         with contextlib.suppress(OSError), _locked(abandoned, wait=False):
             shutil.rmtree(abandoned.with_suffix(""), ignore_errors=True)
 
@@ -84,7 +85,7 @@ def _cannot_write(parent: Path, error: OSError) -> DatabaseError:
 def _locked(path: Path, *, wait: bool) -> Iterator[None]:
     """Hold the lock file `path`, which is removed with the lock."""
     while True:
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
             if _is_still(path, descriptor):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import re
 import shutil
 from typing import TYPE_CHECKING, Any
@@ -13,6 +12,7 @@ import pyarrow as pa
 from msgflow.errors import UsageError
 from msgflow.events.formats import EventFormat, table_writer
 from msgflow.events.sequence import COLUMNS, Sequencer, common_columns
+from msgflow.files.temporary_owner import mark
 from msgflow.sql.json_fields import column_name, exact
 from msgflow.sql.quoting import identifier
 
@@ -141,18 +141,19 @@ def _row(name: str, payload: pa.Schema, expressions: list[str]) -> str:
 
 @contextlib.contextmanager
 def _new_directory(directory: Path) -> Iterator[Path]:
-    temporary = directory.with_name(f".{directory.name}.{os.getpid()}.part")
+    temporary = directory.with_name(f".{directory.name}.{mark()}.part")
     try:
         if directory.exists() and any(directory.iterdir()):
             raise UsageError(f"the directory is not empty — {directory}", "choose another with -o")
         temporary.mkdir()
-        yield temporary
-        temporary.replace(directory)
+        try:
+            yield temporary
+            temporary.replace(directory)
+        finally:
+            shutil.rmtree(temporary, ignore_errors=True)
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
         raise UsageError(
             f"cannot write the directory: {reason} — {directory}",
             "give a directory in a place that exists and can be written with -o",
         ) from error
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)

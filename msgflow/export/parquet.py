@@ -6,7 +6,7 @@ import json
 from typing import TYPE_CHECKING, Any
 
 from msgflow.export.views import ExportedView, Selection
-from msgflow.files.atomic_directory import replacing_entries
+from msgflow.files.atomic_directory import PARTITION_FILE, replacing_entries
 from msgflow.version import __version__
 
 if TYPE_CHECKING:
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
     from msgflow.run.choice import Run
 
-FILE_NAME = "data.parquet"
 # Readers take this column from the name of the partition: the file must not have it.
 _PARTITION = "run_id"
 
@@ -79,7 +78,7 @@ def _write(
         schema = pyarrow.schema([reader.schema.field(name) for name in names])
         schema = schema.with_metadata(metadata | {"pandas": _pandas_types(schema)})
         with pyarrow.parquet.ParquetWriter(
-            partition / FILE_NAME, schema, compression="zstd"
+            partition / PARTITION_FILE, schema, compression="zstd"
         ) as writer:
             for batch in reader:
                 writer.write_batch(batch.select(names))

@@ -14,6 +14,9 @@ from msgflow.files.temporary_owner import is_abandoned, mark
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+PARTITION_FILE = "data.parquet"
+"""The only file in a directory of one run of a view."""
+
 _PARTITION = "run_id="
 _ASIDE = ".export."
 _SUFFIX = ".part"
@@ -76,8 +79,12 @@ def _clean_up(directory: Path) -> None:
     """Remove remains of killed exports; entries that they were replacing go back."""
     for aside in directory.glob(f"{_ASIDE}*{_SUFFIX}"):
         if is_abandoned(aside.name.removeprefix(_ASIDE).removesuffix(_SUFFIX)):
-            for old in (aside / "old").glob("*"):
-                if not (directory / old.name).exists():
+            moved = aside / "old"
+            # What a link leads to was never here.
+            if aside.is_symlink() or moved.is_symlink():
+                continue
+            for old in moved.glob("*"):
+                if not os.path.lexists(directory / old.name):
                     old.rename(directory / old.name)
             shutil.rmtree(aside, ignore_errors=True)
 
@@ -104,8 +111,9 @@ def _refuse_existing(directory: Path, names: Sequence[str], force: bool) -> None
 def _is_exported(path: Path) -> bool:
     return all(
         partition.is_dir()
+        and not partition.is_symlink()
         and partition.name.startswith(_PARTITION)
-        and all(file.suffix == ".parquet" for file in partition.iterdir())
+        and all(file.name == PARTITION_FILE and file.is_file() for file in partition.iterdir())
         for partition in path.iterdir()
     )
 

@@ -152,10 +152,12 @@ class FlightRecorder:
 
 def _made(path: Path) -> Path:
     """Make a directory with this name, or with the first free number behind it."""
+    # It fails where a link leads nowhere: no number would be free.
+    path.parent.mkdir(parents=True, exist_ok=True)
     for number in count(1):
         made = path if number == 1 else path.with_name(f"{path.name}-{number}")
         try:
-            made.mkdir(parents=True)
+            made.mkdir()
         except FileExistsError:
             continue
         return made

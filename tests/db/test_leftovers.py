@@ -71,12 +71,22 @@ def test_a_query_spills_beside_the_database_and_leaves_nothing(small_database: P
 
 def test_abandoned_workspaces_go_with_any_command(small_database: Path) -> None:
     with workspace(small_database) as running:
-        abandoned = running.with_name(".msgflow-abandoned")
-        abandoned.mkdir()
-        abandoned.with_suffix(".lock").touch()
+        abandoned = running.with_name(f".msgflow-{'0' * 32}")
+        # That of a user, whose database `notes` was being created when the process was killed.
+        mine = running.with_name(".msgflow-notes")
+        for directory in (abandoned, mine):
+            directory.mkdir()
+            directory.with_suffix(".lock").touch()
         msgflow.open_db(small_database).runs()
-        assert (running.exists(), abandoned.exists()) == (True, False)
+        assert (running.exists(), abandoned.exists(), mine.exists()) == (True, False, True)
         assert not abandoned.with_suffix(".lock").exists()
+
+
+def test_a_lock_is_no_link(tmp_path: Path) -> None:
+    (tmp_path / ".msgflow-new.duckdb.lock").symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(DatabaseError, match="cannot write"), creating(tmp_path / "new.duckdb"):
+        pass
+    assert not (tmp_path / "elsewhere").exists()
 
 
 def test_the_second_to_create_a_database_learns_it_at_once(tmp_path: Path) -> None:
@@ -117,3 +127,19 @@ def test_an_export_puts_back_what_a_killed_one_moved_away(
     assert sorted(os.listdir(directory)) == ["host.csv", "mine.csv", "node.csv"]
     assert (directory / "mine.csv").read_text() == "before"
     assert (directory / "host.csv").read_text() == "after"
+
+
+@pytest.mark.parametrize("link", [".export.{}.part", ".export.{}.part/old"])
+def test_an_export_puts_nothing_back_from_behind_a_link(
+    small_database: Path, tmp_path: Path, link: str
+) -> None:
+    mine = tmp_path / "mine"
+    (mine / "old").mkdir(parents=True)
+    for place in (mine, mine / "old"):
+        (place / "letter.txt").write_text("precious")
+    at = tmp_path / "export" / link.format(dead_mark())
+    at.parent.mkdir(parents=True)
+    at.symlink_to(mine)
+    with msgflow.open_db(small_database) as database:
+        database.export_csv(tmp_path / "export", ["node"])
+    assert len(list(mine.rglob("letter.txt"))) == 2

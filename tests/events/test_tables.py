@@ -13,6 +13,7 @@ from msgflow.errors import TraceError, UsageError
 from msgflow.events.formats import EventFormat
 from msgflow.events.selection import Selection
 from msgflow.events.tables import write_event_tables
+from msgflow.files.temporary_owner import mark
 
 TYPES = {"handle": "x64", "bytes": "u8[]", "vpid": "i32"}
 
@@ -77,6 +78,14 @@ def test_a_full_directory_is_left_alone(trace: Path, tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="not empty"):
         write(trace, EventFormat.PARQUET, tmp_path / "out")
     assert sorted((tmp_path / "out").iterdir()) == before
+
+
+def test_what_another_process_writes_is_left_alone(trace: Path, tmp_path: Path) -> None:
+    other = tmp_path / f".out.{mark()}.part"
+    other.mkdir()
+    with pytest.raises(UsageError, match="cannot write the directory"):
+        write(trace, EventFormat.CSV, tmp_path / "out")
+    assert other.exists()
 
 
 def test_nothing_is_left_of_what_failed(

@@ -190,8 +190,13 @@ def test_an_export_is_replaced_only_when_told_and_then_whole(
     }
 
 
-def test_a_directory_that_is_no_export_is_left_alone(small_database: Path, tmp_path: Path) -> None:
-    mine = tmp_path / "out" / "publisher" / "mine.txt"
+@pytest.mark.parametrize(
+    "name", ["mine.txt", "run_id=1/mine.parquet", "run_id=1/data.parquet/mine.txt"]
+)
+def test_a_directory_that_is_no_export_is_left_alone(
+    small_database: Path, tmp_path: Path, name: str
+) -> None:
+    mine = tmp_path / "out" / "publisher" / name
     mine.parent.mkdir(parents=True)
     mine.write_text("precious")
     with (

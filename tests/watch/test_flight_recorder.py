@@ -41,3 +41,21 @@ def test_what_nobody_foresaw_is_a_note(
     assert [note.partition(" in ")[0] for note in notes] == ["the violation is not kept"] * 2
     assert all(note.endswith(": RuntimeError: can't start new thread") for note in notes)
     assert not list((tmp_path / "kept").iterdir())
+
+
+def test_a_link_that_leads_nowhere_is_a_note(tmp_path: Path) -> None:
+    (tmp_path / "kept").symlink_to(tmp_path / "gone")
+    chunk = tmp_path / "drive" / "archives" / "0"
+    chunk.mkdir(parents=True)
+    notes: list[str] = []
+    recorder = FlightRecorder(
+        tmp_path / "kept",
+        most=5,
+        window_ns=_SECOND_NS,
+        earlier_ns=0,
+        clock_sync="none",
+        note=notes.append,
+    )
+    recorder.keep(0, None, [chunk], None, None)  # type: ignore[arg-type]
+    recorder.close()
+    assert [note.partition(": ")[2].partition(";")[0] for note in notes] == ["file exists"]
