@@ -6,7 +6,7 @@ import os
 import shlex
 import shutil
 import time
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
 from typing import IO, TYPE_CHECKING
 
@@ -191,8 +191,12 @@ def _written(log: Path) -> Iterator[IO[bytes]]:
         try:
             yield stream
         finally:
-            if not log.stat().st_size:
-                log.unlink()
+            # The program may have moved it, and put something else there.
+            with suppress(FileNotFoundError):
+                found = log.lstat()
+                is_ours = os.path.samestat(found, os.fstat(stream.fileno()))
+                if is_ours and not found.st_size:
+                    log.unlink()
 
 
 class _Watch:

@@ -15,6 +15,7 @@ from msgflow.errors import RecordingError, UsageError
 from msgflow.files.temporary_owner import is_abandoned, mark
 from msgflow.record.kernel_events import KERNEL_EVENTS
 from msgflow.record.lttng import is_daemon_running, lttng, sessions
+from msgflow.trace.regular_file import read_regular
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -29,6 +30,7 @@ _LATER_CONTEXT = "pid_ns"
 _CHANNEL = "ros2"
 # In the directory of a recording while it is made: the mark of its process.
 _OWNER = ".msgflow-record"
+_MOST_BYTES = 100
 _TEMPORARY = "msgflow-watch-"
 
 
@@ -232,6 +234,7 @@ def _is_left(directory: Path | None) -> bool:
     if directory is None:
         return False
     try:
-        return is_abandoned((directory / _OWNER).read_text())
+        # Sessions of others may write where a pipe of this name is.
+        return is_abandoned(read_regular(directory / _OWNER, _MOST_BYTES).decode())
     except (OSError, UnicodeDecodeError):
         return False

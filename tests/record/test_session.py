@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
 
 from msgflow.errors import RecordingError
 from msgflow.record import session
+from msgflow.record.lttng import Session
 from msgflow.record.session import Channel, recording_session
 
 
@@ -47,6 +49,14 @@ def test_events_are_left_out_of_the_patterns_that_have_them(
         ("--exclude=ros2:a,ros2:b", "ros2:*"),
         ("dds:*",),
     ]
+
+
+def test_a_pipe_in_the_directory_of_a_session_is_no_leftover(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    os.mkfifo(tmp_path / ".msgflow-record")
+    monkeypatch.setattr(session, "sessions", lambda: [Session("theirs", tmp_path, False)])
+    assert not session.remove_leftovers()
 
 
 def test_a_session_created_anew_rotates_again(monkeypatch: pytest.MonkeyPatch) -> None:

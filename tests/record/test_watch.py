@@ -141,8 +141,10 @@ def test_a_recording_with_a_name_has_what_the_program_printed_beside_it(tmp_path
 
 
 @pytest.mark.thorough
-def test_a_program_that_prints_nothing_leaves_nothing(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "msgflow", "watch", "--", "true"]
+@pytest.mark.parametrize("program", [["true"], ["sh", "-c", "echo spoken; rm watch-*.log"]])
+def test_a_program_that_prints_nothing_leaves_nothing(tmp_path: Path, program: list[str]) -> None:
+    """Nor does one that removes what it printed."""
+    command = [sys.executable, "-m", "msgflow", "watch", "--", *program]
     with Terminal(command, tmp_path) as terminal:
         assert terminal.wait() == 0
     assert not list(tmp_path.iterdir())
