@@ -69,6 +69,7 @@ def make_server(path: Path, *, seconds: float = MOST_SECONDS) -> MCPServer[Any]:
             schemas = {tool.name: tool.input_schema for tool in await self.list_tools()}
             if name in schemas:
                 with _as_tool_errors():
+                    _require_text(arguments)
                     _refuse_unknown(name, arguments, list(schemas[name].get("properties", {})))
             return await super().call_tool(name, arguments, context)
 
@@ -145,7 +146,8 @@ class _Tools:
         """
         with self._opened() as database:
             findings = database.findings(run=run)
-        return _answer({}, (json.dumps(asdict(finding), default=str) for finding in findings))
+        rows = (json.dumps(asdict(finding), default=str) for finding in findings)
+        return _answer((), map(_with_short_cells, rows))
 
     def list_queries(self, name: str | None = None) -> str:
         """List the named queries; with a name, explain that query: parameters and columns."""
@@ -153,7 +155,7 @@ class _Tools:
 
         if name is None:
             titles = ({"name": query.words, "title": query.title} for query in load_queries())
-            return _answer({}, map(json.dumps, titles))
+            return _answer((), map(json.dumps, titles))
         return json.dumps(_explained(load_query(name)), ensure_ascii=False)
 
     def run_query(
@@ -270,7 +272,7 @@ class _Tools:
             for name, result in found.sections.items()
             for row in json_rows(result)
         )
-        return _answer({"runs": [found.run.title]}, rows, found.notes)
+        return _answer([found.run.title], rows, found.notes)
 
     def compare(
         self,
@@ -324,8 +326,16 @@ def _as_tool_errors() -> Iterator[None]:
     try:
         yield
     except MsgflowError as error:
-        hint = "" if error.hint is None else f"\nhint: {error.hint}"
-        raise ToolError(f"{error.message}{hint}") from error
+        hint = "" if error.hint is None else f"\nhint: {_short(error.hint)}"
+        raise ToolError(f"{_short(error.message)}{hint}") from error
+
+
+def _require_text(given: object) -> None:
+    """Refuse half characters, which JSON can hold and nothing behind it can."""
+    try:
+        json.dumps(given, ensure_ascii=False).encode()
+    except UnicodeEncodeError as error:
+        raise UsageError("an argument has half of a character", "send whole characters") from error
 
 
 def _refuse_unknown(tool: str, arguments: dict[str, Any], known: Sequence[str]) -> None:
@@ -395,14 +405,12 @@ def _rows(result: QueryResult, limit: int = DEFAULT_ROWS) -> str:
     from msgflow.export.formats import json_rows
 
     most = _capped(limit)
-    said: dict[str, Any] = {}
-    if result.runs:
-        said["runs"] = [run.title for run in result.runs]
     notes = list(result.notes)
     if len(result) > most:
         notes.append(f"only the first {most} of {len(result):,} rows; limit allows {MOST_ROWS:,}")
     first = replace(result, table=result.table.slice(0, most))
-    return _answer(said, map(_with_short_cells, json_rows(first)), notes)
+    titles = [run.title for run in result.runs]
+    return _answer(titles, map(_with_short_cells, json_rows(first)), notes)
 
 
 def _with_short_cells(text: str) -> str:
@@ -413,12 +421,19 @@ def _with_short_cells(text: str) -> str:
     for name, value in row.items():
         cell = value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
         if len(cell) > MOST_IN_CELL:
-            row[name] = f"{cell[:MOST_IN_CELL]}… ({len(cell):,} characters)"
+            row[name] = _short(cell)
     return json.dumps(row, ensure_ascii=False)
 
 
-def _answer(said: dict[str, Any], rows: Iterable[str], notes: Sequence[str] = ()) -> str:
-    """Return JSON of the fields in `said`, the notes, and as many rows as there is room for."""
+def _short(text: str) -> str:
+    """Return a text that is cut where it is long, which it says."""
+    if len(text) <= MOST_IN_CELL:
+        return text
+    return f"{text[:MOST_IN_CELL]}… ({len(text):,} characters)"
+
+
+def _answer(runs: Sequence[str], rows: Iterable[str], notes: Sequence[str] = ()) -> str:
+    """Return JSON of the titles of runs, the notes, and as many rows as there is room for."""
     texts = list(rows)
     room = MOST_CHARACTERS
     shown: list[str] = []
@@ -433,7 +448,10 @@ def _answer(said: dict[str, Any], rows: Iterable[str], notes: Sequence[str] = ()
             f"only {len(shown)} of these {len(texts)} rows have room in {MOST_CHARACTERS:,}"
             " characters: choose columns or rows",
         ]
-    parts = [f"{json.dumps(key)}: {json.dumps(value)}" for key, value in said.items()]
+    titles = [_short(title) for title in runs[:DEFAULT_ROWS]]
+    if len(titles) < len(runs):
+        titles.append(f"… and {len(runs) - len(titles):,} more")
+    parts = [f'"runs": {json.dumps(titles)}'] if titles else []
     parts.append('"rows": [' + ",\n".join(shown) + "]")
-    parts.append(f'"notes": {json.dumps(list(notes), ensure_ascii=False)}')
+    parts.append(f'"notes": {json.dumps([*map(_short, notes)], ensure_ascii=False)}')
     return "{" + ",\n".join(parts) + "}"

@@ -7,6 +7,7 @@ from collections import deque
 from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
+from msgflow.sql.interrupt import noted_interrupts
 from msgflow.watch.arrivals import PATIENCE, Arrivals, by_arrival
 from msgflow.watch.chunk import ChunkFinder, finished_chunks
 
@@ -99,13 +100,16 @@ def watch_live(
         is_last = is_over() or is_last
         looked_s = time.monotonic()
         waiting.extend(by_arrival(finder.further(is_last=is_last)))
-        while waiting and not watcher.history.is_full(known_ns()):
-            chunk = waiting.popleft()
-            if not arrivals.is_left_out(chunk):
-                watcher.read(chunk)
-                end_ns = watcher.history.ends_ns.get(chunk.source)
-                arrivals.add(chunk, end_ns, is_live=not is_first)
-                watcher.skip_old()
+        # A backlog takes a while to read: Ctrl-C does not wait for all of it.
+        with noted_interrupts() as interrupts:
+            while waiting and not watcher.history.is_full(known_ns()):
+                interrupts.check()
+                chunk = waiting.popleft()
+                if not arrivals.is_left_out(chunk):
+                    watcher.read(chunk)
+                    end_ns = watcher.history.ends_ns.get(chunk.source)
+                    arrivals.add(chunk, end_ns, is_live=not is_first)
+                    watcher.skip_old()
         is_first = False
         for source in arrivals.vanished(looked_s, {chunk.source for chunk in waiting}):
             note(f"no chunk comes any more from {source}")

@@ -159,6 +159,24 @@ def test_an_interrupt_ends_the_statement_of_a_step(
     assert time.process_time() - begin < 5
 
 
+def test_an_interrupt_does_not_wait_for_a_backlog(
+    simulated: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read: list[Chunk] = []
+
+    def interrupted(watcher: Watcher, chunk: Chunk) -> None:
+        read.append(chunk)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    monkeypatch.setattr(Watcher, "read", interrupted)
+    watcher = watching([], 0.5, 0.5)
+    with until_interrupted():
+        list(watch_live(simulated, watcher, step_ns=SECOND, is_over=lambda: True, note=print))
+        raise AssertionError
+    watcher.close()
+    assert len(read) == 1
+
+
 @pytest.mark.thorough
 def test_a_simulated_recording(simulated: Path, tmp_path: Path) -> None:
     ingest([simulated], tmp_path / "whole.duckdb")
