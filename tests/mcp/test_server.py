@@ -292,3 +292,25 @@ def test_a_signal_ends_it_while_it_waits(small_database: Path, number: int) -> N
             assert server.wait(10) == -number
         finally:
             server.kill()
+
+
+def test_names_of_a_stranger_make_no_long_answers(small_database: Path, tmp_path: Path) -> None:
+    forged = tmp_path / "forged.duckdb"
+    forged.write_bytes(small_database.read_bytes())
+    with duckdb.connect(str(forged)) as con:
+        con.execute("UPDATE store.run SET name = repeat('n', 100_000)")
+        con.execute(
+            "INSERT INTO store.finding SELECT run_id, NULL, 'lost_packets', repeat('s', 30_000), 1,"
+            " NULL FROM store.run"
+        )
+    long = "q" * 100_000
+    answers = ask_here(forged, ("info", {}), ("check", {}), ("run_query", {"name": long}))
+    assert [failed for failed, _ in answers] == [False, False, True]
+    assert all(len(text) < 1.5 * mcp_server.MOST_CHARACTERS for _, text in answers)
+    # One that is long does not hide the others.
+    assert json.loads(answers[1][1])["rows"]
+
+
+def test_half_a_character_is_refused_in_words(small_database: Path) -> None:
+    for call in (("sql", {"query": "\ud800"}), ("schema", {"view": "\udcff"})):
+        assert ask_here(small_database, call)[0][1].startswith("an argument has half of a char")

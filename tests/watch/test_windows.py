@@ -29,6 +29,7 @@ from msgflow.watch import Watcher, WindowReport, finished_chunks, watch_finished
 from msgflow.watch import chunk as chunk_module
 from msgflow.watch import history as history_module
 from msgflow.watch.arrivals import Arrivals
+from msgflow.watch.chunk import Chunk
 from msgflow.watch.learned_answers import LearnedAnswers
 from msgflow_sim import (
     Host,
