@@ -36,39 +36,25 @@ _LARGEST_DRIFT_PPB = 1_000_000
 
 @dataclass(frozen=True)
 class GivenClock:
-    """The correction of one clock in a file.
+    """The correction of one clock in a file."""
 
-    Attributes:
-        name: hostname, or uuid of the clock.
-        line: its line, from 1.
-        offset_ns: to add to its times [ns].
-        drift_ppb: to add per time since the reference [1e-9].
-        reference_ns: the moment when offset_ns alone is right [epoch ns, as recorded]; None: the
-            begin of its traces.
-        uncertainty_ns: bound of the error [ns]; None: not known.
-    """
-
-    name: str
-    line: int
-    offset_ns: int
-    drift_ppb: int = 0
+    name: str  # hostname, or uuid of the clock
+    line: int  # its line, from 1
+    offset_ns: int  # to add to its times [ns]
+    drift_ppb: int = 0  # to add per time since the reference [1e-9]
+    # The moment when offset_ns alone is right [epoch ns, as recorded]; None: the begin of its
+    # traces.
     reference_ns: int | None = None
-    uncertainty_ns: int | None = None
+    uncertainty_ns: int | None = None  # bound of the error [ns]; None: not known
 
 
 @dataclass(frozen=True)
 class ClockSync:
-    """A way to correct clocks.
+    """A way to correct clocks."""
 
-    Attributes:
-        method: 'none', 'messages' or 'file'.
-        path: the file.
-        clocks: its entries, in order.
-    """
-
-    method: str
-    path: Path | None = None
-    clocks: tuple[GivenClock, ...] = ()
+    method: str  # 'none', 'messages' or 'file'
+    path: Path | None = None  # the file
+    clocks: tuple[GivenClock, ...] = ()  # its entries, in order
 
     def fail(self, line: int, what: str, hint: str | None = None) -> NoReturn:
         """Raise the error of a line of the file."""

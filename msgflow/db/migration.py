@@ -38,19 +38,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Upgrade:
-    """The result of an upgrade.
+    """The result of an upgrade."""
 
-    Attributes:
-        before: schema revision found; None for a new file.
-        after: schema revision now.
-        views_changed: the views were not current.
-        rederived_runs: names of the runs whose links were derived again.
-    """
-
-    before: str | None
-    after: str
-    views_changed: bool
-    rederived_runs: tuple[str, ...]
+    before: str | None  # schema revision found; None for a new file
+    after: str  # schema revision now
+    views_changed: bool  # the views were not current
+    rederived_runs: tuple[str, ...]  # names of the runs whose links were derived again
 
 
 def create(path: Path) -> None:

@@ -35,40 +35,25 @@ _BREAK = re.compile(r"\n *-- ")
 
 @dataclass(frozen=True)
 class StoreColumn(Column):
-    """A column of a table.
+    """A column of a table."""
 
-    Attributes:
-        is_required: it is never NULL.
-        to: table to whose rows it refers, by their key.
-        clock: of a moment: column of the table that leads to the clock that showed it.
-        is_hidden: the public view does not show it.
-        sql: of a column that only the view has: its expression.
-    """
-
-    is_required: bool = False
-    to: str | None = None
+    is_required: bool = False  # it is never NULL
+    to: str | None = None  # table to whose rows it refers, by their key
+    # Of a moment: column of the table that leads to the clock that showed it.
     clock: str | None = None
-    is_hidden: bool = False
-    sql: str | None = None
+    is_hidden: bool = False  # the public view does not show it
+    sql: str | None = None  # of a column that only the view has: its expression
 
 
 @dataclass(frozen=True)
 class StoreTable:
-    """A table.
+    """A table."""
 
-    Attributes:
-        name: without its schema.
-        grain: what one row is.
-        view: what the public view has, if that shows the table as it is.
-        columns: of the table, by name.
-        computed: columns that only this view has.
-    """
-
-    name: str
-    grain: str
-    view: str | None
-    columns: Mapping[str, StoreColumn]
-    computed: tuple[StoreColumn, ...]
+    name: str  # without its schema
+    grain: str  # what one row is
+    view: str | None  # what the public view has, if that shows the table as it is
+    columns: Mapping[str, StoreColumn]  # of the table, by name
+    computed: tuple[StoreColumn, ...]  # columns that only this view has
 
     @property
     def key(self) -> str:

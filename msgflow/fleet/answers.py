@@ -37,14 +37,10 @@ QUERIES = (
 
 @dataclass(frozen=True)
 class Answer:
-    """A table of the lake.
-
-    Attributes:
-        table: its name.
-        read: returns the rows of a run, in a fixed order and with a column `run_id`.
-    """
+    """A table of the lake."""
 
     table: str
+    # Returns the rows of a run, in a fixed order and with a column `run_id`.
     read: Callable[[duckdb.DuckDBPyConnection, int], pa.Table]
 
 

@@ -33,15 +33,10 @@ _MOST_NAMED = 10
 
 @dataclass(frozen=True)
 class FleetComparison:
-    """Runs of one side compared with those of another.
+    """Runs of one side compared with those of another."""
 
-    Attributes:
-        result: one row per path and statistic, see `internal.fleet_comparison`.
-        parts: None: only a comparison of two runs has them.
-    """
-
-    result: QueryResult
-    parts: None = None
+    result: QueryResult  # one row per path and statistic, see `internal.fleet_comparison`
+    parts: None = None  # only a comparison of two runs has them
 
     def changes(self, *, only_different: bool = True) -> QueryResult:
         """Return a row for each path, the greatest change first."""

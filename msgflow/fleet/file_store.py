@@ -54,17 +54,11 @@ _USERINFO_ALONE = re.compile(r"^([a-z][\w+.-]*:)[^/:]*:.*@", re.I)
 
 @dataclass(frozen=True)
 class Entry:
-    """A file below a store's root.
+    """A file below a store's root."""
 
-    Attributes:
-        path: from the root, with `/`.
-        size: bytes.
-        changed_ns: when it was written [epoch ns].
-    """
-
-    path: str
-    size: int
-    changed_ns: int
+    path: str  # from the root, with `/`
+    size: int  # bytes
+    changed_ns: int  # when it was written [epoch ns]
 
 
 class Store:
@@ -72,14 +66,11 @@ class Store:
 
     A file appears whole or not at all: in a folder it is renamed into place, in a bucket an object
     becomes visible when it is complete.
-
-    Attributes:
-        url: the address: an absolute path, or `s3://BUCKET/PREFIX`.
     """
 
     def __init__(self, url: str | Path, *, follows_links: bool = True) -> None:
         """Reach a store; nothing is read yet."""
-        self.url = normal_url(url)
+        self.url = normal_url(url)  # the address: an absolute path, or `s3://BUCKET/PREFIX`
         self._follows_links = follows_links
         self.is_local = not self.url.startswith(S3)
         self._root = self.url if self.is_local else self.url.removeprefix(S3)

@@ -37,63 +37,37 @@ _LONGEST_PAUSE = 60.0
 
 @dataclass(frozen=True)
 class Options:
-    """Options for all recordings.
+    """Options for all recordings."""
 
-    Attributes:
-        ingest: options of the ingest: reader, strict, ignore, events, clock_sync.
-        views: also write the public views.
-        database: also write the database.
-        replace: ingest recordings again that the lake has already.
-        retry_failed: ingest recordings again that failed before.
-        tries: most tries of a recording, if another one may succeed.
-        pause: seconds before the second try; twice as many before each further one.
-        timeout: most seconds of one recording.
-        memory: most bytes of one recording.
-        scratch: folder of each worker for temporary files.
-    """
-
+    # Options of the ingest: reader, strict, ignore, events, clock_sync.
     ingest: Mapping[str, Any] = field(default_factory=dict)
-    views: bool = False
-    database: bool = True
-    replace: bool = False
-    retry_failed: bool = False
-    tries: int = 3
-    pause: float = 2.0
-    timeout: float = 3600.0
-    memory: int | None = None
-    scratch: str | None = None
+    views: bool = False  # also write the public views
+    database: bool = True  # also write the database
+    replace: bool = False  # ingest recordings again that the lake has already
+    retry_failed: bool = False  # ingest recordings again that failed before
+    tries: int = 3  # most tries of a recording, if another one may succeed
+    pause: float = 2.0  # seconds before the second try; twice as many before each further one
+    timeout: float = 3600.0  # most seconds of one recording
+    memory: int | None = None  # most bytes of one recording
+    scratch: str | None = None  # folder of each worker for temporary files
 
 
 @dataclass
 class FleetProgress:
-    """Progress of the ingest, in numbers of recordings.
+    """Progress of the ingest, in numbers of recordings."""
 
-    Attributes:
-        total: all recordings.
-        added: new in the lake.
-        replaced: took the place of an earlier run.
-        there: were in the lake already, unchanged.
-        same: have the packets and labels of another recording that is in the lake.
-        failed: failed now.
-        failed_before: failed in an earlier call, and were left alone.
-        retried: tries after a first one.
-        events: events of those that were added or replaced.
-        seconds: since the start.
-        workers: number of recordings by worker.
-        failures: (source, reason, error) of those that failed now.
-    """
-
-    total: int
-    added: int = 0
-    replaced: int = 0
-    there: int = 0
-    same: int = 0
-    failed: int = 0
-    failed_before: int = 0
-    retried: int = 0
-    events: int = 0
-    seconds: float = 0.0
-    workers: Counter[str] = field(default_factory=Counter)
+    total: int  # all recordings
+    added: int = 0  # new in the lake
+    replaced: int = 0  # took the place of an earlier run
+    there: int = 0  # were in the lake already, unchanged
+    same: int = 0  # have the packets and labels of another recording that is in the lake
+    failed: int = 0  # failed now
+    failed_before: int = 0  # failed in an earlier call, and were left alone
+    retried: int = 0  # tries after a first one
+    events: int = 0  # events of those that were added or replaced
+    seconds: float = 0.0  # since the start
+    workers: Counter[str] = field(default_factory=Counter)  # number of recordings by worker
+    # (source, reason, error) of those that failed now.
     failures: list[tuple[str, str, str]] = field(default_factory=list)
 
     @property

@@ -56,11 +56,7 @@ ORDER BY run
 
 
 class Lake:
-    """A lake at one address, open for reading and writing.
-
-    Attributes:
-        store: the files.
-    """
+    """A lake at one address, open for reading and writing."""
 
     def __init__(self, store: Store) -> None:
         self.store = store

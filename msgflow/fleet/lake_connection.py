@@ -45,19 +45,12 @@ _NONE_YET = "msgflow fleet ingest SOURCE --lake adds some"
 
 @dataclass(frozen=True)
 class Choice:
-    """Runs of a lake, some or all.
-
-    Attributes:
-        lake: the lake.
-        runs: the chosen ones, one row each, ordered by key; columns of `run_schema`.
-        labels: keys of the labels of all runs of the lake, sorted.
-        total: number of runs of the lake.
-    """
+    """Runs of a lake, some or all."""
 
     lake: Lake
-    runs: pa.Table
-    labels: tuple[str, ...]
-    total: int
+    runs: pa.Table  # the chosen ones, one row each, ordered by key; columns of `run_schema`
+    labels: tuple[str, ...]  # keys of the labels of all runs of the lake, sorted
+    total: int  # number of runs of the lake
 
 
 def choose(lake: Lake, where: str | None = None) -> Choice:
@@ -130,14 +123,7 @@ def what_there_is(name: str, labels: Sequence[str], columns: Sequence[str]) -> s
 
 
 class Reading:
-    """A connection to chosen runs of a lake. Use it as a context manager, or call `close`.
-
-    Attributes:
-        choice: the runs.
-        connection: it has the table `run`, and a view of each table that was asked for, without the
-            column `part`.
-        tables: those of them that these runs have.
-    """
+    """A connection to chosen runs of a lake. Use it as a context manager, or call `close`."""
 
     def __init__(
         self, choice: Choice, tables: Sequence[str] | None = None, *, listed: bool = False
@@ -150,9 +136,11 @@ class Reading:
             listed: names and columns of all others are wanted, too.
         """
         self.choice = choice
-        self.tables: set[str] = set()
+        self.tables: set[str] = set()  # those asked for that these runs have
         self._local_files: list[str] = []
         self._resources = ExitStack()
+        # It has the table `run`, and a view of each table that was asked for, without the column
+        # `part`.
         self.connection = self._resources.enter_context(open_memory())
         try:
             with lake_errors(choice.lake):

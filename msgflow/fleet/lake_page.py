@@ -30,17 +30,11 @@ _LATENCY, _FINDINGS = "e2e-latency", "info-findings"
 
 @dataclass(frozen=True)
 class LakePage:
-    """The page of a lake.
+    """The page of a lake."""
 
-    Attributes:
-        content: HTML.
-        runs: number of runs on it.
-        notes: what it leaves out, one sentence each.
-    """
-
-    content: str
-    runs: int
-    notes: tuple[str, ...]
+    content: str  # HTML
+    runs: int  # number of runs on it
+    notes: tuple[str, ...]  # what it leaves out, one sentence each
 
 
 def lake_page(lake: Lake, *, where: str | None = None) -> LakePage:

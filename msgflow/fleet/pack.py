@@ -45,19 +45,12 @@ _READ_AT_ONCE = 16
 
 @dataclass(frozen=True)
 class Packed:
-    """What was packed.
+    """What was packed."""
 
-    Attributes:
-        runs: runs whose answers or views are in a new part now.
-        packs: new parts.
-        deleted: deleted files.
-        size: their bytes.
-    """
-
-    runs: int
-    packs: int
-    deleted: int
-    size: int
+    runs: int  # runs whose answers or views are in a new part now
+    packs: int  # new parts
+    deleted: int  # deleted files
+    size: int  # their bytes
 
 
 def pack(lake: Lake) -> Packed:

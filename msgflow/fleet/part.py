@@ -34,15 +34,10 @@ _LEFT_OUT = (RUN,)
 
 @dataclass(frozen=True)
 class Content:
-    """What to write besides the answers.
+    """What to write besides the answers."""
 
-    Attributes:
-        views: the public views.
-        database: the database itself.
-    """
-
-    views: bool = False
-    database: bool = True
+    views: bool = False  # the public views
+    database: bool = True  # the database itself
 
 
 def run_key(connection: duckdb.DuckDBPyConnection, run_id: int) -> str:

@@ -18,30 +18,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Recording:
-    """A recording, which becomes one run.
+    """A recording, which becomes one run."""
 
-    Attributes:
-        source: absolute path, or `s3://…`: a directory with traces, or an archive.
-        labels: by key.
-    """
-
-    source: str
-    labels: Mapping[str, str] = field(default_factory=dict)
+    source: str  # absolute path, or `s3://…`: a directory with traces, or an archive
+    labels: Mapping[str, str] = field(default_factory=dict)  # by key
 
 
 @dataclass(frozen=True)
 class State:
-    """The files of a source, without their content.
+    """The files of a source, without their content."""
 
-    Attributes:
-        signature: hash of names, sizes and times of all its files.
-        size: their bytes.
-        is_archive: it is one file.
-    """
-
-    signature: str
-    size: int
-    is_archive: bool
+    signature: str  # hash of names, sizes and times of all its files
+    size: int  # their bytes
+    is_archive: bool  # it is one file
 
 
 def look_at(source: str) -> State:

@@ -31,21 +31,13 @@ _SHORTEST = 4
 
 @dataclass(frozen=True)
 class OpenedRun:
-    """A restored run.
+    """A restored run."""
 
-    Attributes:
-        run: its key.
-        name: its name.
-        path: the database.
-        size: bytes of it.
-        before: the schema revision before the upgrade; None if it had the current one.
-    """
-
-    run: str
+    run: str  # its key
     name: str
-    path: Path
-    size: int
-    before: str | None
+    path: Path  # the database
+    size: int  # bytes of it
+    before: str | None  # the schema revision before the upgrade; None if it had the current one
 
 
 def open_run(lake: Lake, run: str, path: Path | None = None) -> OpenedRun:

@@ -43,33 +43,20 @@ PASSING = frozenset(
 
 @dataclass(frozen=True)
 class Task:
-    """One recording to ingest, with options.
+    """One recording to ingest, with options."""
 
-    Attributes:
-        index: number of the recording in the call.
-        source: address of the recording.
-        lake: address of the lake.
-        options: of the ingest: reader, strict, ignore, events, clock_sync.
-        views: write the public views.
-        database: write the database.
-        timeout: most seconds.
-        most_memory: most bytes of memory; None for no limit.
-        scratch: folder for temporary files; that of the system when None.
-        memory: estimated bytes of memory.
-        disk: estimated bytes of scratch space.
-    """
-
-    index: int
-    source: str
-    lake: str
+    index: int  # number of the recording in the call
+    source: str  # address of the recording
+    lake: str  # address of the lake
+    # Of the ingest: reader, strict, ignore, events, clock_sync.
     options: dict[str, Any] = field(default_factory=dict)
-    views: bool = False
-    database: bool = True
-    timeout: float = 3600.0
-    most_memory: int | None = None
-    scratch: str | None = None
-    memory: int = 0
-    disk: int = 0
+    views: bool = False  # write the public views
+    database: bool = True  # write the database
+    timeout: float = 3600.0  # most seconds
+    most_memory: int | None = None  # most bytes of memory; None for no limit
+    scratch: str | None = None  # folder for temporary files; that of the system when None
+    memory: int = 0  # estimated bytes of memory
+    disk: int = 0  # estimated bytes of scratch space
 
     def as_dict(self) -> dict[str, Any]:
         """Return the attributes, as values for JSON."""
@@ -78,27 +65,16 @@ class Task:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The outcome of a task.
+    """The outcome of a task."""
 
-    Attributes:
-        values: columns of the table `run`; None after a failure.
-        reason: kind of failure.
-        stage: what the task was doing.
-        error: what went wrong.
-        hint: what to do about it.
-        signature: of the source, if known.
-        seconds: duration.
-        worker: machine and process.
-    """
-
-    values: dict[str, Any] | None = None
+    values: dict[str, Any] | None = None  # columns of the table `run`; None after a failure
     reason: str = ""
-    stage: str = ""
-    error: str = ""
+    stage: str = ""  # what the task was doing
+    error: str = ""  # what went wrong
     hint: str | None = None
-    signature: str | None = None
+    signature: str | None = None  # of the source, if known
     seconds: float = 0.0
-    worker: str = ""
+    worker: str = ""  # machine and process
 
     def as_dict(self) -> dict[str, Any]:
         """Return the attributes, as values for JSON."""

@@ -31,23 +31,14 @@ _FILE = Path(__file__).with_name("tracepoints.toml")
 
 @dataclass(frozen=True)
 class Field:
-    """A payload field.
+    """A payload field."""
 
-    Attributes:
-        name: the column, and the name in most traces.
-        type: DuckDB's type of the column.
-        aliases: other names in traces.
-        since: first version of tracetools that has it, None if as old as the event.
-        until: last version of tracetools that has it, None if it is still there.
-        where: other places that have it, None if there are no others.
-    """
-
-    name: str
-    type: str
-    aliases: tuple[str, ...] = ()
-    since: str | None = None
-    until: str | None = None
-    where: str | None = None
+    name: str  # the column, and the name in most traces
+    type: str  # DuckDB's type of the column
+    aliases: tuple[str, ...] = ()  # other names in traces
+    since: str | None = None  # first version of tracetools that has it, None if as old as the event
+    until: str | None = None  # last version of tracetools that has it, None if it is still there
+    where: str | None = None  # other places that have it, None if there are no others
 
 
 class Origin(Enum):
@@ -74,15 +65,10 @@ def enum_type(values: Iterable[str]) -> str:
 
 @dataclass(frozen=True)
 class Predecessor:
-    """A column about the latest earlier event of a sequence on the same thread.
+    """A column about the latest earlier event of a sequence on the same thread."""
 
-    Attributes:
-        sequence: the sequence of events.
-        origin: the property of the earlier event that the column holds.
-    """
-
-    sequence: str
-    origin: Origin
+    sequence: str  # the sequence of events
+    origin: Origin  # the property of the earlier event that the column holds
 
     @property
     def column(self) -> str:
@@ -92,45 +78,31 @@ class Predecessor:
 
 @dataclass(frozen=True)
 class Tracepoint:
-    """An event.
+    """An event."""
 
-    Attributes:
-        name: provider and event, such as 'ros2:rcl_publish'.
-        description: one sentence.
-        fields: its payload, over all versions.
-        aliases: other names that it has in traces.
-        sequences: sequences of its thread that the event belongs to.
-        predecessors: columns about the events before it.
-        label: the name that columns of its successors show, None if no column shows it.
-        since: first version of tracetools that has it, None for other providers.
-        until: last version of tracetools that has it, None if it is still there.
-        where: other places that have it, None if there are no others.
-        is_kernel: the kernel emits it: it has no provider, and nothing to do with the thread that
-            it interrupted.
-        is_lasting: what it says stays true: of objects, their names and states. Who reads a part of
-            a recording needs it from all that came before.
-        is_translated: events of ROS 2 that are made of it have its id, and take its place.
-        is_staged: answers are made of it. Else it is known by its name, and left unread.
-        role: what it says of its CPU; the begin and end of interrupts have no staging table.
-        interrupt: the kind of interrupt that begins or ends.
-    """
-
-    name: str
-    description: str
-    fields: tuple[Field, ...]
-    aliases: tuple[str, ...] = ()
-    sequences: tuple[str, ...] = ()
-    predecessors: tuple[Predecessor, ...] = ()
+    name: str  # provider and event, such as 'ros2:rcl_publish'
+    description: str  # one sentence
+    fields: tuple[Field, ...]  # its payload, over all versions
+    aliases: tuple[str, ...] = ()  # other names that it has in traces
+    sequences: tuple[str, ...] = ()  # sequences of its thread that the event belongs to
+    predecessors: tuple[Predecessor, ...] = ()  # columns about the events before it
+    # The name that columns of its successors show, None if no column shows it.
     label: str | None = None
-    since: str | None = None
-    until: str | None = None
-    where: str | None = None
+    since: str | None = None  # first version of tracetools that has it, None for other providers
+    until: str | None = None  # last version of tracetools that has it, None if it is still there
+    where: str | None = None  # other places that have it, None if there are no others
+    # The kernel emits it: it has no provider, and nothing to do with the thread that it
+    # interrupted.
     is_kernel: bool = False
+    # What it says stays true: of objects, their names and states. Who reads a part of a recording
+    # needs it from all that came before.
     is_lasting: bool = False
+    # Events of ROS 2 that are made of it have its id, and take its place.
     is_translated: bool = False
-    is_staged: bool = True
+    is_staged: bool = True  # answers are made of it. Else it is known by its name, and left unread
+    # What it says of its CPU; the begin and end of interrupts have no staging table.
     role: CpuRole | None = None
-    interrupt: str | None = None
+    interrupt: str | None = None  # the kind of interrupt that begins or ends
 
     @property
     def provider(self) -> str:
@@ -210,13 +182,9 @@ fields as JSON. Behind a gap they tell, as calls do, that the thread went on."""
 
 @dataclass(frozen=True)
 class Catalogue:
-    """All tracepoints.
+    """All tracepoints."""
 
-    Attributes:
-        tracepoints: by name, in the order of the file.
-    """
-
-    tracepoints: Mapping[str, Tracepoint]
+    tracepoints: Mapping[str, Tracepoint]  # by name, in the order of the file
 
     @cached_property
     def staged(self) -> Mapping[str, Tracepoint]:

@@ -53,16 +53,7 @@ class Numbers:
 
 
 class Groups:
-    """Events ordered by group and number.
-
-    Attributes:
-        rows: the events, as rows of the batches one after the other.
-        place: where each row went.
-        groups: the group of each.
-        starts: where each group begins.
-        ends: where each group's last event is.
-        start_of: where the group of each begins.
-    """
+    """Events ordered by group and number."""
 
     def __init__(self, ids: NDArray[np.int64], of_groups: NDArray[np.int32]) -> None:
         count = ids.size
@@ -74,13 +65,16 @@ class Groups:
         # Numbers of 16 bits are sorted in linear time.
         is_short = of_groups.max() < 1 << 16
         keys = of_groups[order].astype(np.uint16 if is_short else np.uint32)
+        # The events, as rows of the batches one after the other.
         self.rows = order[np.argsort(keys, kind="stable")]
-        self.place = np.empty(count, np.int32)
+        self.place = np.empty(count, np.int32)  # where each row went
         self.place[self.rows] = numbers
-        self.groups = of_groups[self.rows]
+        self.groups = of_groups[self.rows]  # the group of each
         is_start = np.append(True, self.groups[1:] != self.groups[:-1])
-        self.starts = np.flatnonzero(is_start).astype(np.int32)
+        self.starts = np.flatnonzero(is_start).astype(np.int32)  # where each group begins
+        # Where each group's last event is.
         self.ends = np.append(self.starts[1:], count).astype(np.int32) - 1
+        # Where the group of each begins.
         self.start_of = np.repeat(self.starts, self.ends + 1 - self.starts)
 
 

@@ -42,15 +42,11 @@ _LONGEST_SYMBOL = 1 << 16
 
 @dataclass(frozen=True)
 class Loaded:
-    """What was loaded.
+    """What was loaded."""
 
-    Attributes:
-        event_counts: (trace index, event name) -> events read, wanted or not.
-        replaced_runs: ids of the runs that hold some of these packets already.
-    """
-
+    # (trace index, event name) -> events read, wanted or not.
     event_counts: Mapping[tuple[int, str], int]
-    replaced_runs: frozenset[int]
+    replaced_runs: frozenset[int]  # ids of the runs that hold some of these packets already
 
 
 def load_traces(

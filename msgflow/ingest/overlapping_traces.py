@@ -40,22 +40,15 @@ _PARAMETERS = {"slack_ns": _SLACK_NS, "twin_ns": _TWIN_NS}
 
 @dataclass(frozen=True)
 class Corrections:
-    """Corrections of the events of a reader.
+    """Corrections of the events of a reader."""
 
-    Attributes:
-        duplicates: ids of events that another trace holds as well, in order.
-        processes: (session, pid, name of the thread) whose PID namespace is filled in where it is
-            missing, as one number each, in order.
-        namespaces: the PID namespace of each.
-        sessions: trace index -> number of its session.
-        names: name of a thread -> its number.
-    """
-
-    duplicates: NDArray[np.int64]
+    duplicates: NDArray[np.int64]  # ids of events that another trace holds as well, in order
+    # (session, pid, name of the thread) whose PID namespace is filled in where it is missing, as
+    # one number each, in order.
     processes: NDArray[np.int64]
-    namespaces: NDArray[np.int64]
-    sessions: NDArray[np.int64]
-    names: Mapping[str | None, int]
+    namespaces: NDArray[np.int64]  # the PID namespace of each
+    sessions: NDArray[np.int64]  # trace index -> number of its session
+    names: Mapping[str | None, int]  # name of a thread -> its number
 
     def __bool__(self) -> bool:
         return bool(self.duplicates.size or self.processes.size)

@@ -27,9 +27,6 @@ class RawTables:
     """The tables of `raw`, filled inside a transaction that is committed now and then.
 
     Rows wait until there are enough of them, or `flush` is called.
-
-    Attributes:
-        replaced: ids of the runs that hold some of the packets added already.
     """
 
     def __init__(
@@ -50,6 +47,7 @@ class RawTables:
         self._waiting: dict[str, list[pa.RecordBatch]] = {}
         self._counts: dict[str, int] = {}
         self._uncommitted = 0
+        # Ids of the runs that hold some of the packets added already.
         self.replaced: set[int] = set()
 
     def add_all(self, item: Placed | tuple[str, pa.RecordBatch]) -> None:

@@ -33,15 +33,10 @@ _OF_LTTNG = re.compile(
 
 @dataclass(frozen=True)
 class Recording:
-    """Traces that become one run.
+    """Traces that become one run."""
 
-    Attributes:
-        paths: that have all of them below, and no others.
-        hosts: name of a host -> paths of its traces.
-    """
-
-    paths: Sequence[str | Path]
-    hosts: Mapping[str, Sequence[str | Path]]
+    paths: Sequence[str | Path]  # that have all of them below, and no others
+    hosts: Mapping[str, Sequence[str | Path]]  # name of a host -> paths of its traces
 
 
 def session_folder(path: str | Path) -> Path:

@@ -65,19 +65,13 @@ _SHORTEST_RETURN_NS = 10_000
 
 @dataclass(frozen=True)
 class Placed:
-    """Events of a round with their threads and predecessors.
+    """Events of a round with their threads and predecessors."""
 
-    Attributes:
-        batches: (event name, batch), with the columns of the staging tables.
-        threads: rows of `THREAD_SCHEMA` that were not there before.
-        thread_names: rows of `THREAD_NAME_SCHEMA`.
-        cpu_returns: rows of `CPU_RETURN_SCHEMA`.
-    """
-
+    # (event name, batch), with the columns of the staging tables.
     batches: tuple[tuple[str, pa.RecordBatch], ...]
-    threads: pa.RecordBatch
-    thread_names: pa.RecordBatch
-    cpu_returns: pa.RecordBatch
+    threads: pa.RecordBatch  # rows of `THREAD_SCHEMA` that were not there before
+    thread_names: pa.RecordBatch  # rows of `THREAD_NAME_SCHEMA`
+    cpu_returns: pa.RecordBatch  # rows of `CPU_RETURN_SCHEMA`
 
 
 class Sequences:

@@ -25,32 +25,21 @@ _NOT_XML = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 @dataclass(frozen=True, slots=True)
 class Session:
-    """A recording session of the session daemon.
+    """A recording session of the session daemon."""
 
-    Attributes:
-        name: unique in the daemon.
-        directory: where it writes; None where it writes over the network or keeps a snapshot.
-        is_snapshot: it keeps the last events in memory, and writes them when asked.
-    """
-
-    name: str
+    name: str  # unique in the daemon
+    # Where it writes; None where it writes over the network or keeps a snapshot.
     directory: Path | None
-    is_snapshot: bool
+    is_snapshot: bool  # it keeps the last events in memory, and writes them when asked
 
 
 @dataclass(frozen=True, slots=True)
 class Provider:
-    """A process that has tracepoints.
-
-    Attributes:
-        pid: its number.
-        program: its command line, as the kernel has it.
-        tracepoints: their names.
-    """
+    """A process that has tracepoints."""
 
     pid: int
-    program: str
-    tracepoints: frozenset[str]
+    program: str  # its command line, as the kernel has it
+    tracepoints: frozenset[str]  # their names
 
     @property
     def is_ros(self) -> bool:

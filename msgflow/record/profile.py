@@ -29,15 +29,10 @@ _PYTHON_NAMES = (
 
 @dataclass(frozen=True, slots=True)
 class Rate:
-    """How to sample.
+    """How to sample."""
 
-    Attributes:
-        hz: samples of each CPU per second.
-        graph: how perf finds callers: 'fp' by frame pointers, 'dwarf' by what debuggers read.
-    """
-
-    hz: int
-    graph: str
+    hz: int  # samples of each CPU per second
+    graph: str  # how perf finds callers: 'fp' by frame pointers, 'dwarf' by what debuggers read
 
 
 def read_rate(text: str) -> Rate:

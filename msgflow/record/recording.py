@@ -52,33 +52,21 @@ _UNTIL_FIRST_NODE = 5.0
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """How a recording goes.
+    """How a recording goes."""
 
-    Attributes:
-        seconds: since it began.
-        event_bytes: bytes of all events on the disk; others are still in the buffers.
-        discarded: events for which the buffers were too small.
-        free_bytes: of the disk.
-    """
-
-    seconds: float
-    event_bytes: int
-    discarded: int
-    free_bytes: int
+    seconds: float  # since it began
+    event_bytes: int  # bytes of all events on the disk; others are still in the buffers
+    discarded: int  # events for which the buffers were too small
+    free_bytes: int  # of the disk
 
 
 @dataclass(frozen=True, slots=True)
 class Recorded:
-    """What was recorded.
-
-    Attributes:
-        directory: of the trace.
-        last: how it was at the last look.
-        exit_code: of the program that was recorded, if it ended by itself; None without one.
-    """
+    """What was recorded."""
 
     directory: Path
-    last: Status
+    last: Status  # how it was at the last look
+    # Of the program that was recorded, if it ended by itself; None without one.
     exit_code: int | None
 
 

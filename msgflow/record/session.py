@@ -36,21 +36,14 @@ _TEMPORARY = "msgflow-watch-"
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """How a session records events of programs.
+    """How a session records events of programs."""
 
-    Attributes:
-        events: names, or patterns of them, such as `ros2:*`.
-        sub_buffer_size: of each CPU, in the words of LTTng, such as `1M`.
-        sub_buffers: their number.
-        rotation_ns: length of the chunks that the recording is cut into; None: it is not.
-        without: names of events, or patterns of them, that are left out.
-    """
-
-    events: tuple[str, ...] = EVENTS
-    sub_buffer_size: str = "1M"
-    sub_buffers: int = 4
+    events: tuple[str, ...] = EVENTS  # names, or patterns of them, such as `ros2:*`
+    sub_buffer_size: str = "1M"  # of each CPU, in the words of LTTng, such as `1M`
+    sub_buffers: int = 4  # their number
+    # Length of the chunks that the recording is cut into; None: it is not.
     rotation_ns: int | None = None
-    without: tuple[str, ...] = ()
+    without: tuple[str, ...] = ()  # names of events, or patterns of them, that are left out
 
 
 @contextmanager

@@ -39,15 +39,10 @@ _FRACTION = re.compile(r"(?P<head>.*:\d\d)\.(?P<fraction>\d{1,9})(?P<tail>.*)")
 
 @dataclass(frozen=True)
 class Window:
-    """A time window.
+    """A time window."""
 
-    Attributes:
-        start_ns: its begin, epoch ns.
-        end_ns: its end, epoch ns, exclusive.
-    """
-
-    start_ns: int = MINIMUM_NS
-    end_ns: int = MAXIMUM_NS
+    start_ns: int = MINIMUM_NS  # its begin, epoch ns
+    end_ns: int = MAXIMUM_NS  # its end, epoch ns, exclusive
 
     @property
     def bindings(self) -> dict[str, int]:

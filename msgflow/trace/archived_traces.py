@@ -30,15 +30,11 @@ class Unpacked:
     """Directories in place of archives, in the temporary directory (TMPDIR).
 
     They are removed by `remove`, or when this object is dropped.
-
-    Attributes:
-        paths: the paths given, archives replaced by the directories they were unpacked to.
-        archives: each of these directories, and its archive.
     """
 
     def __init__(self, paths: Sequence[str | Path]) -> None:
         """Unpack all archives among `paths`."""
-        self.archives: dict[Path, Path] = {}
+        self.archives: dict[Path, Path] = {}  # each of these directories, and its archive
         try:
             self._root = Path(tempfile.mkdtemp(prefix=_PREFIX)).resolve()
         except OSError as error:
@@ -48,6 +44,7 @@ class Unpacked:
             ) from error
         self.remove = weakref.finalize(self, shutil.rmtree, self._root, ignore_errors=True)
         try:
+            # The paths given, archives replaced by the directories they were unpacked to.
             self.paths = [self._unpacked(Path(path)) for path in paths]
         except BaseException:
             self.remove()

@@ -34,19 +34,12 @@ _MOST_LINES = 1 << 10
 
 @dataclass(frozen=True, slots=True)
 class Samples:
-    """Samples of one file.
+    """Samples of one file."""
 
-    Attributes:
-        hostname: of the machine, as perf has it; None: not known.
-        is_monotonic: whether their times are of the clock of LTTng.
-        heads: of each sample a line with its process, thread, CPU, time and event.
-        stacks: its calls, a line each, the innermost first.
-    """
-
-    hostname: str | None
-    is_monotonic: bool
-    heads: list[str]
-    stacks: list[str]
+    hostname: str | None  # of the machine, as perf has it; None: not known
+    is_monotonic: bool  # whether their times are of the clock of LTTng
+    heads: list[str]  # of each sample a line with its process, thread, CPU, time and event
+    stacks: list[str]  # its calls, a line each, the innermost first
 
 
 def sample_files(paths: Sequence[str | Path]) -> list[Path]:

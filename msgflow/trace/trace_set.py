@@ -30,25 +30,20 @@ class TraceSet(ABC):
     """Traces opened together, read as one sequence of events in time order.
 
     A context manager; closing it ends an iteration that is under way.
-
-    Attributes:
-        traces: what each trace declares, in order of path.
-        event_counts: (trace index, event name) to the number of events read, wanted or not;
-            only events that occur. Complete after `batches` has ended.
-        duplicate_packet_count: packets skipped because another trace of the set holds them.
-        repeated_packet_counts: trace index to the packets skipped because that trace holds them
-            twice, such as those of a stream file copied beside itself.
-        damages: what is damaged and was left out or read as far as possible. Complete after
-            `batches` has ended.
-        unpacked: directories where archives were unpacked to until the set is closed, each with
-            its archive.
     """
 
-    traces: tuple[TraceInfo, ...]
+    traces: tuple[TraceInfo, ...]  # what each trace declares, in order of path
+    # (trace index, event name) to the number of events read, wanted or not; only events that occur.
+    # Complete after `batches` has ended.
     event_counts: Mapping[tuple[int, str], int]
-    duplicate_packet_count: int
+    duplicate_packet_count: int  # packets skipped because another trace of the set holds them
+    # Trace index to the packets skipped because that trace holds them twice, such as those of a
+    # stream file copied beside itself.
     repeated_packet_counts: Mapping[int, int] = MappingProxyType({})
+    # What is damaged and was left out or read as far as possible. Complete after `batches` has
+    # ended.
     damages: Sequence[Damage] = ()
+    # Directories where archives were unpacked to until the set is closed, each with its archive.
     unpacked: Mapping[Path, Path] = MappingProxyType({})
 
     @abstractmethod

@@ -57,16 +57,11 @@ class _Told:
 
     A case is news if it began after all that was judged, or is worse than all that was told. When
     the worst case has left the window, the next worst one is no news.
-
-    Attributes:
-        worst_ns: the worst case so far; 0 of requirements that have no worst case.
-        until_ns: until when all was judged.
-        culprit: what was to blame when it was told.
     """
 
-    worst_ns: int
-    until_ns: int
-    culprit: str | None
+    worst_ns: int  # the worst case so far; 0 of requirements that have no worst case
+    until_ns: int  # until when all was judged
+    culprit: str | None  # what was to blame when it was told
 
     @classmethod
     def of(cls, row: Row, until_ns: int, before: _Told | None) -> _Told:

@@ -22,21 +22,13 @@ _LEAST_CHUNKS = 3
 
 @dataclass
 class _Source:
-    """What is known of a source.
+    """What is known of a source."""
 
-    Attributes:
-        number: of its last chunk.
-        came_s: when that came [s, monotonic].
-        length_s: of that chunk.
-        live_chunks: chunks that came while we looked.
-        ahead_ns: by how much its clock is ahead of ours, at least.
-    """
-
-    number: int
-    came_s: float
-    length_s: float
-    live_chunks: int = 0
-    ahead_ns: int | None = None
+    number: int  # of its last chunk
+    came_s: float  # when that came [s, monotonic]
+    length_s: float  # of that chunk
+    live_chunks: int = 0  # chunks that came while we looked
+    ahead_ns: int | None = None  # by how much its clock is ahead of ours, at least
     has_vanished: bool = False
     is_left_out: bool = False
 

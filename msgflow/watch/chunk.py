@@ -32,16 +32,10 @@ _Found = tuple[int, datetime, datetime, Path]
 
 @dataclass(frozen=True, order=True)
 class Chunk:
-    """A chunk that is finished: LTTng renames its directory when all of it is written.
+    """A chunk that is finished: LTTng renames its directory when all of it is written."""
 
-    Attributes:
-        number: its place in the recording.
-        source: the directory whose `archives` it is in: of one session on one host.
-        path: of the chunk.
-    """
-
-    number: int
-    source: Path
+    number: int  # its place in the recording
+    source: Path  # the directory whose `archives` it is in: of one session on one host
     path: Path
 
     @property

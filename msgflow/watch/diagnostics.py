@@ -27,18 +27,12 @@ _LEVELS = {
 
 @dataclass(frozen=True)
 class Status:
-    """What is said of a target.
+    """What is said of a target."""
 
-    Attributes:
-        target: what the file calls it.
-        level: 'OK', 'WARN', 'ERROR' or 'STALE'.
-        message: what is required and measured; of what fails also the path, and what is to blame.
-        values: 'p50', 'p99' and 'lost' (flows lost or dropped) where it is about flows; and 'lag'.
-    """
-
-    target: str
-    level: str
-    message: str
+    target: str  # what the file calls it
+    level: str  # 'OK', 'WARN', 'ERROR' or 'STALE'
+    message: str  # what is required and measured; of what fails also the path, and what is to blame
+    # 'p50', 'p99' and 'lost' (flows lost or dropped) where it is about flows; and 'lag'.
     values: dict[str, str]
 
 

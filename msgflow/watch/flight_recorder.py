@@ -32,9 +32,6 @@ class FlightRecorder:
 
     A violation that goes on is kept once per window. Its database is written beside the view, which
     goes on meanwhile.
-
-    Attributes:
-        earlier_ns: how much of what came before the window of a violation is kept, too.
     """
 
     def __init__(
@@ -60,6 +57,7 @@ class FlightRecorder:
         self._directory = directory
         self._most = most
         self._window_ns = window_ns
+        # How much of what came before the window of a violation is kept, too.
         self.earlier_ns = earlier_ns
         self._clock_sync = clock_sync
         self._note = note

@@ -25,10 +25,6 @@ class History:
     Windows end at multiples of a step. A window is closed once the newest time of all chunks passes
     its end by as much as something may be late: a chunk of another host, or the last message of a
     flow. As much of the time before a window is kept, for flows that began there.
-
-    Attributes:
-        closed_ns: the end of the last window that is closed; before the first one, where that
-            begins.
     """
 
     def __init__(self, window_ns: int, step_ns: int, late_ns: int) -> None:
@@ -39,7 +35,9 @@ class History:
         self._lasting: dict[Path, KeptChunk] = {}
         self._chunks: list[KeptChunk] = []
         self._ends: dict[Path, int] = {}
-        self._begin_ns = self.closed_ns = 0
+        self._begin_ns = 0
+        # The end of the last window that is closed; before the first one, where that begins.
+        self.closed_ns = 0
         self._has_closed = False
         # Events that have come since the last window.
         self._further = 0

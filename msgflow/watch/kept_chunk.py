@@ -29,31 +29,20 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class KeptChunk:
-    """The content of a chunk.
+    """The content of a chunk."""
 
-    Attributes:
-        source: of which recording it is a part.
-        path: its directory, which need not exist any more.
-        traces: what its traces declare.
-        events: by name, in order of `event_id`, which counts those that are kept from 0.
-        times_ns: of all events that are kept, by `event_id`.
-        packets: all packets.
-        event_counts: (trace index, event name) -> events read, kept or not.
-        damages: what is damaged.
-        begin_ns: when its first packet began.
-        end_ns: when its last packet ended.
-    """
-
-    source: Path
-    path: Path
-    traces: tuple[TraceInfo, ...]
+    source: Path  # of which recording it is a part
+    path: Path  # its directory, which need not exist any more
+    traces: tuple[TraceInfo, ...]  # what its traces declare
+    # By name, in order of `event_id`, which counts those that are kept from 0.
     events: Mapping[str, pa.RecordBatch]
-    times_ns: NDArray[np.int64]
+    times_ns: NDArray[np.int64]  # of all events that are kept, by `event_id`
     packets: tuple[pa.RecordBatch, ...]
+    # (trace index, event name) -> events read, kept or not.
     event_counts: Mapping[tuple[int, str], int]
     damages: tuple[Damage, ...]
-    begin_ns: int
-    end_ns: int
+    begin_ns: int  # when its first packet began
+    end_ns: int  # when its last packet ended
 
     @property
     def last_event_ns(self) -> int:

@@ -38,12 +38,7 @@ _LEAST_STEP_NS = 500_000_000
 
 
 class Watcher:
-    """What is known of a recording so far, and the windows over it.
-
-    Attributes:
-        history: the last chunks.
-        on_passed: gets the directory of each chunk that no window needs any more.
-    """
+    """What is known of a recording so far, and the windows over it."""
 
     def __init__(
         self,
@@ -85,6 +80,7 @@ class Watcher:
         self._exporter = exporter
         self._database = database
         self._has_node = has_node
+        # Gets the directory of each chunk that no window needs any more.
         self.on_passed: Callable[[Path], None] | None = None
         self._said: set[str] = set()
         # Since the last report.

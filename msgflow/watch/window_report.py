@@ -45,30 +45,19 @@ WHERE kind = 'loss' AND start_ns >= $start_ns AND start_ns < $end_ns
 
 @dataclass(frozen=True)
 class WindowReport:
-    """What happened in a window.
+    """What happened in a window."""
 
-    Attributes:
-        window: from when to when.
-        lag_s: how old its last event is [s]; None of a recording that is finished.
-        paths: rows of `e2e-latency`.
-        executors: rows of `executor-usage`, the busiest first.
-        losses: rows of `topics --measure delivery` with messages that were dropped or lost.
-        discarded_events: events that the tracer lost.
-        topics: rows of `topics --measure summary`.
-        late_events: events that have come since the last window, but belong to closed ones.
-        violations: what is not as the targets demand.
-        judged: rows of `verify`, as `Alarm.judge` returns them.
-    """
-
-    window: Window
-    paths: Sequence[Row]
-    executors: Sequence[Row]
+    window: Window  # from when to when
+    paths: Sequence[Row]  # rows of `e2e-latency`
+    executors: Sequence[Row]  # rows of `executor-usage`, the busiest first
+    # Rows of `topics --measure delivery` with messages that were dropped or lost.
     losses: Sequence[Row]
-    discarded_events: int
-    topics: Sequence[Row] = field(default=())
-    late_events: int = 0
-    violations: Sequence[Row] = field(default=())
-    judged: Sequence[Row] = field(default=())
+    discarded_events: int  # events that the tracer lost
+    topics: Sequence[Row] = field(default=())  # rows of `topics --measure summary`
+    late_events: int = 0  # events that have come since the last window, but belong to closed ones
+    violations: Sequence[Row] = field(default=())  # what is not as the targets demand
+    judged: Sequence[Row] = field(default=())  # rows of `verify`, as `Alarm.judge` returns them
+    # How old its last event is [s]; None of a recording that is finished.
     lag_s: float | None = None
 
     @property

@@ -35,11 +35,7 @@ _AHEAD = 1
 
 
 class Iteration:
-    """Reads packets once.
-
-    Attributes:
-        event_count: events read so far.
-    """
+    """Reads packets once."""
 
     def __init__(
         self,
@@ -62,7 +58,7 @@ class Iteration:
             (known.event.name, declared_schema(known.event.payload)) for _, known in self._classes
         )
         self._plans = self._planned(complete_schemas(wanted, declared))
-        self.event_count = 0
+        self.event_count = 0  # events read so far
 
     def event_counts(self) -> dict[tuple[int, str], int]:
         """Return (trace index, event name) to the number of events read so far."""

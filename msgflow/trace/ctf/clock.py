@@ -24,19 +24,11 @@ _HIGHEST_FAST_FREQUENCY = 9 * GIGA
 
 @dataclass(frozen=True)
 class Clock:
-    """A clock of the metadata.
+    """A clock of the metadata."""
 
-    Attributes:
-        frequency: in hertz.
-        offset_seconds: from the epoch to its origin, whole seconds.
-        offset_cycles: the rest of that offset, in cycles; may well be more than a second.
-        name: its name, or None.
-        uuid: its uuid, or None.
-    """
-
-    frequency: int = GIGA
-    offset_seconds: int = 0
-    offset_cycles: int = 0
+    frequency: int = GIGA  # in hertz
+    offset_seconds: int = 0  # from the epoch to its origin, whole seconds
+    offset_cycles: int = 0  # the rest of that offset, in cycles; may well be more than a second
     name: str | None = None
     uuid: str | None = None
 

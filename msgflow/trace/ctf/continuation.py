@@ -13,12 +13,8 @@ if TYPE_CHECKING:
 
 @dataclass
 class Continuation:
-    """What was read so far of recordings whose parts are opened one after the other, each once.
+    """What was read so far of recordings whose parts are opened one after the other, each once."""
 
-    Attributes:
-        clock_offsets: how far the clocks are from the epoch, see `on_one_base`.
-        losses: the counters in their packets.
-    """
-
+    # How far the clocks are from the epoch, see `on_one_base`.
     clock_offsets: dict[ClockName, int] = field(default_factory=dict)
-    losses: LossCounter = field(default_factory=LossCounter)
+    losses: LossCounter = field(default_factory=LossCounter)  # the counters in their packets

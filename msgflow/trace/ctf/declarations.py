@@ -35,11 +35,7 @@ class EventClass:
 
 @dataclass(eq=False)
 class StreamClass:
-    """One kind of stream (LTTng: channel) and its events.
-
-    Attributes:
-        has_time: its events have times; if not, `clock` only counts packets.
-    """
+    """One kind of stream (LTTng: channel) and its events."""
 
     id: int
     packet_context: Structure = field(default_factory=Structure)
@@ -47,21 +43,18 @@ class StreamClass:
     event_context: Structure = field(default_factory=Structure)
     clock: Clock | None = None
     events: dict[int, EventClass] = field(default_factory=dict)
-    has_time: bool = True
+    has_time: bool = True  # its events have times; if not, `clock` only counts packets
 
 
 @dataclass(eq=False)
 class TraceClass:
-    """All of a trace's metadata.
-
-    Attributes:
-        notes: messages about declarations left out because they make no sense.
-    """
+    """All of a trace's metadata."""
 
     uuid: str | None = None
     environment: dict[str, int | str] = field(default_factory=dict)
     packet_header: Structure = field(default_factory=Structure)
     streams: dict[int, StreamClass] = field(default_factory=dict)
+    # Messages about declarations left out because they make no sense.
     notes: list[str] = field(default_factory=list)
 
     def add_event(self, stream: StreamClass, event: EventClass) -> None:

@@ -44,34 +44,20 @@ class Kind(Enum):
 
 @dataclass(frozen=True)
 class PlainField:
-    """A field that lies on whole bytes, whether or not its type is aligned to them.
+    """A field that lies on whole bytes, whether or not its type is aligned to them."""
 
-    Attributes:
-        scope: the structure that it is in.
-        name: its name there.
-        kind: what it is.
-        align: in bytes.
-        dtype: of the number or element, as numpy calls it.
-        width: bytes of the number or element.
-        count: of the elements of an array, otherwise 1.
-        length_at: for a sequence, the place in the list of the field with its length.
-        is_length: it is the length of a sequence, or chooses the option of the variant.
-        type: as declared.
-        size: in bytes, None if it varies.
-    """
-
-    scope: Scope
+    scope: Scope  # the structure that it is in
     name: str
-    kind: Kind
-    align: int
-    dtype: str = "u1"
-    width: int = 1
-    count: int = 1
-    length_at: int = -1
-    is_length: bool = False
-    type: Type | None = None
+    kind: Kind  # what it is
+    align: int  # in bytes
+    dtype: str = "u1"  # of the number or element, as numpy calls it
+    width: int = 1  # bytes of the number or element
+    count: int = 1  # of the elements of an array, otherwise 1
+    length_at: int = -1  # for a sequence, the place in the list of the field with its length
+    is_length: bool = False  # it is the length of a sequence, or chooses the option of the variant
+    type: Type | None = None  # as declared
 
-    size: int | None = dataclass_field(init=False)
+    size: int | None = dataclass_field(init=False)  # in bytes, None if it varies
 
     def __post_init__(self) -> None:
         varies = self.kind in {Kind.STRING, Kind.SEQUENCE, Kind.TEXT_SEQUENCE}
@@ -81,23 +67,17 @@ class PlainField:
 
 @dataclass(frozen=True)
 class EventBody:
-    """How to read the contexts and payload of one event class.
+    """How to read the contexts and payload of one event class."""
 
-    Attributes:
-        fields: its fields in order; None if they must be read field by field.
-        sizes: of the body in bytes, by residue of its position; None if the size varies.
-        offsets: of each field in bytes, by residue; None if `sizes` is None.
-        variant: the variant behind the fields; None without one.
-        variant_name: its name in the payload.
-        selector: place in the list of the field that chooses its option.
-    """
-
+    # Its fields in order; None if they must be read field by field.
     fields: tuple[PlainField, ...] | None
+    # Of the body in bytes, by residue of its position; None if the size varies.
     sizes: tuple[int, ...] | None
+    # Of each field in bytes, by residue; None if `sizes` is None.
     offsets: tuple[tuple[int, ...], ...] | None
-    variant: VariantLayout | None = None
-    variant_name: str = ""
-    selector: int = -1
+    variant: VariantLayout | None = None  # the variant behind the fields; None without one
+    variant_name: str = ""  # its name in the payload
+    selector: int = -1  # place in the list of the field that chooses its option
 
     @cached_property
     def _orders(self) -> tuple[Literal["big", "little"], ...]:

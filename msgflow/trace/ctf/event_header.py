@@ -28,21 +28,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Place:
-    """Where an integer lies.
+    """Where an integer lies."""
 
-    Attributes:
-        offsets: bytes from the begin of the header, by residue of the header's own position.
-        width: bytes to read there: 1, 2, 4 or 8.
-        big_endian: their order.
-        shift: bits below the integer in what was read.
-        bits: of the integer.
-    """
-
+    # Bytes from the begin of the header, by residue of the header's own position.
     offsets: tuple[int, ...]
-    width: int
-    big_endian: bool
-    shift: int
-    bits: int
+    width: int  # bytes to read there: 1, 2, 4 or 8
+    big_endian: bool  # their order
+    shift: int  # bits below the integer in what was read
+    bits: int  # of the integer
 
     @property
     def mask(self) -> int:
@@ -64,19 +57,12 @@ class Place:
 
 @dataclass(frozen=True)
 class Form:
-    """One form of the header.
+    """One form of the header."""
 
-    Attributes:
-        choice: for which selector values; None: always.
-        id: where the event's class is; None if there is only one.
-        time: where the time stamp is; None without one.
-        sizes: of the header in bytes, by residue.
-    """
-
-    choice: Choice | None
-    id: Place | None
-    time: Place | None
-    sizes: tuple[int, ...]
+    choice: Choice | None  # for which selector values; None: always
+    id: Place | None  # where the event's class is; None if there is only one
+    time: Place | None  # where the time stamp is; None without one
+    sizes: tuple[int, ...]  # of the header in bytes, by residue
 
     def holds(self, selector: int) -> bool:
         """Tell whether a header with this selector has this form."""
@@ -85,18 +71,12 @@ class Form:
 
 @dataclass(frozen=True)
 class EventHeader:
-    """How to read a stream's event headers.
+    """How to read a stream's event headers."""
 
-    Attributes:
-        align: of the header, in bytes.
-        selector: the number that tells the form, and the id unless the form has its own.
-        forms: all forms.
-        narrow_bits: size of the time stamps that are not whole clock values, None if all are.
-    """
-
-    align: int
-    selector: Place
+    align: int  # of the header, in bytes
+    selector: Place  # the number that tells the form, and the id unless the form has its own
     forms: tuple[Form, ...]
+    # Size of the time stamps that are not whole clock values, None if all are.
     narrow_bits: int | None
 
     @property

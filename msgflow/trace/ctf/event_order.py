@@ -29,56 +29,35 @@ MOST_EVENTS = 1 << 18
 
 @dataclass(frozen=True)
 class Batch:
-    """Events that follow those of the batch before in the total order, and their packets.
-
-    Attributes:
-        memory: where the packets lie.
-        entries: the packets in memory, in the order of their rows.
-        bases: where they lie in memory; `Entry.base` may already belong to a later batch.
-        packets: summaries of the packets that were in no batch before.
-        in_packet: which of `entries` each event is in.
-        classes: numbers of the event classes.
-        ts_ns: times.
-        bodies: where contexts and payload begin.
-        positions: where headers begin.
-        cpus: the CPU of each packet.
-        has_cpu: which packets have one; None if all have.
-    """
+    """Events that follow those of the batch before in the total order, and their packets."""
 
     memory: Memory
-    entries: list[Entry]
-    bases: list[int]
-    packets: list[PacketEvents]
-    in_packet: NDArray[np.int32]
-    classes: NDArray[np.uint32]
+    entries: list[Entry]  # the packets in memory, in the order of their rows
+    bases: list[int]  # where they lie in memory; `Entry.base` may already belong to a later batch
+    packets: list[PacketEvents]  # summaries of the packets that were in no batch before
+    in_packet: NDArray[np.int32]  # which of `entries` each event is in
+    classes: NDArray[np.uint32]  # numbers of the event classes
     ts_ns: NDArray[np.int64]
-    bodies: NDArray[np.int64]
-    positions: NDArray[np.int64]
-    cpus: NDArray[np.int32]
-    has_cpu: NDArray[np.bool_] | None
+    bodies: NDArray[np.int64]  # where contexts and payload begin
+    positions: NDArray[np.int64]  # where headers begin
+    cpus: NDArray[np.int32]  # the CPU of each packet
+    has_cpu: NDArray[np.bool_] | None  # which packets have one; None if all have
 
 
 @dataclass(frozen=True)
 class _Loaded:
-    """All that is in memory.
-
-    Attributes:
-        new: which of the packets were not there before.
-        counts: rows of each packet.
-        clock: values of the clock.
-        rank_ns: times to order the events by: none is before `Entry.order_ns`, where
-            batches are cut. The order would differ with their size.
-        rest: as in `Batch`, with a row per event in memory.
-    """
+    """All that is in memory; what has no comment is as in `Batch`, a row per event."""
 
     memory: Memory
     entries: list[Entry]
-    new: list[bool]
-    counts: NDArray[np.int64]
+    new: list[bool]  # which of the packets were not there before
+    counts: NDArray[np.int64]  # rows of each packet
     in_packet: NDArray[np.int32]
     classes: NDArray[np.uint32]
-    clock: NDArray[np.uint64]
+    clock: NDArray[np.uint64]  # values of the clock
     ts_ns: NDArray[np.int64]
+    # Times to order the events by: none is before `Entry.order_ns`, where batches are cut. The
+    # order would differ with their size.
     rank_ns: NDArray[np.int64]
     bodies: NDArray[np.int64]
     positions: NDArray[np.int64]

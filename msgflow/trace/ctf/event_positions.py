@@ -44,30 +44,21 @@ _NOWHERE = -1
 
 @dataclass
 class Found:
-    """The events of a packet, up to its damage if it has any.
+    """The events of a packet, up to its damage if it has any."""
 
-    Attributes:
-        positions: bytes of memory at which event headers begin, ascending.
-        problem: the byte of memory that cannot be read, and why; None if all is well.
-    """
-
-    positions: NDArray[np.int64]
+    positions: NDArray[np.int64]  # bytes of memory at which event headers begin, ascending
+    # The byte of memory that cannot be read, and why; None if all is well.
     problem: tuple[int, str] | None = None
 
 
 @dataclass(frozen=True)
 class Lanes:
-    """Stretches of packets, in the order of memory, without gaps.
+    """Stretches of packets, in the order of memory, without gaps."""
 
-    Attributes:
-        spans: which packet each belongs to.
-        begins: where it begins, in bytes of memory; a guess unless the packet begins there.
-        ends: where the next one begins, or the packet ends.
-    """
-
-    spans: NDArray[np.int64]
+    spans: NDArray[np.int64]  # which packet each belongs to
+    # Where it begins, in bytes of memory; a guess unless the packet begins there.
     begins: NDArray[np.int64]
-    ends: NDArray[np.int64]
+    ends: NDArray[np.int64]  # where the next one begins, or the packet ends
 
 
 def find_positions(layout: StreamLayout, memory: Memory, spans: Sequence[Span]) -> list[Found]:

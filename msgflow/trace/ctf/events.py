@@ -29,21 +29,14 @@ _SLACK_SECONDS = 86_400
 
 @dataclass(frozen=True)
 class Events:
-    """Events of some packets, packet after packet.
+    """Events of some packets, packet after packet."""
 
-    Attributes:
-        counts: how many each packet has.
-        classes: numbers of their classes.
-        clock: values of the clock.
-        bodies: where contexts and payload begin: bytes of memory.
-        positions: where headers begin: bytes of memory, or bits of the packet in streams whose
-            headers are read field by field.
-    """
-
-    counts: NDArray[np.int64]
-    classes: NDArray[np.uint32]
-    clock: NDArray[np.uint64]
-    bodies: NDArray[np.int64]
+    counts: NDArray[np.int64]  # how many each packet has
+    classes: NDArray[np.uint32]  # numbers of their classes
+    clock: NDArray[np.uint64]  # values of the clock
+    bodies: NDArray[np.int64]  # where contexts and payload begin: bytes of memory
+    # Where headers begin: bytes of memory, or bits of the packet in streams whose headers are read
+    # field by field.
     positions: NDArray[np.int64]
 
 

@@ -37,19 +37,13 @@ _USUAL_TEXT = 64
 
 
 class FieldReader:
-    """Reads the fields of one packet.
-
-    Attributes:
-        position: of the next field, in bits from the begin of the packet.
-        found: role to the value found last, for fields that have a role.
-        time_bits: size of the clock value found last.
-    """
+    """Reads the fields of one packet."""
 
     def __init__(self, data: bytes | memoryview, end: int) -> None:
         """Read from `data`, which begins with the packet, up to the bit `end`."""
-        self.position = 0
-        self.found: dict[str, Any] = {}
-        self.time_bits = 64
+        self.position = 0  # of the next field, in bits from the begin of the packet
+        self.found: dict[str, Any] = {}  # role to the value found last, for fields that have a role
+        self.time_bits = 64  # size of the clock value found last
         self._data = data
         self._end = min(end, len(data) * BYTE)
         self._scopes: dict[Scope, dict[str, Any]] = {}

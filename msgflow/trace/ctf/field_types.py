@@ -46,39 +46,28 @@ class Scope(IntEnum):
 
 @dataclass(frozen=True)
 class Reference:
-    """Path to the field with a length or a selector.
+    """Path to the field with a length or a selector."""
 
-    Attributes:
-        scope: structure at which the path starts; None: the innermost structure around that
-            has a member of the path's first name.
-        path: names of members; None is the structure around the current one.
-    """
-
+    # Structure at which the path starts; None: the innermost structure around that has a member of
+    # the path's first name.
     scope: Scope | None
-    path: tuple[str | None, ...]
+    path: tuple[str | None, ...]  # names of members; None is the structure around the current one
 
 
 @dataclass(frozen=True)
 class Integer:
-    """An integer, enumeration, boolean or bit array of at most 64 bits.
-
-    Attributes:
-        labels: of an enumeration, label to ranges of values (both ends belong to it).
-        is_text: an array of these is text.
-        roles: what the value is for.
-        arrow: 'integer', 'bool' or 'bits': kind of the Arrow type.
-        base: number base for showing it: 10 or 16.
-    """
+    """An integer, enumeration, boolean or bit array of at most 64 bits."""
 
     size: int
     align: int
     big_endian: bool
     signed: bool = False
+    # Of an enumeration, label to ranges of values (both ends belong to it).
     labels: Mapping[str, tuple[tuple[int, int], ...]] | None = None
-    is_text: bool = False
-    roles: frozenset[str] = frozenset()
-    arrow: str = "integer"
-    base: int = 10
+    is_text: bool = False  # an array of these is text
+    roles: frozenset[str] = frozenset()  # what the value is for
+    arrow: str = "integer"  # 'integer', 'bool' or 'bits': kind of the Arrow type
+    base: int = 10  # number base for showing it: 10 or 16
 
 
 @dataclass(frozen=True)

@@ -22,17 +22,11 @@ class DynamicError(Exception):
 
 @dataclass(frozen=True)
 class Leaf:
-    """A number, or an array of numbers that follow each other without gaps.
+    """A number, or an array of numbers that follow each other without gaps."""
 
-    Attributes:
-        path: names of the members from the outermost to this one.
-        type: its type.
-        position: in bits.
-    """
-
-    path: tuple[str, ...]
+    path: tuple[str, ...]  # names of the members from the outermost to this one
     type: Integer | Real | Array
-    position: int
+    position: int  # in bits
 
 
 def lay_out(

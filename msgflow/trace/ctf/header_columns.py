@@ -17,17 +17,11 @@ if TYPE_CHECKING:
 
 @dataclass
 class Headers:
-    """Event headers, in the order of their positions.
+    """Event headers, in the order of their positions."""
 
-    Attributes:
-        classes: number of the event class.
-        clock: value of the clock.
-        bodies: where contexts and payload begin: bytes of memory.
-    """
-
-    classes: NDArray[np.uint32]
-    clock: NDArray[np.uint64]
-    bodies: NDArray[np.int64]
+    classes: NDArray[np.uint32]  # number of the event class
+    clock: NDArray[np.uint64]  # value of the clock
+    bodies: NDArray[np.int64]  # where contexts and payload begin: bytes of memory
 
 
 def read_headers(

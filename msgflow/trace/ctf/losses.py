@@ -18,17 +18,11 @@ _MOST_LOST = 1 << 48
 
 @dataclass(frozen=True)
 class Losses:
-    """What was lost.
+    """What was lost."""
 
-    Attributes:
-        events: in the packet; None: unknown.
-        packets: right before it.
-        problem: message about a counter that makes no sense, None if all is well.
-    """
-
-    events: int | None
-    packets: int
-    problem: str | None
+    events: int | None  # in the packet; None: unknown
+    packets: int  # right before it
+    problem: str | None  # message about a counter that makes no sense, None if all is well
 
 
 class LossCounter:

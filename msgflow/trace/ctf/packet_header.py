@@ -50,43 +50,24 @@ _KNOWN_ROLES = {
 
 @dataclass(frozen=True, slots=True)
 class PacketHeader:
-    """Header and context of a packet; None for what they do not have.
-
-    Attributes:
-        stream: its stream class.
-        instance: which stream of the class (the buffer).
-        size_bits: of the packet.
-        content_bits: of the part of it that is used, header and context included.
-        events_at: the bit at which its events begin.
-        begin: clock value at its begin.
-        end: clock value at its end.
-        sequence: its number in the stream.
-        discarded: events lost in the stream so far.
-        discarded_bits: size of that counter.
-        cpu: the CPU it was written on.
-        foreign: uuid of the packet's trace, if it differs from the uuid of the metadata.
-    """
+    """Header and context of a packet; None for what they do not have."""
 
     stream: StreamClass
-    instance: int | None
-    size_bits: int | None
-    content_bits: int | None
-    events_at: int
-    begin: int | None
-    end: int | None
-    sequence: int | None
-    discarded: int | None
-    discarded_bits: int
-    cpu: int | None
-    foreign: str | None
+    instance: int | None  # which stream of the class (the buffer)
+    size_bits: int | None  # of the packet
+    content_bits: int | None  # of the part of it that is used, header and context included
+    events_at: int  # the bit at which its events begin
+    begin: int | None  # clock value at its begin
+    end: int | None  # clock value at its end
+    sequence: int | None  # its number in the stream
+    discarded: int | None  # events lost in the stream so far
+    discarded_bits: int  # size of that counter
+    cpu: int | None  # the CPU it was written on
+    foreign: str | None  # uuid of the packet's trace, if it differs from the uuid of the metadata
 
 
 class HeaderReader:
-    """Reads the packet headers of one trace.
-
-    Attributes:
-        size: number of bytes that hold any header, unless its size varies.
-    """
+    """Reads the packet headers of one trace."""
 
     def __init__(self, trace: TraceClass) -> None:
         """Compile the headers that a trace declares."""
@@ -96,6 +77,7 @@ class HeaderReader:
         self._start = _plan(trace.packet_header, 0)
         contexts = [self._plan_of(stream) for stream in trace.streams.values()]
         ends = [_LONGEST_HEADER if plan is None else plan.end // BYTE + 1 for plan in contexts]
+        # Number of bytes that hold any header, unless its size varies.
         self.size = max(ends, default=_LONGEST_HEADER)
         if self.size > _LONGEST_HEADER:
             raise MetadataError(f"the headers of packets have {self.size:,} bytes")
@@ -197,18 +179,12 @@ class _Place:
 
 
 class _Plan:
-    """Places of the values of a structure of fixed layout.
-
-    Attributes:
-        places: role (or name) to place.
-        end: the bit at which the structure ends.
-        discarded_bits: size of the counter of lost events.
-    """
+    """Places of the values of a structure of fixed layout."""
 
     def __init__(self, places: dict[str, _Place], end: int, discarded_bits: int) -> None:
-        self.places = places
-        self.end = end
-        self.discarded_bits = discarded_bits
+        self.places = places  # role (or name) to place
+        self.end = end  # the bit at which the structure ends
+        self.discarded_bits = discarded_bits  # size of the counter of lost events
 
     def read(self, data: bytes) -> dict[str, Any]:
         return {name: place.read(data) for name, place in self.places.items()}

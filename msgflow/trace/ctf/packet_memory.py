@@ -26,16 +26,11 @@ _ONES = b"\xff" * GAP
 
 
 class Memory:
-    """Bytes that Python and numpy share.
-
-    Attributes:
-        data: for Python.
-        bytes: for numpy.
-    """
+    """Bytes that Python and numpy share."""
 
     def __init__(self, data: bytearray) -> None:
-        self.data = data
-        self.bytes: NDArray[np.uint8] = np.frombuffer(self.data, np.uint8)
+        self.data = data  # for Python
+        self.bytes: NDArray[np.uint8] = np.frombuffer(self.data, np.uint8)  # for numpy
         self._views: dict[str, NDArray[Any]] = {}
 
     def view(self, dtype: str) -> NDArray[Any]:
@@ -59,13 +54,10 @@ class Loader:
 
     Packets that the next batch needs, too, are copied to its memory. Buffers of memories that are
     no longer in use are used again.
-
-    Attributes:
-        memory: where the packets of the current batch are.
     """
 
     def __init__(self) -> None:
-        self.memory = Memory(bytearray(PADDING))
+        self.memory = Memory(bytearray(PADDING))  # where the packets of the current batch are
         self._rooms: list[tuple[bytearray, weakref.ref[Memory]]] = []
         self._files: dict[Path, int] = {}
 

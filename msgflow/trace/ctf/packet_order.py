@@ -22,37 +22,25 @@ if TYPE_CHECKING:
 
 @dataclass(slots=True, eq=False)
 class Entry:
-    """A packet that is to be read.
-
-    Attributes:
-        stream: its stream.
-        packet: where it lies in its file.
-        position: its place in the stream, copies not counted.
-        begin: value of the clock at its begin.
-        order_ns: time of the first event at the earliest. Events that are earlier,
-            in a damaged packet, are put there.
-        discarded: events lost in it.
-        lost: packets lost right before it.
-        base: where it lies in memory, in bytes.
-        events: begins of its events relative to `base`, without those that are done; None until
-            they are found.
-        clock_before: value of the clock at the event before these, or at the begin.
-        skipped: of a piece of a packet, bytes in front of it, which are read before.
-        until: where the piece ends; None: what is read is the whole packet.
-    """
+    """A packet that is to be read."""
 
     stream: Stream
-    packet: Packet
-    position: int
-    begin: int
+    packet: Packet  # where it lies in its file
+    position: int  # its place in the stream, copies not counted
+    begin: int  # value of the clock at its begin
+    # Time of the first event at the earliest. Events that are earlier, in a damaged packet, are put
+    # there.
     order_ns: int
-    discarded: int | None
-    lost: int
-    base: int = -1
+    discarded: int | None  # events lost in it
+    lost: int  # packets lost right before it
+    base: int = -1  # where it lies in memory, in bytes
+    # Begins of its events relative to `base`, without those that are done; None until they are
+    # found.
     events: NDArray[np.int64] | None = field(default=None)
+    # Value of the clock at the event before these, or at the begin.
     clock_before: int = field(init=False)
-    skipped: int = 0
-    until: int | None = None
+    skipped: int = 0  # of a piece of a packet, bytes in front of it, which are read before
+    until: int | None = None  # where the piece ends; None: what is read is the whole packet
 
     def __post_init__(self) -> None:
         self.clock_before = self.begin
@@ -71,37 +59,23 @@ class Entry:
 
 @dataclass(frozen=True)
 class PacketEvents:
-    """Summary of the events of a packet.
-
-    Attributes:
-        entry: the packet.
-        count: of its events.
-        first: value of the clock at the first event; None without events.
-        last: value at the last event.
-        last_ns: time of the last.
-        falls_back: time runs backward in it.
-    """
+    """Summary of the events of a packet."""
 
     entry: Entry
-    count: int
-    first: int | None
-    last: int | None
-    last_ns: int | None
-    falls_back: bool
+    count: int  # of its events
+    first: int | None  # value of the clock at the first event; None without events
+    last: int | None  # value at the last event
+    last_ns: int | None  # time of the last
+    falls_back: bool  # time runs backward in it
 
 
 @dataclass(frozen=True)
 class Entries:
-    """Packets to read, and how many were left out.
+    """Packets to read, and how many were left out."""
 
-    Attributes:
-        packets: in order of time.
-        copies: number of packets left out because another trace holds them, too.
-        repeated: trace index to number of packets left out because the trace holds them twice.
-    """
-
-    packets: list[Entry]
-    copies: int
+    packets: list[Entry]  # in order of time
+    copies: int  # number of packets left out because another trace holds them, too
+    # Trace index to number of packets left out because the trace holds them twice.
     repeated: Mapping[int, int]
 
 
@@ -174,17 +148,11 @@ _CHUNK = 1 << 20
 
 
 class Repetition(Enum):
-    """What a packet is to an earlier one of its trace.
+    """What a packet is to an earlier one of its trace."""
 
-    Attributes:
-        NONE: there is none like it.
-        SAME: it is the same once more.
-        OTHER: another one with the same identity; one of them is damaged.
-    """
-
-    NONE = auto()
-    SAME = auto()
-    OTHER = auto()
+    NONE = auto()  # there is none like it
+    SAME = auto()  # it is the same once more
+    OTHER = auto()  # another one with the same identity; one of them is damaged
 
 
 class Repetitions:

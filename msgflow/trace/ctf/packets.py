@@ -30,25 +30,15 @@ _CUT = "the file ends within this packet, it was cut off or is still being writt
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Packet:
-    """A packet whose header makes sense.
-
-    Attributes:
-        path: its file.
-        number: its place in the file.
-        offset: its place in the file, in bytes.
-        size: in bytes, from `offset`.
-        content_bits: how much of that is used.
-        header: what it says of itself.
-        is_cut: the file ends before the packet does.
-    """
+    """A packet whose header makes sense."""
 
     path: Path
-    number: int
-    offset: int
-    size: int
-    content_bits: int
-    header: PacketHeader
-    is_cut: bool = False
+    number: int  # its place in the file
+    offset: int  # its place in the file, in bytes
+    size: int  # in bytes, from `offset`
+    content_bits: int  # how much of that is used
+    header: PacketHeader  # what it says of itself
+    is_cut: bool = False  # the file ends before the packet does
 
 
 def packets_of(

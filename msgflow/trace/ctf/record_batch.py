@@ -38,39 +38,24 @@ _WITHOUT_CONTEXT = {"vpid": -1, "vtid": -1}
 
 @dataclass(frozen=True)
 class Source:
-    """The field that fills a column.
+    """The field that fills a column."""
 
-    Attributes:
-        scope: the structure that it is in.
-        name: its name there.
-        type: as declared.
-        number: its place among the plain fields of the event, None if it is not plain.
-    """
-
-    scope: Scope
-    name: str
+    scope: Scope  # the structure that it is in
+    name: str  # its name there
     type: Type
-    number: int | None
+    number: int | None  # its place among the plain fields of the event, None if it is not plain
 
 
 @dataclass(frozen=True)
 class ClassPlan:
-    """How batches of one event class are made.
-
-    Attributes:
-        layout: the event class.
-        stream: its stream class.
-        schema: of the batches, the common columns first.
-        contexts: common column to field, where there is one.
-        payload: payload column to field, where there is one.
-        inner: payload column to the names of the fields inside others that fill it.
-    """
+    """How batches of one event class are made."""
 
     layout: ClassLayout
     stream: StreamLayout
-    schema: pa.Schema
-    contexts: Mapping[str, Source]
-    payload: Mapping[str, Source]
+    schema: pa.Schema  # of the batches, the common columns first
+    contexts: Mapping[str, Source]  # common column to field, where there is one
+    payload: Mapping[str, Source]  # payload column to field, where there is one
+    # Payload column to the names of the fields inside others that fill it.
     inner: Mapping[str, tuple[tuple[str, ...], ...]]
 
     @property
@@ -107,26 +92,17 @@ def make_plan(stream: StreamLayout, layout: ClassLayout, wanted: pa.Schema) -> C
 
 @dataclass(frozen=True)
 class EventRows:
-    """Events of one class, in order of `event_id`.
-
-    Attributes:
-        event_ids: their numbers.
-        ts_ns: their times.
-        cpus: the CPU of each.
-        has_cpu: which have one; None if all have.
-        bodies: where contexts and payload begin: bytes of memory.
-        positions: where headers begin: bytes of memory, or bits of the packet in streams whose
-            headers are read field by field.
-        packets: which packet of the batch each is in.
-    """
+    """Events of one class, in order of `event_id`."""
 
     event_ids: NDArray[np.int64]
     ts_ns: NDArray[np.int64]
     cpus: NDArray[np.int32]
-    has_cpu: NDArray[np.bool_] | None
-    bodies: NDArray[np.int64]
+    has_cpu: NDArray[np.bool_] | None  # which have one; None if all have
+    bodies: NDArray[np.int64]  # where contexts and payload begin: bytes of memory
+    # Where headers begin: bytes of memory, or bits of the packet in streams whose headers are read
+    # field by field.
     positions: NDArray[np.int64]
-    packets: NDArray[np.int32]
+    packets: NDArray[np.int32]  # which packet of the batch each is in
 
 
 def build_batch(

@@ -27,44 +27,25 @@ _LONGEST_TABLE = 1 << 16
 
 @dataclass(frozen=True)
 class Span:
-    """Where the events of a packet lie in memory, in bytes.
+    """Where the events of a packet lie in memory, in bytes."""
 
-    Attributes:
-        base: the begin of the packet.
-        begin: where the first event begins.
-        end: where the next header would begin after the last event.
-        limit: the end of the content, not after `end`.
-    """
-
-    base: int
-    begin: int
-    end: int
-    limit: int
+    base: int  # the begin of the packet
+    begin: int  # where the first event begins
+    end: int  # where the next header would begin after the last event
+    limit: int  # the end of the content, not after `end`
 
 
 @dataclass(frozen=True, eq=False)
 class ClassLayout:
-    """An event class and how to read it.
+    """An event class and how to read it."""
 
-    Attributes:
-        number: its place among all classes of a set of traces.
-        event: what is declared.
-        body: how to read it.
-    """
-
-    number: int
-    event: EventClass
-    body: EventBody
+    number: int  # its place among all classes of a set of traces
+    event: EventClass  # what is declared
+    body: EventBody  # how to read it
 
 
 class StreamLayout:
-    """How to find the events of one stream class.
-
-    Attributes:
-        residues: events whose positions differ by a multiple of this have the same layout.
-        header: how to read many event headers at once; None: they are read field by field.
-        classes: event class id to layout.
-    """
+    """How to find the events of one stream class."""
 
     def __init__(
         self, trace_index: int, trace: TraceClass, stream: StreamClass, first_number: int
@@ -80,7 +61,9 @@ class StreamLayout:
             *(largest_align(event.payload) for event in stream.events.values()),
             BYTE,
         )
+        # Events whose positions differ by a multiple of this have the same layout.
         self.residues = min(align // BYTE, _MOST_RESIDUES)
+        # How to read many event headers at once; None: they are read field by field.
         self.header: EventHeader | None = None
         # From selector * `residues` + residue to the body behind such a header, and the header's
         # size in bytes.
@@ -90,6 +73,7 @@ class StreamLayout:
         if self.header is not None and self.header.largest_size > GAP:
             # Reading it all at once might go beyond the end of the memory.
             self.header = None
+        # Event class id to layout.
         self.classes = {
             event_id: ClassLayout(number, event, compile_body(stream, event, self.residues))
             for number, (event_id, event) in enumerate(stream.events.items(), first_number)

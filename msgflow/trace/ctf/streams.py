@@ -18,21 +18,13 @@ from msgflow.trace.ctf.packets import packets_of
 
 @dataclass(eq=False)
 class Stream:
-    """One data stream: the packets of one buffer, from all its files.
-
-    Attributes:
-        layout: of its stream class.
-        instance: its number in its class.
-        packets: in order of time.
-        index: its place among the streams of the trace, by class and instance.
-        rank: its place among the streams of all traces.
-    """
+    """One data stream: the packets of one buffer, from all its files."""
 
     layout: StreamLayout
-    instance: int
-    packets: list[Packet] = field(default_factory=list)
-    index: int = -1
-    rank: int = -1
+    instance: int  # its number in its class
+    packets: list[Packet] = field(default_factory=list)  # in order of time
+    index: int = -1  # its place among the streams of the trace, by class and instance
+    rank: int = -1  # its place among the streams of all traces
 
     @property
     def class_id(self) -> int:

@@ -22,51 +22,31 @@ _WIDTHS = {8, 16, 32, 64}
 
 @dataclass(frozen=True)
 class Part:
-    """A number, or an array of numbers, on whole bytes.
+    """A number, or an array of numbers, on whole bytes."""
 
-    Attributes:
-        offset: in bytes from the begin of its option.
-        dtype: of the number or element, as numpy calls it.
-        width: bytes of the number or element.
-        count: of the elements of an array, None for a number.
-    """
-
-    offset: int
-    dtype: str
-    width: int
-    count: int | None
+    offset: int  # in bytes from the begin of its option
+    dtype: str  # of the number or element, as numpy calls it
+    width: int  # bytes of the number or element
+    count: int | None  # of the elements of an array, None for a number
 
 
 @dataclass(frozen=True)
 class OptionLayout:
-    """A structure of fixed size, and the variant that it may end in.
+    """A structure of fixed size, and the variant that it may end in."""
 
-    Attributes:
-        align: in bytes.
-        size: of the fixed part, in bytes.
-        parts: name, with dots inside nested structures, to where it is.
-        selector: name of the part that chooses the option of `variant`.
-        variant: the variant.
-        name: of the variant.
-    """
-
-    align: int
-    size: int
-    parts: Mapping[str, Part]
-    selector: str = ""
+    align: int  # in bytes
+    size: int  # of the fixed part, in bytes
+    parts: Mapping[str, Part]  # name, with dots inside nested structures, to where it is
+    selector: str = ""  # name of the part that chooses the option of `variant`
     variant: VariantLayout | None = None
-    name: str = ""
+    name: str = ""  # of the variant
 
 
 @dataclass(frozen=True)
 class VariantLayout:
-    """The options of a variant.
+    """The options of a variant."""
 
-    Attributes:
-        options: declaration and layout of each option.
-    """
-
-    options: tuple[tuple[Choice, OptionLayout], ...]
+    options: tuple[tuple[Choice, OptionLayout], ...]  # declaration and layout of each option
     _chosen: dict[int, OptionLayout] = field(default_factory=dict, compare=False, repr=False)
 
     def option(self, value: int) -> OptionLayout:
