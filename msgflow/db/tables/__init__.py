@@ -12,7 +12,7 @@ what their `info` holds. Each `ForeignKey` declares a relation. Databases do not
 foreign keys would forbid replacing a run in one transaction. `relation_check.py` proves it instead.
 """
 
-from msgflow.db.tables import (
+from msgflow.db.tables import (  # noqa: F401
     bag,
     call,
     callback,
@@ -29,19 +29,4 @@ from msgflow.db.tables import (
 )
 from msgflow.db.tables.column import STORE
 
-__all__ = [
-    "STORE",
-    "bag",
-    "call",
-    "callback",
-    "clock",
-    "executor",
-    "flow",
-    "identity",
-    "link",
-    "profile",
-    "recording",
-    "ros_object",
-    "schedule",
-    "user_event",
-]
+__all__ = ["STORE"]

@@ -2,20 +2,12 @@
 
 from __future__ import annotations
 
-from sqlalchemy import Table
+from msgflow.db.tables.column import moment, number, reference, run_id, table, text
 
-from msgflow.db.tables.column import STORE, moment, number, reference, run_id, text
-
-Table(
+table(
     "bag_message",
-    STORE,
     run_id(),
-    reference(
-        "publication_id",
-        "The publication that it is the message of",
-        to="publication.publication_id",
-        required=True,
-    ),
+    reference("publication_id", "The publication that it is the message of", required=True),
     text("topic_name", "Name of the topic", required=True),
     text("type_name", "Type of the message, such as sensor_msgs/msg/Image", required=True),
     moment("received_ns", "When the recorder of the bag received it, clock of ROS", required=True),
@@ -23,5 +15,5 @@ Table(
     moment("stamp_ns", "header.stamp, clock of ROS; NULL: its type has no header"),
     text("frame_id", "header.frame_id; NULL: its type has no header"),
     comment="One row per message of a bag whose publication is known (msgflow bag)",
-    info={"view": "Messages of a bag that was recorded in the same run: size, stamp and frame."},
+    view="Messages of a bag that was recorded in the same run: size, stamp and frame.",
 )

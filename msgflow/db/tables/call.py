@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from sqlalchemy import Table
-
 from msgflow.db.tables.column import (
-    STORE,
     event_order,
     flag,
     handle,
@@ -15,20 +12,18 @@ from msgflow.db.tables.column import (
     process_id,
     reference,
     run_id,
+    table,
     text,
     thread_id,
     trace_id,
 )
 
-Table(
+table(
     "publication",
-    STORE,
     identity("publication_id", "Identity of the publication"),
     run_id(),
     trace_id(),
-    reference(
-        "publisher_id", "Publisher; NULL: the middleware itself", to="publisher.publisher_id"
-    ),
+    reference("publisher_id", "Publisher; NULL: the middleware itself"),
     process_id(),
     thread_id(),
     moment("start_ns", "First layer seen", required=True, clock="process_id"),
@@ -49,16 +44,15 @@ Table(
         hidden=True,
     ),
     comment="One row per publish() call",
-    info={"view": "Messages at the moment they were published, with the time of each layer seen."},
+    view="Messages at the moment they were published, with the time of each layer seen.",
 )
 
-Table(
+table(
     "take",
-    STORE,
     identity("take_id", "Identity of the take"),
     run_id(),
     trace_id(),
-    reference("subscription_id", "Subscription", to="subscription.subscription_id"),
+    reference("subscription_id", "Subscription"),
     process_id(),
     thread_id(),
     moment("taken_ns", "Moment of the hand-over", required=True, clock="process_id"),
@@ -71,25 +65,23 @@ Table(
         "A gap right before or after it on its thread may hide a layer or its callback",
     ),
     comment="One row per message handed over to a subscription",
-    info={"view": "Messages at the moment they were handed over to a subscription."},
+    view="Messages at the moment they were handed over to a subscription.",
 )
 
-Table(
+table(
     "failed_take",
-    STORE,
     run_id(),
     trace_id(),
-    reference("subscription_id", "Subscription", to="subscription.subscription_id"),
+    reference("subscription_id", "Subscription"),
     process_id(),
     thread_id(),
     moment("failed_ns", "Moment of the attempt", required=True, clock="process_id"),
     comment="One row per attempt that took nothing",
-    info={"view": "Attempts to take from a subscription that got nothing."},
+    view="Attempts to take from a subscription that got nothing.",
 )
 
-Table(
+table(
     "ring_buffer_event",
-    STORE,
     run_id(),
     trace_id(),
     process_id(),
@@ -98,81 +90,67 @@ Table(
     number("slot", "Index in the buffer; NULL: all"),
     moment("at_ns", "Moment of the event", required=True),
     reference(
-        "publication_id",
-        "Message put in; NULL: the replay of one kept for late subscriptions",
-        to="publication.publication_id",
+        "publication_id", "Message put in; NULL: the replay of one kept for late subscriptions"
     ),
-    reference("take_id", "Message taken out", to="take.take_id"),
+    reference("take_id", "Message taken out"),
     flag("is_overwriting", "An older message was lost from the slot"),
     event_order("event_id", "The event"),
     comment="One row per enqueue, dequeue or clearing of an intra-process ring buffer",
 )
 
-Table(
+table(
     "data_arrival",
-    STORE,
     run_id(),
-    reference("take_id", "Take of the message", to="take.take_id", required=True),
+    reference("take_id", "Take of the message", required=True),
     number("waited_ns", "From there until the take", unit="ns", required=True),
     flag("is_ambiguous", "Several readers of the process had a message of that stamp"),
     comment="One row per take of a message whose arrival something else than its thread told",
-    info={
-        "view": "When messages were there before they were taken, as CARET's hook in Fast DDS "
+    view=(
+        "When messages were there before they were taken, as CARET's hook in Fast DDS "
         "says. In events executors also: those that their own thread published, and those for "
         "which, as a kernel trace shows, the publishing thread woke one of the middleware."
-    },
+    ),
 )
 
-Table(
+table(
     "agnocast_entry",
-    STORE,
     run_id(),
-    reference("publication_id", "Message put in; NULL: of a take", to="publication.publication_id"),
-    reference("take_id", "Message handed over; NULL: of a publication", to="take.take_id"),
+    reference("publication_id", "Message put in; NULL: of a take"),
+    reference("take_id", "Message handed over; NULL: of a publication"),
     number("entry_id", "Number of the message on its topic and kernel", required=True),
     comment="One row per publication or take of Agnocast",
-    info={"view": "Numbers that Agnocast gave to messages."},
+    view="Numbers that Agnocast gave to messages.",
 )
 
-Table(
+table(
     "request",
-    STORE,
     identity("request_id", "Identity of the request"),
     run_id(),
-    reference("client_id", "Client that sent it", to="client.client_id"),
-    reference("service_id", "Service that took it", to="service.service_id"),
+    reference("client_id", "Client that sent it"),
+    reference("service_id", "Service that took it"),
     number("sequence_number", "Number given by the client"),
     moment("sent_ns", "rmw_send_request", clock="sender_thread_id"),
     moment("taken_ns", "rmw_take_request", clock="receiver_thread_id"),
     thread_id("Thread that sent it", "sender_thread_id", required=False),
     thread_id("Thread that took it", "receiver_thread_id", required=False),
-    reference(
-        "callback_instance_id",
-        "Service callback it led to",
-        to="callback_instance.callback_instance_id",
-    ),
+    reference("callback_instance_id", "Service callback it led to"),
     comment="One row per service request",
-    info={"view": "Service requests."},
+    view="Service requests.",
 )
 
-Table(
+table(
     "response",
-    STORE,
     identity("response_id", "Identity of the response"),
     run_id(),
-    reference("client_id", "Client that took it", to="client.client_id"),
-    reference("service_id", "Service that sent it", to="service.service_id"),
+    reference("client_id", "Client that took it"),
+    reference("service_id", "Service that sent it"),
     number("sequence_number", "Number given by the client"),
     moment("sent_ns", "rmw_send_response", clock="sender_thread_id"),
     moment("taken_ns", "rmw_take_response", clock="receiver_thread_id"),
     thread_id("Thread that sent it", "sender_thread_id", required=False),
     thread_id("Thread that took it", "receiver_thread_id", required=False),
-    reference(
-        "callback_instance_id",
-        "Service callback it came from",
-        to="callback_instance.callback_instance_id",
-    ),
-    reference("request_id", "Request that it answers", to="request.request_id"),
+    reference("callback_instance_id", "Service callback it came from"),
+    reference("request_id", "Request that it answers"),
     comment="One row per service response",
-    info={"view": "Service responses."},
+    view="Service responses.",
 )

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from sqlalchemy import BOOLEAN, INTEGER, Column, Table
+from sqlalchemy import BOOLEAN
 
 from msgflow.db.tables.column import (
-    STORE,
     column,
     event_order,
     flag,
     handle,
     identity,
+    integer,
     key,
     moment,
     node_id,
     process_id,
     reference,
     run_id,
+    table,
     text,
     thread_id,
     trace_id,
@@ -30,9 +31,8 @@ _IS_END_INFERRED = column(
     sql="self.end_ns IS NOT NULL AND self.end_event_id IS NULL",
 )
 
-Table(
+table(
     "callback",
-    STORE,
     key("callback_id", "Identity of the callback"),
     run_id(),
     process_id(),
@@ -43,57 +43,47 @@ Table(
         " or 'unknown'",
         required=True,
     ),
-    reference("subscription_id", "Its subscription", to="subscription.subscription_id"),
-    reference("timer_id", "Its timer", to="timer.timer_id"),
-    reference("service_id", "Its service", to="service.service_id"),
+    reference("subscription_id", "Its subscription"),
+    reference("timer_id", "Its timer"),
+    reference("service_id", "Its service"),
     handle("callback_handle", "Address of the callback object"),
     text("symbol", "Function registered for it; NULL: none or unresolvable"),
     moment("created_ns", "First initialisation event", clock="process_id"),
     comment="One row per callback object",
-    info={"view": "Callback objects and what they belong to."},
+    view="Callback objects and what they belong to.",
 )
 
-Table(
+table(
     "callback_group",
-    STORE,
     key("callback_group_id", "Identity of the callback group"),
     run_id(),
     process_id(),
-    reference("executor_id", "Executor that it was added to", to="executor.executor_id"),
+    reference("executor_id", "Executor that it was added to"),
     text(
         "kind", "'mutually_exclusive', 'reentrant' or 'unknown', as CARET names it", required=True
     ),
     comment="One row per callback group of an executor",
-    info={
-        "view": (
-            "Callback groups, where the trace has them (CARET). Callbacks of a mutually exclusive "
-            "group never run at the same time."
-        )
-    },
-)
-
-Table(
-    "callback_group_member",
-    STORE,
-    run_id(),
-    reference(
-        "callback_group_id",
-        "The callback group",
-        to="callback_group.callback_group_id",
-        required=True,
+    view=(
+        "Callback groups, where the trace has them (CARET). Callbacks of a mutually exclusive "
+        "group never run at the same time."
     ),
-    reference("callback_id", "The callback", to="callback.callback_id", required=True),
-    comment="One row per callback in a callback group",
-    info={"view": "Callbacks of the callback groups."},
 )
 
-Table(
+table(
+    "callback_group_member",
+    run_id(),
+    reference("callback_group_id", "The callback group", required=True),
+    reference("callback_id", "The callback", required=True),
+    comment="One row per callback in a callback group",
+    view="Callbacks of the callback groups.",
+)
+
+table(
     "callback_instance",
-    STORE,
     identity("callback_instance_id", "Identity of the callback instance"),
     run_id(),
     trace_id(),
-    reference("callback_id", "Callback that ran", to="callback.callback_id", required=True),
+    reference("callback_id", "Callback that ran", required=True),
     process_id(),
     thread_id(),
     moment("start_ns", "callback_start", required=True, clock="process_id"),
@@ -102,21 +92,17 @@ Table(
         "callback_end, else what is_end_inferred says; NULL: never seen to end",
         clock="process_id",
     ),
-    reference("take_id", "Message it was called with", to="take.take_id"),
-    reference("request_id", "Request it was called with", to="request.request_id"),
-    reference("response_id", "Response that it follows from, in Python", to="response.response_id"),
+    reference("take_id", "Message it was called with"),
+    reference("request_id", "Request it was called with"),
+    reference("response_id", "Response that it follows from, in Python"),
     reference(
         "continues_id",
         "Callback instance that it is a later step of, in Python; NULL: it is the first",
-        to="callback_instance.callback_instance_id",
+        to="callback_instance",
     ),
     flag("is_intra_process", "Called with an intra-process message"),
-    reference(
-        "parent_id",
-        "Callback instance that it is nested in",
-        to="callback_instance.callback_instance_id",
-    ),
-    Column("depth", INTEGER, nullable=False, comment="Nesting depth on its thread, from 1"),
+    reference("parent_id", "Callback instance that it is nested in", to="callback_instance"),
+    integer("depth", "Nesting depth on its thread, from 1", required=True),
     event_order("start_event_id", "callback_start"),
     event_order("end_event_id", "callback_end; NULL: never seen to end"),
     event_order(
@@ -127,5 +113,6 @@ Table(
         "A gap inside or beside it on its thread may hide its end or what it did",
     ),
     comment="One row per callback instance",
-    info={"view": "Callback instances.", "computed": (_IS_END_INFERRED,)},
+    view="Callback instances.",
+    computed=(_IS_END_INFERRED,),
 )

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from sqlalchemy import BOOLEAN, Column, Table
+from sqlalchemy import BOOLEAN
 
-from msgflow.db.tables.column import STORE, key, moment, number, reference, run_id, text
+from msgflow.db.tables.column import column, key, moment, number, reference, run_id, table, text
 
-Table(
+table(
     "clock",
-    STORE,
     key("clock_id", "Identity of the clock"),
     run_id(),
     text("uuid", "UUID of the clock (LTTng: boot identity)"),
@@ -27,22 +26,18 @@ Table(
         "reference_clock_id",
         "Clock that this one is corrected to: times of clocks with the same one can be "
         "compared; NULL: as recorded",
-        to="clock.clock_id",
+        to="clock",
     ),
     comment="One row per clock: hosts of one clock need no synchronisation",
-    info={
-        "view": (
-            "Clocks and how their times are corrected. Times in the other views are corrected "
-            "already."
-        )
-    },
+    view=(
+        "Clocks and how their times are corrected. Times in the other views are corrected already."
+    ),
 )
 
-Table(
+table(
     "clock_uncertainty",
-    STORE,
     run_id(),
-    reference("clock_id", "The clock", to="clock.clock_id", required=True),
+    reference("clock_id", "The clock", required=True),
     moment("at_ns", "Moment, as the clock showed it", required=True),
     number(
         "uncertainty_ns",
@@ -51,21 +46,18 @@ Table(
         required=True,
     ),
     comment="One row per clock and moment",
-    info={
-        "view": (
-            "Bounds of the error of each clock's correction: at the moments listed here, "
-            "uncertainty_ns; between two of them, on the straight line. Times of two clocks with "
-            "the same reference can be compared to within the sum of both bounds. The reference "
-            "itself has no error and no rows."
-        )
-    },
+    view=(
+        "Bounds of the error of each clock's correction: at the moments listed here, "
+        "uncertainty_ns; between two of them, on the straight line. Times of two clocks with "
+        "the same reference can be compared to within the sum of both bounds. The reference "
+        "itself has no error and no rows."
+    ),
 )
 
-Table(
+table(
     "stamp_clock",
-    STORE,
     run_id(),
-    reference("clock_id", "Clock of the traces", to="clock.clock_id", required=True),
+    reference("clock_id", "Clock of the traces", required=True),
     moment("at_ns", "Middle of the stretch, time of the traces", required=True),
     moment("start_ns", "Begin of the stretch", required=True),
     moment("end_ns", "End of the stretch, exclusive", required=True),
@@ -78,10 +70,6 @@ Table(
     number("drift_ppb", "Change of the difference in the stretch", unit="ppb"),
     number("message_count", "Messages that agree with it"),
     number("segment", "Number of jumps of the clock before it"),
-    Column(
-        "is_sharp",
-        BOOLEAN,
-        comment="Publications microseconds apart can be distinguished; NULL: yes",
-    ),
+    column("is_sharp", BOOLEAN, "Publications microseconds apart can be distinguished; NULL: yes"),
     comment="One row per stretch of time in which stamps run along a clock of the traces",
 )

@@ -7,7 +7,7 @@
 | `is_hidden` | True: the public view does not show the column |
 | `sql` | of a column that only the view has: its expression; `self` is the table |
 
-| key of `Table.info` | value |
+| key of `Table.info`, as `table` sets it | value |
 | --- | --- |
 | `view` | description of the public view, if that shows the table as it is |
 | `computed` | columns that only this view has, after the others |
@@ -18,13 +18,25 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from duckdb_engine.datatypes import UBigInteger
-from sqlalchemy import ARRAY, BIGINT, BOOLEAN, VARCHAR, Column, ForeignKey, MetaData
+from sqlalchemy import ARRAY, BIGINT, BOOLEAN, INTEGER, VARCHAR, Column, ForeignKey, MetaData, Table
 from sqlalchemy import text as expression
 
 if TYPE_CHECKING:
     from sqlalchemy.types import TypeEngine
 
 STORE = MetaData(schema="store")
+
+
+def table(
+    name: str,
+    *columns: Column[Any],
+    comment: str,
+    view: str | None = None,
+    computed: tuple[Column[Any], ...] = (),
+) -> None:
+    """Define a table of `store`."""
+    info = {} if view is None else {"view": view, **({"computed": computed} if computed else {})}
+    Table(name, STORE, *columns, comment=comment, info=info)
 
 
 def column(
@@ -58,36 +70,39 @@ def identity(name: str, comment: str) -> Column[Any]:
     return column(name, BIGINT, comment, required=True)
 
 
-def reference(name: str, comment: str, *, to: str, required: bool = False) -> Column[Any]:
-    """Return a column with identities of another table."""
-    return column(name, BIGINT, comment, to=to, required=required)
+def reference(
+    name: str, comment: str, *, to: str | None = None, required: bool = False
+) -> Column[Any]:
+    """Return a column with identities of another table: `to`, or the one that its name says."""
+    key = name if to is None else f"{to}_id"
+    return column(name, BIGINT, comment, to=f"{key.removesuffix('_id')}.{key}", required=required)
 
 
 def run_id() -> Column[Any]:
     """Return the run of a row."""
-    return reference("run_id", "Run that the row belongs to", to="run.run_id", required=True)
+    return reference("run_id", "Run that the row belongs to", required=True)
 
 
 def trace_id(comment: str = "Trace it was recorded in", required: bool = True) -> Column[Any]:
     """Return the trace of a row."""
-    return reference("trace_id", comment, to="trace.trace_id", required=required)
+    return reference("trace_id", comment, required=required)
 
 
 def process_id() -> Column[Any]:
     """Return the process of a row."""
-    return reference("process_id", "Process it lives in", to="process.process_id", required=True)
+    return reference("process_id", "Process it lives in", required=True)
 
 
 def thread_id(
     comment: str = "Thread it happened on", name: str = "thread_id", required: bool = True
 ) -> Column[Any]:
     """Return a thread of a row."""
-    return reference(name, comment, to="thread.thread_id", required=required)
+    return reference(name, comment, to="thread", required=required)
 
 
 def node_id() -> Column[Any]:
     """Return the node of an object."""
-    return reference("node_id", "Node it belongs to", to="node.node_id")
+    return reference("node_id", "Node it belongs to")
 
 
 def moment(
@@ -123,6 +138,11 @@ def number(
 ) -> Column[Any]:
     """Return a number."""
     return column(name, BIGINT, comment, unit=unit, required=required)
+
+
+def integer(name: str, comment: str, *, required: bool = False) -> Column[Any]:
+    """Return a number of 32 bits."""
+    return column(name, INTEGER, comment, required=required)
 
 
 def flag(name: str, comment: str, *, hidden: bool = False) -> Column[Any]:

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from sqlalchemy import Table
-
 from msgflow.db.tables.column import (
-    STORE,
     event_order,
     flag,
     key,
@@ -13,13 +10,13 @@ from msgflow.db.tables.column import (
     process_id,
     reference,
     run_id,
+    table,
     text,
     thread_id,
 )
 
-Table(
+table(
     "executor",
-    STORE,
     key("executor_id", "Identity of the executor"),
     run_id(),
     process_id(),
@@ -31,32 +28,26 @@ Table(
     ),
     flag("is_inferred", "Deduced from the threads that run the same callbacks"),
     comment="One row per executor",
-    info={"view": "Executors."},
+    view="Executors.",
 )
 
-Table(
+table(
     "executor_thread",
-    STORE,
     run_id(),
-    reference("executor_id", "The executor", to="executor.executor_id", required=True),
+    reference("executor_id", "The executor", required=True),
     thread_id("The thread"),
     comment="One row per thread of an executor",
-    info={"view": "Threads of the executors."},
+    view="Threads of the executors.",
 )
 
-Table(
+table(
     "executor_state",
-    STORE,
     run_id(),
     thread_id("The thread"),
     text("state", "'wait', 'process' or 'execute'", required=True),
     moment("start_ns", "Executor event that began it", required=True, clock="thread_id"),
     flag("is_behind_gap", "A gap may hide an executor event between the one before and this one"),
-    reference(
-        "callback_instance_id",
-        "First callback instance in it",
-        to="callback_instance.callback_instance_id",
-    ),
+    reference("callback_instance_id", "First callback instance in it"),
     event_order("start_event_id", "Executor event that began it"),
     comment="One row per executor event of a thread: a state lasts until the next one",
 )

@@ -2,44 +2,32 @@
 
 from __future__ import annotations
 
-from sqlalchemy import Table
+from msgflow.db.tables.column import flag, number, reference, route, run_id, table, text
 
-from msgflow.db.tables.column import STORE, flag, number, reference, route, run_id, text
-
-Table(
+table(
     "flow_call",
-    STORE,
     run_id(),
-    reference(
-        "publication_id", "What was published", to="publication.publication_id", required=True
-    ),
-    reference("publisher_id", "Its publisher", to="publisher.publisher_id"),
+    reference("publication_id", "What was published", required=True),
+    reference("publisher_id", "Its publisher"),
     text("kind", "Kind of the causal link to the publication", required=True),
     reference(
         "callback_instance_id",
         "Callback instance of the service; NULL: what was taken led to it without one",
-        to="callback_instance.callback_instance_id",
     ),
-    reference(
-        "caller_id",
-        "Callback instance that called",
-        to="callback_instance.callback_instance_id",
-        required=True,
-    ),
+    reference("caller_id", "Callback instance that called", to="callback_instance", required=True),
     route(),
-    reference("take_id", "Message that the caller processed; NULL: none", to="take.take_id"),
-    reference("subscription_id", "Subscription of that message", to="subscription.subscription_id"),
-    reference("taken_request_id", "Request that the service took", to="request.request_id"),
-    reference("taken_response_id", "Response that the caller took", to="response.response_id"),
+    reference("take_id", "Message that the caller processed; NULL: none"),
+    reference("subscription_id", "Subscription of that message"),
+    reference("taken_request_id", "Request that the service took", to="request"),
+    reference("taken_response_id", "Response that the caller took", to="response"),
     comment=(
         "One row per publication caused by a call, callback instance that called, and services in "
         "between"
     ),
 )
 
-Table(
+table(
     "flow_root",
-    STORE,
     run_id(),
     number("publication_id", "The message; below 0: its publisher is not traced", required=True),
     number("publisher_id", "Its publisher; below 0: not traced", required=True),
@@ -51,23 +39,15 @@ Table(
     comment="One row per publication on a topic of the application, and per take from (not traced)",
 )
 
-Table(
+table(
     "flow_hop",
-    STORE,
     run_id(),
     reference(
-        "from_subscription_id",
-        "Subscription whose message led on; NULL: none",
-        to="subscription.subscription_id",
+        "from_subscription_id", "Subscription whose message led on; NULL: none", to="subscription"
     ),
     route(),
     number("publisher_id", "Publisher; below 0: not traced", required=True),
-    reference(
-        "subscription_id",
-        "Subscription that took from it",
-        to="subscription.subscription_id",
-        required=True,
-    ),
+    reference("subscription_id", "Subscription that took from it", required=True),
     flag("is_source", "At least one of its publications was not caused by a taken message"),
     flag("is_cached", "The message may wait in the node for others"),
     comment="One row per step of the graph: subscription before, route, publisher and subscription",

@@ -2,46 +2,44 @@
 
 from __future__ import annotations
 
-from sqlalchemy import BOOLEAN, INTEGER, Column, Table
+from sqlalchemy import BOOLEAN
 
 from msgflow.db.tables.column import (
-    STORE,
     column,
     event_order,
     flag,
     handle,
+    integer,
     key,
     moment,
     number,
     process_id,
     reference,
     run_id,
+    table,
     text,
     thread_id,
 )
 
-Table(
+table(
     "host",
-    STORE,
     key("host_id", "Identity of the host"),
     run_id(),
-    reference("clock_id", "Clock of the host", to="clock.clock_id", required=True),
+    reference("clock_id", "Clock of the host", required=True),
     text("hostname", "Name recorded in the trace, or given by the user", required=True),
     comment="One row per machine or container",
-    info={"view": "Machines and containers."},
+    view="Machines and containers.",
 )
 
-Table(
+table(
     "process",
-    STORE,
     key("process_id", "Identity of the process life"),
     run_id(),
-    reference("host_id", "Host it ran on", to="host.host_id", required=True),
-    Column(
+    reference("host_id", "Host it ran on", required=True),
+    integer(
         "pid",
-        INTEGER,
-        nullable=False,
-        comment="Process id; the one inside its PID namespace if the trace has no other",
+        "Process id; the one inside its PID namespace if the trace has no other",
+        required=True,
     ),
     text("name", "Name of the process (its first thread)"),
     text("tracetools_version", "Version that rcl_init reported; for display only"),
@@ -56,32 +54,25 @@ Table(
         "PID namespace, where the trace has it; a negative number if msgflow gave it, since "
         "processes have equal ids",
     ),
-    Column(
-        "life",
-        INTEGER,
-        nullable=False,
-        comment="Number of this life among those of the pid, from 1",
-    ),
+    integer("life", "Number of this life among those of the pid, from 1", required=True),
     column(
         "is_ambiguous",
         BOOLEAN,
         "Several processes with equal ids are one here: nothing tells them apart",
     ),
     comment="One row per process life",
-    info={"view": "Process lives: a pid that is used again is another process."},
+    view="Process lives: a pid that is used again is another process.",
 )
 
-Table(
+table(
     "thread",
-    STORE,
     key("thread_id", "Identity of the thread"),
     run_id(),
     process_id(),
-    Column(
+    integer(
         "tid",
-        INTEGER,
-        nullable=False,
-        comment="Thread id; the one inside its PID namespace if the trace has no other",
+        "Thread id; the one inside its PID namespace if the trace has no other",
+        required=True,
     ),
     text("name", "Name of the thread"),
     event_order("first_event_id", "First event"),
@@ -89,12 +80,11 @@ Table(
     moment("first_seen_ns", "First event", clock="process_id"),
     moment("last_seen_ns", "Last event", clock="process_id"),
     comment="One row per thread",
-    info={"view": "Threads, each with its last name."},
+    view="Threads, each with its last name.",
 )
 
-Table(
+table(
     "node",
-    STORE,
     key("node_id", "Identity of the node"),
     run_id(),
     process_id(),
@@ -109,24 +99,22 @@ Table(
     moment("created_ns", "rcl_node_init", clock="process_id"),
     flag("is_inferred", "Its initialisation was not traced"),
     comment="One row per ROS node",
-    info={"view": "ROS nodes."},
+    view="ROS nodes.",
 )
 
-Table(
+table(
     "lifecycle_transition",
-    STORE,
     run_id(),
-    reference("node_id", "The node", to="node.node_id"),
+    reference("node_id", "The node"),
     moment("at_ns", "Moment of the change", required=True, clock="node_id"),
     text("start_state", "State that was left"),
     text("goal_state", "State that was entered"),
     comment="One row per state change of a managed node",
-    info={"view": "State changes of managed nodes."},
+    view="State changes of managed nodes.",
 )
 
-Table(
+table(
     "thread_break",
-    STORE,
     run_id(),
     thread_id("Thread whose events may be missing"),
     moment(
@@ -139,11 +127,9 @@ Table(
         "pairs may reach across",
     ),
     comment="One row per gap in the record of a thread",
-    info={
-        "view": (
-            "Where the record of a thread breaks: events of the thread may be missing before these "
-            "moments. No executor state reaches across a break, and pairs of events that do are "
-            "marked."
-        )
-    },
+    view=(
+        "Where the record of a thread breaks: events of the thread may be missing before these "
+        "moments. No executor state reaches across a break, and pairs of events that do are "
+        "marked."
+    ),
 )

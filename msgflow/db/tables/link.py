@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-from sqlalchemy import INTEGER, Column, Table
-
 from msgflow.db.tables.column import (
-    STORE,
     flag,
+    integer,
     key,
     moment,
     number,
     process_id,
     reference,
     run_id,
+    table,
     text,
 )
 
-Table(
+table(
     "annotation",
-    STORE,
     key("annotation_id", "Identity of the annotation"),
     run_id(),
     text(
@@ -30,40 +28,33 @@ Table(
     process_id(),
     number("queue_depth", "Of a queue: most messages that wait in it; NULL: not limited"),
     comment="One row per declared link",
-    info={"view": "Declared links: indirect ones, and whether publications answer messages."},
+    view="Declared links: indirect ones, and whether publications answer messages.",
 )
 
-Table(
+table(
     "annotation_input",
-    STORE,
     run_id(),
-    reference("annotation_id", "The annotation", to="annotation.annotation_id", required=True),
-    reference("subscription_id", "Its input", to="subscription.subscription_id", required=True),
+    reference("annotation_id", "The annotation", required=True),
+    reference("subscription_id", "Its input", required=True),
     comment="One row per subscription of an annotation",
-    info={"view": "Subscriptions of the declared indirect links."},
+    view="Subscriptions of the declared indirect links.",
 )
 
-Table(
+table(
     "annotation_output",
-    STORE,
     run_id(),
-    reference("annotation_id", "The annotation", to="annotation.annotation_id", required=True),
-    reference("publisher_id", "Its output", to="publisher.publisher_id", required=True),
+    reference("annotation_id", "The annotation", required=True),
+    reference("publisher_id", "Its output", required=True),
     comment="One row per publisher of an annotation",
-    info={"view": "Publishers of the declared indirect links."},
+    view="Publishers of the declared indirect links.",
 )
 
-Table(
+table(
     "nearest_message",
-    STORE,
     run_id(),
     text("topic_name", "Topic of the message", required=True),
     moment("source_timestamp_ns", "Stamp of the message, clock of ROS", required=True),
-    reference(
-        "publication_id",
-        "Where it came from; NULL: several could be it",
-        to="publication.publication_id",
-    ),
+    reference("publication_id", "Where it came from; NULL: several could be it"),
     number(
         "candidate_count",
         "Publications that it could have been; NULL: the clock was set about then",
@@ -71,21 +62,13 @@ Table(
     comment="One row per message that one publication or several fit by time",
 )
 
-Table(
+table(
     "link_transport",
-    STORE,
     run_id(),
-    reference(
-        "publication_id",
-        "Where the message came from",
-        to="publication.publication_id",
-        required=True,
-    ),
-    reference("take_id", "Where it was received", to="take.take_id", required=True),
-    reference("publisher_id", "Publisher of the message", to="publisher.publisher_id"),
-    reference(
-        "subscription_id", "Subscription that received it", to="subscription.subscription_id"
-    ),
+    reference("publication_id", "Where the message came from", required=True),
+    reference("take_id", "Where it was received", required=True),
+    reference("publisher_id", "Publisher of the message"),
+    reference("subscription_id", "Subscription that received it"),
     text("method", "'exact', 'exact_stamp', 'nearest', 'ring_buffer' or 'agnocast'", required=True),
     number("candidate_count", "Number of publications that are possible"),
     flag("is_self_loop", "Received by the publishing node itself"),
@@ -94,52 +77,38 @@ Table(
     comment="One row per take whose publication is known",
 )
 
-Table(
+table(
     "link_packet",
-    STORE,
     run_id(),
-    reference("sent_trace_id", "Trace of its sender", to="trace.trace_id", required=True),
-    reference("received_trace_id", "Trace of its receiver", to="trace.trace_id", required=True),
+    reference("sent_trace_id", "Trace of its sender", to="trace", required=True),
+    reference("received_trace_id", "Trace of its receiver", to="trace", required=True),
     moment("sent_ns", "Handed to the network device", required=True),
     moment("received_ns", "Came from the network device", required=True),
     text("protocol", "'tcp' or 'udp'", required=True),
     text("source_address", "IP address that it was sent from", required=True),
-    Column("source_port", INTEGER, nullable=False, comment="Port that it was sent from"),
+    integer("source_port", "Port that it was sent from", required=True),
     text("destination_address", "IP address that it was sent to", required=True),
-    Column("destination_port", INTEGER, nullable=False, comment="Port that it was sent to"),
-    Column(
-        "identification", INTEGER, comment="Identification of the datagram; NULL: IPv6 has none"
-    ),
+    integer("destination_port", "Port that it was sent to", required=True),
+    integer("identification", "Identification of the datagram; NULL: IPv6 has none"),
     number("sequence_number", "Sequence number of its first byte; NULL: not TCP"),
     comment="One row per network packet and clock that received it from another",
 )
 
-Table(
+table(
     "link_causal",
-    STORE,
     run_id(),
-    reference(
-        "callback_instance_id",
-        "Cause; NULL: the take itself",
-        to="callback_instance.callback_instance_id",
-    ),
-    reference("publication_id", "Effect", to="publication.publication_id", required=True),
-    reference(
-        "take_id", "Message that led to it; NULL: none (timers, services)", to="take.take_id"
-    ),
-    reference("subscription_id", "Subscription of that message", to="subscription.subscription_id"),
-    reference("publisher_id", "Publisher of the effect", to="publisher.publisher_id"),
+    reference("callback_instance_id", "Cause; NULL: the take itself"),
+    reference("publication_id", "Effect", required=True),
+    reference("take_id", "Message that led to it; NULL: none (timers, services)"),
+    reference("subscription_id", "Subscription of that message"),
+    reference("publisher_id", "Publisher of the effect"),
     text(
         "kind",
         "'direct', 'periodic_async', 'partial_sync', 'approximate_sync', 'queue', 'take_adjacent' "
         "or 'polled'",
         required=True,
     ),
-    reference(
-        "annotation_id",
-        "Annotation that declares it; NULL for links that are not indirect",
-        to="annotation.annotation_id",
-    ),
+    reference("annotation_id", "Annotation that declares it; NULL for links that are not indirect"),
     number(
         "candidate_count",
         "Callback instances that it could have been; one more if the message may have led to "
@@ -151,36 +120,33 @@ Table(
     comment="One row per callback instance, or take without one, and publication that it led to",
 )
 
-Table(
+table(
     "link_request",
-    STORE,
     run_id(),
-    reference("request_id", "Effect", to="request.request_id", required=True),
-    reference("callback_instance_id", "Cause", to="callback_instance.callback_instance_id"),
+    reference("request_id", "Effect", required=True),
+    reference("callback_instance_id", "Cause"),
     comment="One row per request that a callback instance or thread sent",
-    info={"view": "Requests and what sent them."},
+    view="Requests and what sent them.",
 )
 
-Table(
+table(
     "link_response",
-    STORE,
     run_id(),
-    reference("response_id", "Effect", to="response.response_id", required=True),
-    reference("callback_instance_id", "Cause", to="callback_instance.callback_instance_id"),
+    reference("response_id", "Effect", required=True),
+    reference("callback_instance_id", "Cause"),
     comment="One row per response and the callback instance that sent it",
-    info={"view": "Responses and the callback instance that sent them."},
+    view="Responses and the callback instance that sent them.",
 )
 
-Table(
+table(
     "link_call",
-    STORE,
     run_id(),
-    reference("taken_request_id", "Cause: a request", to="request.request_id"),
-    reference("taken_response_id", "Cause: a response", to="response.response_id"),
-    reference("publication_id", "Effect: a publication", to="publication.publication_id"),
-    reference("publisher_id", "Its publisher", to="publisher.publisher_id"),
-    reference("request_id", "Effect: a request", to="request.request_id"),
-    reference("response_id", "Effect: a response", to="response.response_id"),
+    reference("taken_request_id", "Cause: a request", to="request"),
+    reference("taken_response_id", "Cause: a response", to="response"),
+    reference("publication_id", "Effect: a publication"),
+    reference("publisher_id", "Its publisher"),
+    reference("request_id", "Effect: a request"),
+    reference("response_id", "Effect: a response"),
     number(
         "candidate_count",
         "1; 2 where the thread sends such messages by itself, too; at least 2 where its process is "
@@ -191,35 +157,26 @@ Table(
         "One row per message that a thread sent after it took a request or response without a "
         "callback"
     ),
-    info={"view": "What threads sent after they took a request or response, in no callback."},
+    view="What threads sent after they took a request or response, in no callback.",
 )
 
-Table(
+table(
     "undelivered",
-    STORE,
     run_id(),
-    reference("publication_id", "The message", to="publication.publication_id", required=True),
-    reference("publisher_id", "Its publisher", to="publisher.publisher_id", required=True),
-    reference(
-        "subscription_id",
-        "Subscription that did not take it",
-        to="subscription.subscription_id",
-        required=True,
-    ),
+    reference("publication_id", "The message", required=True),
+    reference("publisher_id", "Its publisher", required=True),
+    reference("subscription_id", "Subscription that did not take it", required=True),
     text("reason", "Why; a closed vocabulary", required=True),
     comment=(
         "One row per publication and subscription of its topic that is not known to have taken it"
     ),
 )
 
-Table(
+table(
     "orphan_take",
-    STORE,
     run_id(),
-    reference("take_id", "The take", to="take.take_id", required=True),
-    reference(
-        "subscription_id", "Subscription that received it", to="subscription.subscription_id"
-    ),
+    reference("take_id", "The take", required=True),
+    reference("subscription_id", "Subscription that received it"),
     text("reason", "Why; a closed vocabulary", required=True),
     comment="One row per take whose publication is not known",
 )

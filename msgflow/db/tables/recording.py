@@ -2,45 +2,53 @@
 
 from __future__ import annotations
 
-from sqlalchemy import ARRAY, BOOLEAN, INTEGER, TIMESTAMP, VARCHAR, Column, Table
+from sqlalchemy import ARRAY, BOOLEAN, TIMESTAMP, VARCHAR, Column
 
-from msgflow.db.tables.column import STORE, key, moment, number, reference, run_id, text, trace_id
+from msgflow.db.tables.column import (
+    column,
+    integer,
+    key,
+    moment,
+    number,
+    reference,
+    run_id,
+    table,
+    text,
+    trace_id,
+)
 
-Table(
+table(
     "definition",
-    STORE,
     Column("name", VARCHAR, primary_key=True, comment="'views': the SQL of all views and macros"),
     text("hash", "SHA-256 of the SQL that was last applied", required=True),
     text("msgflow_version", "Version of msgflow that applied it", required=True),
     comment="One row per part of the schema that is re-applied rather than migrated",
 )
 
-Table(
+table(
     "run",
-    STORE,
     key("run_id", "Identity of the run"),
     text("name", "Name given by the user, or the name of the first trace directory", required=True),
-    Column("created_at", TIMESTAMP, nullable=False, comment="When the run was ingested, UTC"),
+    column("created_at", TIMESTAMP, "When the run was ingested, UTC", required=True),
     text("msgflow_version", "Version of msgflow that ingested the run", required=True),
     text("derivation_hash", "SHA-256 of the SQL that derived the links", required=True),
     moment("start_ns", "First event of any trace"),
     moment("end_ns", "Last event of any trace"),
     number("event_count", "Events read"),
-    Column(
+    column(
         "labels",
         ARRAY(VARCHAR),
-        comment="Labels that users gave to the run, KEY=VALUE each, sorted; NULL: no label",
+        "Labels that users gave to the run, KEY=VALUE each, sorted; NULL: no label",
     ),
     text("clock_sync", "How clocks were to be brought together: 'none', 'messages' or 'file'"),
     comment="One row per ingest of traces that belong together",
 )
 
-Table(
+table(
     "trace",
-    STORE,
     key("trace_id", "Identity of the trace"),
     run_id(),
-    reference("host_id", "Host that was traced", to="host.host_id", required=True),
+    reference("host_id", "Host that was traced", required=True),
     text("path", "Directory as it was given", required=True),
     text("uuid", "UUID of the trace"),
     text("tracer", "Tracer and its version"),
@@ -49,23 +57,22 @@ Table(
     moment("end_ns", "Last event or end of a packet", clock="host_id"),
     number("event_count", "Events read"),
     number("discarded_event_count", "Events that the tracer counted as discarded"),
-    Column(
+    column(
         "has_request_events",
         BOOLEAN,
-        comment="Requests would have events in it, if there were any (Kilted and later)",
+        "Requests would have events in it, if there were any (Kilted and later)",
     ),
     comment="One row per CTF trace read",
-    info={"view": "CTF traces that were read."},
+    view="CTF traces that were read.",
 )
 
-Table(
+table(
     "packet",
-    STORE,
     run_id(),
     trace_id(),
     number("stream_class_id", "Stream class (channel) of the packet"),
     number("stream_instance_id", "Stream (buffer) of the packet"),
-    Column("cpu_id", INTEGER, comment="CPU that wrote the packet"),
+    integer("cpu_id", "CPU that wrote the packet"),
     number("position", "Position in its stream, from 0"),
     moment("begin_ns", "Begin of the packet"),
     moment("end_ns", "End of the packet"),
@@ -76,12 +83,11 @@ Table(
     comment="One row per packet of a trace; the identity of what was read",
 )
 
-Table(
+table(
     "gap",
-    STORE,
     run_id(),
     trace_id("Trace it was recorded in; between two chunks of a recording, the later"),
-    Column("cpu", INTEGER, comment="CPU concerned; NULL: all"),
+    integer("cpu", "CPU concerned; NULL: all"),
     text(
         "kind",
         "'loss' (discarded events), 'packets' (lost packets) or 'pause' (not tracing)",
@@ -91,12 +97,11 @@ Table(
     moment("end_ns", "First moment after the gap", clock="trace_id"),
     number("event_count", "Events lost, where the tracer counted them"),
     comment="One row per gap in a trace",
-    info={"view": "Gaps in the traces: no two events are paired across one."},
+    view="Gaps in the traces: no two events are paired across one.",
 )
 
-Table(
+table(
     "finding",
-    STORE,
     run_id(),
     trace_id("Trace it is about; NULL: not one trace alone", required=False),
     text("name", "Kind of finding: its file in `schema/health`", required=True),

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from sqlalchemy import BLOB, BOOLEAN, Column, Table
+from sqlalchemy import BLOB, BOOLEAN
 
 from msgflow.db.tables.column import (
-    STORE,
     column,
     flag,
     handle,
@@ -15,6 +14,7 @@ from msgflow.db.tables.column import (
     number,
     process_id,
     run_id,
+    table,
     text,
 )
 
@@ -22,9 +22,8 @@ _IS_INFERRED = column(
     "is_inferred", BOOLEAN, "Its initialisation was not traced", sql="self.created_ns IS NULL"
 )
 
-Table(
+table(
     "publisher",
-    STORE,
     key("publisher_id", "Identity of the publisher"),
     run_id(),
     process_id(),
@@ -32,7 +31,7 @@ Table(
     text("topic_name", "Fully expanded topic name"),
     handle("publisher_handle", "rcl publisher handle"),
     handle("rmw_handle", "rmw publisher handle"),
-    Column("gid", BLOB, comment="Global identifier, 16 bytes; NULL: none"),
+    column("gid", BLOB, "Global identifier, 16 bytes; NULL: none"),
     number("queue_depth", "History depth asked for"),
     moment("created_ns", "First initialisation event", clock="process_id"),
     flag("is_internal", "Infrastructure of ROS (/rosout, /parameter_events, ...)"),
@@ -41,12 +40,11 @@ Table(
     flag("is_topic_declared", "Its topic was given by a file of links"),
     flag("is_agnocast", "Its messages pass through the shared memory of Agnocast"),
     comment="One row per publisher",
-    info={"view": "Publishers, those of ROS itself marked as internal."},
+    view="Publishers, those of ROS itself marked as internal.",
 )
 
-Table(
+table(
     "subscription",
-    STORE,
     key("subscription_id", "Identity of the subscription"),
     run_id(),
     process_id(),
@@ -54,7 +52,7 @@ Table(
     text("topic_name", "Fully expanded topic name"),
     handle("subscription_handle", "rcl subscription handle"),
     handle("rmw_handle", "rmw subscription handle"),
-    Column("gid", BLOB, comment="Global identifier, 16 bytes; NULL: none"),
+    column("gid", BLOB, "Global identifier, 16 bytes; NULL: none"),
     number("queue_depth", "History depth asked for"),
     moment("created_ns", "First initialisation event", clock="process_id"),
     flag("is_internal", "Infrastructure of ROS (/parameter_events, /clock, ...)"),
@@ -63,12 +61,11 @@ Table(
     flag("is_topic_declared", "Its topic was given by a file of links"),
     flag("is_agnocast", "Its messages pass through the shared memory of Agnocast"),
     comment="One row per subscription",
-    info={"view": "Subscriptions, those of ROS itself marked as internal."},
+    view="Subscriptions, those of ROS itself marked as internal.",
 )
 
-Table(
+table(
     "timer",
-    STORE,
     key("timer_id", "Identity of the timer"),
     run_id(),
     process_id(),
@@ -77,15 +74,12 @@ Table(
     handle("timer_handle", "rcl timer handle"),
     moment("created_ns", "rcl_timer_init", clock="process_id"),
     comment="One row per timer",
-    info={
-        "view": "Timers. If the initialisation of a timer was not traced, its period is not known.",
-        "computed": (_IS_INFERRED,),
-    },
+    view="Timers. If the initialisation of a timer was not traced, its period is not known.",
+    computed=(_IS_INFERRED,),
 )
 
-Table(
+table(
     "service",
-    STORE,
     key("service_id", "Identity of the service"),
     run_id(),
     process_id(),
@@ -93,16 +87,16 @@ Table(
     text("service_name", "Fully expanded service name"),
     handle("service_handle", "rcl service handle"),
     handle("rmw_handle", "rmw service handle"),
-    Column("gid", BLOB, comment="Global identifier, 16 bytes; NULL: none"),
+    column("gid", BLOB, "Global identifier, 16 bytes; NULL: none"),
     moment("created_ns", "rcl_service_init", clock="process_id"),
     flag("is_internal", "Infrastructure of ROS (parameter and lifecycle services)"),
     comment="One row per service",
-    info={"view": "Services, those of ROS itself marked as internal.", "computed": (_IS_INFERRED,)},
+    view="Services, those of ROS itself marked as internal.",
+    computed=(_IS_INFERRED,),
 )
 
-Table(
+table(
     "client",
-    STORE,
     key("client_id", "Identity of the client"),
     run_id(),
     process_id(),
@@ -110,12 +104,10 @@ Table(
     text("service_name", "Fully expanded service name"),
     handle("client_handle", "rcl client handle"),
     handle("rmw_handle", "rmw client handle"),
-    Column("gid", BLOB, comment="Identifier that servers see, 16 bytes; NULL: none"),
+    column("gid", BLOB, "Identifier that servers see, 16 bytes; NULL: none"),
     moment("created_ns", "rcl_client_init", clock="process_id"),
     flag("is_internal", "Infrastructure of ROS (parameter and lifecycle services)"),
     comment="One row per service client",
-    info={
-        "view": "Service clients, those of ROS itself marked as internal.",
-        "computed": (_IS_INFERRED,),
-    },
+    view="Service clients, those of ROS itself marked as internal.",
+    computed=(_IS_INFERRED,),
 )

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from typing import Any
 
-from sqlalchemy import INTEGER, VARCHAR, Column, Table
+from sqlalchemy import VARCHAR, Column
 
 from msgflow.db.tables.column import (
-    STORE,
     column,
     flag,
+    integer,
     key,
     moment,
     number,
     reference,
     run_id,
+    table,
     text,
     thread_id,
 )
@@ -34,27 +35,25 @@ def _preemptor() -> tuple[Column[Any], ...]:
         reference(
             "preemptor_other_thread_id",
             "Thread of another process that had the CPU",
-            to="other_thread.other_thread_id",
+            to="other_thread",
         ),
-        Column("preemptor_priority", INTEGER, comment="The priority of that thread"),
+        integer("preemptor_priority", "The priority of that thread"),
     )
 
 
-Table(
+table(
     "other_thread",
-    STORE,
     key("other_thread_id", "Identity of the thread"),
     run_id(),
-    reference("host_id", "Host it ran on", to="host.host_id", required=True),
-    Column("tid", INTEGER, nullable=False, comment="Thread, as the kernel numbers it; 0: idle"),
+    reference("host_id", "Host it ran on", required=True),
+    integer("tid", "Thread, as the kernel numbers it; 0: idle", required=True),
     text("name", "Its name"),
     comment="One row per host, tid and name",
-    info={"view": "Threads of other processes that took the CPU from a ROS thread, or woke one."},
+    view="Threads of other processes that took the CPU from a ROS thread, or woke one.",
 )
 
-Table(
+table(
     "thread_state",
-    STORE,
     run_id(),
     thread_id("The thread"),
     moment("start_ns", "Begin", required=True, clock="thread_id"),
@@ -65,84 +64,57 @@ Table(
         "'sleeping', 'uninterruptible' (waits for a page or a disk) or 'unknown'",
         required=True,
     ),
-    Column(
-        "cpu",
-        INTEGER,
-        comment="CPU it ran on; preempted: the one it waits for; else the one that it left",
-    ),
-    Column(
-        "priority",
-        INTEGER,
-        comment="Its priority to the kernel: 0 to 99 real-time, 100 to 139 nice -20 to 19",
-    ),
+    integer("cpu", "CPU it ran on; preempted: the one it waits for; else the one that it left"),
+    integer("priority", "Its priority to the kernel: 0 to 99 real-time, 100 to 139 nice -20 to 19"),
     thread_id("Thread that took the CPU", name="preempted_by_thread_id", required=False),
     reference(
         "preempted_by_other_thread_id",
         "Thread of another process that took the CPU",
-        to="other_thread.other_thread_id",
+        to="other_thread",
     ),
-    Column("preempted_by_priority", INTEGER, comment="The priority of what took the CPU"),
+    integer("preempted_by_priority", "The priority of what took the CPU"),
     text(
         "waker_kind",
         "What ended the sleep: 'thread', 'timer', 'interrupt' or 'softirq'; with an interrupt the "
         "waker is what it interrupted. NULL: not known",
     ),
     thread_id("Thread that woke it", name="waker_thread_id", required=False),
-    reference(
-        "waker_other_thread_id",
-        "Thread of another process that woke it",
-        to="other_thread.other_thread_id",
-    ),
+    reference("waker_other_thread_id", "Thread of another process that woke it", to="other_thread"),
     flag("is_loss_affected", "Kernel events were lost meanwhile"),
     comment="One row per interval in which a thread had one state",
-    info={
-        "view": "States of threads of ROS processes, as the kernel recorded them.",
-        "computed": (_POLICY,),
-    },
+    view="States of threads of ROS processes, as the kernel recorded them.",
+    computed=(_POLICY,),
 )
 
-Table(
+table(
     "preemptor",
-    STORE,
     run_id(),
     thread_id("The thread that waited"),
     moment("start_ns", "Begin", required=True, clock="thread_id"),
     moment("end_ns", "End", required=True, clock="thread_id"),
     text("state", "Its state: 'preempted' or 'runnable'", required=True),
-    Column("cpu", INTEGER, comment="The CPU"),
+    integer("cpu", "The CPU"),
     *_preemptor(),
-    Column("thread_priority", INTEGER, comment="The priority of the thread that waited"),
+    integer("thread_priority", "The priority of the thread that waited"),
     comment="One row per wait of a thread for a CPU, and stretch in which another thread had it",
-    info={"view": "What ran on the CPU for which a thread of a ROS process waited."},
+    view="What ran on the CPU for which a thread of a ROS process waited.",
 )
 
-Table(
+table(
     "callback_preemptor",
-    STORE,
     run_id(),
-    reference(
-        "callback_instance_id",
-        "The callback instance that waited",
-        to="callback_instance.callback_instance_id",
-        required=True,
-    ),
+    reference("callback_instance_id", "The callback instance that waited", required=True),
     *_preemptor(),
     number("preempted_ns", "For so long, while it was preempted", unit="ns", required=True),
     number("runnable_ns", "For so long, while it was woken", unit="ns", required=True),
     comment="One row per callback instance that waited for a CPU, and thread that had it meanwhile",
-    info={"view": "What ran on the CPU for which callback instances waited, and for how long."},
+    view="What ran on the CPU for which callback instances waited, and for how long.",
 )
 
-Table(
+table(
     "callback_schedule",
-    STORE,
     run_id(),
-    reference(
-        "callback_instance_id",
-        "The callback instance",
-        to="callback_instance.callback_instance_id",
-        required=True,
-    ),
+    reference("callback_instance_id", "The callback instance", required=True),
     number("running_ns", "On a CPU", unit="ns", required=True),
     number("preempted_ns", "Ready, but another thread had the CPU", unit="ns", required=True),
     number("runnable_ns", "Woken, waiting for a CPU", unit="ns", required=True),
@@ -159,21 +131,20 @@ Table(
         unit="ns",
     ),
     comment="One row per callback instance that ended, on a thread whose states are known",
-    info={
-        "view": "How the time of callback instances divides into states of their threads: the "
+    view=(
+        "How the time of callback instances divides into states of their threads: the "
         "parts add up to the duration."
-    },
+    ),
 )
 
-Table(
+table(
     "cpu_usage",
-    STORE,
     run_id(),
-    reference("host_id", "Host", to="host.host_id", required=True),
-    Column("cpu", INTEGER, comment="CPU"),
+    reference("host_id", "Host", required=True),
+    integer("cpu", "CPU"),
     moment("start_ns", "Begin of the second", required=True, clock="host_id"),
     thread_id("The thread; NULL: of a process without ROS", required=False),
-    Column("tid", INTEGER, nullable=False, comment="Its number to the kernel; 0: idle"),
+    integer("tid", "Its number to the kernel; 0: idle", required=True),
     text("name", "Its name"),
     number("running_ns", "How long it ran", unit="ns", required=True),
     number(
@@ -182,7 +153,5 @@ Table(
         unit="Hz",
     ),
     comment="One row per CPU, second and thread that ran there",
-    info={
-        "view": "What ran on each CPU, second by second, threads of processes without ROS included."
-    },
+    view="What ran on each CPU, second by second, threads of processes without ROS included.",
 )

@@ -2,39 +2,36 @@
 
 from __future__ import annotations
 
-from sqlalchemy import INTEGER, Column, Table
-
 from msgflow.db.tables.column import (
-    STORE,
     flag,
     identity,
+    integer,
     moment,
     process_id,
     reference,
     run_id,
+    table,
     text,
     thread_id,
     trace_id,
 )
 
-Table(
+table(
     "user_event",
-    STORE,
     identity("user_event_id", "Identity of the event"),
     run_id(),
     trace_id(),
     process_id(),
     thread_id(),
-    Column("cpu", INTEGER, comment="CPU that it happened on"),
+    integer("cpu", "CPU that it happened on"),
     moment("at_ns", "When it happened", required=True, clock="process_id"),
     text("name", "Provider and event, such as my_pkg:frame_done", required=True),
     reference(
         "callback_instance_id",
         "Innermost callback instance inside which it happened, on its thread; NULL: none",
-        to="callback_instance.callback_instance_id",
     ),
     text("fields", "Its fields, a JSON object: fields->>'$.name' is one of them", required=True),
     flag("is_loss_affected", "A gap may hide that the callback instance was over"),
     comment="One row per event whose name a pattern of msgflow ingest --events matches",
-    info={"view": "Events of the user's own tracepoints."},
+    view="Events of the user's own tracepoints.",
 )
