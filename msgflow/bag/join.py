@@ -40,25 +40,7 @@ ORDER BY publication_id
 def join_bag(
     path: Path, bag: Path, *, run: str | int | None, memory_limit: str | None = None
 ) -> QueryResult:
-    """Store which publications the messages of a bag are of, in one transaction.
-
-    What an earlier bag gave to the run is removed.
-
-    Args:
-        path: the database.
-        bag: directory of a rosbag2, or one of its files (.mcap, .db3).
-        run: a name or an id; the latest run when None.
-        memory_limit: most memory of the database, and of what reads the bag, such as '2GB'.
-
-    Returns:
-        A row per topic of the bag: how many messages were joined, and why others were not.
-
-    Raises:
-        UsageError: no such run or several, clocks that are not synchronised, or the package rosbags
-            is not installed.
-        TraceError: not a bag, a damaged one, or one that takes too much memory.
-        DatabaseError: the database is missing, locked, foreign, or of another schema revision.
-    """
+    """Store which publications the messages of a bag are of; see `Database.join_bag`."""
 
     def join(con: duckdb.DuckDBPyConnection, runs: tuple[Run, ...]) -> QueryResult:
         if len(runs) > 1:

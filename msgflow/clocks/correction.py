@@ -42,18 +42,7 @@ WHERE clock_id = ?
 def apply_clocks(
     path: Path, sync: ClockSync, *, run: str | int | None, memory_limit: str | None = None
 ) -> tuple[Run, ...]:
-    """Correct the clocks of runs of a database, in one transaction; this reads no trace.
-
-    Args:
-        path: the database.
-        sync: how to correct them.
-        run: 'all', a name or an id; the latest run when None.
-        memory_limit: most memory that the database takes, such as '2GB'.
-
-    Raises:
-        UsageError: no such run, or a file that does not fit it.
-        DatabaseError: the database is missing, locked, foreign, or of another schema revision.
-    """
+    """Correct the clocks of runs anew, in one transaction; see `Database.apply_clocks`."""
 
     def apply(con: duckdb.DuckDBPyConnection, runs: tuple[Run, ...]) -> tuple[Run, ...]:
         for run in runs:
@@ -69,9 +58,6 @@ def set_clocks(con: duckdb.DuckDBPyConnection, run_id: int, sync: ClockSync) -> 
 
     The messages must be linked before. The caller derives afterwards what depends on clocks, such
     as the reasons of missing messages.
-
-    Raises:
-        UsageError: a file that does not fit the run.
     """
     _correct(con, f"({internal_sql().text('clock_as_recorded')})", {"run_id": run_id})
     con.execute("DELETE FROM store.clock_uncertainty WHERE run_id = ?", [run_id])

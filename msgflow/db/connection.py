@@ -23,14 +23,8 @@ def connect(
 ) -> duckdb.DuckDBPyConnection:
     """Open an existing, current msgflow database.
 
-    Args:
-        path: the database file.
-        read_only: open it for reading only; several processes can do so at once.
-        memory_limit: most memory that DuckDB takes, such as '2GB'; DuckDB's default when None.
-
-    Raises:
-        DatabaseError: the file is missing, locked, foreign, or of another schema revision; or it is
-            opened for writing and its definitions are not those of this msgflow.
+    It is not opened for writing if its definitions are not those of this msgflow. `memory_limit` is
+    the most memory that DuckDB takes, such as '2GB'; DuckDB's default when None.
     """
     if not path.exists():
         raise DatabaseError(f"no database — {path}", "msgflow ingest TRACE")

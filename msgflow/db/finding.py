@@ -162,10 +162,7 @@ def read_findings(
 ) -> list[Finding]:
     """Return the stored findings of runs: errors first, those of one kind together.
 
-    Args:
-        con: connection to a current database.
-        run_ids: the runs.
-        info: those of severity 'info' too.
+    `info` also returns those of severity 'info'.
     """
     rows = con.execute(
         f"SELECT {', '.join(Finding.__dataclass_fields__)} FROM main.finding "
@@ -190,12 +187,7 @@ def commands_after(findings: Sequence[Finding]) -> list[str]:
 
 
 def broken_rules(con: duckdb.DuckDBPyConnection, run_id: int | None = None) -> list[Finding]:
-    """Return the broken rules of the database, in the order of `read_findings`.
-
-    Args:
-        con: connection to a current database.
-        run_id: look at this run only; at all runs when None.
-    """
+    """Return the broken rules of all runs, or of one, in the order of `read_findings`."""
     found = (each for header in kinds_of("database") for each in _broken(con, header, run_id))
     return sorted(found, key=_order)
 

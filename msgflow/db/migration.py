@@ -143,8 +143,7 @@ def migrated(
 ) -> Iterator[duckdb.DuckDBPyConnection]:
     """Apply the migrations up to a revision, and commit them at the end of the block.
 
-    Yields:
-        A connection inside their transaction, for what belongs to it as well.
+    The connection is inside their transaction, for what belongs to it as well.
     """
     # These imports are slow, and only files of an older revision need them.
     from alembic import command

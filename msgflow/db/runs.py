@@ -51,17 +51,7 @@ def change_runs(
 
 
 def remove_runs(path: Path, run: str | int, *, memory_limit: str | None = None) -> tuple[Run, ...]:
-    """Delete runs with all their rows, and return them.
-
-    Args:
-        path: the database.
-        run: 'all', a name or an id.
-        memory_limit: most memory that the database takes, such as '2GB'.
-
-    Raises:
-        UsageError: no such run.
-        DatabaseError: the database is missing, locked, foreign, or of another schema revision.
-    """
+    """Delete runs with all their rows, and return them; see `Database.remove_runs`."""
 
     def change(con: duckdb.DuckDBPyConnection, runs: tuple[Run, ...]) -> tuple[Run, ...]:
         delete(con, [one.run_id for one in runs])
@@ -71,19 +61,7 @@ def remove_runs(path: Path, run: str | int, *, memory_limit: str | None = None) 
 
 
 def rename_run(path: Path, run: str | int, name: str, *, memory_limit: str | None = None) -> Run:
-    """Give a run another name, and return the run as it was.
-
-    Args:
-        path: the database.
-        run: a name or an id.
-        name: the new name.
-        memory_limit: most memory that the database takes, such as '2GB'.
-
-    Raises:
-        UsageError: no such run, several, or a name that another run has or `require_run_name`
-            refuses.
-        DatabaseError: the database is missing, locked, foreign, or of another schema revision.
-    """
+    """Give a run another name, and return the run as it was; see `Database.rename_run`."""
     require_run_name(name)
 
     def change(con: duckdb.DuckDBPyConnection, runs: tuple[Run, ...]) -> Run:
@@ -108,18 +86,7 @@ def label_runs(
     *,
     memory_limit: str | None = None,
 ) -> tuple[Run, ...]:
-    """Give runs labels or take them away, and return the runs as they were.
-
-    Args:
-        path: the database.
-        run: 'all', a name, an id, or a label that the runs have.
-        labels: values by key; None takes the label of that key away.
-        memory_limit: most memory that the database takes, such as '2GB'.
-
-    Raises:
-        UsageError: no such run, an invalid key or value, or no such label to take away.
-        DatabaseError: the database is missing, locked, foreign, or of another schema revision.
-    """
+    """Give runs labels, or take them away (None), and return the runs as they were."""
     for key, value in labels.items():
         require_label(key, value)
 

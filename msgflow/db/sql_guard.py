@@ -27,18 +27,10 @@ _PARSED = "SELECT json_serialize_sql(?, skip_null := true, skip_empty := true)"
 def guarded_query(
     con: duckdb.DuckDBPyConnection, text: str, example: str, limit: int | None = None
 ) -> str:
-    """Return the SQL to run in place of the query in `text`, with the same rows.
+    """Return the SQL to run in place of the query in `text`, with the same rows, at most `limit`.
 
-    Args:
-        con: any connection; it parses.
-        text: one query, or EXPLAIN of one.
-        example: a command with SQL.
-        limit: most rows of a query, all when None; EXPLAIN has few.
-
-    Raises:
-        UsageError: `text` is empty.
-        QueryError: it is another kind of statement, or more than one.
-        duckdb.Error: it is not SQL.
+    Any connection parses it. A UsageError shows `example`, a command with SQL. Another kind of
+    statement, or more than one, is a QueryError, and what is no SQL a `duckdb.Error`.
     """
     statements = _statements(con, text)
     if not statements:
@@ -80,19 +72,10 @@ def in_own_lines(message: str) -> str:
 def require_condition(
     con: duckdb.DuckDBPyConnection, text: str, hint: str = _CONDITION_HINT
 ) -> None:
-    """Raise unless `text` is one expression of SQL.
+    """Raise unless `text` is one expression of SQL, without parameters; any connection parses it.
 
     `1) OR (1=1` is no expression, but would pass inside of parentheses. Only the syntax tree shows
     that.
-
-    Args:
-        con: any connection; it parses.
-        text: the condition that a user gave.
-        hint: an example of one.
-
-    Raises:
-        UsageError: it is something else, or has parameters.
-        QueryError: it is nested too deeply.
     """
     sql = f"SELECT {text}\n"
     try:

@@ -13,11 +13,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def transaction(con: duckdb.DuckDBPyConnection) -> Iterator[duckdb.DuckDBPyConnection]:
-    """Commit what the block changes, or roll it back if the block raises an error.
-
-    Yields:
-        The connection itself.
-    """
+    """Commit what the block changes, or roll it back if the block raises an error."""
     con.begin()
     try:
         yield con

@@ -64,22 +64,12 @@ def compare(
 ) -> FleetComparison:
     """Compare runs whose label has one value with those of another.
 
-    Args:
-        lake: the lake.
-        by: key of the label.
-        base: its value in side A. None if the runs have two values: A is the lesser one, and
-            numbers in them count by their size.
-        other: its value in side B. None if they have one value besides `base`.
-        where: a condition on the runs, see `choose`; all runs when None.
-        unit: key of a label; runs with the same value count as one. Runs of one robot are more
-            alike than runs of several, so that they tell less.
-        case: which arrivals of paths: one of CASES.
-        confidence: probability that an interval contains the true difference.
-        at_least: the smallest change that matters: less is about equal.
-
-    Raises:
-        UsageError: no such label or value, no run, or no path in common.
-        DatabaseError: the lake cannot be read.
+    `by` is the key of the label, `base` and `other` its values on side A and B. They may be left
+    out if the runs have two values: A is the lesser one, and numbers in them count by their size.
+    Runs with the same value of the label `unit` count as one: runs of one robot are more alike than
+    runs of several, so that they tell less. Arrivals of paths are those of `case`, one of CASES. An
+    interval contains the true difference with the probability `confidence`. Less than `at_least` is
+    about equal.
     """
     if not 0 < confidence < 1:
         raise UsageError(f"the confidence lies between 0 and 1 — {confidence}", "0.95 is usual")

@@ -130,10 +130,8 @@ class Reading:
     ) -> None:
         """Open runs for reading.
 
-        Args:
-            choice: the runs.
-            tables: tables and public views to read, `view/NAME`; all when None.
-            listed: names and columns of all others are wanted, too.
+        `tables` are those to read, and public views as `view/NAME`; all when None. `listed` says
+        that names and columns of all others are wanted, too.
         """
         self.choice = choice
         self.tables: set[str] = set()  # those asked for that these runs have

@@ -55,11 +55,7 @@ def write_part(
     scratch: Path,
     content: Content,
 ) -> dict[str, Any]:
-    """Write all files of the only run of a database; commit nothing.
-
-    Returns:
-        The columns of the table `run` that the database knows.
-    """
+    """Write all files of the only run of a database, and return its row as far as that knows it."""
     from msgflow.db.connection import recorded_revision
 
     ((run_id, name, start_ns, end_ns, event_count),) = connection.execute(

@@ -23,17 +23,11 @@ def write_views(
     *,
     listed: bool = False,
 ) -> dict[str, list[str]]:
-    """Write views of runs into a folder, as `--views` writes them into a lake.
+    """Write views of runs into a folder, as `--views` writes them into a lake; return their files.
 
-    Args:
-        lake: the lake, which has the databases of the runs.
-        runs: their rows of the table `run`. The part of their views is that of the database.
-        folder: where to write; the databases are there for a moment, too.
-        wanted: the views, each as `view/NAME`; all when None.
-        listed: write all views of the first run, so that their names and columns are known.
-
-    Returns:
-        The files of each view.
+    `wanted` are the views, each as `view/NAME`; all when None. `listed` also writes all views of
+    the first run, so that their names and columns are known. The part of a run's views is that of
+    its database, which is in the folder for a moment, too.
     """
     made: dict[str, list[str]] = {}
     for run in runs:

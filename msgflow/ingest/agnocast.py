@@ -17,11 +17,7 @@ if TYPE_CHECKING:
 
 
 def translate(con: duckdb.DuckDBPyConnection, empty: Collection[str]) -> bool:
-    """Add what these events say to the tables of ROS 2's events.
-
-    Returns:
-        Whether there were any.
-    """
+    """Add what these events say to the tables of ROS 2's events; tell whether there were any."""
     tables = [f"raw.{each.table}" for each in load().staged.values() if each.is_translated]
     if all(table in empty for table in tables):
         return False

@@ -30,10 +30,9 @@ _LEADING = ("ts_ns", "trace_index", "cpu_id", "thread_index")
 
 
 def restore(con: duckdb.DuckDBPyConnection, empty: Collection[str]) -> bool:
-    """Add the events that were reported again to `raw`, unless the originals were recorded.
+    """Add events that were reported again to `raw`, unless the originals were recorded too.
 
-    Returns:
-        Whether there were any.
+    It tells whether there were any.
     """
     reported, moved = _reported(), _moved()
     tables = [f"raw.{each.table}" for each in (*(again for again, _ in reported), *moved)]

@@ -108,41 +108,14 @@ def ingest(
     progress: Callable[[IngestProgress], None] | None = None,
     traces: TraceSet | None = None,
 ) -> IngestReport:
-    """Read all traces below `paths` into `database` as one run.
+    """Read all traces below `paths` into `database` as one run; see `Database.ingest`.
 
     Everything happens in one transaction; a new database appears only when it is complete. Ctrl-C
     ends the ingest until the run is stored, and is ignored while it is being finished after that.
 
-    Args:
-        paths: CTF traces, session directories, directories above such, or archives of such.
-        database: the database file; created where it does not exist, or where a symbolic link of
-            that name points to.
-        name: name of the run; that of the first session's folder when None.
-        replace: delete the runs that hold some of these packets already, or have this name.
-        hosts: name of a host -> path or paths; the traces below belong to that host. Where several
-            paths lead to a trace, the deepest counts.
-        keep_staging: directory to which the staged events are written as Parquet.
-        links: indirect links to declare, or the file with them.
-        clock_sync: how clocks of several hosts are brought together: 'none', 'messages', or a file
-            with the offset of each.
-        reader: which reader to use: 'auto', 'msgflow' or 'bt2'.
-        strict: refuse a trace at its first damage, instead of keeping what is good.
-        ignore: patterns of event names that are not loaded, such as 'dds:*'.
-        events: patterns of names of the user's own events, such as 'my_pkg:*': they become rows of
-            `user_event`.
-        memory_limit: most memory that the database takes, such as '4GB'; when None a quarter of
-            that of the machine, at least 500 MB and at most 4 GB.
-        progress: called every now and then.
-        traces: what to read, if it was opened before; `paths` only give the run its name then.
-
-    Raises:
-        TraceError: a path holds no trace, or none that can be read and used.
-        DatabaseError: the database is locked, foreign, or of another schema revision; or the
-            traces need more memory.
-        UsageError: the packets are in the database already, the name of the run is taken or means
-            something else, a path is empty, or `links` or the file of `clock_sync` does not fit
-            the traces.
-        KeyboardInterrupt: Ctrl-C came before the run was stored.
+    `memory_limit` is the most memory that the database takes, such as '4GB'. When None, it is a
+    quarter of that of the machine, at least 500 MB and at most 4 GB. `traces` are what to read, if
+    they were opened before; `paths` only give the run its name then.
     """
     _require_usable(paths, name)
     declared = read_links(links) if isinstance(links, Path) else links

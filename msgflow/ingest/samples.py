@@ -32,13 +32,7 @@ def load_samples(
 ) -> tuple[str, ...]:
     """Load the samples below these paths, and return what could not be read, for people.
 
-    Args:
-        con: where `raw` is.
-        paths: directories; those of archives are where the traces have them unpacked.
-        traces: what is ingested with them.
-        hostnames: the names that the user gives to the hosts of traces.
-        workspace: a folder for the text of perf.
-        interrupts: end it.
+    Those of archives are where the traces have them unpacked. The text of perf goes to `workspace`.
     """
     warnings = []
     for file in sample_files([*paths, *traces.unpacked]):

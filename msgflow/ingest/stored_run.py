@@ -29,10 +29,7 @@ def store_run(
     """Store a run from staging, inside the open transaction, in place of those that it replaces.
 
     It replaces the run that has `name`, too. Without a name it gets `fallback`, with a number
-    behind it if another run has that name.
-
-    Returns:
-        Its id and name.
+    behind it if another run has that name. Its id and name are returned.
     """
     run_id = int(con.execute("SELECT coalesce(max(run_id), 0) + 1 FROM store.run").fetchall()[0][0])
     replaced = set(loaded.replaced_runs)

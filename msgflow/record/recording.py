@@ -85,28 +85,14 @@ def record(
     note: Callable[[str], None],
     show: Callable[[Status], None],
 ) -> Recorded:
-    """Record until Ctrl-C, until the program ends, or for some seconds.
+    """Record until Ctrl-C, until the program ends, or for some seconds; see `Database.record`.
 
-    Args:
-        directory: to write to; it must not exist, or be empty.
-        name: of the LTTng session.
-        channel: which events, in which buffers.
-        program: to start once all is ready, and to end afterwards; with its arguments.
-        log: new file that gets what the program prints, if it prints anything; None: our stderr.
-        seconds: how long to record; None: without a limit.
-        kernel: also record what the scheduler does.
-        snapshot: a snapshot session that has the initialisation of nodes that run already; what it
-            has is written too.
-        python: trace callbacks and executors of the program's nodes of rclpy, too.
-        profile: how to sample which functions run; None: not at all.
-        note: gets sentences about what is wrong with the recording.
-        show: gets the status twice a second; what it raises ends the recording.
-
-    Raises:
-        UsageError: there is no such program.
-        RecordingError: LTTng is missing or refuses, the directory is in use, or the disk is full.
-        KeyboardInterrupt: Ctrl-C before it began; or Terminated: SIGTERM at any time. Nothing of
-            the recording stays but what is written.
+    The directory must not exist, or be empty. `log` is a new file that gets what the program
+    prints, if it prints anything; None is our stderr. `snapshot` is a snapshot session that has the
+    initialisation of nodes that run already; what it has is written too. `python` also traces
+    callbacks and executors of the program's nodes of rclpy. `note` gets sentences about what is
+    wrong with the recording. `show` gets the status twice a second; what it raises ends the
+    recording. After Ctrl-C or SIGTERM nothing of the recording stays but what is written.
     """
     if program:
         require_program(program[0])

@@ -92,11 +92,8 @@ def temporary_directory() -> Iterator[Path]:
 def rotated(name: str, length_ns: int) -> Iterator[Callable[[], None]]:
     """Let a session cut its recording into chunks during the block; one that does so goes on.
 
-    Yields:
-        A function to call now and then: it starts the rotation anew if another program ended it.
-
-    Raises:
-        RecordingError: it cannot, as one with a live connection or a snapshot session.
+    The function of the block is to be called now and then: it starts the rotation anew if another
+    program ended it. A session with a live connection and a snapshot session cannot rotate.
     """
     is_ours = _is_first_to_rotate(name, length_ns)
 
@@ -130,11 +127,7 @@ def record_snapshot(name: str, directory: Path) -> None:
 
 
 def remove_leftovers() -> list[str]:
-    """Remove what recordings leave whose process is gone: sessions, temporary directories.
-
-    Returns:
-        The names of the sessions.
-    """
+    """Remove directories and sessions that killed recordings left; return the sessions' names."""
     left = [session for session in sessions() if _is_left(session.directory)]
     for session in left:
         lttng("destroy", session.name)

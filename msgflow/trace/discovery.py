@@ -40,11 +40,8 @@ _RECORD_HINT = "ros2 trace"
 def discover(paths: Sequence[str | Path]) -> list[TraceLocation]:
     """List every directory with a `metadata` file below `paths`, sorted by path.
 
-    Symbolic links are followed and resolved, so that no directory is listed twice.
-
-    Raises:
-        TraceError: a path does not exist or cannot be read, there is no CTF trace below it, or
-            none of the traces holds any event data.
+    Symbolic links are followed and resolved, so that no directory is listed twice. At least one
+    trace has event data.
     """
     found: dict[Path, TraceLocation] = {}
     for path in map(Path, paths):

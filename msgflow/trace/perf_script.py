@@ -57,11 +57,7 @@ def sample_files(paths: Sequence[str | Path]) -> list[Path]:
 def write_script(data: Path, text: Path) -> str | None:
     """Have perf write the samples of a `perf.data` as text, with the names of their functions.
 
-    Returns:
-        What was left out, as a sentence; None where all is there.
-
-    Raises:
-        TraceError: perf is missing or fails, or the file is none of perf.
+    It returns what was left out, as a sentence; None where all is there.
     """
     if shutil.which("perf") is None:
         raise TraceError(
@@ -110,11 +106,7 @@ def _why_not_written(data: Path, text: Path, fields: str) -> str | None:
 
 
 def read_script(text: Path, at_once: int = 10_000) -> Iterator[Samples]:
-    """Yield the samples of a text of perf, so many at a time.
-
-    Raises:
-        TraceError: the file cannot be read.
-    """
+    """Yield the samples of a text of perf, so many at a time."""
     hostname: str | None = None
     is_monotonic = False
     heads: list[str] = []

@@ -28,21 +28,12 @@ def open(
 ) -> TraceSet:
     """Open all traces below `paths` as one set.
 
-    Archives are unpacked to the temporary directory (TMPDIR) until the set is closed.
-
-    Args:
-        paths: CTF directories, directories above such, or archives of such (.tar, also with .gz,
-            .xz or .zst, and .zip).
-        reader: 'msgflow' (its own decoder), 'bt2' (Babeltrace 2's Python bindings, which end at
-            the first damage), or 'auto', which is 'msgflow'.
-        strict: end at the first damage.
-        after: the parts of the same recordings that were read before; it takes in these, which can
-            be read only once then. Only msgflow's own decoder can go on like this.
-
-    Raises:
-        TraceError: there is no readable trace below a path, an archive cannot be unpacked, or
-            the reader is not installed.
-        UsageError: there is no reader of that name.
+    Paths are CTF directories, directories above such, or archives of such (.tar, also with .gz, .xz
+    or .zst, and .zip). Archives are unpacked to the temporary directory (TMPDIR) until the set is
+    closed. The reader is 'msgflow' (its own decoder), 'bt2' (Babeltrace 2's Python bindings, which
+    end at the first damage), or 'auto', which is 'msgflow'. `strict` ends at the first damage.
+    `after` has the parts of the same recordings that were read before; it takes in these, which can
+    be read only once then. Only msgflow's own decoder can go on like this.
     """
     if reader not in READERS:
         raise UsageError(f"there is no reader {reader!r}", hint=f"use one of {', '.join(READERS)}")

@@ -86,11 +86,9 @@ class Alarm:
     ) -> None:
         """Start without a verdict.
 
-        Args:
-            targets: the requirements.
-            paths: places of the named paths of the requirements, as `verify` takes them.
-            note: gets a sentence about each requirement that had data and has none any more.
-            with_flows: also ask what became of the flows of paths.
+        `paths` are places of the named paths of the requirements, as `verify` takes them. `note`
+        gets a sentence about each requirement that had data and has none any more. `with_flows`
+        also asks what became of the flows of paths.
         """
         self._targets = targets
         self._with_flows = with_flows
@@ -119,16 +117,10 @@ class Alarm:
     def judge(
         self, con: duckdb.DuckDBPyConnection, window: Window, final_ns: int
     ) -> tuple[list[Row], list[Row]]:
-        """Verify a window.
+        """Verify a window, of whose times those from `final_ns` on are not final yet.
 
-        Args:
-            con: to a database with one run.
-            window: the window, with the part of it that is not final yet.
-            final_ns: where this part begins.
-
-        Returns:
-            What is violated there and was not before; and the rows of `verify`, each with the
-            `culprit` of what fails, and as `flows` the row of `e2e-latency` of a path if asked for.
+        It returns what is violated there and was not before; and the rows of `verify`, each with
+        the `culprit` of what fails, and as `flows` the row of `e2e-latency` of a path if asked for.
         """
         part = Slice(start=window.start_ns, end=window.end_ns)
         rows = verify(con, self._targets, part, paths=self._paths).result.table.to_pylist()

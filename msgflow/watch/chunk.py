@@ -158,11 +158,7 @@ class ChunkFinder:
 
 
 def finished_chunks(directory: Path) -> list[Chunk]:
-    """Return all finished chunks below a directory, of all hosts, by number.
-
-    Raises:
-        TraceError: a directory cannot be read.
-    """
+    """Return all finished chunks below a directory, of all hosts, by number."""
 
     def refuse(error: TraceError) -> None:
         raise error

@@ -74,11 +74,7 @@ class Diagnostics:
     """
 
     def __init__(self) -> None:
-        """Start the node.
-
-        Raises:
-            UsageError: rclpy or diagnostic_msgs cannot be imported.
-        """
+        """Start the node; a UsageError says what cannot be imported."""
         try:
             import rclpy
             from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue

@@ -46,13 +46,8 @@ class FlightRecorder:
     ) -> None:
         """Keep nothing yet.
 
-        Args:
-            directory: gets a directory per violation.
-            most: how many of them stay.
-            window_ns: length of a window.
-            earlier_ns: how much of what came before the window of a violation is kept, too.
-            clock_sync: how clocks of several hosts are brought together, as `ingest` takes it.
-            note: gets a sentence about what was kept, or why not.
+        The directory gets one per violation, of which the `most` last ones stay. `clock_sync` is as
+        `ingest` takes it. `note` gets a sentence about what was kept, or why not.
         """
         self._directory = directory
         self._most = most
@@ -75,12 +70,9 @@ class FlightRecorder:
     ) -> None:
         """Keep the last chunks, unless a violation in the same window has kept them.
 
-        Args:
-            end_ns: until when they were recorded.
-            traces: their events, with the names of all objects.
-            chunks: their directories; of those that are gone only the events are kept.
-            links: all that are declared, with those that were learned.
-            learned: a file of the latter, which is kept, too; None if there are none.
+        They were recorded until `end_ns`. Of directories that are gone only the events, in
+        `traces`, are kept. `links` has all links that are declared. Those of them that were learned
+        are in the file `learned`, which is kept, too.
         """
         if end_ns < self._until_ns:
             return

@@ -28,11 +28,7 @@ _REMEDY = "clocks are in step (chrony) and its session is created anew"
 
 
 def watch_finished(directory: Path, watcher: Watcher) -> Iterator[WindowReport]:
-    """Watch a recording that has ended, from its first to its last chunk.
-
-    Raises:
-        TraceError: there is no chunk, or a directory cannot be read.
-    """
+    """Watch a recording that has ended, from its first to its last chunk."""
     chunks = finished_chunks(directory)
     if not chunks:
         raise TraceError(
@@ -65,14 +61,7 @@ def watch_live(
     """Watch a recording while it grows; where there is no chunk yet, wait for one.
 
     If chunks come faster than they can be read, several of them become one step, and others wait on
-    the disk: a step must not take any memory.
-
-    Args:
-        directory: of a session, or above several.
-        watcher: reads it.
-        step_ns: how often to report at most.
-        is_over: tells whether no further chunk comes.
-        note: gets sentences about what goes wrong.
+    the disk: a step must not take any memory. `note` gets sentences about what goes wrong.
     """
     begin = time.monotonic()
     finder = ChunkFinder(directory, lambda error: note(f"{error.message}: {error.hint}"))

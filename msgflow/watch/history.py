@@ -63,11 +63,7 @@ class History:
         return max(chunk.last_event_ns for chunk in self._chunks)
 
     def add(self, chunk: KeptChunk) -> int:
-        """Add the next chunk of a source.
-
-        Returns:
-            How many of its events came too late: after their window was closed.
-        """
+        """Add the next chunk of a source; return how many of its events are of closed windows."""
         self._further += chunk.times_ns.size
         self._chunks.append(chunk)
         self._chunks.sort(key=lambda each: each.end_ns)
@@ -94,8 +90,7 @@ class History:
     def skip_old(self, *, earlier_ns: int = 0) -> list[Path]:
         """Let the first window be no longer than others, however much was recorded before it.
 
-        Returns:
-            The directories of the chunks that are forgotten.
+        Like `close` and `forget`, it returns the directories of the chunks that are forgotten.
         """
         if self._has_closed or (window := self.next_window(self.newest_ns)) is None:
             return []
@@ -132,11 +127,7 @@ class History:
         )
 
     def close(self, window: Window, *, earlier_ns: int = 0) -> list[Path]:
-        """Close a window: what comes of it from now on is late.
-
-        Returns:
-            The directories of the chunks that are forgotten.
-        """
+        """Close a window: what comes of it from now on is late."""
         self.closed_ns = window.end_ns
         self._has_closed = True
         self._further = 0
@@ -152,11 +143,7 @@ class History:
         return [chunk.path for chunk in self._needed(window, earlier_ns)]
 
     def forget(self, window: Window, *, earlier_ns: int = 0) -> list[Path]:
-        """Forget what no window needs that comes after this one, but for what lasts.
-
-        Returns:
-            The directories of the chunks that are forgotten.
-        """
+        """Forget what no window needs that comes after this one, but for what lasts."""
         needed = self._needed(window, earlier_ns)
         for lasting in self._lasting_without(needed):
             before = self._lasting.get(lasting.source)

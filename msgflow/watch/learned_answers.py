@@ -63,11 +63,7 @@ class LearnedAnswers:
         self._scores: Counter[_Pair] = Counter()
 
     def doubted(self, con: duckdb.DuckDBPyConnection) -> str | None:
-        """Learn from a window, and return what it doubts and earlier ones have shown.
-
-        Returns:
-            A file of links; None if there is nothing to declare.
-        """
+        """Learn from a window; return a file of links: what it doubts and earlier ones showed."""
         verdicts = {
             _Pair(*names): is_answer for *names, is_answer in con.execute(_PAIRS).fetchall()
         }

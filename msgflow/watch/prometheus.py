@@ -75,14 +75,7 @@ class Exporter:
         self._shown_s = 0.0
 
     def serve(self, place: str) -> None:
-        """Serve /metrics in a thread, until the process ends.
-
-        Args:
-            place: a port of 127.0.0.1, or ADDRESS:PORT.
-
-        Raises:
-            UsageError: prometheus-client is missing, or the port cannot be used.
-        """
+        """Serve /metrics in a thread, at a port of 127.0.0.1 or ADDRESS:PORT."""
         try:
             from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, generate_latest
         except ImportError:
@@ -107,12 +100,7 @@ class Exporter:
             ) from error
 
     def count(self, con: duckdb.DuckDBPyConnection, part: Window) -> None:
-        """Count what happened in a further part of the recording, of which all is known.
-
-        Args:
-            con: to a database with one run.
-            part: from the end of the part before.
-        """
+        """Count what happened in a further part of the recording, of which all is known."""
         times = Slice(start=part.start_ns, end=part.end_ns)
         flows = run_query(con, load_query("flows"), {}, times).table
         losses = con.execute(_LOSSES, part.bindings).fetchall()

@@ -25,13 +25,9 @@ _MOST_ABSENCES = 2
 
 
 def watched_place(word: str | None) -> Path:
-    """Return the directory to watch.
+    """Return the directory to watch: that of a session with this name, or the directory itself.
 
-    Args:
-        word: the name of a session, or a directory; without one, the only session is meant.
-
-    Raises:
-        UsageError: there is none, or LTTng cannot rotate it.
+    Without a word, the only session is meant.
     """
     try:
         found, reason = sessions(), None
@@ -94,13 +90,7 @@ class WatchedSessions:
     """
 
     def __init__(self, place: Path, step_ns: int, note: Callable[[str], None]) -> None:
-        """Nothing rotates before the block.
-
-        Args:
-            place: the directory.
-            step_ns: how often they rotate.
-            note: gets sentences about what goes wrong.
-        """
+        """Nothing rotates before the block; `note` gets sentences about what goes wrong."""
         self._place = place
         self._step_ns = step_ns
         self._note = note
@@ -111,11 +101,7 @@ class WatchedSessions:
         self._absences: dict[Session, int] = {}
 
     def __enter__(self) -> WatchedSessions:
-        """Let the sessions rotate that are there.
-
-        Raises:
-            RecordingError: one cannot, as one with `--live`.
-        """
+        """Let the sessions rotate that are there; one with `--live` cannot."""
         try:
             found = sessions()
         except RecordingError:

@@ -57,18 +57,10 @@ class Watcher:
     ) -> None:
         """Start before the first chunk.
 
-        Args:
-            window_ns: length of a window.
-            step_ns: how far a window is from the one before.
-            late_ns: how long a window waits for what is late.
-            links: indirect links to declare.
-            clocks: how clocks of several hosts are brought together.
-            note: gets sentences about what is wrong with the recording.
-            alarm: the targets of each window.
-            recorder: keeps the chunks around a violation.
-            exporter: counts each moment once.
-            database: gets each window, for pages.
-            has_node: this process has a node, which the windows leave out.
+        A window is `step_ns` from the one before, and waits `late_ns` for what is late. `note` gets
+        sentences about what is wrong with the recording. The recorder keeps the chunks around a
+        violation, the exporter counts each moment once, and the database gets each window, for
+        pages. `has_node` says that this process has a node, which the windows leave out.
         """
         self.history = History(window_ns, step_ns, late_ns)
         self._links = links
@@ -133,10 +125,7 @@ class Watcher:
     ) -> WindowReport | None:
         """Close the next window, and return what it shows; None until there is one.
 
-        Args:
-            newest_ns: the newest time that was recorded.
-            is_live: the recording goes on at this moment.
-            is_last: nothing more comes.
+        `is_live` says that the recording goes on at this moment, `is_last` that nothing more comes.
         """
         window = self.history.next_window(newest_ns, is_last=is_last)
         if window is None:
@@ -161,9 +150,8 @@ class Watcher:
     def _ingest(self, traces: KeptTraces) -> tuple[LinksFile | None, str | None]:
         """Ingest what a window needs, without the links of nodes that are not there yet.
 
-        Returns:
-            The links that are declared in it, and a file of those of them that were learned from
-            earlier windows; None if there are none.
+        It returns the links that are declared in it, and a file of those of them that were learned
+        from earlier windows; None if there are none.
         """
         left: list[DeclaredLink] = []
 

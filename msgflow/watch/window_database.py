@@ -25,12 +25,7 @@ class WindowDatabase:
     """
 
     def __init__(self, path: Path, *, clock_sync: str) -> None:
-        """Write a database without a run.
-
-        Args:
-            path: of the file, which does not exist yet.
-            clock_sync: how clocks of several hosts are brought together, as `ingest` takes it.
-        """
+        """Write a database without a run; `clock_sync` is as `ingest` takes it."""
         self.path = path
         self._prepared = path.with_name(f"next-{path.name}")
         self._clock_sync = clock_sync
@@ -41,22 +36,12 @@ class WindowDatabase:
         empty_database.write_empty(path)
 
     def offer(self, end_ns: int, traces: KeptTraces, links: LinksFile | None) -> None:
-        """Take over a further window.
-
-        Args:
-            end_ns: when it ended.
-            traces: its events, with those around it.
-            links: all that are declared, with those that were learned.
-        """
+        """Take over a window: its end, its events and those around it, and all links."""
         with self._lock:
             self._last = (end_ns, traces, links)
 
     def prepare(self) -> None:
-        """Write the last window beside the database, unless that was done before.
-
-        Raises:
-            MsgflowError: it cannot be written.
-        """
+        """Write the last window beside the database, unless that was done before."""
         with self._lock:
             last, self._last = self._last, None
         if last is None:

@@ -158,9 +158,7 @@ def _find_alone(
 ) -> tuple[Found, int]:
     """Find the events of a packet that begin in front of the byte `until`, from this one on.
 
-    Returns:
-        the events, and where the one after them begins: not before `until`, unless there is a
-        problem.
+    Also return where the one after them begins: not before `until`, unless there is a problem.
     """
     header = layout.header
     assert header is not None

@@ -128,12 +128,7 @@ def event_reader_of(layout: StreamLayout, memory: Memory, entry: Entry, base: in
 def _find_field_by_field(
     layout: StreamLayout, memory: Memory, entry: Entry
 ) -> tuple[NDArray[np.int64], tuple[int, str] | None]:
-    """Find the events of a packet.
-
-    Returns:
-        bits of the packet at which event headers begin, up to the damage if there is any; and
-        the byte that cannot be read and why, None if all is well.
-    """
+    """Return at which bits of a packet its events begin, and its damage: a byte, and why."""
     reader = event_reader_of(layout, memory, entry, entry.base)
     end = entry.packet.content_bits
     begins = []

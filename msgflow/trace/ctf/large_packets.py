@@ -32,11 +32,9 @@ def cut(
 ) -> tuple[PacketEvents, list[Entry]] | None:
     """Return a packet's times and counts, and its pieces in order of time.
 
-    Its events are found once, for all pieces; `report` is called for damage.
-
-    Returns:
-        None if the packet is better read as a whole: it is small, a piece already, empty, or its
-        times make no sense.
+    Its events are found once, for all pieces; `report` is called for damage. None says that the
+    packet is better read as a whole: it is small, a piece already, empty, or its times make no
+    sense.
     """
     if entry.size <= LARGEST_WHOLE or entry.until is not None:
         return None

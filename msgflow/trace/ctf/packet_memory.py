@@ -64,8 +64,7 @@ class Loader:
     def load(self, entries: Sequence[Entry]) -> list[Entry]:
         """Put these packets into memory in this order, including those that are there already.
 
-        Returns:
-            packets that their files no longer hold.
+        It returns those that their files no longer hold.
         """
         missing = []
         size = sum(room_for(entry.size) for entry in entries)
