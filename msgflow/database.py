@@ -19,8 +19,6 @@ from msgflow.text.name_suggestions import did_you_mean
 
 # What is imported here, `msgflow COMMAND --help` waits for: DuckDB and what asks it are not.
 if TYPE_CHECKING:
-    from types import TracebackType
-
     import duckdb
     import pyarrow as pa
 
@@ -95,12 +93,7 @@ class Database:
     def __enter__(self) -> Database:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:

@@ -40,16 +40,13 @@ if TYPE_CHECKING:
 
     import duckdb
 
-_PACKET_TABLE = """
+_TABLES = """
 CREATE TABLE raw.packet (
     trace_index INTEGER, stream_index INTEGER, stream_class_id BIGINT, stream_instance_id BIGINT,
     cpu_id INTEGER, position BIGINT, begin_ns BIGINT, end_ns BIGINT, last_event_ns BIGINT,
     event_count BIGINT, discarded_event_count BIGINT, lost_packet_count BIGINT,
     is_numbered BOOLEAN
-)
-"""
-
-_THREAD_TABLES = """
+);
 CREATE TABLE raw.thread (
     thread_index INTEGER, trace_index INTEGER, pid_ns BIGINT, vpid INTEGER, vtid INTEGER
 );
@@ -57,72 +54,36 @@ CREATE TABLE raw.thread_name (
     thread_index INTEGER, procname VARCHAR, first_event_id BIGINT, last_event_id BIGINT,
     first_seen_ns BIGINT, last_seen_ns BIGINT
 );
-CREATE TABLE raw.cpu_return (thread_index INTEGER, event_id BIGINT)
-"""
-
-_INTERRUPT_TABLE = """
+CREATE TABLE raw.cpu_return (thread_index INTEGER, event_id BIGINT);
 CREATE TABLE raw.interrupt (
     trace_index INTEGER, kind {kind}, start_ns BIGINT, end_ns BIGINT, tid INTEGER
-)
-"""
-
-_KERNEL_THREAD_TABLE = """
+);
 CREATE TABLE raw.kernel_thread (
     trace_index INTEGER, tid INTEGER, vpid INTEGER, vtid INTEGER, pid_ns BIGINT, first_ns BIGINT,
     last_ns BIGINT
-)
-"""
-
-_STACK_SAMPLE_TABLE = """
+);
 CREATE TABLE raw.stack_sample (
     hostname VARCHAR, is_monotonic BOOLEAN, head VARCHAR, stack VARCHAR
-)
-"""
-
-_SOURCE_TABLE = """
+);
 CREATE TABLE staging.source (
     trace_index INTEGER, path VARCHAR, uuid VARCHAR, domain VARCHAR, hostname VARCHAR,
     tracer VARCHAR, clock_uuid VARCHAR, clock_key VARCHAR, begin_ns BIGINT, end_ns BIGINT,
     clock_correction_ns BIGINT, clock_origin_ns BIGINT
-)
-"""
-
-_EVENT_COUNT_TABLE = """
+);
 CREATE TABLE staging.event_count (
     trace_index INTEGER, name VARCHAR, is_known BOOLEAN, event_count BIGINT
-)
-"""
-
-_DECLARED_TABLE = """
-CREATE TABLE staging.declared (trace_index INTEGER, name VARCHAR)
-"""
-
-_LEFT_OUT_TABLE = """
+);
+CREATE TABLE staging.declared (trace_index INTEGER, name VARCHAR);
 CREATE TABLE staging.left_out (
     trace_index INTEGER, used_index INTEGER, event_count BIGINT, thread_count BIGINT,
     length_ns BIGINT
-)
-"""
-
-_IGNORED_TABLE = """
-CREATE TABLE staging.ignored (place INTEGER, pattern VARCHAR, event VARCHAR)
-"""
-
-_ASKED_TABLE = """
-CREATE TABLE staging.asked (place INTEGER, pattern VARCHAR, event VARCHAR)
-"""
-
-_PACKET_READ_ONCE_TABLE = """
-CREATE TABLE staging.packet_read_once (trace_index INTEGER, packet_count BIGINT)
-"""
-
-_IMPLAUSIBLE_TABLE = """
+);
+CREATE TABLE staging.ignored (place INTEGER, pattern VARCHAR, event VARCHAR);
+CREATE TABLE staging.asked (place INTEGER, pattern VARCHAR, event VARCHAR);
+CREATE TABLE staging.packet_read_once (trace_index INTEGER, packet_count BIGINT);
 CREATE TABLE staging.implausible (
     event VARCHAR, field VARCHAR, what VARCHAR, value_count BIGINT
-)
-"""
-
-_DAMAGE_TABLE = """
+);
 CREATE TABLE staging.damage (
     trace_index INTEGER, file VARCHAR, position BIGINT, byte_offset BIGINT, message VARCHAR
 )
@@ -138,30 +99,10 @@ def attach(con: duckdb.DuckDBPyConnection, directory: Path | None) -> None:
         path = ":memory:" if directory is None else str(directory / f"{name}.duckdb")
         # Staged tables are of no use after a crash.
         con.execute(f"ATTACH {literal(path)} AS {name} (RECOVERY_MODE no_wal_writes)")
-    for statement in _tables():
-        con.execute(statement)
-
-
-def _tables() -> tuple[str, ...]:
     catalogue = load()
-    labels, interrupts = catalogue.labels, catalogue.interrupts
-    return (
-        *(each.create_table_sql("raw", labels, interrupts) for each in catalogue.staged.values()),
-        _PACKET_TABLE,
-        _THREAD_TABLES,
-        _INTERRUPT_TABLE.format(kind=enum_type(interrupts)),
-        _KERNEL_THREAD_TABLE,
-        _STACK_SAMPLE_TABLE,
-        _SOURCE_TABLE,
-        _EVENT_COUNT_TABLE,
-        _DECLARED_TABLE,
-        _LEFT_OUT_TABLE,
-        _IGNORED_TABLE,
-        _ASKED_TABLE,
-        _PACKET_READ_ONCE_TABLE,
-        _IMPLAUSIBLE_TABLE,
-        _DAMAGE_TABLE,
-    )
+    for each in catalogue.staged.values():
+        con.execute(each.create_table_sql("raw", catalogue.labels, catalogue.interrupts))
+    con.execute(_TABLES.format(kind=enum_type(catalogue.interrupts)))
 
 
 def empty_tables(con: duckdb.DuckDBPyConnection) -> set[str]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from msgflow.trace.ctf.continuation import Continuation
+from msgflow.trace.ctf.losses import Continuation
 from msgflow.trace.discovery import discover
 from msgflow.trace.model import Damage, EventBatch, Progress, TraceInfo, TraceLocation
 from msgflow.trace.reader_choice import open

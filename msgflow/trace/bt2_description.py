@@ -12,7 +12,7 @@ from msgflow.trace.bt2_messages import messages, parameters_of
 from msgflow.trace.ctf.clock import Clock
 from msgflow.trace.description import description
 from msgflow.trace.metadata_frame import MetadataKind, kind_of
-from msgflow.trace.model import TraceInfo, undeclared
+from msgflow.trace.model import TraceInfo
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -29,7 +29,7 @@ def describe(bt2: Any, path: Path, index: int) -> tuple[TraceInfo, list[Any]]:
         )
     first = next(messages(bt2, [(path, 0)]), None)
     if first is None:
-        return undeclared(path, index), []
+        return TraceInfo(index, path), []
     trace = first.stream.trace
     streams = list(trace.cls.values())
     events = [event for stream in streams for event in stream.values()]

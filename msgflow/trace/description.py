@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from msgflow.trace.model import TraceInfo
 
@@ -10,24 +10,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence, Set
     from pathlib import Path
 
-
-class DeclaredClock(Protocol):
-    """A clock as the metadata of a trace declares it."""
-
-    @property
-    def uuid(self) -> str | None:
-        """Its uuid."""
-
-    @property
-    def name(self) -> str | None:
-        """Its name."""
-
-    @property
-    def frequency(self) -> int:
-        """How often it counts [Hz]."""
-
-    def to_ns(self, value: int) -> int:
-        """Return the time of a value of it [ns since the epoch]."""
+    from msgflow.trace.ctf.clock import Clock
 
 
 _PROCESS_CONTEXT = {"vpid", "vtid"}
@@ -39,7 +22,7 @@ def description(
     *,
     uuid: str | None,
     environment: Mapping[str, int | str],
-    clock: DeclaredClock,
+    clock: Clock,
     begins: Sequence[int],
     ends: Sequence[int],
     events: Sequence[tuple[str, Set[str]]],

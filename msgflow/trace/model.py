@@ -30,22 +30,22 @@ class TraceInfo:
 
     index: int  # place of the trace among those opened together, from 0, in order of path
     path: Path  # the directory; in an archive, the archive's path followed by that inside
-    uuid: str | None  # the CTF trace uuid, lower case with hyphens, or None
-    domain: str | None  # 'ust', 'kernel', or None when the tracer does not say
-    hostname: str | None  # name of the machine or container, or None
-    tracer: str | None  # name and version, such as 'lttng-ust 2.13', or None
-    clock_uuid: str | None  # uuid of the clock (LTTng: the boot id), or None
-    clock_name: str | None  # name of the clock, such as 'monotonic', or None
-    clock_offset_ns: int  # nanoseconds from the epoch to the origin of the clock, as declared
-    clock_frequency: int  # how often the clock counts [Hz]; 0 without event data
+    uuid: str | None = None  # the CTF trace uuid, lower case with hyphens, or None
+    domain: str | None = None  # 'ust', 'kernel', or None when the tracer does not say
+    hostname: str | None = None  # name of the machine or container, or None
+    tracer: str | None = None  # name and version, such as 'lttng-ust 2.13', or None
+    clock_uuid: str | None = None  # uuid of the clock (LTTng: the boot id), or None
+    clock_name: str | None = None  # name of the clock, such as 'monotonic', or None
+    clock_offset_ns: int = 0  # nanoseconds from the epoch to the origin of the clock, as declared
+    clock_frequency: int = 0  # how often the clock counts [Hz]; 0 without event data
     # What is added to the offset, to be on one time base with the first trace of the same clock
     # that is not the kernel's.
-    clock_correction_ns: int
-    begin_ns: int | None  # time of the first packet's begin, epoch nanoseconds, or None
-    end_ns: int | None  # time of the last packet's end, epoch nanoseconds, or None
-    has_process_context: bool  # every event carries both `vpid` and `vtid`
+    clock_correction_ns: int = 0
+    begin_ns: int | None = None  # time of the first packet's begin, epoch nanoseconds, or None
+    end_ns: int | None = None  # time of the last packet's end, epoch nanoseconds, or None
+    has_process_context: bool = False  # every event carries both `vpid` and `vtid`
     # Event classes declared in the metadata, sorted; they need not occur.
-    event_names: tuple[str, ...]
+    event_names: tuple[str, ...] = ()
     # The events have times. Where they have none, `ts_ns` only gives their order.
     has_time: bool = True
 
@@ -53,27 +53,6 @@ class TraceInfo:
     def identity(self) -> str:
         """What chunks of one recording have in common."""
         return self.uuid or str(self.path)
-
-
-def undeclared(path: Path, index: int) -> TraceInfo:
-    """Describe a trace without any event data; see `TraceInfo` for the arguments."""
-    return TraceInfo(
-        index=index,
-        path=path,
-        uuid=None,
-        domain=None,
-        hostname=None,
-        tracer=None,
-        clock_uuid=None,
-        clock_name=None,
-        clock_offset_ns=0,
-        clock_frequency=0,
-        clock_correction_ns=0,
-        begin_ns=None,
-        end_ns=None,
-        has_process_context=False,
-        event_names=(),
-    )
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from msgflow.trace.discovery import discover
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from msgflow.trace.ctf.continuation import Continuation
+    from msgflow.trace.ctf.losses import Continuation
     from msgflow.trace.model import TraceLocation
     from msgflow.trace.trace_set import TraceSet
 

@@ -14,7 +14,6 @@ from msgflow.text.name_suggestions import did_you_mean
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from types import TracebackType
 
     from msgflow.record.lttng import Session
 
@@ -111,12 +110,7 @@ class WatchedSessions:
             self._begin(session)
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """End the rotations that began here."""
         self._stack.close()
 

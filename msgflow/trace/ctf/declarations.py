@@ -6,13 +6,12 @@ from dataclasses import dataclass, field, replace
 
 from msgflow.trace.ctf.clock import Clock
 from msgflow.trace.ctf.field_types import (
-    END_ROLE,
-    TIME_ROLE,
     Array,
     Choice,
     Integer,
     Member,
     MetadataError,
+    Role,
     Structure,
     Type,
     VariableInteger,
@@ -20,7 +19,7 @@ from msgflow.trace.ctf.field_types import (
 )
 
 _SMALLEST_ID, _LARGEST_ID = -(1 << 63), (1 << 64) - 1
-_TIMES = {TIME_ROLE, END_ROLE}
+_TIMES = {Role.TIME, Role.END}
 
 
 @dataclass(eq=False)

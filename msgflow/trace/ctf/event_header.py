@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING
 
 from msgflow.trace.ctf.field_types import (
     BYTE,
-    EVENT_CLASS_ROLE,
-    TIME_ROLE,
     Choice,
     Integer,
+    Role,
     Scope,
     Structure,
     Type,
@@ -138,8 +137,8 @@ def _form(structure: Structure, choice: Choice | None, residues: int) -> Form:
         sizes.append(end // BYTE - residue)
     return Form(
         choice,
-        _place([_last_of_role(found, EVENT_CLASS_ROLE) for found in laid_out]),
-        _place([_last_of_role(found, TIME_ROLE) for found in laid_out]),
+        _place([_last_of_role(found, Role.EVENT_CLASS) for found in laid_out]),
+        _place([_last_of_role(found, Role.TIME) for found in laid_out]),
         tuple(sizes),
     )
 

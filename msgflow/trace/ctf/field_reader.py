@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 from msgflow.trace.ctf.field_types import (
     BYTE,
-    EVENT_CLASS_ROLE,
-    TIME_ROLE,
     Array,
     FieldError,
     Integer,
     Optional,
     Real,
     Reference,
+    Role,
     Scope,
     Sequence,
     String,
@@ -100,7 +99,7 @@ class FieldReader:
             value -= 1 << size
         for role in field_type.roles:
             self.found[role] = value
-            if role == TIME_ROLE:
+            if role == Role.TIME:
                 self.time_bits = size
         return bool(value) if field_type.arrow == "bool" else value
 
@@ -117,7 +116,7 @@ class FieldReader:
             value -= 1 << (7 * (number + 1))
         for role in field_type.roles:
             self.found[role] = value
-            if role == TIME_ROLE:
+            if role == Role.TIME:
                 self.time_bits = 64
         return value
 
@@ -289,13 +288,13 @@ class EventReader:
         """Read the header of the event that begins at this bit."""
         reader = self._reader
         reader.position = position
-        reader.found.pop(TIME_ROLE, None)
-        reader.found[EVENT_CLASS_ROLE] = 0
+        reader.found.pop(Role.TIME, None)
+        reader.found[Role.EVENT_CLASS] = 0
         reader.read_scope(Scope.EVENT_HEADER, self._stream.event_header)
-        event = self._stream.events.get(reader.found[EVENT_CLASS_ROLE])
+        event = self._stream.events.get(reader.found[Role.EVENT_CLASS])
         if event is None:
-            raise FieldError(f"there is no event class {reader.found[EVENT_CLASS_ROLE]}")
-        return HeaderValues(event, reader.found.get(TIME_ROLE), reader.time_bits)
+            raise FieldError(f"there is no event class {reader.found[Role.EVENT_CLASS]}")
+        return HeaderValues(event, reader.found.get(Role.TIME), reader.time_bits)
 
     def event(self, position: int) -> dict[Scope, dict[str, Any]]:
         """Read the contexts and payload of the event that begins at this bit."""

@@ -3,23 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from enum import IntEnum
+from enum import IntEnum, StrEnum
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-
-MAGIC_ROLE = "packet-magic-number"
-UUID_ROLE = "metadata-stream-uuid"
-STREAM_CLASS_ROLE = "data-stream-class-id"
-STREAM_ROLE = "data-stream-id"
-PACKET_SIZE_ROLE = "packet-total-length"
-CONTENT_SIZE_ROLE = "packet-content-length"
-TIME_ROLE = "default-clock-timestamp"
-END_ROLE = "packet-end-default-clock-timestamp"
-DISCARDED_ROLE = "discarded-event-record-counter-snapshot"
-SEQUENCE_ROLE = "packet-sequence-number"
-EVENT_CLASS_ROLE = "event-record-class-id"
 
 BYTE = 8
 _UUID_BYTES = 16
@@ -31,6 +19,22 @@ class MetadataError(Exception):
 
 class FieldError(Exception):
     """A field cannot be read; the message says why."""
+
+
+class Role(StrEnum):
+    """What the value of a field is for, in the words of CTF 2."""
+
+    MAGIC = "packet-magic-number"
+    UUID = "metadata-stream-uuid"
+    STREAM_CLASS = "data-stream-class-id"
+    STREAM = "data-stream-id"
+    PACKET_SIZE = "packet-total-length"
+    CONTENT_SIZE = "packet-content-length"
+    TIME = "default-clock-timestamp"
+    END = "packet-end-default-clock-timestamp"
+    DISCARDED = "discarded-event-record-counter-snapshot"
+    SEQUENCE = "packet-sequence-number"
+    EVENT_CLASS = "event-record-class-id"
 
 
 class Scope(IntEnum):
@@ -205,7 +209,7 @@ def parts(declared: Type) -> list[Type]:
 
 def may_have(declared: Type, role: str) -> bool:
     """Tell whether a field of this type can have the role."""
-    if role != UUID_ROLE:
+    if role != Role.UUID:
         return isinstance(declared, Integer | VariableInteger)
     if not isinstance(declared, Array) or declared.length != _UUID_BYTES:
         return False

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,23 +14,14 @@ if TYPE_CHECKING:
     from msgflow.trace.ctf.stream_layout import StreamLayout
 
 
-@dataclass
-class Headers:
-    """Event headers, in the order of their positions."""
-
-    classes: NDArray[np.uint32]  # number of the event class
-    clock: NDArray[np.uint64]  # value of the clock
-    bodies: NDArray[np.int64]  # where contexts and payload begin: bytes of memory
-
-
 def read_headers(
     layout: StreamLayout,
     memory: Memory,
     positions: NDArray[np.int64],
     counts: NDArray[np.int64],
     befores: NDArray[np.uint64],
-) -> Headers:
-    """Read the headers of the events at these positions.
+) -> tuple[NDArray[np.uint32], NDArray[np.uint64], NDArray[np.int64]]:
+    """Return class, clock and body of the events at these positions, as `Events` has them.
 
     `positions` are the bytes of memory at which events begin, packet after packet. `counts` are the
     events of each packet, `befores` the values of the clock before the first event of each.
@@ -59,10 +49,10 @@ def read_headers(
         else:
             values[rows] = np.repeat(befores, counts)[rows]
     if header.narrow_bits is None:
-        return Headers(classes, values, bodies)
+        return classes, values, bodies
     whole_rows = np.sort(np.concatenate([*whole, np.empty(0, np.int64)]))
     clock = _unwrapped(values, header.narrow_bits, firsts, owner_befores, whole_rows)
-    return Headers(classes, clock, bodies)
+    return classes, clock, bodies
 
 
 class _Reader:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from msgflow.trace.ctf.events import find_events, read_events, without_absurd
+from msgflow.trace.ctf.events import find_events, read_events, say_nothing, without_absurd
 from msgflow.trace.ctf.packet_order import PacketEvents
 from msgflow.trace.ctf.stream_layout import GAP
 from msgflow.trace.numpy_arrow import distinct
@@ -46,7 +46,7 @@ def cut(
     entry.base = 0
     find_events(layout, memory, [entry], report)
     events = read_events(layout, memory, [entry])
-    is_sound = without_absurd(layout, [entry], events, _say_nothing) is events
+    is_sound = without_absurd(layout, [entry], events, say_nothing) is events
     entry.base = -1
     ts_ns = clock_class.to_ns_array(events.clock)
     begins = events.positions
@@ -73,7 +73,3 @@ def cut(
         entry, begins.size, int(clock[0]), int(clock[-1]), int(ts_ns[-1]), falls_back=False
     )
     return summary, pieces
-
-
-def _say_nothing(entry: Entry, offset: int, message: str) -> None:
-    pass

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from msgflow.trace.ctf.packets import Packet
     from msgflow.trace.ctf.streams import Stream
+    from msgflow.trace.time_base import ClockName
 
 Recording = tuple[str, int, int]
 """Trace uuid (or path), stream class and stream instance: one counter, through all chunks."""
@@ -70,6 +71,15 @@ class LossCounter:
             # The events may have been lost in the missing packets or in this one.
             return Losses(None, lost, problem)
         return Losses(discarded, lost, problem)
+
+
+@dataclass
+class Continuation:
+    """What was read so far of recordings whose parts are opened one after the other, each once."""
+
+    # How far the clocks are from the epoch, see `on_one_base`.
+    clock_offsets: dict[ClockName, int] = field(default_factory=dict)
+    losses: LossCounter = field(default_factory=LossCounter)  # the counters in their packets
 
 
 def recording_of(stream: Stream, uuid: str | None, path: str) -> Recording:

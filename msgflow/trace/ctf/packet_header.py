@@ -9,20 +9,11 @@ from uuid import UUID
 from msgflow.trace.ctf.field_reader import FieldReader
 from msgflow.trace.ctf.field_types import (
     BYTE,
-    CONTENT_SIZE_ROLE,
-    DISCARDED_ROLE,
-    END_ROLE,
-    MAGIC_ROLE,
-    PACKET_SIZE_ROLE,
-    SEQUENCE_ROLE,
-    STREAM_CLASS_ROLE,
-    STREAM_ROLE,
-    TIME_ROLE,
-    UUID_ROLE,
     Array,
     FieldError,
     Integer,
     MetadataError,
+    Role,
     Scope,
     Structure,
 )
@@ -34,18 +25,7 @@ if TYPE_CHECKING:
 MAGIC = 0xC1FC1FC1
 _CPU = "cpu_id"
 _LONGEST_HEADER = 1 << 16
-_KNOWN_ROLES = {
-    MAGIC_ROLE,
-    UUID_ROLE,
-    STREAM_CLASS_ROLE,
-    STREAM_ROLE,
-    PACKET_SIZE_ROLE,
-    CONTENT_SIZE_ROLE,
-    TIME_ROLE,
-    END_ROLE,
-    SEQUENCE_ROLE,
-    DISCARDED_ROLE,
-}
+_KNOWN_ROLES = set(Role) - {Role.EVENT_CLASS}
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,9 +83,9 @@ class HeaderReader:
         if self._start is None or uuid_text is None:
             return None
         places = self._start.places
-        if MAGIC_ROLE not in places or UUID_ROLE not in places:
+        if Role.MAGIC not in places or Role.UUID not in places:
             return None
-        magic, uuid = places[MAGIC_ROLE], places[UUID_ROLE]
+        magic, uuid = places[Role.MAGIC], places[Role.UUID]
         if (magic.first, magic.last, uuid.first) != (0, 4, 4):
             return None
         return MAGIC.to_bytes(4, magic.order) + bytes.fromhex(uuid_text.replace("-", ""))
@@ -116,10 +96,10 @@ class HeaderReader:
         return plan
 
     def _check(self, found: dict[str, Any]) -> StreamClass:
-        if found.get(MAGIC_ROLE, MAGIC) != MAGIC:
+        if found.get(Role.MAGIC, MAGIC) != MAGIC:
             raise FieldError("no packet begins here, the magic number is missing")
         streams = self._trace.streams
-        class_id = found.get(STREAM_CLASS_ROLE)
+        class_id = found.get(Role.STREAM_CLASS)
         if class_id is None and len(streams) == 1:
             return next(iter(streams.values()))
         stream = streams.get(class_id or 0)
@@ -140,18 +120,18 @@ class HeaderReader:
     def _header(
         self, stream: StreamClass, found: dict[str, Any], events_at: int, discarded_bits: int
     ) -> PacketHeader:
-        uuid = found.get(UUID_ROLE)
+        uuid = found.get(Role.UUID)
         is_foreign = uuid is not None and self._uuid is not None and uuid != self._uuid
         return PacketHeader(
             stream=stream,
-            instance=found.get(STREAM_ROLE),
-            size_bits=found.get(PACKET_SIZE_ROLE),
-            content_bits=found.get(CONTENT_SIZE_ROLE),
+            instance=found.get(Role.STREAM),
+            size_bits=found.get(Role.PACKET_SIZE),
+            content_bits=found.get(Role.CONTENT_SIZE),
             events_at=events_at,
-            begin=found.get(TIME_ROLE),
-            end=found.get(END_ROLE),
-            sequence=found.get(SEQUENCE_ROLE),
-            discarded=found.get(DISCARDED_ROLE),
+            begin=found.get(Role.TIME),
+            end=found.get(Role.END),
+            sequence=found.get(Role.SEQUENCE),
+            discarded=found.get(Role.DISCARDED),
             discarded_bits=discarded_bits,
             cpu=found.get(_CPU),
             foreign=_uuid_text(uuid) if uuid is not None and is_foreign else None,
@@ -204,7 +184,7 @@ def _plan(structure: Structure, position: int) -> _Plan | None:
             places[role] = _place(leaf)
         if leaf.path == (_CPU,) and isinstance(leaf.type, Integer):
             places[_CPU] = _place(leaf)
-        if DISCARDED_ROLE in roles and isinstance(leaf.type, Integer):
+        if Role.DISCARDED in roles and isinstance(leaf.type, Integer):
             discarded_bits = leaf.type.size
     return _Plan(places, end, discarded_bits)
 

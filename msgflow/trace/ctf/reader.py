@@ -20,7 +20,7 @@ from msgflow.trace.ctf.streams import streams_of
 from msgflow.trace.ctf.trace_info import corrected, describe
 from msgflow.trace.discovery import irregular_files, stream_files
 from msgflow.trace.metadata_frame import FILE_NAME
-from msgflow.trace.model import Damage, undeclared
+from msgflow.trace.model import Damage, TraceInfo
 from msgflow.trace.regular_file import unreadable_error
 from msgflow.trace.time_base import on_one_base
 from msgflow.trace.trace_set import ExclusiveTraceSet
@@ -31,11 +31,11 @@ if TYPE_CHECKING:
 
     import pyarrow as pa
 
-    from msgflow.trace.ctf.continuation import Continuation
+    from msgflow.trace.ctf.losses import Continuation
     from msgflow.trace.ctf.packet_order import Entry
     from msgflow.trace.ctf.packets import Packet
     from msgflow.trace.ctf.streams import Stream
-    from msgflow.trace.model import EventBatch, Progress, TraceInfo, TraceLocation
+    from msgflow.trace.model import EventBatch, Progress, TraceLocation
 
 
 class CtfTraceSet(ExclusiveTraceSet):
@@ -76,7 +76,7 @@ class CtfTraceSet(ExclusiveTraceSet):
         except OSError as error:
             raise unreadable_error(error, path) from error
         if not location.size_bytes:
-            return undeclared(path, index)
+            return TraceInfo(index, path)
         if is_timeless(declared):
             for stream_class in declared.streams.values():
                 give_order(stream_class)

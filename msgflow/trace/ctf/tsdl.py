@@ -9,22 +9,12 @@ from uuid import UUID
 from msgflow.trace.ctf.clock import Clock
 from msgflow.trace.ctf.declarations import EventClass, StreamClass, TraceClass
 from msgflow.trace.ctf.field_types import (
-    CONTENT_SIZE_ROLE,
-    DISCARDED_ROLE,
-    END_ROLE,
-    EVENT_CLASS_ROLE,
-    MAGIC_ROLE,
-    PACKET_SIZE_ROLE,
-    SEQUENCE_ROLE,
-    STREAM_CLASS_ROLE,
-    STREAM_ROLE,
-    TIME_ROLE,
-    UUID_ROLE,
     Array,
     Choice,
     Integer,
     Member,
     MetadataError,
+    Role,
     Scope,
     Structure,
     Type,
@@ -40,20 +30,20 @@ if TYPE_CHECKING:
 
 _ROLES: Mapping[Scope, Mapping[str, str]] = {
     Scope.PACKET_HEADER: {
-        "magic": MAGIC_ROLE,
-        "uuid": UUID_ROLE,
-        "stream_id": STREAM_CLASS_ROLE,
-        "stream_instance_id": STREAM_ROLE,
+        "magic": Role.MAGIC,
+        "uuid": Role.UUID,
+        "stream_id": Role.STREAM_CLASS,
+        "stream_instance_id": Role.STREAM,
     },
     Scope.PACKET_CONTEXT: {
-        "timestamp_begin": TIME_ROLE,
-        "timestamp_end": END_ROLE,
-        "content_size": CONTENT_SIZE_ROLE,
-        "packet_size": PACKET_SIZE_ROLE,
-        "packet_seq_num": SEQUENCE_ROLE,
-        "events_discarded": DISCARDED_ROLE,
+        "timestamp_begin": Role.TIME,
+        "timestamp_end": Role.END,
+        "content_size": Role.CONTENT_SIZE,
+        "packet_size": Role.PACKET_SIZE,
+        "packet_seq_num": Role.SEQUENCE,
+        "events_discarded": Role.DISCARDED,
     },
-    Scope.EVENT_HEADER: {"id": EVENT_CLASS_ROLE, "timestamp": TIME_ROLE},
+    Scope.EVENT_HEADER: {"id": Role.EVENT_CLASS, "timestamp": Role.TIME},
 }
 _SCOPES = {
     "packet.header": Scope.PACKET_HEADER,
