@@ -1,6 +1,6 @@
-"""Frame of the metadata of a trace: its kind, and whether it is whole.
+"""Frame of the metadata of a trace: its kind, whether it is whole, and the text in it.
 
-This module looks only at the frame, so that no reader meets a file that is cut off or no metadata.
+No reader meets a file that is cut off, or one that is no metadata.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from msgflow.errors import TraceError
 from msgflow.trace.regular_file import read_regular
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
 FILE_NAME = "metadata"
@@ -20,11 +21,11 @@ FILE_NAME = "metadata"
 DIRECTORY_HINT = "give the directory that `ros2 trace` or `lttng` wrote"
 """Hint for those who gave something that is no trace."""
 
-BYTE_ORDER_OF_MAGIC = {b"\x57\x1d\xd1\x75": "<", b"\x75\xd1\x1d\x57": ">"}
+_BYTE_ORDER_OF_MAGIC = {b"\x57\x1d\xd1\x75": "<", b"\x75\xd1\x1d\x57": ">"}
 # Of a metadata packet: magic, uuid, checksum, content size and packet size in bits, then five
 # bytes that say nothing useful (the version in them is 1.8 even for CTF 2).
-HEADER_SIZE = 37
-SIZES_OFFSET = 24
+_HEADER_SIZE = 37
+_SIZES_OFFSET = 24
 # Of the largest kernel traces it is a few megabytes.
 _MOST_BYTES = 64 << 20
 _RECORD_SEPARATOR = b"\x1e"
@@ -45,42 +46,42 @@ def content_of(directory: Path) -> bytes:
 
 def kind_of(directory: Path) -> MetadataKind:
     """Tell the kind of metadata of the trace in this directory."""
+    return text_of(directory)[0]
+
+
+def text_of(directory: Path) -> tuple[MetadataKind, bytes]:
+    """Return the kind and the text of the metadata of the trace in this directory."""
     content = content_of(directory)
     if not content:
         raise TraceError(
             f"the trace's `metadata` is empty, nothing of it was written yet — {directory}",
             hint="stop the recording (lttng stop), then copy it again",
         )
-    order = BYTE_ORDER_OF_MAGIC.get(content[:4])
+    order = _BYTE_ORDER_OF_MAGIC.get(content[:4])
     if order is not None:
-        content = _first_content(content, order, directory)
+        content = b"".join(_in_packets(content, order, directory))
     if content.startswith(_RECORD_SEPARATOR):
-        return MetadataKind.JSON
+        return MetadataKind.JSON, content
     if order is not None or content.lstrip().startswith(_TSDL_BEGIN):
-        return MetadataKind.TSDL
+        return MetadataKind.TSDL, content
     raise TraceError(
         f"not a CTF trace, its `metadata` is something else — {directory}",
         hint=DIRECTORY_HINT,
     )
 
 
-def _first_content(content: bytes, order: str, directory: Path) -> bytes:
-    """Check that packet follows packet up to the end, return the text of the first one."""
+def _in_packets(content: bytes, order: str, directory: Path) -> Iterator[bytes]:
+    """Yield the text of each packet; each has to follow the one before, up to the end."""
     offset = 0
     while offset < len(content):
-        rest = len(content) - offset
-        if rest < HEADER_SIZE:
-            raise _cut_off_error(directory)
-        bits = struct.unpack_from(f"{order}II", content, offset + SIZES_OFFSET)
+        rest, bits = len(content) - offset, (0, 0)
+        if rest >= _HEADER_SIZE:
+            bits = struct.unpack_from(f"{order}II", content, offset + _SIZES_OFFSET)
         content_size, packet_size = bits[0] // 8, bits[1] // 8
-        if not HEADER_SIZE <= content_size <= packet_size <= rest:
-            raise _cut_off_error(directory)
+        if not _HEADER_SIZE <= content_size <= packet_size <= rest:
+            raise TraceError(
+                f"the trace's `metadata` is damaged or cut off — {directory}",
+                hint="copy it again from where it was recorded",
+            )
+        yield content[offset + _HEADER_SIZE : offset + content_size]
         offset += packet_size
-    return content[HEADER_SIZE:]
-
-
-def _cut_off_error(directory: Path) -> TraceError:
-    return TraceError(
-        f"the trace's `metadata` is damaged or cut off — {directory}",
-        hint="copy it again from where it was recorded",
-    )

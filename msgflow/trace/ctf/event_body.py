@@ -221,56 +221,25 @@ def _add_fields(
 def _plain(fields: list[PlainField], scope: Scope, name: str, declared: Type) -> PlainField | None:
     # Every plain field ends on a whole byte: a smaller alignment changes nothing behind it.
     align = max(declared.align // BYTE, 1)
+    kind, count, length_at, element = Kind.NUMBER, 1, -1, declared
     match declared:
         case String():
             return PlainField(scope, name, Kind.STRING, align, type=declared)
-        case Integer() | Real() if declared.size in _WIDTHS:
-            return PlainField(
-                scope,
-                name,
-                Kind.NUMBER,
-                align,
-                dtype_of(declared),
-                declared.size // BYTE,
-                type=declared,
-            )
-        case Array() if _is_plain_element(declared.element):
-            element = declared.element
-            assert isinstance(element, Integer | Real)
+        case Array():
             kind = Kind.TEXT if declared.is_text else Kind.NUMBERS
-            return PlainField(
-                scope,
-                name,
-                kind,
-                align,
-                dtype_of(element),
-                element.size // BYTE,
-                declared.length,
-                type=declared,
-            )
-        case Sequence() if _is_plain_element(declared.element):
-            element = declared.element
-            assert isinstance(element, Integer | Real)
+            count, element = declared.length, declared.element
+        case Sequence():
             kind = Kind.TEXT_SEQUENCE if declared.is_text else Kind.SEQUENCE
-            length_at = _length_field(fields, scope, declared)
-            if length_at is None:
+            found, element = _length_field(fields, scope, declared), declared.element
+            if found is None:
                 return None
-            return PlainField(
-                scope,
-                name,
-                kind,
-                align,
-                dtype_of(element),
-                element.size // BYTE,
-                length_at=length_at,
-                type=declared,
-            )
-        case _:
-            return None
-
-
-def _is_plain_element(element: Type) -> bool:
-    return isinstance(element, Integer | Real) and element.size in _WIDTHS and is_dense(element)
+            length_at = found
+    if not isinstance(element, Integer | Real) or element.size not in _WIDTHS:
+        return None
+    if element is not declared and not is_dense(element):
+        return None
+    dtype, width = dtype_of(element), element.size // BYTE
+    return PlainField(scope, name, kind, align, dtype, width, count, length_at, type=declared)
 
 
 def _length_field(fields: list[PlainField], scope: Scope, declared: Sequence) -> int | None:

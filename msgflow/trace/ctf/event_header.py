@@ -22,7 +22,7 @@ from msgflow.trace.ctf.field_types import (
 from msgflow.trace.ctf.fixed_layout import DynamicError, Leaf, lay_out
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
 
 @dataclass(frozen=True)
@@ -102,11 +102,9 @@ def compile_header(structure: Structure, residues: int) -> EventHeader | None:
             path = last.selector.path
             if last.selector.scope not in {None, Scope.EVENT_HEADER} or len(path) != 1:
                 return None
-            leaves = [
-                _find(_leaves(structure, choices[0], r), lambda leaf: leaf.path == path)
-                for r in range(residues)
-            ]
-            selector = _place(leaves)
+            laid_out = [_leaves(structure, choices[0], r)[0] for r in range(residues)]
+            named = (next((leaf for leaf in each if leaf.path == path), None) for each in laid_out)
+            selector = _place(list(named))
     except DynamicError:
         return None
     widths = {form.time.bits for form in forms if form.time is not None} - {64}
@@ -144,15 +142,12 @@ def _form(structure: Structure, choice: Choice | None, residues: int) -> Form:
 
 
 def _last_of_role(laid_out: tuple[list[Leaf], int], role: str) -> Leaf | None:
-    found = None
-    for leaf in laid_out[0]:
-        if isinstance(leaf.type, Integer) and role in leaf.type.roles:
-            found = leaf
-    return found
-
-
-def _find(laid_out: tuple[list[Leaf], int], matches: Callable[[Leaf], bool]) -> Leaf | None:
-    return next((leaf for leaf in laid_out[0] if matches(leaf)), None)
+    of_role = (
+        leaf
+        for leaf in reversed(laid_out[0])
+        if isinstance(leaf.type, Integer) and role in leaf.type.roles
+    )
+    return next(of_role, None)
 
 
 def _place(leaves: Sequence[Leaf | None]) -> Place | None:

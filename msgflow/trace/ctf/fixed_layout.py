@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeGuard
 
 from msgflow.trace.ctf.field_types import (
     Array,
@@ -64,7 +65,7 @@ class _Layout:
             case Array() if is_dense(declared.element):
                 if self._leaves is not None:
                     self._leaves.append(Leaf(path, declared, position))
-                return position + declared.length * _dense_size(declared.element)
+                return position + declared.length * declared.element.size
             case Array():
                 if declared.length > _MOST_STEPS:
                     raise DynamicError
@@ -79,11 +80,6 @@ class _Layout:
                 raise DynamicError
 
 
-def is_dense(element: Type) -> bool:
+def is_dense(element: Type) -> TypeGuard[Integer | Real]:
     """Tell whether elements of this type follow each other without gaps."""
     return isinstance(element, Integer | Real) and element.size % element.align == 0
-
-
-def _dense_size(element: Type) -> int:
-    assert isinstance(element, Integer | Real)
-    return element.size

@@ -2,20 +2,12 @@
 
 from __future__ import annotations
 
-import struct
 from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
 from msgflow.trace.ctf import json_metadata, tsdl
 from msgflow.trace.ctf.field_types import MetadataError, parts
-from msgflow.trace.metadata_frame import (
-    BYTE_ORDER_OF_MAGIC,
-    HEADER_SIZE,
-    SIZES_OFFSET,
-    MetadataKind,
-    content_of,
-    kind_of,
-)
+from msgflow.trace.metadata_frame import MetadataKind, text_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -27,9 +19,9 @@ if TYPE_CHECKING:
 
 def read(directory: Path) -> TraceClass:
     """Read what the trace in this directory declares."""
-    kind = kind_of(directory)
+    kind, content = text_of(directory)
+    text = content.decode("utf-8", "replace")
     try:
-        text = _text(content_of(directory))
         trace = json_metadata.parse(text) if kind is MetadataKind.JSON else tsdl.parse(text)
         _check_sizes(trace)
     except (MetadataError, RecursionError) as error:
@@ -44,22 +36,6 @@ def damaged_error(directory: Path, reason: str) -> TraceError:
         f"the trace's `metadata` is damaged or incomplete: {reason} — {directory}",
         hint="copy it again from where it was recorded",
     )
-
-
-def _text(content: bytes) -> str:
-    """Return the text, taken out of its packets if there are any."""
-    order = BYTE_ORDER_OF_MAGIC.get(content[:4])
-    if order is not None:
-        parts = []
-        offset = 0
-        while offset < len(content):
-            content_bits, packet_bits = struct.unpack_from(
-                f"{order}II", content, offset + SIZES_OFFSET
-            )
-            parts.append(content[offset + HEADER_SIZE : offset + content_bits // 8])
-            offset += packet_bits // 8
-        content = b"".join(parts)
-    return content.decode("utf-8", "replace")
 
 
 _MOST_FIELDS = 100_000
