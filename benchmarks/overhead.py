@@ -38,8 +38,8 @@ from msgflow.record import perf
 from msgflow.record.daemon import session_daemon
 from msgflow.record.profile import Rate, recorded_samples
 from msgflow.record.python_path import PYTHON_NODES
+from msgflow.record.recording import recorded_bytes
 from msgflow.record.session import Channel, can_trace_kernel, recording_session
-from msgflow.record.written import recorded_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -156,9 +156,9 @@ def opening(path: Path) -> Iterator[None]:
     """Turn errors of opening a file into a DatabaseError."""
     try:
         yield
-    except duckdb.IOException as error:
-        text = str(error)
-        if "lock" in text.lower():
+    except (duckdb.Error, UnicodeDecodeError) as error:
+        is_of_file = isinstance(error, duckdb.IOException)
+        if is_of_file and "lock" in str(error).lower():
             holder = lock_holder(path)
             raise DatabaseInUseError(
                 f"database is in use by another process{holder} — {path}",
@@ -168,13 +168,8 @@ def opening(path: Path) -> Iterator[None]:
             ) from error
         if (words := in_words(error, path)) is not None:
             raise words from error
+        permissions = ", or check its permissions" if is_of_file else ""
         raise DatabaseError(
             f"cannot open as a DuckDB database — {path}",
-            "give another file with --db, or check its permissions",
-        ) from error
-    except (duckdb.Error, UnicodeDecodeError) as error:
-        if (words := in_words(error, path)) is not None:
-            raise words from error
-        raise DatabaseError(
-            f"cannot open as a DuckDB database — {path}", "give another file with --db"
+            f"give another file with --db{permissions}",
         ) from error

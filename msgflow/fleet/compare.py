@@ -90,13 +90,8 @@ def compare(
     ]
     import pyarrow as pa
 
-    columns = ("run", "side", "unit")
-    table = pa.table(
-        {
-            name: pa.array([row[place] for row in sided], pa.string())
-            for place, name in enumerate(columns)
-        }
-    )
+    runs, sides_of_runs, units = map(list, zip(*sided, strict=True))
+    table = pa.table({"run": runs, "side": sides_of_runs, "unit": units})
     wanted = pa.array([each.get(by) in sides for each in labels])
     with Reading(replace(choice, runs=choice.runs.filter(wanted)), _TABLES) as reading:
         reading.connection.register("sided", table)

@@ -74,18 +74,17 @@ class Store:
         self._follows_links = follows_links
         self.is_local = not self.url.startswith(S3)
         self._root = self.url if self.is_local else self.url.removeprefix(S3)
-        self._system: Any = None
 
     @cached_property
     def _real_root(self) -> str:
         return os.path.realpath(self._root)
 
-    @property
+    @cached_property
     def filesystem(self) -> Any:
-        """Return the `pyarrow.fs.FileSystem`; `full` gives its paths."""
-        if self._system is None:
-            self._system = _local() if self.is_local else _s3()
-        return self._system
+        """The `pyarrow.fs.FileSystem`; `full` gives its paths."""
+        from pyarrow.fs import LocalFileSystem
+
+        return LocalFileSystem() if self.is_local else _s3()
 
     def full(self, path: str = "") -> str:
         """Return the path of a file in `filesystem`."""
@@ -291,12 +290,6 @@ def normal_url(url: str | Path) -> str:
 def endpoint() -> str | None:
     """Return the endpoint that the environment names, None for that of AWS."""
     return next((os.environ[name] for name in _ENDPOINTS if os.environ.get(name)), None)
-
-
-def _local() -> Any:
-    from pyarrow.fs import LocalFileSystem
-
-    return LocalFileSystem()
 
 
 def _s3() -> Any:

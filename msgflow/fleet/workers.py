@@ -6,7 +6,7 @@ import contextlib
 import logging
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from msgflow.errors import UsageError
 from msgflow.fleet.task import Outcome, Reason, Task
@@ -20,25 +20,6 @@ _SCRATCH = "scratch"
 _FOLDER_WITHOUT_MODULES = Path(__file__).parent / "sql"
 # Tasks that wait for each worker, besides the one that it does.
 _WAITING = 1
-
-
-class Workers(Protocol):
-    """Does tasks and returns their outcomes."""
-
-    def has_room(self) -> bool:
-        """Tell whether another task would start soon."""
-
-    def is_too_large(self, task: Task) -> str | None:
-        """Return why no worker can ever do a task; None if one can."""
-
-    def submit(self, task: Task) -> None:
-        """Take a task."""
-
-    def wait(self, seconds: float) -> Iterator[tuple[Task, Outcome]]:
-        """Yield finished tasks; wait for the first, at most `seconds`."""
-
-    def close(self) -> None:
-        """Cancel all tasks."""
 
 
 class OneProcess:
@@ -135,7 +116,7 @@ class RayWorkers:
         self._running[ask.remote(task.as_dict())] = task
 
     def wait(self, seconds: float) -> Iterator[tuple[Task, Outcome]]:
-        """Yield finished tasks."""
+        """Yield finished tasks; wait for the first, at most `seconds`."""
         if not self._running:
             return
         done, _ = self._ray.wait(list(self._running), num_returns=1, timeout=seconds)
@@ -161,6 +142,9 @@ class RayWorkers:
         self._running.clear()
         if self._is_ours:
             self._ray.shutdown()
+
+
+Workers = OneProcess | RayWorkers
 
 
 def make_workers(ray: str | None) -> Workers:

@@ -79,9 +79,10 @@ class Cpus:
         for latest in (self._switches, *self._handlings):
             latest.grow(self._cpus.count)
         switch = self._switches.before(groups, _has_role(batches, groups, CpuRole.SWITCH), events)
+        of_kinds = ([one.interrupt == kind for one, _ in batches] for kind in self._kinds)
         handlings = [
-            latest.before(groups, _is_of(batches, groups, kind), events)
-            for kind, latest in zip(self._kinds, self._handlings, strict=True)
+            latest.before(groups, _repeated(batches, groups, is_of), events)
+            for is_of, latest in zip(of_kinds, self._handlings, strict=True)
         ]
         is_open = np.array(
             [(one["is_open"] == 1) & (one["event_id"] > switch["event_id"]) for one in handlings]
@@ -197,12 +198,6 @@ def _has_role(
     batches: Sequence[tuple[Tracepoint, pa.RecordBatch]], groups: Groups, role: CpuRole
 ) -> NDArray[np.bool_]:
     return _repeated(batches, groups, [tracepoint.role is role for tracepoint, _ in batches])
-
-
-def _is_of(
-    batches: Sequence[tuple[Tracepoint, pa.RecordBatch]], groups: Groups, interrupt: str
-) -> NDArray[np.bool_]:
-    return _repeated(batches, groups, [t.interrupt == interrupt for t, _ in batches])
 
 
 def _repeated(

@@ -233,17 +233,6 @@ def _write(
     if keep_staging is not None:
         watch.enter("writing the staged events")
         staging.export(con, keep_staging)
-    return _write_run(con, names, loaded, given, watch, interrupts)
-
-
-def _write_run(
-    con: duckdb.DuckDBPyConnection,
-    names: tuple[str | None, str],
-    loaded: Loaded,
-    given: tuple[LinksFile | None, ClockSync],
-    watch: _Watch,
-    interrupts: Interrupts,
-) -> tuple[int, str, tuple[Finding, ...]]:
     with transaction(con):
         watch.enter("storing the run")
         run_id, run_name = store_run(con, *names, loaded)

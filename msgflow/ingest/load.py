@@ -106,44 +106,33 @@ def load_traces(
     if corrections:
         staging.empty(con)
         implausible = read(corrections)
-    con.execute(
-        "INSERT INTO staging.event_count SELECT unnest(?::INTEGER[]), unnest(?::VARCHAR[]), "
-        "unnest(?::BOOLEAN[]), unnest(?::BIGINT[])",
-        [
-            [trace_index for trace_index, _ in traces.event_counts],
-            [name for _, name in traces.event_counts],
-            [name in catalogue.in_traces or name in user_names for _, name in traces.event_counts],
-            list(traces.event_counts.values()),
-        ],
+    _insert(
+        con,
+        "event_count",
+        (
+            (index, name, name in catalogue.in_traces or name in user_names, count)
+            for (index, name), count in traces.event_counts.items()
+        ),
     )
-    for trace in traces.traces:
-        con.execute(
-            "INSERT INTO staging.declared SELECT ?, unnest(?::VARCHAR[])",
-            [trace.index, [name for name in trace.event_names if name in wanted]],
-        )
-    for damage in traces.damages:
-        con.execute(
-            "INSERT INTO staging.damage VALUES (?, ?, ?, ?, ?)",
-            [
-                damage.trace_index,
-                str(damage.file),
-                damage.position,
-                damage.offset,
-                damage.message,
-            ],
-        )
-    for table, patterns in (("ignored", ignore), ("asked", events)):
-        for match in matches(patterns, traces.event_counts):
-            con.execute(f"INSERT INTO staging.{table} VALUES (?, ?, ?)", match)
-    for left_out in implausible.rows():
-        con.execute("INSERT INTO staging.implausible VALUES (?, ?, ?, ?)", left_out)
+    declared = ((trace.index, name) for trace in traces.traces for name in trace.event_names)
+    _insert(con, "declared", (row for row in declared if row[1] in wanted))
+    damages = (
+        (d.trace_index, str(d.file), d.position, d.offset, d.message) for d in traces.damages
+    )
+    _insert(con, "damage", damages)
+    _insert(con, "ignored", matches(ignore, traces.event_counts))
+    _insert(con, "asked", matches(events, traces.event_counts))
+    _insert(con, "implausible", implausible.rows())
     if traces.duplicate_packet_count:
-        con.execute(
-            "INSERT INTO staging.packet_read_once VALUES (NULL, ?)", [traces.duplicate_packet_count]
-        )
-    for repeated in traces.repeated_packet_counts.items():
-        con.execute("INSERT INTO staging.packet_read_once VALUES (?, ?)", repeated)
+        _insert(con, "packet_read_once", [(None, traces.duplicate_packet_count)])
+    _insert(con, "packet_read_once", traces.repeated_packet_counts.items())
     return Loaded(dict(traces.event_counts), frozenset(tables.replaced))
+
+
+def _insert(con: duckdb.DuckDBPyConnection, table: str, rows: Iterable[Sequence[object]]) -> None:
+    if columns := list(zip(*rows, strict=True)):
+        values = ", ".join(["unnest(?)"] * len(columns))
+        con.execute(f"INSERT INTO staging.{table} SELECT {values}", [*map(list, columns)])
 
 
 def wanted_events(ignore: Sequence[str] = ()) -> dict[str, pa.Schema | None]:

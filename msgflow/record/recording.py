@@ -8,6 +8,7 @@ import shutil
 import time
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
 from msgflow.errors import RecordingError
@@ -29,12 +30,11 @@ from msgflow.record.session import (
     require_new,
     require_snapshot,
 )
-from msgflow.record.written import recorded_bytes
 from msgflow.sql.interrupt import noted_interrupts, until_interrupted
+from msgflow.trace.ctf.packet_index import content_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
-    from pathlib import Path
 
     from msgflow.record.profile import Rate
 
@@ -244,6 +244,17 @@ class _Watch:
                     f"after {passed:.0f} s no process has the tracepoints of ROS 2: is tracing"
                     " built in (ros2 run tracetools status), are nodes running?"
                 )
+
+
+def recorded_bytes(directory: Path) -> int:
+    """Return the bytes of all packets that are written, without what only fills them up."""
+    # A chunk of it may go away meanwhile: unlike others, this walk goes on.
+    return sum(
+        content_bytes(Path(folder, name))
+        for folder, _, names in os.walk(directory)
+        for name in names
+        if name.endswith(".idx")
+    )
 
 
 def _require_room(directory: Path, note: Callable[[str], None], seconds: float | None) -> None:
