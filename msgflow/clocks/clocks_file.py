@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from msgflow.errors import UsageError
 from msgflow.files.text_file import read_text
+from msgflow.files.yaml_file import YamlFile, line_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -135,42 +136,28 @@ def _toml_scalar(value: object) -> str:
 
 
 def _yaml(text: str, sync: ClockSync) -> Iterator[_Entry]:
-    from ruamel.yaml import YAML
-    from ruamel.yaml.error import MarkedYAMLError, YAMLError
-
-    try:
-        root: Any = YAML(typ="safe", pure=True).compose(text)
-    except MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        what = " ".join(str(error.problem or error.context or "not YAML").split())
-        sync.fail(1 if mark is None else mark.line + 1, what, _EXAMPLE)
-    except (YAMLError, RecursionError, ValueError) as error:
-        raise UsageError(f"not a YAML file — {sync.path}", _EXAMPLE) from error
+    root = YamlFile(sync.path, _EXAMPLE, _EXAMPLE, text).root()
     if root is None:
         return
     for name, value in _pairs(sync, root, "the file is not a mapping from hosts to offsets"):
-        fields = {"offset_ns": (_scalar(value), _line(value if _scalar(value) else name))}
+        fields = {"offset_ns": (_scalar(value), line_of(value if _scalar(value) else name))}
         if value.id == "mapping":
             fields = {}
             for key, field in _pairs(sync, value, ""):
                 if _scalar(key) in fields:
-                    sync.fail(_line(key), f"{_scalar(key)} is given twice")
-                fields[_scalar(key)] = (_scalar(field), _line(field if _scalar(field) else key))
-        yield _scalar(name), _line(name), fields
+                    sync.fail(line_of(key), f"{_scalar(key)} is given twice")
+                fields[_scalar(key)] = (_scalar(field), line_of(field if _scalar(field) else key))
+        yield _scalar(name), line_of(name), fields
 
 
 def _pairs(sync: ClockSync, node: Any, what: str) -> list[tuple[Any, Any]]:
     if node.id != "mapping":
-        sync.fail(_line(node), what, _EXAMPLE)
+        sync.fail(line_of(node), what, _EXAMPLE)
     return list(node.value)
 
 
 def _scalar(node: Any) -> str:
     return str(node.value) if node.id == "scalar" else f"a {node.id}"
-
-
-def _line(node: Any) -> int:
-    return int(node.start_mark.line) + 1
 
 
 def _clock(sync: ClockSync, name: str, line: int, fields: dict[str, tuple[str, int]]) -> GivenClock:

@@ -51,7 +51,7 @@ class YamlFile:
 
     def entries(self, *names: str) -> tuple[list[Any], ...]:
         """Return the nodes of each list; the file has at least one list and no other keys."""
-        root = self._compose()
+        root = self.root()
         if root is None:
             self.fail(1, "the file is empty", self.example)
         lists = self.mapping(root, "the file", (), names, may_be_null=names)
@@ -111,7 +111,7 @@ class YamlFile:
             self.fail(line_of(node), f"{what} is not {kind}", self.example)
         return Text(str(node.value), line_of(node))
 
-    def _compose(self) -> Any:
+    def root(self) -> Any:
         """Return the tree of nodes of the only document; nodes know their lines."""
         from ruamel.yaml import YAML
         from ruamel.yaml.error import MarkedYAMLError, YAMLError

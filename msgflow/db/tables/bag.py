@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from msgflow.db.tables.column import moment, number, reference, run_id, table, text
+from msgflow.db.tables.column import moment, number, reference, table, text
 
 table(
     "bag_message",
-    run_id(),
     reference("publication_id", "The publication that it is the message of", required=True),
     text("topic_name", "Name of the topic", required=True),
     text("type_name", "Type of the message, such as sensor_msgs/msg/Image", required=True),

@@ -11,7 +11,6 @@ from msgflow.db.tables.column import (
     number,
     process_id,
     reference,
-    run_id,
     table,
     text,
     thread_id,
@@ -21,7 +20,6 @@ from msgflow.db.tables.column import (
 table(
     "publication",
     identity("publication_id", "Identity of the publication"),
-    run_id(),
     trace_id(),
     reference("publisher_id", "Publisher; NULL: the middleware itself"),
     process_id(),
@@ -50,7 +48,6 @@ table(
 table(
     "take",
     identity("take_id", "Identity of the take"),
-    run_id(),
     trace_id(),
     reference("subscription_id", "Subscription"),
     process_id(),
@@ -70,7 +67,6 @@ table(
 
 table(
     "failed_take",
-    run_id(),
     trace_id(),
     reference("subscription_id", "Subscription"),
     process_id(),
@@ -82,7 +78,6 @@ table(
 
 table(
     "ring_buffer_event",
-    run_id(),
     trace_id(),
     process_id(),
     text("kind", "'enqueue', 'dequeue' or 'clear'", required=True),
@@ -100,7 +95,6 @@ table(
 
 table(
     "data_arrival",
-    run_id(),
     reference("take_id", "Take of the message", required=True),
     number("waited_ns", "From there until the take", unit="ns", required=True),
     flag("is_ambiguous", "Several readers of the process had a message of that stamp"),
@@ -114,7 +108,6 @@ table(
 
 table(
     "agnocast_entry",
-    run_id(),
     reference("publication_id", "Message put in; NULL: of a take"),
     reference("take_id", "Message handed over; NULL: of a publication"),
     number("entry_id", "Number of the message on its topic and kernel", required=True),
@@ -125,7 +118,6 @@ table(
 table(
     "request",
     identity("request_id", "Identity of the request"),
-    run_id(),
     reference("client_id", "Client that sent it"),
     reference("service_id", "Service that took it"),
     number("sequence_number", "Number given by the client"),
@@ -141,7 +133,6 @@ table(
 table(
     "response",
     identity("response_id", "Identity of the response"),
-    run_id(),
     reference("client_id", "Client that took it"),
     reference("service_id", "Service that sent it"),
     number("sequence_number", "Number given by the client"),

@@ -16,7 +16,6 @@ from msgflow.db.tables.column import (
     node_id,
     process_id,
     reference,
-    run_id,
     table,
     text,
     thread_id,
@@ -34,7 +33,6 @@ _IS_END_INFERRED = column(
 table(
     "callback",
     key("callback_id", "Identity of the callback"),
-    run_id(),
     process_id(),
     node_id(),
     text(
@@ -56,7 +54,6 @@ table(
 table(
     "callback_group",
     key("callback_group_id", "Identity of the callback group"),
-    run_id(),
     process_id(),
     reference("executor_id", "Executor that it was added to"),
     text(
@@ -71,7 +68,6 @@ table(
 
 table(
     "callback_group_member",
-    run_id(),
     reference("callback_group_id", "The callback group", required=True),
     reference("callback_id", "The callback", required=True),
     comment="One row per callback in a callback group",
@@ -81,7 +77,6 @@ table(
 table(
     "callback_instance",
     identity("callback_instance_id", "Identity of the callback instance"),
-    run_id(),
     trace_id(),
     reference("callback_id", "Callback that ran", required=True),
     process_id(),

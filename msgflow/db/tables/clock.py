@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from sqlalchemy import BOOLEAN
 
-from msgflow.db.tables.column import column, key, moment, number, reference, run_id, table, text
+from msgflow.db.tables.column import column, key, moment, number, reference, table, text
 
 table(
     "clock",
     key("clock_id", "Identity of the clock"),
-    run_id(),
     text("uuid", "UUID of the clock (LTTng: boot identity)"),
     number("offset_ns", "Added to a time of this clock to correct it", unit="ns", required=True),
     number("drift_ppb", "Added per unit of time since reference_ns", unit="1e-9", required=True),
@@ -36,7 +35,6 @@ table(
 
 table(
     "clock_uncertainty",
-    run_id(),
     reference("clock_id", "The clock", required=True),
     moment("at_ns", "Moment, as the clock showed it", required=True),
     number(
@@ -56,7 +54,6 @@ table(
 
 table(
     "stamp_clock",
-    run_id(),
     reference("clock_id", "Clock of the traces", required=True),
     moment("at_ns", "Middle of the stretch, time of the traces", required=True),
     moment("start_ns", "Begin of the stretch", required=True),

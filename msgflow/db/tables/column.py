@@ -33,8 +33,13 @@ def table(
     comment: str,
     view: str | None = None,
     computed: tuple[Column[Any], ...] = (),
+    of_run: bool = True,
 ) -> None:
-    """Define a table of `store`."""
+    """Define a table of `store`; its rows belong to runs, which stand behind their identities."""
+    if of_run:
+        run = reference("run_id", "Run that the row belongs to", required=True)
+        place = int(columns[0].name == f"{name}_id")
+        columns = (*columns[:place], run, *columns[place:])
     info = {} if view is None else {"view": view, **({"computed": computed} if computed else {})}
     Table(name, STORE, *columns, comment=comment, info=info)
 
@@ -76,11 +81,6 @@ def reference(
     """Return a column with identities of another table: `to`, or the one that its name says."""
     key = name if to is None else f"{to}_id"
     return column(name, BIGINT, comment, to=f"{key.removesuffix('_id')}.{key}", required=required)
-
-
-def run_id() -> Column[Any]:
-    """Return the run of a row."""
-    return reference("run_id", "Run that the row belongs to", required=True)
 
 
 def trace_id(comment: str = "Trace it was recorded in", required: bool = True) -> Column[Any]:

@@ -9,7 +9,6 @@ from msgflow.db.tables.column import (
     moment,
     process_id,
     reference,
-    run_id,
     table,
     text,
     thread_id,
@@ -18,7 +17,6 @@ from msgflow.db.tables.column import (
 table(
     "executor",
     key("executor_id", "Identity of the executor"),
-    run_id(),
     process_id(),
     text(
         "kind",
@@ -33,7 +31,6 @@ table(
 
 table(
     "executor_thread",
-    run_id(),
     reference("executor_id", "The executor", required=True),
     thread_id("The thread"),
     comment="One row per thread of an executor",
@@ -42,7 +39,6 @@ table(
 
 table(
     "executor_state",
-    run_id(),
     thread_id("The thread"),
     text("state", "'wait', 'process' or 'execute'", required=True),
     moment("start_ns", "Executor event that began it", required=True, clock="thread_id"),

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from msgflow.db.tables.column import flag, number, reference, route, run_id, table, text
+from msgflow.db.tables.column import flag, number, reference, route, table, text
 
 table(
     "flow_call",
-    run_id(),
     reference("publication_id", "What was published", required=True),
     reference("publisher_id", "Its publisher"),
     text("kind", "Kind of the causal link to the publication", required=True),
@@ -28,7 +27,6 @@ table(
 
 table(
     "flow_root",
-    run_id(),
     number("publication_id", "The message; below 0: its publisher is not traced", required=True),
     number("publisher_id", "Its publisher; below 0: not traced", required=True),
     flag("is_source", "Not caused by a taken message"),
@@ -41,7 +39,6 @@ table(
 
 table(
     "flow_hop",
-    run_id(),
     reference(
         "from_subscription_id", "Subscription whose message led on; NULL: none", to="subscription"
     ),

@@ -15,7 +15,6 @@ from msgflow.db.tables.column import (
     number,
     process_id,
     reference,
-    run_id,
     table,
     text,
     thread_id,
@@ -24,7 +23,6 @@ from msgflow.db.tables.column import (
 table(
     "host",
     key("host_id", "Identity of the host"),
-    run_id(),
     reference("clock_id", "Clock of the host", required=True),
     text("hostname", "Name recorded in the trace, or given by the user", required=True),
     comment="One row per machine or container",
@@ -34,7 +32,6 @@ table(
 table(
     "process",
     key("process_id", "Identity of the process life"),
-    run_id(),
     reference("host_id", "Host it ran on", required=True),
     integer(
         "pid",
@@ -67,7 +64,6 @@ table(
 table(
     "thread",
     key("thread_id", "Identity of the thread"),
-    run_id(),
     process_id(),
     integer(
         "tid",
@@ -86,7 +82,6 @@ table(
 table(
     "node",
     key("node_id", "Identity of the node"),
-    run_id(),
     process_id(),
     text("name", "Name without namespace"),
     text("namespace", "Namespace, beginning with /"),
@@ -104,7 +99,6 @@ table(
 
 table(
     "lifecycle_transition",
-    run_id(),
     reference("node_id", "The node"),
     moment("at_ns", "Moment of the change", required=True, clock="node_id"),
     text("start_state", "State that was left"),
@@ -115,7 +109,6 @@ table(
 
 table(
     "thread_break",
-    run_id(),
     thread_id("Thread whose events may be missing"),
     moment(
         "resumed_ns", "First event of the thread behind the gap", required=True, clock="thread_id"

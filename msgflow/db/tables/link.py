@@ -10,7 +10,6 @@ from msgflow.db.tables.column import (
     number,
     process_id,
     reference,
-    run_id,
     table,
     text,
 )
@@ -18,7 +17,6 @@ from msgflow.db.tables.column import (
 table(
     "annotation",
     key("annotation_id", "Identity of the annotation"),
-    run_id(),
     text(
         "kind",
         "'periodic_async', 'partial_sync', 'approximate_sync', 'queue', 'direct' or 'independent'",
@@ -33,7 +31,6 @@ table(
 
 table(
     "annotation_input",
-    run_id(),
     reference("annotation_id", "The annotation", required=True),
     reference("subscription_id", "Its input", required=True),
     comment="One row per subscription of an annotation",
@@ -42,7 +39,6 @@ table(
 
 table(
     "annotation_output",
-    run_id(),
     reference("annotation_id", "The annotation", required=True),
     reference("publisher_id", "Its output", required=True),
     comment="One row per publisher of an annotation",
@@ -51,7 +47,6 @@ table(
 
 table(
     "nearest_message",
-    run_id(),
     text("topic_name", "Topic of the message", required=True),
     moment("source_timestamp_ns", "Stamp of the message, clock of ROS", required=True),
     reference("publication_id", "Where it came from; NULL: several could be it"),
@@ -64,7 +59,6 @@ table(
 
 table(
     "link_transport",
-    run_id(),
     reference("publication_id", "Where the message came from", required=True),
     reference("take_id", "Where it was received", required=True),
     reference("publisher_id", "Publisher of the message"),
@@ -79,7 +73,6 @@ table(
 
 table(
     "link_packet",
-    run_id(),
     reference("sent_trace_id", "Trace of its sender", to="trace", required=True),
     reference("received_trace_id", "Trace of its receiver", to="trace", required=True),
     moment("sent_ns", "Handed to the network device", required=True),
@@ -96,7 +89,6 @@ table(
 
 table(
     "link_causal",
-    run_id(),
     reference("callback_instance_id", "Cause; NULL: the take itself"),
     reference("publication_id", "Effect", required=True),
     reference("take_id", "Message that led to it; NULL: none (timers, services)"),
@@ -122,7 +114,6 @@ table(
 
 table(
     "link_request",
-    run_id(),
     reference("request_id", "Effect", required=True),
     reference("callback_instance_id", "Cause"),
     comment="One row per request that a callback instance or thread sent",
@@ -131,7 +122,6 @@ table(
 
 table(
     "link_response",
-    run_id(),
     reference("response_id", "Effect", required=True),
     reference("callback_instance_id", "Cause"),
     comment="One row per response and the callback instance that sent it",
@@ -140,7 +130,6 @@ table(
 
 table(
     "link_call",
-    run_id(),
     reference("taken_request_id", "Cause: a request", to="request"),
     reference("taken_response_id", "Cause: a response", to="response"),
     reference("publication_id", "Effect: a publication"),
@@ -162,7 +151,6 @@ table(
 
 table(
     "undelivered",
-    run_id(),
     reference("publication_id", "The message", required=True),
     reference("publisher_id", "Its publisher", required=True),
     reference("subscription_id", "Subscription that did not take it", required=True),
@@ -174,7 +162,6 @@ table(
 
 table(
     "orphan_take",
-    run_id(),
     reference("take_id", "The take", required=True),
     reference("subscription_id", "Subscription that received it"),
     text("reason", "Why; a closed vocabulary", required=True),

@@ -9,7 +9,6 @@ from msgflow.db.tables.column import (
     number,
     process_id,
     reference,
-    run_id,
     table,
     text,
     thread_id,
@@ -18,7 +17,6 @@ from msgflow.db.tables.column import (
 table(
     "stack_frame",
     key("stack_frame_id", "Identity of the function"),
-    run_id(),
     text("function", "Its name; '[unknown]': the file has no symbol for it", required=True),
     text("file", "Library or program that has it, of Python the source file", required=True),
     comment="One row per function and file",
@@ -28,7 +26,6 @@ table(
 table(
     "stack",
     key("stack_id", "Identity of the stack"),
-    run_id(),
     reference("stack_frame_id", "The function that ran: the innermost one", required=True),
     integer("depth", "How many calls it has", required=True),
     comment="One row per different stack",
@@ -37,7 +34,6 @@ table(
 
 table(
     "stack_call",
-    run_id(),
     reference("stack_id", "The stack", required=True),
     integer("position", "Place of the call, 1: the outermost", required=True),
     reference("stack_frame_id", "The function that was called", required=True),
@@ -47,7 +43,6 @@ table(
 
 table(
     "stack_sample",
-    run_id(),
     process_id(),
     thread_id("Thread that ran; NULL: one that recorded no event", required=False),
     integer("tid", "Thread that ran, as perf numbers it", required=True),

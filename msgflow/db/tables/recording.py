@@ -11,7 +11,6 @@ from msgflow.db.tables.column import (
     moment,
     number,
     reference,
-    run_id,
     table,
     text,
     trace_id,
@@ -23,6 +22,7 @@ table(
     text("hash", "SHA-256 of the SQL that was last applied", required=True),
     text("msgflow_version", "Version of msgflow that applied it", required=True),
     comment="One row per part of the schema that is re-applied rather than migrated",
+    of_run=False,
 )
 
 table(
@@ -42,12 +42,12 @@ table(
     ),
     text("clock_sync", "How clocks were to be brought together: 'none', 'messages' or 'file'"),
     comment="One row per ingest of traces that belong together",
+    of_run=False,
 )
 
 table(
     "trace",
     key("trace_id", "Identity of the trace"),
-    run_id(),
     reference("host_id", "Host that was traced", required=True),
     text("path", "Directory as it was given", required=True),
     text("uuid", "UUID of the trace"),
@@ -68,7 +68,6 @@ table(
 
 table(
     "packet",
-    run_id(),
     trace_id(),
     number("stream_class_id", "Stream class (channel) of the packet"),
     number("stream_instance_id", "Stream (buffer) of the packet"),
@@ -85,7 +84,6 @@ table(
 
 table(
     "gap",
-    run_id(),
     trace_id("Trace it was recorded in; between two chunks of a recording, the later"),
     integer("cpu", "CPU concerned; NULL: all"),
     text(
@@ -102,7 +100,6 @@ table(
 
 table(
     "finding",
-    run_id(),
     trace_id("Trace it is about; NULL: not one trace alone", required=False),
     text("name", "Kind of finding: its file in `schema/health`", required=True),
     text("subject", "Where: a trace, process, host, topic; NULL: the trace, or all of the phase"),

@@ -13,7 +13,6 @@ from msgflow.db.tables.column import (
     node_id,
     number,
     process_id,
-    run_id,
     table,
     text,
 )
@@ -25,7 +24,6 @@ _IS_INFERRED = column(
 table(
     "publisher",
     key("publisher_id", "Identity of the publisher"),
-    run_id(),
     process_id(),
     node_id(),
     text("topic_name", "Fully expanded topic name"),
@@ -46,7 +44,6 @@ table(
 table(
     "subscription",
     key("subscription_id", "Identity of the subscription"),
-    run_id(),
     process_id(),
     node_id(),
     text("topic_name", "Fully expanded topic name"),
@@ -67,7 +64,6 @@ table(
 table(
     "timer",
     key("timer_id", "Identity of the timer"),
-    run_id(),
     process_id(),
     node_id(),
     number("period_ns", "Period; NULL: not known", unit="ns"),
@@ -81,7 +77,6 @@ table(
 table(
     "service",
     key("service_id", "Identity of the service"),
-    run_id(),
     process_id(),
     node_id(),
     text("service_name", "Fully expanded service name"),
@@ -98,7 +93,6 @@ table(
 table(
     "client",
     key("client_id", "Identity of the client"),
-    run_id(),
     process_id(),
     node_id(),
     text("service_name", "Fully expanded service name"),

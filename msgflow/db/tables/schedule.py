@@ -14,7 +14,6 @@ from msgflow.db.tables.column import (
     moment,
     number,
     reference,
-    run_id,
     table,
     text,
     thread_id,
@@ -44,7 +43,6 @@ def _preemptor() -> tuple[Column[Any], ...]:
 table(
     "other_thread",
     key("other_thread_id", "Identity of the thread"),
-    run_id(),
     reference("host_id", "Host it ran on", required=True),
     integer("tid", "Thread, as the kernel numbers it; 0: idle", required=True),
     text("name", "Its name"),
@@ -54,7 +52,6 @@ table(
 
 table(
     "thread_state",
-    run_id(),
     thread_id("The thread"),
     moment("start_ns", "Begin", required=True, clock="thread_id"),
     moment("end_ns", "End", required=True, clock="thread_id"),
@@ -88,7 +85,6 @@ table(
 
 table(
     "preemptor",
-    run_id(),
     thread_id("The thread that waited"),
     moment("start_ns", "Begin", required=True, clock="thread_id"),
     moment("end_ns", "End", required=True, clock="thread_id"),
@@ -102,7 +98,6 @@ table(
 
 table(
     "callback_preemptor",
-    run_id(),
     reference("callback_instance_id", "The callback instance that waited", required=True),
     *_preemptor(),
     number("preempted_ns", "For so long, while it was preempted", unit="ns", required=True),
@@ -113,7 +108,6 @@ table(
 
 table(
     "callback_schedule",
-    run_id(),
     reference("callback_instance_id", "The callback instance", required=True),
     number("running_ns", "On a CPU", unit="ns", required=True),
     number("preempted_ns", "Ready, but another thread had the CPU", unit="ns", required=True),
@@ -139,7 +133,6 @@ table(
 
 table(
     "cpu_usage",
-    run_id(),
     reference("host_id", "Host", required=True),
     integer("cpu", "CPU"),
     moment("start_ns", "Begin of the second", required=True, clock="host_id"),

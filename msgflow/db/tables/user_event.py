@@ -9,7 +9,6 @@ from msgflow.db.tables.column import (
     moment,
     process_id,
     reference,
-    run_id,
     table,
     text,
     thread_id,
@@ -19,7 +18,6 @@ from msgflow.db.tables.column import (
 table(
     "user_event",
     identity("user_event_id", "Identity of the event"),
-    run_id(),
     trace_id(),
     process_id(),
     thread_id(),

@@ -14,7 +14,7 @@ from msgflow.trace.ctf.event_order import ordered_batches
 from msgflow.trace.ctf.events import event_reader_of
 from msgflow.trace.ctf.field_types import BYTE
 from msgflow.trace.ctf.packet_rows import PacketRows
-from msgflow.trace.ctf.record_batch import ClassPlan, EventRows, ThreadNames, build_batch, make_plan
+from msgflow.trace.ctf.record_batch import ClassPlan, ThreadNames, build_batch, make_plan
 from msgflow.trace.model import EventBatch, Progress
 from msgflow.trace.prefetch import Prefetch
 
@@ -133,9 +133,8 @@ class Iteration:
             for plan in plans:
                 place = plan.layout.number
                 if counts[place]:
-                    of_class = by_class[ends[place] - counts[place] : ends[place]]
-                    rows = _rows(batch, of_class, first_id)
-                    parts.append(build_batch(plan, batch.memory, rows, self._names, reader_at))
+                    rows = by_class[ends[place] - counts[place] : ends[place]]
+                    parts.append(build_batch(plan, batch, rows, first_id, self._names, reader_at))
             if parts:
                 whole = parts[0] if len(parts) == 1 else _in_order(parts)
                 for begin in range(0, whole.num_rows, self._batch_rows):
@@ -151,19 +150,6 @@ def _split(batch: Batch, class_count: int) -> tuple[NDArray[np.int64], NDArray[n
     classes = batch.classes.astype(np.uint16 if class_count < 1 << 16 else np.uint32)
     ends = np.cumsum(np.bincount(classes, minlength=class_count))
     return np.argsort(classes, kind="stable"), ends
-
-
-def _rows(batch: Batch, rows: NDArray[np.int64], first_id: int) -> EventRows:
-    packets = batch.in_packet[rows]
-    return EventRows(
-        event_ids=rows + first_id,
-        ts_ns=batch.ts_ns[rows],
-        cpus=batch.cpus[packets],
-        has_cpu=None if batch.has_cpu is None else batch.has_cpu[packets],
-        bodies=batch.bodies[rows],
-        positions=batch.positions[rows],
-        packets=packets,
-    )
 
 
 def _in_order(parts: list[pa.RecordBatch]) -> pa.RecordBatch:

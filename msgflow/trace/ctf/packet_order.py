@@ -69,24 +69,17 @@ class PacketEvents:
     falls_back: bool  # time runs backward in it
 
 
-@dataclass(frozen=True)
-class Entries:
-    """Packets to read, and how many were left out."""
-
-    packets: list[Entry]  # in order of time
-    copies: int  # number of packets left out because another trace holds them, too
-    # Trace index to number of packets left out because the trace holds them twice.
-    repeated: Mapping[int, int]
-
-
 def entries_of(
     streams: Sequence[Stream],
     traces: Sequence[TraceInfo],
     begins: Mapping[Packet, tuple[int, int]],
     counter: LossCounter,
     report: Callable[[Entry, int, str], None],
-) -> Entries:
+) -> tuple[list[Entry], int, Mapping[int, int]]:
     """Return the packets to read, in order of time and without copies.
+
+    Also return how many packets were left out because another trace holds them, too, and of each
+    trace, by its index, how many because it holds them twice.
 
     The same packet may be given twice (a copied directory, overlapping snapshots): same trace
     uuid, stream class, stream instance and begin. The one of the first trace is read. In one
@@ -141,7 +134,7 @@ def entries_of(
             report(entry, 0, losses.problem)
         if repetition is Repetition.OTHER:
             report(entry, 0, "another packet has its stream, number and begin: both were read")
-    return Entries(entries, copies, repeated)
+    return entries, copies, repeated
 
 
 _CHUNK = 1 << 20

@@ -125,13 +125,11 @@ class CtfTraceSet(ExclusiveTraceSet):
                 if stream.has_time:
                     self._begins |= begins_of(stream)
         counter = LossCounter() if self._losses is None else self._losses
-        entries = entries_of(
+        packets, self.duplicate_packet_count, self.repeated_packet_counts = entries_of(
             self._streams, self.traces, self._begins, counter, self._report_in_packet
         )
-        self.duplicate_packet_count = entries.copies
-        self.repeated_packet_counts = entries.repeated
         iteration = Iteration(
-            self._layouts, entries.packets, wanted, progress, batch_rows, self._report_in_packet
+            self._layouts, packets, wanted, progress, batch_rows, self._report_in_packet
         )
         try:
             yield from iteration.run()

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from msgflow.trace.ctf.event_order import Batch
     from msgflow.trace.ctf.field_reader import EventReader
     from msgflow.trace.ctf.packet_memory import Memory
     from msgflow.trace.ctf.stream_layout import ClassLayout, StreamLayout
@@ -90,46 +91,34 @@ def make_plan(stream: StreamLayout, layout: ClassLayout, wanted: pa.Schema) -> C
     return ClassPlan(layout, stream, schema, contexts, payload, inner)
 
 
-@dataclass(frozen=True)
-class EventRows:
-    """Events of one class, in order of `event_id`."""
-
-    event_ids: NDArray[np.int64]
-    ts_ns: NDArray[np.int64]
-    cpus: NDArray[np.int32]
-    has_cpu: NDArray[np.bool_] | None  # which have one; None if all have
-    bodies: NDArray[np.int64]  # where contexts and payload begin: bytes of memory
-    # Where headers begin: bytes of memory, or bits of the packet in streams whose headers are read
-    # field by field.
-    positions: NDArray[np.int64]
-    packets: NDArray[np.int32]  # which packet of the batch each is in
-
-
 def build_batch(
     plan: ClassPlan,
-    memory: Memory,
-    rows: EventRows,
+    batch: Batch,
+    rows: NDArray[np.int64],
+    first_id: int,
     names: ThreadNames,
     reader_at: Callable[[int, int], tuple[EventReader, int]],
 ) -> pa.RecordBatch:
-    """Build a batch.
+    """Build a batch of events of one class, rows of `batch` in their order.
 
-    `names` are the thread names seen so far. `reader_at` takes a packet of the batch and the
-    position of an event. It returns what reads the packet field by field, and the bit at which the
-    event begins.
+    `first_id` is the number of the first event of `batch`, `names` are the thread names seen so
+    far. `reader_at` takes a packet of the batch and the position of an event. It returns what reads
+    the packet field by field, and the bit at which the event begins.
     """
-    count = rows.event_ids.size
+    count, packets = rows.size, batch.in_packet[rows]
+    without_cpu = None if batch.has_cpu is None else ~batch.has_cpu[packets]
     columns = {
-        "event_id": to_arrow(rows.event_ids),
-        "ts_ns": to_arrow(rows.ts_ns),
+        "event_id": to_arrow(rows + first_id),
+        "ts_ns": to_arrow(batch.ts_ns[rows]),
         "trace_index": to_arrow(np.full(count, plan.stream.trace_index, np.int32)),
-        "cpu_id": to_arrow(rows.cpus, None if rows.has_cpu is None else ~rows.has_cpu),
+        "cpu_id": to_arrow(batch.cpus[packets], without_cpu),
     }
     field_of: _GatheredColumns | _FieldByField
     if plan.is_field_by_field:
-        field_of = _FieldByField(rows, names, reader_at)
+        at = map(reader_at, packets.tolist(), batch.positions[rows].tolist())
+        field_of = _FieldByField([reader.event(bit) for reader, bit in at], names)
     else:
-        field_of = _GatheredColumns(plan, memory, rows, names)
+        field_of = _GatheredColumns(plan, batch.memory, batch.bodies[rows], names)
     arrays = []
     for position, field in enumerate(plan.schema):
         is_common = position < len(COMMON_SCHEMA)
@@ -151,7 +140,7 @@ class _GatheredColumns:
     """Columns gathered from memory, for all events at once."""
 
     def __init__(
-        self, plan: ClassPlan, memory: Memory, rows: EventRows, names: ThreadNames
+        self, plan: ClassPlan, memory: Memory, bodies: NDArray[np.int64], names: ThreadNames
     ) -> None:
         body = plan.layout.body
         sources = [*plan.contexts.values(), *plan.payload.values()]
@@ -159,8 +148,8 @@ class _GatheredColumns:
         self._fields = body.fields or ()
         self._names = names
         with_variant = bool(plan.inner)
-        self._rows = FieldRows(body, memory, rows.bodies, sorted(wanted), with_variant=with_variant)
-        self._count = rows.bodies.size
+        self._rows = FieldRows(body, memory, bodies, sorted(wanted), with_variant=with_variant)
+        self._count = bodies.size
 
     def array(self, source: Source, data_type: pa.DataType) -> pa.Array:
         number = source.number
@@ -191,16 +180,10 @@ class _FieldByField:
     """Columns of events that are read field by field: slower, but any layout will do."""
 
     def __init__(
-        self,
-        rows: EventRows,
-        names: ThreadNames,
-        reader_at: Callable[[int, int], tuple[EventReader, int]],
+        self, events: Sequence[Mapping[Scope, Mapping[str, Any]]], names: ThreadNames
     ) -> None:
+        self._events = events
         self._names = names
-        self._events = []
-        for packet, position in zip(rows.packets.tolist(), rows.positions.tolist(), strict=True):
-            reader, bit = reader_at(packet, position)
-            self._events.append(reader.event(bit))
 
     def array(self, source: Source, data_type: pa.DataType) -> pa.Array:
         values: list[Any] = [event[source.scope][source.name] for event in self._events]
