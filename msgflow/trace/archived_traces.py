@@ -9,19 +9,17 @@ import shutil
 import tempfile
 import weakref
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from msgflow.errors import TraceError
 from msgflow.trace.archive import is_archive
 from msgflow.trace.extraction import unpack
-from msgflow.trace.trace_set import DEFAULT_BATCH_ROWS, TraceSet
+from msgflow.trace.trace_set import TraceSet
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+    from collections.abc import Generator, Iterator, Sequence
 
-    import pyarrow as pa
-
-    from msgflow.trace.model import EventBatch, Progress
+    from msgflow.trace.model import EventBatch
 
 _PREFIX = "msgflow-"
 
@@ -98,17 +96,9 @@ class UnpackedTraceSet(TraceSet):
         )
         self._take_over()
 
-    def batches(
-        self,
-        wanted: Mapping[str, pa.Schema | None] | None = None,
-        *,
-        progress: Callable[[Progress], None] | None = None,
-        batch_rows: int = DEFAULT_BATCH_ROWS,
-    ) -> Iterator[EventBatch]:
+    def batches(self, *given: Any, **named: Any) -> Iterator[EventBatch]:
         """Read everything once; see `TraceSet.batches`."""
-        return self._explained(
-            self._traces.batches(wanted, progress=progress, batch_rows=batch_rows)
-        )
+        return self._explained(self._traces.batches(*given, **named))
 
     def close(self) -> None:
         """Close the set and remove what was unpacked."""

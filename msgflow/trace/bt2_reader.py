@@ -22,9 +22,10 @@ from msgflow.trace.time_base import on_one_base
 from msgflow.trace.trace_set import ExclusiveTraceSet, Report
 
 if TYPE_CHECKING:
-    from collections.abc import Generator, Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from msgflow.trace.model import TraceInfo, TraceLocation
+    from msgflow.trace.trace_set import Batches, Wanted
 
 # Babeltrace orders by times that it rounds, where a clock does not count nanoseconds.
 _ROUNDING_NS = 1000
@@ -42,12 +43,7 @@ class Bt2TraceSet(ExclusiveTraceSet):
         self.traces = on_one_base([info for info, _ in described], {})
         self._declared = columns.merged_schemas(e for _, events in described for e in events)
 
-    def _batches(
-        self,
-        wanted: Mapping[str, pa.Schema | None] | None,
-        progress: Report | None,
-        batch_rows: int,
-    ) -> Generator[EventBatch, None, None]:
+    def _batches(self, wanted: Wanted, progress: Report | None, batch_rows: int) -> Batches:
         reading = _Reading(self._bt2, self.traces, columns.complete_schemas(wanted, self._declared))
         try:
             yield from reading.batches(progress, batch_rows)

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 
     from msgflow.trace.model import Damage, EventBatch, TraceInfo
 
+    Wanted = Mapping[str, pa.Schema | None] | None
+    Batches = Generator[EventBatch, None, None]
+
 DEFAULT_BATCH_ROWS = 65_536
 
 Report = Callable[[Progress], None]
@@ -48,7 +51,7 @@ class TraceSet(ABC):
     @abstractmethod
     def batches(
         self,
-        wanted: Mapping[str, pa.Schema | None] | None = None,
+        wanted: Wanted = None,
         *,
         progress: Report | None = None,
         batch_rows: int = DEFAULT_BATCH_ROWS,
@@ -58,17 +61,14 @@ class TraceSet(ABC):
         The batches of one name come in order of `event_id`, those of all names in rounds: see
         `EventBatch.round`. Memory stays bounded by `batch_rows`, whatever the size of the traces.
 
-        Args:
-            wanted: event name to the payload columns to deliver, None for all its fields. A
-                column is filled from the field of its name, else of a name in its metadata
-                `aliases` (comma separated), else it is NULL. None: all events with all fields.
-            progress: called now and then, at the least for every 16 MB, and once at the end.
-            batch_rows: events held before they are handed over.
+        `wanted` has the payload columns to deliver by name of event, None for all its fields; None:
+        all events with all fields. A column is filled from the field of its name, else of a name in
+        its metadata `aliases` (comma separated), else it is NULL. `progress` is called now and
+        then, at the least for every 16 MB, and once at the end. `batch_rows` are held before they
+        are handed over.
 
-        Raises:
-            TraceError: a trace is damaged, and the reader does not go on after that (it is
-                strict, or bt2); what came before has been delivered.
-            UsageError: the set is closed, or an earlier iteration has not ended.
+        Where a trace is damaged, and the reader does not go on after that (it is strict, or bt2),
+        what came before has been delivered.
         """
 
     @abstractmethod
@@ -90,21 +90,16 @@ class ExclusiveTraceSet(TraceSet):
         self.duplicate_packet_count = 0
         self.repeated_packet_counts: Mapping[int, int] = {}
         # Weak, so that an iteration which its consumer has dropped is over.
-        self._running: weakref.ref[Generator[EventBatch, None, None]] | None = None
+        self._running: weakref.ref[Batches] | None = None
         self._closed = False
 
     @abstractmethod
-    def _batches(
-        self,
-        wanted: Mapping[str, pa.Schema | None] | None,
-        progress: Report | None,
-        batch_rows: int,
-    ) -> Generator[EventBatch, None, None]:
+    def _batches(self, wanted: Wanted, progress: Report | None, batch_rows: int) -> Batches:
         """Read everything; sets `event_counts` and `duplicate_packet_count` at its end."""
 
     def batches(
         self,
-        wanted: Mapping[str, pa.Schema | None] | None = None,
+        wanted: Wanted = None,
         *,
         progress: Report | None = None,
         batch_rows: int = DEFAULT_BATCH_ROWS,
@@ -128,5 +123,5 @@ class ExclusiveTraceSet(TraceSet):
             iteration.close()
         self._running = None
 
-    def _under_way(self) -> Generator[EventBatch, None, None] | None:
+    def _under_way(self) -> Batches | None:
         return None if self._running is None else self._running()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,12 +13,12 @@ from msgflow.trace.numpy_arrow import to_numpy
 from msgflow.watch.kept_chunk import joined, placed, with_column
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Sequence
 
     import pyarrow as pa
 
     from msgflow.trace import TraceInfo
-    from msgflow.trace.trace_set import Report
+    from msgflow.trace.trace_set import Wanted
     from msgflow.watch.kept_chunk import KeptChunk
 
 
@@ -60,13 +60,7 @@ class KeptTraces(TraceSet):
             for damage in part.damages
         ]
 
-    def batches(
-        self,
-        wanted: Mapping[str, pa.Schema | None] | None = None,
-        *,
-        progress: Report | None = None,
-        batch_rows: int = 0,
-    ) -> Iterator[EventBatch]:
+    def batches(self, wanted: Wanted = None, **_: Any) -> Iterator[EventBatch]:
         """Deliver everything in one round; what is wanted was decided when the chunks were read."""
         firsts = np.cumsum([0, *(part.times_ns.size for part in self._parts)])
         # Chunks overlap: the buffers of one CPU are exchanged after those of another.

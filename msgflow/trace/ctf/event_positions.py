@@ -76,8 +76,7 @@ def find_positions(layout: StreamLayout, memory: Memory, spans: Sequence[Span]) 
 
 def split(layout: StreamLayout, memory: Memory, spans: Sequence[Span]) -> Lanes:
     """Split packets into lanes; packets without events have none."""
-    header = layout.header
-    assert header is not None
+    header = layout.known_header
     align = header.align
     limits = np.array([(span.begin, span.end) for span in spans], np.int64).reshape(-1, 2)
     numbers = np.flatnonzero(limits[:, 0] < limits[:, 1])
@@ -110,8 +109,7 @@ def guess(
     From any byte, the sizes of events soon lead to the begin of an event, and from there to begins
     only; bytes that lead to no event are none. So most that get far enough meet.
     """
-    assert layout.header is not None
-    offsets = np.arange(0, LOOKED_AT, layout.header.align)
+    offsets = np.arange(0, LOOKED_AT, layout.known_header.align)
     at = (targets[:, np.newaxis] + offsets).reshape(-1)
     owners = np.repeat(np.arange(targets.size), offsets.size)
     goals = targets + (LOOKED_AT + FOLLOWED)
@@ -138,8 +136,7 @@ def _sizes(layout: StreamLayout, memory: Memory, positions: NDArray[np.int64]) -
 
     They are 0 where the size varies within the class, or where no event begins.
     """
-    header, table = layout.header, layout.size_table
-    assert header is not None
+    header, table = layout.known_header, layout.size_table
     assert table is not None
     place = header.selector
     selector = memory.view(place.dtype)[positions + place.offsets[0]]
@@ -160,8 +157,7 @@ def _find_alone(
 
     Also return where the one after them begins: not before `until`, unless there is a problem.
     """
-    header = layout.header
-    assert header is not None
+    header = layout.known_header
     place = header.selector
     read = struct.Struct((">" if place.big_endian else "<") + _CODES[place.width]).unpack_from
     offset, mask = place.offsets[0], place.mask << place.shift

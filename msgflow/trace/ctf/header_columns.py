@@ -29,8 +29,7 @@ def read_headers(
     reader = _Reader(layout, memory, positions)
     owner_befores = befores[counts > 0]
     firsts = (np.cumsum(counts) - counts)[counts > 0]
-    header = layout.header
-    assert header is not None
+    header = layout.known_header
     selector = reader.gather(header.selector, slice(None))
     forms = reader.rows_of_forms(selector)
     classes = np.empty(positions.size, np.uint32)
@@ -81,8 +80,7 @@ class _Reader:
 
     def rows_of_forms(self, selector: NDArray[Any]) -> list[Any]:
         """Return for each form its rows."""
-        header = self._layout.header
-        assert header is not None
+        header = self._layout.known_header
         if len(header.forms) == 1:
             return [slice(None)]
         remaining = np.arange(selector.size)
@@ -107,10 +105,9 @@ class _Reader:
     def classes(self, form: Form, selector: NDArray[Any], rows: Any) -> Any:
         """Return the numbers of the event classes of rows that have this form."""
         layout = self._layout
-        assert layout.header is not None
         if form.id is None:
             return layout.classes[layout.only_id].number
-        is_selector = form.id == layout.header.selector
+        is_selector = form.id == layout.known_header.selector
         ids = selector[rows] if is_selector else self.gather(form.id, rows)
         possible = range(form.id.mask + 1)
         known = np.array(sorted(i for i in layout.classes if i in possible), np.uint64)

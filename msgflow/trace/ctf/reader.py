@@ -26,16 +26,15 @@ from msgflow.trace.time_base import on_one_base
 from msgflow.trace.trace_set import ExclusiveTraceSet
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Mapping, Sequence
+    from collections.abc import Sequence
     from pathlib import Path
-
-    import pyarrow as pa
 
     from msgflow.trace.ctf.losses import Continuation
     from msgflow.trace.ctf.packet_order import Entry
     from msgflow.trace.ctf.packets import Packet
     from msgflow.trace.ctf.streams import Stream
-    from msgflow.trace.model import EventBatch, Progress, TraceLocation
+    from msgflow.trace.model import TraceLocation
+    from msgflow.trace.trace_set import Batches, Report, Wanted
 
 
 class CtfTraceSet(ExclusiveTraceSet):
@@ -112,12 +111,7 @@ class CtfTraceSet(ExclusiveTraceSet):
             self._streams.append(stream)
         return describe(declared, path, index, streams)
 
-    def _batches(
-        self,
-        wanted: Mapping[str, pa.Schema | None] | None,
-        progress: Callable[[Progress], None] | None,
-        batch_rows: int,
-    ) -> Generator[EventBatch, None, None]:
+    def _batches(self, wanted: Wanted, progress: Report | None, batch_rows: int) -> Batches:
         self.damages = list(self._found_early)
         if self._begins is None:
             self._begins = numbers_of(s for s in self._streams if not s.has_time)

@@ -81,11 +81,16 @@ class StreamLayout:
 
     def span(self, base: int, events_at: int, content_bits: int) -> Span:
         """Return where events lie in a packet at the byte `base`; needs `header`."""
-        assert self.header is not None
-        align = self.header.align * BYTE
+        align = self.known_header.align * BYTE
         begin = base + aligned(events_at, align) // BYTE
         end = base + aligned(content_bits, align) // BYTE
         return Span(base, min(begin, end), end, base + (content_bits + BYTE - 1) // BYTE)
+
+    @cached_property
+    def known_header(self) -> EventHeader:
+        """`header`, where events are not read field by field."""
+        assert self.header is not None
+        return self.header
 
     @cached_property
     def only_id(self) -> int:
@@ -99,8 +104,7 @@ class StreamLayout:
         For each residue of the event's position, a dictionary from the selector, shifted as it
         lies in its word, to the size. Events whose size varies are not in it.
         """
-        header = self.header
-        assert header is not None
+        header = self.known_header
         sizes: list[dict[int, int]] = [{} for _ in range(self.residues)]
         for event_id, layout in self.classes.items():
             form = self._short_form(event_id)
@@ -121,8 +125,7 @@ class StreamLayout:
         The last row has none: larger selectors are looked up there. None if there are too many
         selectors, or if one of ones only is a class: ones follow the last event.
         """
-        assert self.header is not None
-        shift, mask = self.header.selector.shift, self.header.selector.mask
+        shift, mask = self.known_header.selector.shift, self.known_header.selector.mask
         sizes = [
             {key >> shift: size for key, size in of_residue.items()}
             for of_residue in self.sizes_by_selector
@@ -138,25 +141,23 @@ class StreamLayout:
 
     def _short_form(self, event_id: int) -> Form | None:
         """Return the form whose selector is this id, None if no form is."""
-        assert self.header is not None
-        for form in self.header.forms:
+        selector = self.known_header.selector
+        for form in self.known_header.forms:
             if form.holds(event_id):
-                is_short = form.id == self.header.selector
-                return form if is_short and 0 <= event_id <= self.header.selector.mask else None
+                is_short = form.id == selector and 0 <= event_id <= selector.mask
+                return form if is_short else None
         return None
 
     def form_of(self, selector: int) -> Form:
         """Return the form of a header with this selector."""
-        assert self.header is not None
-        for form in self.header.forms:
+        for form in self.known_header.forms:
             if form.holds(selector):
                 return form
         raise FieldError(f"there is no form of an event header for {selector}")
 
     def next_event(self, data: bytearray, position: int, span: Span) -> int:
         """Return where the event after the one at this byte begins."""
-        header = self.header
-        assert header is not None
+        header = self.known_header
         residue = position % self.residues
         selector = header.selector.read(data, position, residue)
         key = selector * self.residues + residue
