@@ -78,7 +78,6 @@ def set_clocks(con: duckdb.DuckDBPyConnection, run_id: int, sync: ClockSync) -> 
 def _correct(
     con: duckdb.DuckDBPyConnection, source: str, values: Mapping[str, int] | None = None
 ) -> None:
-    """Store the corrections in the rows of `source`."""
     assigned = ", ".join(f"{column} = new.{column}" for column in _CORRECTION)
     con.execute(
         f"UPDATE store.clock SET {assigned} FROM {source} AS new "

@@ -117,7 +117,6 @@ def _bring_to_head(con: duckdb.DuckDBPyConnection, path: Path) -> tuple[str, ...
 
 
 def _definitions_of(revision: str) -> Mapping[str, str]:
-    """Return the definitions of tables that a database of an older revision has."""
     with tempfile.TemporaryDirectory(prefix="msgflow-") as directory:
         path = Path(directory) / "old.duckdb"
         with duckdb.connect(str(path)) as con:

@@ -91,7 +91,6 @@ def require_condition(
 
 
 def _statements(con: duckdb.DuckDBPyConnection, text: str) -> list[tuple[str, str]]:
-    """Return the kind and the text of each statement."""
     try:
         return [
             (statement.type.name, statement.query) for statement in con.extract_statements(text)

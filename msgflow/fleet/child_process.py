@@ -68,7 +68,6 @@ class _Stage:
         self.name = ""
 
     def enter(self, name: str) -> None:
-        """Begin a stage."""
         self.name = name
         self._file.write_text(name, encoding="utf-8")
 

@@ -175,7 +175,6 @@ class _Ingest:
         self._ties = itertools.count()
 
     def run(self, ray: str | None) -> FleetProgress:
-        """Ingest all recordings."""
         workers: Workers | None = None
         with ThreadPoolExecutor(_LOOKING_AT_ONCE) as pool:
             looked = pool.map(_look, self._recordings)

@@ -246,7 +246,6 @@ class Lake:
 
     @contextmanager
     def _locked(self, path: str, *, alone: bool, wait: bool) -> Iterator[None]:
-        """Hold the lock of a folder of the lake, where there are such."""
         folder = self.store.full(path)
         if not fcntl or not self.store.is_local or not os.path.isdir(folder):
             yield

@@ -85,7 +85,6 @@ def label_columns(labels: Sequence[str], columns: Sequence[str]) -> list[str]:
 def _fitting(
     con: duckdb.DuckDBPyConnection, runs: pa.Table, labels: Sequence[str], where: str
 ) -> pa.Table:
-    """Return the runs that fit a condition, ordered by key."""
     import pyarrow as pa
 
     con.register("known_run", runs)
@@ -226,7 +225,6 @@ class Reading:
         return f"read_parquet(getvariable({literal(name)}), union_by_name = true)"
 
     def _scan(self, table: str, files: dict[str, str]) -> str:
-        """Return SQL for the rows of a table."""
         store = self.choice.lake.store
         name = f"files of {table}"
         paths = [store.full(path) for path in files]

@@ -118,7 +118,6 @@ def _encoded(result: QueryResult, command: str) -> bytes:
 
 
 def _with_time(failures: pa.Table) -> pa.Table:
-    """Return failures with the time of the last try as text."""
     import pyarrow as pa
     import pyarrow.compute as pc
 

@@ -220,7 +220,6 @@ def _command(lake: Lake, row: Mapping[str, Any]) -> str | None:
 
 
 def _tables(header: Header) -> list[str]:
-    """Return the tables of the lake that a statement reads."""
     read = relations_of(statements().text(header.name.partition(".")[2]))
     return sorted(read & {answer.table for answer in answers()})
 
@@ -235,7 +234,6 @@ def _require_tables(reading: Reading, header: Header) -> None:
 
 
 def _named_tables(text: str) -> list[str]:
-    """Return the tables of the lake that SQL names."""
     known = {answer.table for answer in answers()}
     words = set(re.findall(r"\w+", text.lower()))
     return [name for name in sorted(known) if name in words] + (

@@ -125,7 +125,6 @@ def _version(row: Mapping[str, Any]) -> tuple[str, str]:
 
 
 def _pack(lake: Lake, rows: Sequence[Mapping[str, Any]], key: str, tables: Sequence[str]) -> str:
-    """Write the tables of some runs into a new part."""
     part = new_pack(len(rows))
     for table in tables:
         whole = _together(lake, table, rows, key, part)

@@ -142,13 +142,11 @@ class _Writer:
         self._revision = revision
 
     def table(self, name: str, path: str, rows: pa.RecordBatchReader) -> None:
-        """Write the rows of a table."""
         file = self._scratch / "table.parquet"
         write_rows(file, name, rows, self._first, self._revision)
         self._put(path, file)
 
     def database(self, database: Path, path: str) -> None:
-        """Write the database, compressed."""
         import pyarrow as pa
 
         file = self._scratch / "compressed"

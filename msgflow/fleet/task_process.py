@@ -49,12 +49,7 @@ def run_task(given: dict[str, Any]) -> dict[str, Any]:
             " --scratch",
             seconds=time.monotonic() - begin,
         )
-    return {**outcome.as_dict(), "worker": worker_name()}
-
-
-def worker_name() -> str:
-    """Return the name of this worker: its machine and process."""
-    return f"{socket.gethostname()}:{os.getpid()}"
+    return {**outcome.as_dict(), "worker": f"{socket.gethostname()}:{os.getpid()}"}
 
 
 @contextlib.contextmanager

@@ -302,13 +302,11 @@ class _Watch:
         self._tell(None)
 
     def reading(self, state: Progress, seconds: float) -> None:
-        """Take over the progress of the reader."""
         self._events = state.events
         self._rate = state.events / seconds if seconds > 0 else 0.0
         self._tell(state.fraction)
 
     def finish(self) -> Mapping[str, float]:
-        """End the last stage and return the seconds of each."""
         self._close()
         return dict(self._seconds)
 

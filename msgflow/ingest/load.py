@@ -14,10 +14,9 @@ from msgflow.db.transaction import transaction
 from msgflow.ingest import overlapping_traces, staging
 from msgflow.ingest.catalogue import USER_EVENT, load
 from msgflow.ingest.cpus import Cpus
-from msgflow.ingest.event_patterns import is_match, matches
 from msgflow.ingest.raw_tables import RawTables
 from msgflow.ingest.sequences import Placed, Sequences
-from msgflow.ingest.user_events import names_of, user_rows
+from msgflow.ingest.user_events import is_match, matches, names_of, user_rows
 from msgflow.trace import PACKET, EventBatch, Progress, TraceInfo, TraceSet
 from msgflow.trace.numpy_arrow import is_valid, text_lengths, to_numpy, without
 from msgflow.trace.prefetch import Prefetch
@@ -203,7 +202,6 @@ def without_thread(tracepoint: Tracepoint, batch: pa.RecordBatch) -> tuple[str, 
 
 
 def _sources(traces: Sequence[TraceInfo], hostnames: Mapping[int, str]) -> list[list[object]]:
-    """Return the rows of `staging.source`."""
     rows = []
     for trace in traces:
         hostname = hostnames.get(trace.index) or trace.hostname or "unknown"

@@ -138,7 +138,6 @@ def _duplicates(con: duckdb.DuckDBPyConnection) -> NDArray[np.int64]:
 
 
 def _make(con: duckdb.DuckDBPyConnection, made: ExitStack, table: str) -> None:
-    """Make a temporary table as `schema/overlap` has it."""
     header = statements().header(table)
     values = {param.name: _PARAMETERS[param.name] for param in header.params}
     _create(con, made, f"TABLE {table} AS\n{header.body}", values)

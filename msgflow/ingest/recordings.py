@@ -88,7 +88,6 @@ def _archive_of(trace: TraceInfo, archives: Sequence[Path]) -> Path | None:
 
 
 def _by_trace(groups: Sequence[list[TraceInfo]]) -> list[list[TraceInfo]]:
-    """Join the groups that have a trace in common."""
     joined: list[list[TraceInfo]] = []
     for group in groups:
         uuids = {trace.uuid for trace in group} - {None}

@@ -1,18 +1,18 @@
-"""Events of the user's own programs: which ones to load, and their rows with fields as JSON."""
+"""Events of the user's own programs: patterns of their names, and rows with fields as JSON."""
 
 from __future__ import annotations
 
+import fnmatch
 from typing import TYPE_CHECKING
 
 import pyarrow as pa
 
 from msgflow.ingest.catalogue import load
-from msgflow.ingest.event_patterns import is_match
 from msgflow.sql.json_fields import column_name, json_fields
 from msgflow.trace import COMMON_SCHEMA
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     import duckdb
 
@@ -20,6 +20,21 @@ if TYPE_CHECKING:
 
 _SCHEMA = pa.schema([*COMMON_SCHEMA, ("name", pa.string()), ("fields", pa.string())])
 _BATCH = "user_event_batch"
+
+
+def is_match(name: str, patterns: Sequence[str]) -> bool:
+    """Tell whether a name of events matches one of the patterns, such as 'dds:*'."""
+    return any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns)
+
+
+def matches(
+    patterns: Sequence[str], counts: Mapping[tuple[int, str], int]
+) -> Iterator[tuple[int, str, str | None]]:
+    """Yield (place, pattern, event) for each event that a pattern matches, else with None."""
+    occurred = sorted({name for (_, name), count in counts.items() if count})
+    for place, pattern in enumerate(dict.fromkeys(patterns)):
+        found = [name for name in occurred if is_match(name, [pattern])]
+        yield from ((place, pattern, name) for name in found or (None,))
 
 
 def names_of(patterns: Sequence[str], traces: Sequence[TraceInfo]) -> frozenset[str]:

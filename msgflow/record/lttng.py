@@ -7,13 +7,9 @@ import shlex
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 
 from msgflow.errors import RecordingError
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 # What lttng says where no session daemon runs.
 _NO_DAEMON = "No session daemon is available"
@@ -122,15 +118,9 @@ def providers() -> list[Provider]:
 
 def losses(session: str) -> int:
     """Return how many events the channels of a session have discarded so far."""
+    found = lttng("list", session).iterfind(".//{*}discarded_events")
     # LTTng 2.13 now and then sets the highest bit, too.
-    return sum(
-        number % _HIGHEST_BIT for number in _numbers(lttng("list", session), "discarded_events")
-    )
-
-
-def _numbers(element: ElementTree.Element, name: str) -> Iterator[int]:
-    for found in element.iterfind(f".//{{*}}{name}"):
-        yield int(found.text or 0)
+    return sum(int(number.text or 0) % _HIGHEST_BIT for number in found)
 
 
 def _text(element: ElementTree.Element, name: str) -> str:

@@ -60,7 +60,12 @@ def time_point(text: str | int, runs: Sequence[Run], option: str) -> int:
     `text` is an offset from the start of the only run ('2.5' seconds, '100ms'), an ISO time, or
     epoch ns: an integer, or a text of 16 digits or more.
     """
-    return _in_range(_read(text, runs, option), text, option)
+    time_ns = _read(text, runs, option)
+    if not MINIMUM_NS <= time_ns <= MAXIMUM_NS:
+        raise UsageError(
+            f"the time of {option} is out of range — {text}", "times reach from 1677 to 2262"
+        )
+    return time_ns
 
 
 def duration_ns(text: str, option: str, *, least_ns: int = 1) -> int:
@@ -70,14 +75,6 @@ def duration_ns(text: str, option: str, *, least_ns: int = 1) -> int:
     if length < least_ns:
         raise UsageError(f"cannot read the duration of {option} — {text}", f"{option} 2.5s")
     return length
-
-
-def _in_range(time_ns: int, given: str | int, option: str) -> int:
-    if not MINIMUM_NS <= time_ns <= MAXIMUM_NS:
-        raise UsageError(
-            f"the time of {option} is out of range — {given}", "times reach from 1677 to 2262"
-        )
-    return time_ns
 
 
 def _read(text: str | int, runs: Sequence[Run], option: str) -> int:

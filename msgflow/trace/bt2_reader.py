@@ -194,7 +194,6 @@ class _Reading:
             self._time_ns = time_ns
 
     def _values(self, event: Any) -> list[Any]:
-        """Return the values of contexts and payload in the order of the columns."""
         bt2, cls = self.bt2, event.cls
         if cls.addr not in self._paths:
             payload, wanted = schema_of(bt2, cls.payload_field_class), self.payloads[cls.name or ""]

@@ -160,7 +160,6 @@ def first_inner_value(fields: Any, paths: Iterable[Sequence[str]]) -> Any:
 
 
 def _joined(known: pa.Field, field: pa.Field) -> dict[bytes, bytes]:
-    """Return the metadata of a field that is declared in two ways."""
     labels = labels_of(known)
     for label, ranges in labels_of(field).items():
         labels[label] = labels.get(label, []) + ranges

@@ -113,7 +113,6 @@ class FlightRecorder:
         self._writing = None
 
     def _write(self, target: Path, traces: KeptTraces, links: LinksFile | None) -> None:
-        """Write the database of a violation, and remove the oldest ones."""
         try:
             ingest(
                 [target],

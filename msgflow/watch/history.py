@@ -165,6 +165,5 @@ class History:
         return [chunk for chunk in self._chunks if chunk.end_ns > reach]
 
     def _lasting_without(self, needed: Sequence[KeptChunk]) -> list[KeptChunk]:
-        """Return what lasts of the chunks that are not needed."""
         passed = (chunk.lasting() for chunk in self._chunks if chunk not in needed)
         return [lasting for lasting in passed if lasting is not None]

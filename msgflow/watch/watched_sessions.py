@@ -55,7 +55,6 @@ def watched_place(word: str | None) -> Path:
 
 
 def _only(places: dict[str, Path], reason: str | None) -> Path:
-    """Return the directory of the only session."""
     if len(places) == 1:
         return next(iter(places.values()))
     if places:

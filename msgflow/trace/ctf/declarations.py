@@ -84,7 +84,6 @@ def _structure(declared: Structure) -> Structure:
 
 
 def _type(declared: Type) -> Type:
-    """Return the type without roles that make fields times."""
     match declared:
         case Structure():
             return _structure(declared)

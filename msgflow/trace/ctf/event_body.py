@@ -81,7 +81,6 @@ class EventBody:
 
     @cached_property
     def _orders(self) -> tuple[Literal["big", "little"], ...]:
-        """Byte orders of the fields."""
         return tuple("big" if field.dtype[0] == ">" else "little" for field in self.fields or ())
 
     @cached_property

@@ -270,7 +270,6 @@ def _unfinished(loaded: _Loaded, until_ns: int) -> tuple[list[Entry], bool]:
 
 
 def _forget(entries: Sequence[Entry], held: Sequence[Entry]) -> None:
-    """Forget the positions of events of packets that are done."""
     kept = set(map(id, held))
     for entry in entries:
         if id(entry) not in kept:

@@ -113,7 +113,6 @@ class _Elements:
 
     @property
     def is_text(self) -> bool:
-        """The elements are characters."""
         return is_character(self.element)
 
 

@@ -68,7 +68,6 @@ class _Reader:
         return np.array(values, np.int64)[residue]
 
     def gather(self, place: Place, rows: Any) -> NDArray[Any]:
-        """Return the integers at this place of these rows."""
         at = self._positions[rows] + self.by_residue(place.offsets, rows)
         values: NDArray[Any] = self._memory.view(place.dtype)[at]
         values = values.astype(f"u{place.width}", copy=False)
@@ -79,7 +78,6 @@ class _Reader:
         return values
 
     def rows_of_forms(self, selector: NDArray[Any]) -> list[Any]:
-        """Return for each form its rows."""
         header = self._layout.known_header
         if len(header.forms) == 1:
             return [slice(None)]
@@ -103,7 +101,6 @@ class _Reader:
         return rows
 
     def classes(self, form: Form, selector: NDArray[Any], rows: Any) -> Any:
-        """Return the numbers of the event classes of rows that have this form."""
         layout = self._layout
         if form.id is None:
             return layout.classes[layout.only_id].number

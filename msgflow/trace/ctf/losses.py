@@ -82,11 +82,6 @@ class Continuation:
     losses: LossCounter = field(default_factory=LossCounter)  # the counters in their packets
 
 
-def recording_of(stream: Stream, uuid: str | None, path: str) -> Recording:
-    """Return the recording whose lost events the counter of a stream counts."""
-    return uuid or path, stream.class_id, stream.instance
-
-
 def _rise(before: int, counter: int, bits: int) -> int:
     if counter >= before:
         return counter - before

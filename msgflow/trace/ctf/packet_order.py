@@ -6,8 +6,6 @@ from dataclasses import dataclass, field
 from enum import Enum, auto
 from typing import TYPE_CHECKING
 
-from msgflow.trace.ctf.losses import recording_of
-
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
@@ -117,7 +115,7 @@ def entries_of(
         info = traces[stream.trace_index]
         owner = owners.get((info.uuid or "", stream.class_id, stream.instance, begin))
         is_copy = owner is not None and owner != stream.trace_index
-        recording = recording_of(stream, info.uuid, str(info.path))
+        recording = info.identity, stream.class_id, stream.instance
         losses = counter.losses(recording, stream, packet, not is_copy)
         if is_copy:
             copies += 1

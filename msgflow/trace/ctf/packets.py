@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from bisect import bisect_right
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 from msgflow.trace.ctf import packet_index
@@ -57,12 +58,8 @@ def packets_of(
     early = misplaced([packet.header.begin or 0 for packet in packets])
     for place in sorted(early):
         packet = packets[place]
-        report(
-            path,
-            packet.number,
-            packet.offset,
-            "the packet begins earlier or later than its neighbours",
-        )
+        message = "the packet begins earlier or later than its neighbours"
+        report(path, packet.number, packet.offset, message)
     return [packet for place, packet in enumerate(packets) if place not in early]
 
 
@@ -77,7 +74,7 @@ class _PacketFinder:
         self._path = path
         self._descriptor = descriptor
         self._reader = reader
-        self._report = report
+        self._say = partial(report, path)
         status = os.fstat(descriptor)
         self._file_size = status.st_size
         self._is_sparse = status.st_blocks * _BLOCK < status.st_size
@@ -95,7 +92,7 @@ class _PacketFinder:
             try:
                 packet = self._packet(offset, number)
             except FieldError as error:
-                self._report(self._path, number, offset, str(error))
+                self._say(number, offset, str(error))
                 offset = self._next_begin(offset)
             else:
                 if not packet.is_cut:
@@ -105,9 +102,7 @@ class _PacketFinder:
             number += 1
         last = max(self._index, default=-1)
         if last >= self._file_size:
-            self._report(
-                self._path, number, self._file_size, "the file ends before packets of its index"
-            )
+            self._say(number, self._file_size, "the file ends before packets of its index")
 
     def _packet(self, offset: int, number: int) -> Packet:
         header = self._reader.read(os.pread(self._descriptor, self._reader.size, offset))
@@ -124,13 +119,13 @@ class _PacketFinder:
         self._check_times(header)
         self._check_uuid(header, offset, number)
         if header.cpu is not None and not 0 <= header.cpu <= _LARGEST_CPU:
-            self._report(self._path, number, offset, f"there is no CPU {header.cpu}: left out")
+            self._say(number, offset, f"there is no CPU {header.cpu}: left out")
             header = replace(header, cpu=None)
         if size > rest:
             is_last = self._next_begin(offset) == self._file_size
             if not is_last or header.events_at > rest * BYTE:
                 raise FieldError(_CUT)
-            self._report(self._path, number, offset, f"{_CUT}; what is there of it is read")
+            self._say(number, offset, f"{_CUT}; what is there of it is read")
             there = min(content_bits, rest * BYTE)
             return Packet(self._path, number, offset, rest, there, header, is_cut=True)
         size = self._without_swallowed(offset, size, content_bits, number)
@@ -138,7 +133,7 @@ class _PacketFinder:
         if there < content_bits:
             if there < header.events_at:
                 raise FieldError(_HOLE)
-            self._report(self._path, number, offset, f"{_HOLE}; what is in front of it is read")
+            self._say(number, offset, f"{_HOLE}; what is in front of it is read")
             return Packet(self._path, number, offset, size, there, header, is_cut=True)
         return Packet(self._path, number, offset, size, content_bits, header)
 
@@ -161,8 +156,7 @@ class _PacketFinder:
         if pattern is not None and not self._foreign:
             self._patterns.append(pattern)
         self._foreign.add(header.foreign)
-        self._report(
-            self._path,
+        self._say(
             number,
             offset,
             f"the packet belongs to another trace, {header.foreign}: read nevertheless, as this "
@@ -196,9 +190,7 @@ class _PacketFinder:
         found = self._find(offset + used, offset + size)
         if found is None:
             return size
-        self._report(
-            self._path, number, offset, "another packet lies where this one says to be unused"
-        )
+        self._say(number, offset, "another packet lies where this one says to be unused")
         return found - offset
 
     def _next_begin(self, offset: int) -> int:
@@ -232,7 +224,7 @@ class _PacketFinder:
         entry = self._index.get(packet.offset)
         header = packet.header
         if self._index and entry is None and packet.offset < max(self._index):
-            self._report(self._path, packet.number, packet.offset, "the packet is not in the index")
+            self._say(packet.number, packet.offset, "the packet is not in the index")
         if entry is None:
             return
         for found, expected, what in (
@@ -242,8 +234,7 @@ class _PacketFinder:
             (header.end, entry.end, "end"),
         ):
             if found is not None and found != expected:
-                self._report(
-                    self._path,
+                self._say(
                     packet.number,
                     packet.offset,
                     f"the index says that the packet's {what} is {expected}, the packet {found}",

@@ -164,7 +164,6 @@ class _GatheredColumns:
         return list_array(*self._rows.elements(number), data_type)
 
     def inner_array(self, paths: Sequence[Sequence[str]], data_type: pa.DataType) -> pa.Array:
-        """Return a column of fields of the variant."""
         found = [self._rows.in_variant(".".join(path)) for path in paths]
         present = [values for values in found if values is not None]
         return scattered_array(present, self._count, data_type)
