@@ -17,11 +17,11 @@ from msgflow.db.finding import kinds_of, statement
 from msgflow.db.store_table import store_tables
 from msgflow.files.resources import resource_directory
 from msgflow.ingest import staging
-from msgflow.ingest.agnocast import translate
 from msgflow.ingest.caret_initialisation import restore
+from msgflow.ingest.catalogue import load
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Collection, Mapping
 
     import duckdb
 
@@ -48,6 +48,15 @@ def build(con: duckdb.DuckDBPyConnection, *, keep: bool = False, findings: bool 
             # A table without rows is no burden.
             if last_use == position and name not in empty:
                 con.execute(f"DROP TABLE {name}")
+
+
+def translate(con: duckdb.DuckDBPyConnection, empty: Collection[str]) -> bool:
+    """Add what events of Agnocast say to the tables of ROS 2's; tell whether there were any."""
+    tables = [f"raw.{each.table}" for each in load().staged.values() if each.is_translated]
+    if all(table in empty for table in tables):
+        return False
+    con.execute((resource_directory("schema") / "agnocast.sql").read_text(encoding="utf-8"))
+    return True
 
 
 def create(con: duckdb.DuckDBPyConnection, header: Header, empty: set[str]) -> None:

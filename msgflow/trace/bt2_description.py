@@ -10,7 +10,7 @@ from msgflow.errors import TraceError
 from msgflow.trace.bt2_fields import schema_of
 from msgflow.trace.bt2_messages import messages, parameters_of
 from msgflow.trace.ctf.clock import Clock
-from msgflow.trace.description import description
+from msgflow.trace.ctf.trace_info import description
 from msgflow.trace.metadata_frame import MetadataKind, kind_of
 from msgflow.trace.model import TraceInfo
 

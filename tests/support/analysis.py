@@ -19,8 +19,8 @@ from msgflow.db.sandbox import open_memory
 from msgflow.db.store import store
 from msgflow.db.store_table import store_tables
 from msgflow.ingest import model, staging
-from msgflow.ingest.agnocast import translate
 from msgflow.ingest.caret_initialisation import restore
+from msgflow.ingest.model import translate
 
 _NAME = re.compile(r"(?:\b(staging|store|derive|main)\.)?\b([a-z_0-9]+)\b")
 # What is stored of links and of what is missing comes of whole derivations.
