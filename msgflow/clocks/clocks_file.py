@@ -76,7 +76,7 @@ def read_clock_sync(given: str | Path) -> ClockSync:
     path = Path(given)
     text = read_text(path, f"neither {' nor '.join(METHODS)} nor a file that can be read", _EXAMPLE)
     sync = ClockSync("file", path)
-    entries = _toml(text, sync) if _is_toml(path) else _yaml(text, sync)
+    entries = _toml(text, sync) if _is_toml(path) else _yaml(text, path, sync)
     clocks = tuple(_clock(sync, *entry) for entry in entries)
     if not clocks:
         sync.fail(1, "the file names no clock", _EXAMPLE)
@@ -135,8 +135,8 @@ def _toml_scalar(value: object) -> str:
     return "a mapping" if isinstance(value, dict) else str(value)
 
 
-def _yaml(text: str, sync: ClockSync) -> Iterator[_Entry]:
-    root = YamlFile(sync.path, _EXAMPLE, _EXAMPLE, text).root()
+def _yaml(text: str, path: Path, sync: ClockSync) -> Iterator[_Entry]:
+    root = YamlFile(path, _EXAMPLE, _EXAMPLE, text).root()
     if root is None:
         return
     for name, value in _pairs(sync, root, "the file is not a mapping from hosts to offsets"):
