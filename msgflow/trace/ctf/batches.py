@@ -21,8 +21,6 @@ from msgflow.trace.prefetch import Prefetch
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
     from msgflow.trace.ctf.event_order import Batch
     from msgflow.trace.ctf.field_reader import EventReader
     from msgflow.trace.ctf.packet_order import Entry
@@ -115,7 +113,9 @@ class Iteration:
         """Yield the wanted events of a batch, class by class; `number` is that of the round."""
         first_id = self.event_count
         self.event_count += batch.ts_ns.size
-        by_class, ends = _split(batch, len(self._classes))
+        classes = batch.classes.astype(np.uint16 if len(self._classes) < 1 << 16 else np.uint32)
+        by_class = np.argsort(classes, kind="stable")
+        ends = np.cumsum(np.bincount(classes, minlength=len(self._classes)))
         counts = np.diff(ends, prepend=0)
         self._counts += counts
         readers: dict[int, EventReader] = {}
@@ -143,13 +143,6 @@ class Iteration:
     def _report_progress(self, fraction: float, time_ns: int) -> None:
         if self._progress is not None:
             self._progress(Progress(self.event_count, fraction, time_ns))
-
-
-def _split(batch: Batch, class_count: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the events of a batch class after class, and where each class ends among them."""
-    classes = batch.classes.astype(np.uint16 if class_count < 1 << 16 else np.uint32)
-    ends = np.cumsum(np.bincount(classes, minlength=class_count))
-    return np.argsort(classes, kind="stable"), ends
 
 
 def _in_order(parts: list[pa.RecordBatch]) -> pa.RecordBatch:

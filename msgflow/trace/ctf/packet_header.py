@@ -158,13 +158,13 @@ class _Place:
         return int.from_bytes(content, self.order) >> self.shift & self.mask
 
 
+@dataclass(frozen=True)
 class _Plan:
     """Places of the values of a structure of fixed layout."""
 
-    def __init__(self, places: dict[str, _Place], end: int, discarded_bits: int) -> None:
-        self.places = places  # role (or name) to place
-        self.end = end  # the bit at which the structure ends
-        self.discarded_bits = discarded_bits  # size of the counter of lost events
+    places: dict[str, _Place]  # by role (or name)
+    end: int  # the bit at which the structure ends
+    discarded_bits: int  # size of the counter of lost events
 
     def read(self, data: bytes) -> dict[str, Any]:
         return {name: place.read(data) for name, place in self.places.items()}
