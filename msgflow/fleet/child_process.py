@@ -32,9 +32,7 @@ def main() -> None:
     from msgflow.fleet.task import Task
 
     outcome = do(Task(**json.loads(text)), directory)
-    aside = directory / "result.part"
-    aside.write_text(json.dumps(outcome.as_dict()), encoding="utf-8")
-    aside.replace(directory / RESULT)
+    (directory / RESULT).write_text(json.dumps(outcome.as_dict()), encoding="utf-8")
 
 
 def _end_with_parent() -> None:

@@ -7,6 +7,7 @@ are never written, and never part of an address.
 from __future__ import annotations
 
 import errno
+import io
 import os
 import posixpath
 import random
@@ -17,7 +18,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, BinaryIO, TypeVar
 from urllib.parse import urlsplit
 
 from msgflow.errors import DatabaseError, UsageError, require_utf8
@@ -189,8 +190,7 @@ class Store:
 
         def copy() -> None:
             with self._reading(path) as stream, target.open("wb") as file:
-                while chunk := stream.read(_CHUNK):
-                    file.write(chunk)
+                shutil.copyfileobj(stream, file, _CHUNK)
 
         with _reaching(self.url):
             self._patiently(copy)
@@ -217,31 +217,22 @@ class Store:
     def put(self, path: str, content: bytes | Path) -> None:
         """Write a file, in place of an existing one."""
         self._require_here(path)
-        with _reaching(self.url, writing=True):
-            if self.is_local:
-                self._put_locally(Path(self.full(path)), content)
-            elif isinstance(content, bytes):
-                with self._writing(path) as stream:
-                    stream.write(content)
-            else:
-                with (
-                    content.open("rb") as source,
-                    self._writing(path) as stream,
-                ):
-                    while chunk := source.read(_CHUNK):
-                        stream.write(chunk)
+        with (
+            _reaching(self.url, writing=True),
+            io.BytesIO(content) if isinstance(content, bytes) else content.open("rb") as source,
+            self._locally(path) if self.is_local else self._writing(path) as target,
+        ):
+            shutil.copyfileobj(source, target, _CHUNK)
 
-    def _put_locally(self, target: Path, content: bytes | Path) -> None:
+    @contextmanager
+    def _locally(self, path: str) -> Iterator[BinaryIO]:
+        target = Path(self.full(path))
         target.parent.mkdir(parents=True, exist_ok=True)
         # Readers ignore it, as files of a lake end with .parquet.
         temporary = target.with_name(f".{target.name}.{mark()}.part")
         try:
             with temporary.open("wb") as file:
-                if isinstance(content, bytes):
-                    file.write(content)
-                else:
-                    with content.open("rb") as source:
-                        shutil.copyfileobj(source, file, _CHUNK)
+                yield file
                 file.flush()
                 os.fsync(file.fileno())
             temporary.replace(target)

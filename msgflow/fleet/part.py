@@ -6,6 +6,7 @@ time or before, stays as it is.
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -154,8 +155,7 @@ class _Writer:
             database.open("rb") as source,
             pa.CompressedOutputStream(str(file), "zstd") as target,
         ):
-            while chunk := source.read(1 << 20):
-                target.write(chunk)
+            shutil.copyfileobj(source, target, 1 << 20)
         self._put(path, file)
 
     def _put(self, path: str, file: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from msgflow.trace.ctf.field_types import (
@@ -331,14 +332,7 @@ class TypeParser:
             container = self._find("int")
         if not isinstance(container, Integer):
             raise tokens.error("an enumeration must be of an integer type")
-        enumeration = Integer(
-            size=container.size,
-            align=container.align,
-            big_endian=container.big_endian,
-            signed=container.signed,
-            labels=self._labels(),
-            roles=container.roles,
-        )
+        enumeration = replace(container, labels=self._labels(), is_text=False, base=10)
         if name:
             self._named[-1][f"enum {name}"] = enumeration
         return enumeration
