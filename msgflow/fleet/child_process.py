@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 import sys
 import threading
 import time
@@ -162,7 +163,7 @@ def failed_outcome(error: Exception, stage: str, seconds: float) -> Outcome:
         hint = "ingest it again when it is complete"
     elif _is_full(error, message):
         reason = Reason.NO_SPACE
-    elif isinstance(error, MemoryError) or _needs_memory(message):
+    elif isinstance(error, MemoryError) or re.search("(?i:out of memory)|more memory", message):
         reason = Reason.TOO_LARGE
         hint = "give its worker more memory"
     elif isinstance(error, TraceError | UsageError):
@@ -176,10 +177,6 @@ def failed_outcome(error: Exception, stage: str, seconds: float) -> Outcome:
         hint=hint and without_secrets(hint),
         seconds=seconds,
     )
-
-
-def _needs_memory(message: str) -> bool:
-    return "out of memory" in message.lower() or "more memory" in message
 
 
 def _is_full(error: Exception, message: str) -> bool:

@@ -37,7 +37,10 @@ def why_not(options: Sequence[str]) -> str | None:
 @contextmanager
 def recorded(data: Path, options: Sequence[str], note: Callable[[str], None]) -> Iterator[None]:
     """Have perf record into a file during the block."""
-    with tempfile.TemporaryFile("w+") as words, _control() as (ours, of_perf):
+    # Both ends of what perf takes commands from.
+    ours, of_perf = socket.socketpair()
+    ours.settimeout(_LONGEST_START)
+    with tempfile.TemporaryFile("w+") as words, ours, of_perf:
         place = of_perf.fileno()
         control = f"--control=fd:{place},{place}"
         command = [*_RECORD, *options, control, f"--output={data}", "--quiet"]
@@ -56,15 +59,6 @@ def recorded(data: Path, options: Sequence[str], note: Callable[[str], None]) ->
         words.seek(0)
         if ended_early:
             note(f"perf ended before the recording{reason(words.read())}")
-
-
-@contextmanager
-def _control() -> Iterator[tuple[socket.socket, socket.socket]]:
-    """Give both ends of what perf takes commands from."""
-    ours, of_perf = socket.socketpair()
-    ours.settimeout(_LONGEST_START)
-    with ours, of_perf:
-        yield ours, of_perf
 
 
 def reason(printed: str) -> str:

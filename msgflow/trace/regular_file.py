@@ -56,7 +56,9 @@ def irregular(path: Path) -> str | None:
     try:
         mode = path.stat().st_mode
     except OSError as error:
-        return _unreachable(error) if path.is_symlink() else None
+        if not path.is_symlink():
+            return None
+        return "a link in a circle" if error.errno == errno.ELOOP else "a link that leads nowhere"
     return None if stat.S_ISREG(mode) or stat.S_ISDIR(mode) else _kind(mode)
 
 
@@ -77,7 +79,3 @@ def unreadable_error(error: OSError, directory: Path) -> TraceError:
 
 def _kind(mode: int) -> str:
     return _KINDS.get(stat.S_IFMT(mode), "a special file")
-
-
-def _unreachable(error: OSError) -> str:
-    return "a link in a circle" if error.errno == errno.ELOOP else "a link that leads nowhere"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from dataclasses import field as dataclass_field
 from enum import Enum
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal
@@ -57,12 +56,12 @@ class PlainField:
     is_length: bool = False  # it is the length of a sequence, or chooses the option of the variant
     type: Type | None = None  # as declared
 
-    size: int | None = dataclass_field(init=False)  # in bytes, None if it varies
-
-    def __post_init__(self) -> None:
-        varies = self.kind in {Kind.STRING, Kind.SEQUENCE, Kind.TEXT_SEQUENCE}
-        width = 0 if self.kind is Kind.NOTHING else self.width
-        object.__setattr__(self, "size", None if varies else width * self.count)
+    @property
+    def size(self) -> int | None:
+        """Bytes of it; None if that varies."""
+        if self.kind in {Kind.STRING, Kind.SEQUENCE, Kind.TEXT_SEQUENCE}:
+            return None
+        return 0 if self.kind is Kind.NOTHING else self.width * self.count
 
 
 @dataclass(frozen=True)

@@ -134,7 +134,7 @@ class HeaderReader:
             discarded=found.get(Role.DISCARDED),
             discarded_bits=discarded_bits,
             cpu=found.get(_CPU),
-            foreign=_uuid_text(uuid) if uuid is not None and is_foreign else None,
+            foreign=str(UUID(bytes=uuid)) if uuid is not None and is_foreign else None,
         )
 
 
@@ -198,8 +198,3 @@ def _place(leaf: Leaf) -> _Place:
     big = leaf.type.big_endian
     shift = last * BYTE - end if big else leaf.position - first * BYTE
     return _Place(first, last, shift, (1 << leaf.type.size) - 1, "big" if big else "little", True)
-
-
-def _uuid_text(uuid: bytes) -> str:
-    text = uuid.hex()
-    return f"{text[:8]}-{text[8:12]}-{text[12:16]}-{text[16:20]}-{text[20:]}"
