@@ -175,11 +175,7 @@ def _answer(
     clock_sync: str,
     database: Path,
 ) -> bool:
-    """Read the recording into the database, and print what a user wants to know first.
-
-    Returns:
-        Whether the recording has no error.
-    """
+    """Ingest the recording, print what a user wants to know first; tell whether it has no error."""
     from msgflow.cli import check, ingest
     from msgflow.cli.output import print_result, print_status
     from msgflow.cli.tracing_cost import part_of_latencies

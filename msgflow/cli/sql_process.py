@@ -60,11 +60,8 @@ def _cut(table: pa.Table) -> pa.Table:
 class WarmSql:
     """SQL on one database, query after query in one child process, which starts with the first.
 
-    Args:
-        path: the database; every query opens it anew.
-        memory_limit: most memory that DuckDB takes; that of `default_limit` when None. The process
-            takes a quarter more at most, but may take 256 MiB.
-        seconds: how long a query may take.
+    Every query opens the database anew. The process takes a quarter more memory than DuckDB at
+    most, but may take 256 MiB.
     """
 
     def __init__(self, path: Path, *, memory_limit: str | None, seconds: float) -> None:

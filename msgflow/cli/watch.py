@@ -313,11 +313,7 @@ def _record(
     *,
     on_screen: bool,
 ) -> bool:
-    """Start a program, record it, and watch the recording until it ends.
-
-    Returns:
-        Whether the program failed.
-    """
+    """Start a program, record it, and watch the recording until it ends; tell whether it failed."""
     from msgflow.cli.output import print_note
     from msgflow.record import Channel, record, temporary_directory
 

@@ -23,16 +23,8 @@ def export_csv(
 ) -> tuple[ExportedView, ...]:
     """Write views to `directory/VIEW.csv`, all of them or none, rows sorted by all columns.
 
-    Text stands in quotes, a missing value is an empty field without; bytes are hexadecimal.
-
-    Args:
-        connection: to the database.
-        directory: created if missing.
-        selection: what to write.
-        force: replace files that exist.
-
-    Raises:
-        UsageError: a file that is there already, or a directory that cannot be written.
+    Text stands in quotes, a missing value is an empty field without; bytes are hexadecimal. With
+    `force`, files that exist are replaced.
     """
     names = {view: f"{view}.csv" for view in selection.views}
     counts: dict[str, int] = {}

@@ -24,11 +24,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, repr=False)
 class Flow(FlowVertices):
-    """The causes and effects of one message. Times are integers in nanoseconds.
+    """The causes and effects of one message, as `FlowVertices` describes them.
 
     `str` of it is the tree that `msgflow flow` prints.
-
-    Its attributes are those of `FlowVertices`.
     """
 
     def to_arrow(self) -> pa.Table:
@@ -70,17 +68,7 @@ class Flow(FlowVertices):
 
 
 def read_flow(connection: duckdb.DuckDBPyConnection, /, start: Start, **given: Value) -> Flow:
-    """Return the flow that goes through `start`.
-
-    Args:
-        connection: to a database with the public views.
-        start: where to begin.
-        given: direction, depth, limit and internal; see `internal.flow_steps`.
-
-    Raises:
-        UsageError: the start does not exist, or an argument is out of range.
-        QueryError: the database could not run it.
-    """
+    """Return the flow through `start`; `given` are parameters of `internal.flow_steps`."""
     run = require_start(connection, start)
     asked = flow_parameters(start, run, given)
     table = read_steps(connection, asked)

@@ -16,38 +16,25 @@ if TYPE_CHECKING:
 
 @dataclass(eq=False)
 class Item:
-    """One vertex, or a take with the callback instance it was for, or a message that was not taken.
+    """A vertex, a take with the callback instance that it was for, or a message not taken."""
 
-    Attributes:
-        node: the vertex; the callback instance if it is drawn together with its take.
-        take: that take.
-        handover: the link from the take to the callback instance.
-        number: set if another line refers to this one.
-        causes: items that lead here, with the links.
-        effects: items that this leads to, with the links.
-    """
-
-    node: Row
-    take: Row | None = None
-    handover: Row | None = None
-    number: int | None = None
+    node: Row  # the vertex; the callback instance if it is drawn together with its take
+    take: Row | None = None  # that take
+    handover: Row | None = None  # the link from the take to the callback instance
+    number: int | None = None  # set if another line refers to this one
+    # items that lead here, with the links
     causes: list[tuple[Item, Row]] = field(default_factory=list)
+    # items that this leads to, with the links
     effects: list[tuple[Item, Row]] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
 class Line:
-    """An item where it is drawn.
+    """An item where it is drawn."""
 
-    Attributes:
-        item: what to draw.
-        link: the link from the line before, None for the first.
-        is_reference: another line draws the item.
-    """
-
-    item: Item
-    link: Row | None
-    is_reference: bool = False
+    item: Item  # what to draw
+    link: Row | None  # the link from the line before, None for the first
+    is_reference: bool = False  # another line draws the item
 
 
 @dataclass(eq=False)

@@ -20,28 +20,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class FoldedStacks:
-    """A file that was written.
-
-    Attributes:
-        path: the file.
-        run: what it is of.
-        stacks: different ones, each a line.
-        samples: of all of them.
-    """
+    """A file that was written."""
 
     path: Path
-    run: Run
-    stacks: int
-    samples: int
+    run: Run  # what it is of
+    stacks: int  # different ones, each a line
+    samples: int  # of all of them
 
 
 def write_folded(connection: duckdb.DuckDBPyConnection, path: Path, part: Slice) -> FoldedStacks:
-    """Write a line for each stack: node, callback and functions, then how many samples saw it.
-
-    Raises:
-        UsageError: not exactly one run, a run without samples, a time that cannot be read, or a
-            file that cannot be written.
-    """
+    """Write a line for each stack: node, callback and functions, then how many samples saw it."""
     run = part.one_run(connection, "a flame graph")
     bindings = {"run_id": run.run_id, **part.window([run]).bindings}
     rows = internal_sql().run(connection, "folded_stack", bindings).fetchall()

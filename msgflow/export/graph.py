@@ -48,10 +48,7 @@ def graph_format(path: Path | None) -> GraphFormat | Format:
 
 @dataclass(frozen=True, repr=False)
 class Graph(GraphVertices):
-    """Nodes, topics, services and actions of a run, and the messages between them.
-
-    Its attributes are those of `GraphVertices`.
-    """
+    """Nodes, topics, services and actions of a run, as `GraphVertices` describes them."""
 
     def to_json(self) -> str:
         """Return executors, nodes and edges as JSON."""
@@ -104,17 +101,7 @@ class Graph(GraphVertices):
 def read_graph(
     connection: duckdb.DuckDBPyConnection, part: Slice, *, internal: bool = False
 ) -> Graph:
-    """Return the graph of a run.
-
-    Args:
-        connection: to a database with the public views.
-        part: one run, and the times to read.
-        internal: with ROS's own topics and services.
-
-    Raises:
-        UsageError: not exactly one run, or a time that cannot be read.
-        QueryError: the database could not run it.
-    """
+    """Return the graph of a run."""
     run = part.one_run(connection, "a graph")
     header = load_query("graph")
     result = run_query(connection, header, {}, replace(part, run=run.run_id), internal=internal)

@@ -17,21 +17,13 @@ Row = dict[str, Any]
 
 @dataclass(frozen=True)
 class Vertex:
-    """A node, topic, service or action.
+    """A node, topic, service or action."""
 
-    Attributes:
-        id: its name in edges, of letters and digits only.
-        kind: 'node', 'topic', 'service' or 'action'.
-        name: in the trace.
-        rate_hz: messages of a topic per second; None: not known.
-        executor: number of the executor that runs the node, in `Graph.executors`.
-    """
-
-    id: str
-    kind: str
-    name: str
-    rate_hz: float | None = None
-    executor: int | None = None
+    id: str  # its name in edges, of letters and digits only
+    kind: str  # 'node', 'topic', 'service' or 'action'
+    name: str  # in the trace
+    rate_hz: float | None = None  # messages of a topic per second; None: not known
+    executor: int | None = None  # number of the executor that runs the node, in `Graph.executors`
 
     @property
     def lines(self) -> list[str]:
@@ -42,27 +34,17 @@ class Vertex:
 
 @dataclass(frozen=True)
 class Edge:
-    """An arrow between a node and a topic, service or action.
+    """An arrow between a node and a topic, service or action."""
 
-    Attributes:
-        source: id of its first vertex.
-        target: id of its last vertex.
-        kind: 'publish', 'receive', 'call', 'serve', 'send' or 'execute'.
-        indirect: kind of the indirect links through which messages wait in the node; None: none.
-        count: messages, requests or goals.
-        rate_hz: messages per second; None: not known.
-        median_ns: median latency; None: not known.
-        p95_ns: 95 % are at most this.
-    """
-
-    source: str
-    target: str
-    kind: str
+    source: str  # id of its first vertex
+    target: str  # id of its last vertex
+    kind: str  # 'publish', 'receive', 'call', 'serve', 'send' or 'execute'
+    # kind of the indirect links through which messages wait in the node; None: none
     indirect: str | None
-    count: int
-    rate_hz: float | None
-    median_ns: int | None
-    p95_ns: int | None
+    count: int  # messages, requests or goals
+    rate_hz: float | None  # messages per second; None: not known
+    median_ns: int | None  # median latency; None: not known
+    p95_ns: int | None  # 95 % are at most this
 
     @property
     def label(self) -> str:
@@ -93,17 +75,11 @@ def _brief(duration_ns: int) -> str:
 
 @dataclass(frozen=True, repr=False)
 class GraphVertices:
-    """Nodes, topics, services and actions of a run, and the messages between them.
-
-    Attributes:
-        run: the run.
-        result: the rows of the query `graph`.
-        notes: what the rows do not say, a sentence each.
-    """
+    """Nodes, topics, services and actions of a run, and the messages between them."""
 
     run: Run
-    result: QueryResult
-    notes: list[str] = field(default_factory=list)
+    result: QueryResult  # the rows of the query `graph`
+    notes: list[str] = field(default_factory=list)  # what the rows do not say, a sentence each
 
     @cached_property
     def rows(self) -> list[Row]:

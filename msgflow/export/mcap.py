@@ -48,38 +48,23 @@ _ERROR = 40
 
 @dataclass(frozen=True)
 class Violation:
-    """A requirement that the run does not meet.
+    """A requirement that the run does not meet."""
 
-    Attributes:
-        at_ns: when its worst case began, epoch ns; None if it has none, such as a rate.
-        subject: what of the run it is.
-        message: what was required and measured.
-    """
-
-    at_ns: int | None
-    subject: str
-    message: str
+    at_ns: int | None  # when its worst case began, epoch ns; None if it has none, such as a rate
+    subject: str  # what of the run it is
+    message: str  # what was required and measured
 
 
 @dataclass(frozen=True)
 class ExportedMcap:
-    """An MCAP file that was written.
-
-    Attributes:
-        path: the file.
-        run: what it is of.
-        topics: topics with values.
-        values: measured values, a message each.
-        losses: messages about messages that were dropped or lost.
-        violations: messages about requirements that are not met.
-    """
+    """An MCAP file that was written."""
 
     path: Path
-    run: Run
-    topics: int
-    values: int
-    losses: int
-    violations: int
+    run: Run  # what it is of
+    topics: int  # topics with values
+    values: int  # measured values, a message each
+    losses: int  # messages about messages that were dropped or lost
+    violations: int  # messages about requirements that are not met
 
 
 def write_mcap(
@@ -88,19 +73,7 @@ def write_mcap(
     part: Slice,
     violations: Sequence[Violation] = (),
 ) -> ExportedMcap:
-    """Write values and losses of a run as an MCAP file, batch by batch.
-
-    Args:
-        connection: to a database with the public views.
-        path: the file; one that exists is replaced.
-        part: one run, and the times to write.
-        violations: what else the log has; those of no moment come at the end.
-
-    Raises:
-        UsageError: not exactly one run, a time that cannot be read, a file that cannot be written,
-            or the package mcap-ros2-support is not installed.
-        DatabaseError: it has values that no recording has.
-    """
+    """Write values and losses of a run as an MCAP file, batch by batch."""
     run = part.one_run(connection, "an MCAP file")
     bindings = {"runs": [run.run_id], **part.window([run]).bindings}
     try:

@@ -32,19 +32,12 @@ FROM temp.otlp_span
 
 @dataclass(frozen=True)
 class ExportedTraces:
-    """Traces that were written.
+    """Traces that were written."""
 
-    Attributes:
-        run: what they are of.
-        traces: number of traces.
-        spans: number of spans.
-        links: number of links from a span to a further cause.
-    """
-
-    run: Run
+    run: Run  # what they are of
     traces: int
     spans: int
-    links: int
+    links: int  # number of links from a span to a further cause
 
 
 def write_otlp(
@@ -55,15 +48,7 @@ def write_otlp(
 ) -> ExportedTraces:
     """Write a run, or some of its flows, as traces of OpenTelemetry, batch by batch.
 
-    Args:
-        connection: to a database with the public views.
-        target: a file, which is replaced.
-        part: one run, and the times to write: everything that begins there, or flows that do.
-        choice: which flows, as parameters of `internal.otlp_flow`; everything when None.
-
-    Raises:
-        UsageError: not exactly one run, a time that cannot be read, or a file that cannot be
-            written.
+    `choice` has parameters of `internal.otlp_flow`; everything is written when it is None.
     """
     if str(target).startswith(("http:/", "https:/")):
         raise UsageError(

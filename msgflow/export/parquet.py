@@ -32,16 +32,8 @@ def export_parquet(
 
     Rows are sorted by all columns, so that equal content gives equal files. The metadata of a
     file hold `msgflow.view`, `msgflow.version`, `msgflow.schema_revision` and, for pandas, types
-    that keep integers exact beside missing values.
-
-    Args:
-        connection: to the database.
-        directory: created if missing.
-        selection: what to write; a run without rows gives an empty file.
-        force: replace views that an export has written there.
-
-    Raises:
-        UsageError: a view that is there already, or a directory that cannot be written.
+    that keep integers exact beside missing values. With `force`, views that an export has written
+    there are replaced.
     """
     from msgflow.db.connection import recorded_revision
 

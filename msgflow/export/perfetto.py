@@ -42,44 +42,21 @@ _CATEGORIES = ("callback", "publication", "take", *["service"] * 4, "executor")
 
 @dataclass(frozen=True)
 class PerfettoTrace:
-    """A trace that was written.
-
-    Attributes:
-        path: the file.
-        run: what it is of.
-        slices: callbacks, publications, takes, requests, responses and activities of executors.
-        arrows: links between them.
-        values: values of counters.
-        gaps: stretches of a host in which something was not recorded.
-        events: events of the user's own tracepoints.
-        states: states of threads to the kernel, and stretches in which a core ran one of them.
-        samples: samples of stacks.
-    """
+    """A trace that was written."""
 
     path: Path
-    run: Run
-    slices: int
-    arrows: int
-    values: int
-    gaps: int
-    events: int
-    states: int
-    samples: int
+    run: Run  # what it is of
+    slices: int  # callbacks, publications, takes, requests, responses and activities of executors
+    arrows: int  # links between them
+    values: int  # values of counters
+    gaps: int  # stretches of a host in which something was not recorded
+    events: int  # events of the user's own tracepoints
+    states: int  # states of threads to the kernel, and stretches in which a core ran one of them
+    samples: int  # samples of stacks
 
 
 def write_perfetto(connection: duckdb.DuckDBPyConnection, path: Path, part: Slice) -> PerfettoTrace:
-    """Write a run as a Perfetto trace, event by event: memory never holds all of it.
-
-    Args:
-        connection: to a database with the public views.
-        path: the file; one that exists is replaced.
-        part: one run, and the times to write: everything that begins there, and gaps cut to them.
-
-    Raises:
-        UsageError: not exactly one run, a time that cannot be read, a file that cannot be written,
-            or the package perfetto is not installed.
-        DatabaseError: it has values that no recording has.
-    """
+    """Write a run as a Perfetto trace, event by event: memory never holds all of it."""
     run = part.one_run(connection, "a Perfetto trace")
     window = part.window([run])
     try:

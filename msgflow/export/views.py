@@ -51,34 +51,21 @@ _WHOLE = ("run", "trace")
 
 @dataclass(frozen=True)
 class ExportedView:
-    """One view that was written.
-
-    Attributes:
-        view: its name.
-        path: the file, or the directory with one file per run.
-        row_count: rows written.
-    """
+    """One view that was written."""
 
     view: str
-    path: Path
-    row_count: int
+    path: Path  # the file, or the directory with one file per run
+    row_count: int  # rows written
 
 
 @dataclass(frozen=True)
 class Selection:
-    """Views to export, with their runs and times.
+    """Views to export, with their runs and times."""
 
-    Attributes:
-        views: names of the views, sorted.
-        columns: columns of each.
-        runs: the runs, at least one.
-        window: the time window.
-    """
-
-    views: tuple[str, ...]
-    columns: dict[str, list[str]]
-    runs: tuple[Run, ...]
-    window: Window
+    views: tuple[str, ...]  # names of the views, sorted
+    columns: dict[str, list[str]]  # columns of each
+    runs: tuple[Run, ...]  # the runs, at least one
+    window: Window  # the time window
 
     def read(
         self, connection: duckdb.DuckDBPyConnection, view: str, runs: Sequence[Run]
@@ -115,16 +102,7 @@ class Selection:
 def select_views(
     connection: duckdb.DuckDBPyConnection, views: Sequence[str], part: Slice
 ) -> Selection:
-    """Return the views to export.
-
-    Args:
-        connection: to the database.
-        views: names of views that msgflow declares; all of these when empty.
-        part: runs and times to export.
-
-    Raises:
-        UsageError: a view, run or time that does not exist, or no run at all.
-    """
+    """Return the views to export, by their names; all that msgflow declares when there are none."""
     # A database of somebody else may have views of any name, which would become names of files.
     declared = set(public_names())
     found = connection.execute(_VIEWS).fetchall()

@@ -29,10 +29,6 @@ def replacing_entries(
     """Yield a directory to write `names` to; they take their places at the end.
 
     An error or an interrupt before that leaves `directory` as it was. Other entries stay.
-
-    Raises:
-        ValueError: a name that is a path, and might lead out of the directory.
-        UsageError: an entry that is there already, or a directory that cannot be written.
     """
     for name in names:
         if Path(name).name != name:

@@ -31,19 +31,12 @@ class Text:
 
 @dataclass(frozen=True)
 class YamlFile:
-    """A file, read as a tree of nodes that know their lines.
-
-    Attributes:
-        path: the file.
-        example: of its content, for hints.
-        quoting: what users forget to quote, for the hint of a file that is not YAML.
-        content: of the file, if it is not written yet.
-    """
+    """A file, read as a tree of nodes that know their lines."""
 
     path: Path
-    example: str
-    quoting: str
-    content: str | None = None
+    example: str  # of its content, for hints
+    quoting: str  # what users forget to quote, for the hint of a file that is not YAML
+    content: str | None = None  # of the file, if it is not written yet
 
     def fail(self, line: int, what: str, hint: str | None = None) -> NoReturn:
         """Raise the error of a line."""

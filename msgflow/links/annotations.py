@@ -25,25 +25,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class AppliedLinks:
-    """The links that a file declared for a run.
-
-    Attributes:
-        run: the run.
-        annotation_count: declared links, one per node that an entry matches.
-        known_count: those that the trace declares, too; they are not stored again.
-        topic_count: topics that the file names.
-        link_count: indirect links of messages that come from the file only.
-        traced_link_count: indirect links of messages that come from the trace.
-        without_effect: a sentence for each declared link that no message took.
-    """
+    """The links that a file declared for a run."""
 
     run: Run
-    annotation_count: int
-    known_count: int
-    topic_count: int
-    link_count: int
-    traced_link_count: int
-    without_effect: tuple[str, ...]
+    annotation_count: int  # declared links, one per node that an entry matches
+    known_count: int  # those that the trace declares, too; they are not stored again
+    topic_count: int  # topics that the file names
+    link_count: int  # indirect links of messages that come from the file only
+    traced_link_count: int  # indirect links of messages that come from the trace
+    without_effect: tuple[str, ...]  # a sentence for each declared link that no message took
 
 
 def apply_links(
@@ -53,16 +43,6 @@ def apply_links(
 
     Links that an earlier file declared for these runs are removed. Everything happens in one
     transaction.
-
-    Args:
-        path: the database.
-        file: the links.
-        run: 'all', a name or an id; the latest run when None.
-        memory_limit: most memory that the database takes, such as '2GB'.
-
-    Raises:
-        UsageError: no such run, or a link that does not fit it.
-        DatabaseError: the database is missing, locked, foreign, or of another schema revision.
     """
 
     def apply(con: duckdb.DuckDBPyConnection, runs: tuple[Run, ...]) -> tuple[AppliedLinks, ...]:
@@ -90,19 +70,9 @@ def declare_links(
 ) -> tuple[int, int, int]:
     """Name topics, and store links as the annotations of a run, inside the open transaction.
 
-    The caller derives the links between messages afterwards.
-
-    Args:
-        con: to the database.
-        run_id: the run.
-        file: the links.
-        leave_out: gets links that do not fit the run, with the error; None: that is raised.
-
-    Returns:
-        The number of annotations, of those that the trace declares, too, and of named topics.
-
-    Raises:
-        UsageError: a link that does not fit the run.
+    The caller derives the links between messages afterwards. `leave_out` gets links that do not fit
+    the run, with the error; where it is None, that is raised. The numbers returned are those of
+    annotations, of those that the trace declares, too, and of named topics.
     """
     topic_count = declare_topics(con, run_id, file)
     matched = match_links(con, run_id, file, leave_out)

@@ -47,67 +47,42 @@ _QUOTING = "quote patterns that begin with *, as in '*_raw'"
 
 @dataclass(frozen=True)
 class DeclaredLink:
-    """One entry of the file.
+    """One entry of the file."""
 
-    Attributes:
-        kind: one of INDIRECT_KINDS; 'direct': the node publishes
-            on the outputs because of the message before; 'independent': not because of messages of
-            the inputs.
-        node: full name of a node, or a pattern.
-        inputs: topics that the node receives, or patterns.
-        inputs_of: name or pattern of another node of its process that receives the inputs for it.
-        outputs: topics that it publishes, or patterns.
-        process: name or pid of its process, if several nodes have the name.
-        host: its host, likewise.
-        line: where the entry begins.
-        depth: of a queue, how many messages wait in it at most; any number when None.
-    """
-
+    # one of INDIRECT_KINDS; 'direct': the node publishes on the outputs because of the message
+    # before; 'independent': not because of messages of the inputs
     kind: str
-    node: Text
-    inputs: tuple[Text, ...]
-    outputs: tuple[Text, ...]
+    node: Text  # full name of a node, or a pattern
+    inputs: tuple[Text, ...]  # topics that the node receives, or patterns
+    outputs: tuple[Text, ...]  # topics that it publishes, or patterns
+    # name or pattern of another node of its process that receives the inputs for it
     inputs_of: Text | None
-    process: Text | None
-    host: Text | None
-    line: int
+    process: Text | None  # name or pid of its process, if several nodes have the name
+    host: Text | None  # its host, likewise
+    line: int  # where the entry begins
+    # of a queue, how many messages wait in it at most; any number when None
     depth: int | None = None
 
 
 @dataclass(frozen=True)
 class DeclaredTopic:
-    """The name of a topic for which the trace has none.
-
-    Attributes:
-        name: the topic.
-        kind: 'publisher' or 'subscription'.
-        handle: handle of one of its publishers or subscriptions.
-        handle_text: the same, as the file has it.
-        process: name or pid of its process, if several have the handle.
-        host: its host, likewise.
-    """
+    """The name of a topic for which the trace has none."""
 
     name: Text
-    kind: str
-    handle: int
-    handle_text: Text
-    process: Text | None
-    host: Text | None
+    kind: str  # 'publisher' or 'subscription'
+    handle: int  # handle of one of its publishers or subscriptions
+    handle_text: Text  # the same, as the file has it
+    process: Text | None  # name or pid of its process, if several have the handle
+    host: Text | None  # its host, likewise
 
 
 @dataclass(frozen=True)
 class LinksFile:
-    """A file with declared links.
-
-    Attributes:
-        path: the file.
-        links: its links, in order.
-        topics: its topics, in order.
-    """
+    """A file with declared links."""
 
     path: Path
-    links: tuple[DeclaredLink, ...]
-    topics: tuple[DeclaredTopic, ...] = ()
+    links: tuple[DeclaredLink, ...]  # its links, in order
+    topics: tuple[DeclaredTopic, ...] = ()  # its topics, in order
 
     def fail(self, line: int, what: str, hint: str | None = None) -> NoReturn:
         """Raise the error of a line."""
@@ -115,15 +90,7 @@ class LinksFile:
 
 
 def read_links(path: Path, content: str | None = None) -> LinksFile:
-    """Read a file with declared links; whether its names exist is for a run to say.
-
-    Args:
-        path: the file.
-        content: of the file, if it is not written yet.
-
-    Raises:
-        UsageError: the file cannot be read, is not YAML, or not of the form above.
-    """
+    """Read a file with declared links, or its content, which may not be written yet."""
     file = YamlFile(path, _EXAMPLE, _QUOTING, content)
     links, topics = file.entries("links", "topics")
     return LinksFile(

@@ -61,23 +61,14 @@ class Node:
 
 @dataclass(frozen=True)
 class MatchedLink:
-    """A declared link of one node, with its subscriptions and publishers.
+    """A declared link of one node, with its subscriptions and publishers."""
 
-    Attributes:
-        kind: of links_file.KINDS.
-        process_id: process of the node.
-        inputs: subscriptions, in order of their ids.
-        outputs: publishers, likewise.
-        line: its line in the file.
-        depth: of a queue: most messages that wait in it.
-    """
-
-    kind: str
-    process_id: int
-    inputs: tuple[Endpoint, ...]
-    outputs: tuple[Endpoint, ...]
-    line: int
-    depth: int | None
+    kind: str  # of links_file.KINDS
+    process_id: int  # process of the node
+    inputs: tuple[Endpoint, ...]  # subscriptions, in order of their ids
+    outputs: tuple[Endpoint, ...]  # publishers, likewise
+    line: int  # its line in the file
+    depth: int | None  # of a queue: most messages that wait in it
 
 
 def match_links(

@@ -27,18 +27,12 @@ _WIDTH = 76
 
 @dataclass(frozen=True)
 class LinkSuggestions:
-    """What a run suggests.
+    """What a run suggests."""
 
-    Attributes:
-        runs: the run; none if the database holds none.
-        candidates: rows of the query `links --suggested`.
-        declared: links that a file declared before; they stay.
-        topics: topics that it named, which stay, and those without a name.
-    """
-
-    runs: Sequence[Run]
-    candidates: Sequence[Mapping[str, Any]]
-    declared: Sequence[Mapping[str, Any]] = ()
+    runs: Sequence[Run]  # the run; none if the database holds none
+    candidates: Sequence[Mapping[str, Any]]  # rows of the query `links --suggested`
+    declared: Sequence[Mapping[str, Any]] = ()  # links that a file declared before; they stay
+    # topics that it named, which stay, and those without a name
     topics: Sequence[Mapping[str, Any]] = ()
 
     @property
@@ -52,11 +46,7 @@ class LinkSuggestions:
         return [row for row in self.candidates if row["doubt"]]
 
     def text(self, command: str) -> str:
-        """Return the file, with the evidence of each candidate as a comment.
-
-        Args:
-            command: what applies the file.
-        """
+        """Return the file, with the evidence of each candidate, and the command that applies it."""
         lines = [*_comment(_HEAD), f"#   {command}"]
         if not self.candidates and not self.declared:
             return "\n".join([*lines, "# There are none.", "links: []", *self._topics()])

@@ -19,26 +19,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Endpoint:
-    """A publisher or subscription whose topic the trace does not name.
+    """A publisher or subscription whose topic the trace does not name."""
 
-    Attributes:
-        kind: 'publisher' or 'subscription'.
-        id: its identity.
-        handle: its handle.
-        topic: what messages say about its topic; None: nothing.
-        group: messages join all endpoints of a group: they are on one topic.
-        process: name of its process.
-        pid: id of its process.
-        host: its host.
-    """
-
-    kind: str
+    kind: str  # 'publisher' or 'subscription'
     id: int
     handle: int
-    topic: str | None
-    group: int
-    process: str | None
-    pid: int
+    topic: str | None  # what messages say about its topic; None: nothing
+    group: int  # messages join all endpoints of a group: they are on one topic
+    process: str | None  # name of its process
+    pid: int  # id of its process
     host: str
 
     def fits(self, topic: DeclaredTopic) -> bool:
@@ -55,12 +44,9 @@ class Endpoint:
 
 
 def declare_topics(con: duckdb.DuckDBPyConnection, run_id: int, file: LinksFile) -> int:
-    """Name the topics of a run as a file does, in place of an earlier file.
+    """Name the topics of a run as a file does, in place of an earlier file; return how many.
 
     Messages tell the names to all that they join. This happens inside the open transaction.
-
-    Returns:
-        The number of topics that the file names.
     """
     for kind in ("publisher", "subscription"):
         con.execute(

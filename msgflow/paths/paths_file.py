@@ -32,14 +32,10 @@ _QUOTING = "quote patterns that begin with *, as in '*_raw'"
 
 @dataclass(frozen=True)
 class NamedPath:
-    """One entry of the file.
+    """One entry of the file."""
 
-    Attributes:
-        name: its name, for `--path`.
-        places: topics and nodes, or globs, by 'from', 'to', 'via' and 'without'.
-    """
-
-    name: Text
+    name: Text  # its name, for `--path`
+    # topics and nodes, or globs, by 'from', 'to', 'via' and 'without'
     places: dict[str, tuple[Text, ...]]
 
     def words(self) -> dict[str, list[str]]:
@@ -49,22 +45,13 @@ class NamedPath:
 
 @dataclass(frozen=True)
 class PathsFile:
-    """A file with named paths.
+    """A file with named paths."""
 
-    Attributes:
-        file: for errors, which name the line.
-        paths: its entries, in order; their names differ.
-    """
-
-    file: YamlFile
-    paths: tuple[NamedPath, ...]
+    file: YamlFile  # for errors, which name the line
+    paths: tuple[NamedPath, ...]  # its entries, in order; their names differ
 
     def named(self, name: str) -> NamedPath:
-        """Return the path with a name.
-
-        Raises:
-            UsageError: no such path; the message names similar ones.
-        """
+        """Return the path with a name."""
         for path in self.paths:
             if path.name.value == name:
                 return path
@@ -78,11 +65,7 @@ class PathsFile:
     def require(
         self, connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], path: NamedPath
     ) -> None:
-        """Raise unless the runs have every topic and node of a path.
-
-        Raises:
-            UsageError: the message names the line, and similar names.
-        """
+        """Raise unless the runs have every topic and node of a path."""
         for texts in path.places.values():
             for text in texts:
                 try:
@@ -92,11 +75,7 @@ class PathsFile:
 
 
 def read_paths(path: Path) -> PathsFile:
-    """Read a file with named paths; a run decides later whether its topics and nodes exist.
-
-    Raises:
-        UsageError: the file cannot be read, is not YAML, or not of the form above.
-    """
+    """Read a file with named paths; a run decides later whether its topics and nodes exist."""
     file = YamlFile(path, _EXAMPLE, _QUOTING)
     paths: dict[str, NamedPath] = {}
     (entries,) = file.entries("paths")

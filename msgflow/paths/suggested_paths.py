@@ -22,12 +22,9 @@ _WIDTH = 76
 
 
 def suggest_paths(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Return a file with a named path for each path of a run.
+    """Return a file with a named path for each path of a run, from rows of `e2e-latency`.
 
     Paths with the same begin and end differ by topics and nodes that only some of them visit.
-
-    Args:
-        rows: of the query `e2e-latency`.
     """
     texts = list(dict.fromkeys(row["path"] for row in rows))
     if not texts:

@@ -105,16 +105,7 @@ def load_query(name: str, views: Callable[[], Collection[str]] = tuple) -> Heade
 def choose_query(
     name: str, given: Mapping[str, Value], views: Callable[[], Collection[str]] = tuple
 ) -> Header:
-    """Return the query called `name`, or that variant of it which its parameters choose.
-
-    Args:
-        name: of the query.
-        given: values of parameters by name; others than the one that chooses do not count.
-        views: as `load_query` takes them.
-
-    Raises:
-        UsageError: there is no such query; the message names similar ones.
-    """
+    """Return the query called `name`, or that variant of it which its parameters choose."""
     header = load_query(name, views)
     base = header.words.partition(" ")[0]
     own = header.name.removeprefix(f"{base}-")

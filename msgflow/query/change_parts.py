@@ -41,12 +41,8 @@ def change_parts(
 ) -> QueryResult:
     """Return the parts of the difference of the means of each path, the largest first.
 
-    Args:
-        connection: to the database of the runs.
-        compared: paths of two runs.
-        skipped: seconds that were left out at the start of each.
-        asked: with the parameters that it was asked with.
-        windows: 'START..END' of either side.
+    `skipped` are seconds that were left out at the start of each run, `asked` the parameters of the
+    comparison, and `windows` 'START..END' of either side.
     """
     parameters = {name: asked[name] for name in _ASKED}
     with duckdb.connect() as con:

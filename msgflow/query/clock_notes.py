@@ -80,13 +80,7 @@ def untraced_notes(
 def clock_verdicts(
     connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], *, only_several: bool = False
 ) -> list[str]:
-    """Return a sentence per run: whether the times of its hosts can be compared.
-
-    Args:
-        connection: to a database with the public views.
-        runs: the runs.
-        only_several: leave out runs with one clock, where nothing can be wrong.
-    """
+    """Return a sentence per run, or per run with several clocks: whether times of hosts compare."""
     chosen = {"runs": [run.run_id for run in runs]}
     rows = internal_sql().run(connection, "clock_group", chosen).fetchall()
     verdicts = []

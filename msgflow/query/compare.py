@@ -62,34 +62,21 @@ GROUP BY run_id
 
 @dataclass(frozen=True)
 class Condition:
-    """A condition under which run B is worse than it may be.
+    """A condition under which run B is worse than it may be."""
 
-    Attributes:
-        text: as the user wrote it, such as 'p95>5%' or 'share<-1%'.
-        statistic: one of STATISTICS, or SHARE.
-        limit: in percent of run A, or in nanoseconds; for a share in percentage points.
-        is_relative: the limit is in percent.
-    """
-
-    text: str
-    statistic: str
-    limit: float
-    is_relative: bool
+    text: str  # as the user wrote it, such as 'p95>5%' or 'share<-1%'
+    statistic: str  # one of STATISTICS, or SHARE
+    limit: float  # in percent of run A, or in nanoseconds; for a share in percentage points
+    is_relative: bool  # the limit is in percent
 
 
 @dataclass(frozen=True)
 class Failure:
-    """A path, callback or topic that is worse than it may be.
+    """A path, callback or topic that is worse than it may be."""
 
-    Attributes:
-        condition: as the user wrote it.
-        subject: the path, callback or topic.
-        reason: the measured difference.
-    """
-
-    condition: str
-    subject: str
-    reason: str
+    condition: str  # as the user wrote it
+    subject: str  # the path, callback or topic
+    reason: str  # the measured difference
 
 
 @dataclass(frozen=True)

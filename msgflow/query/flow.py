@@ -74,17 +74,11 @@ LIMIT 1
 
 @dataclass(frozen=True)
 class Start:
-    """The start of a flow.
+    """The start of a flow."""
 
-    Attributes:
-        kind: one of `KINDS`.
-        id: its id.
-        notes: notes on the choice, a sentence each.
-    """
-
-    kind: str
+    kind: str  # one of `KINDS`
     id: int
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()  # notes on the choice, a sentence each
 
 
 def find_start(
@@ -95,15 +89,7 @@ def find_start(
 ) -> Start:
     """Return the first publication of a topic, or what a node did first, at or after a time.
 
-    Args:
-        connection: to a database with the public views.
-        place: the topic or the node. Of a node, its first callback instance counts, or its first
-            publication where that is earlier.
-        at: epoch ns, an offset from the run's start, or ISO time; the begin of the run when None.
-        run: a name or an id; the latest run when None.
-
-    Raises:
-        UsageError: no such run or place, a time that cannot be read, or nothing happened then.
+    Of a node, its first callback instance counts, or its first publication where that is earlier.
     """
     one = Slice(run).one_run(connection, "a message")
     require_names(connection, (one,), "place", [place])
@@ -130,9 +116,6 @@ def find_take(connection: duckdb.DuckDBPyConnection, start: Start) -> tuple[int,
     """Return the take that a start means, its topic, and the id of its run.
 
     Of a publication it is the take with the longest latency.
-
-    Raises:
-        UsageError: it was not taken, or is no message of a topic.
     """
     found = connection.execute(_TAKE, {"kind": start.kind, "id": start.id}).fetchall()
     if not found:

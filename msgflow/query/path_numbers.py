@@ -26,12 +26,7 @@ def with_path_numbers(
     """Return a result with the numbers of its paths, if it has several.
 
     A query may ask for flows that end in the middle of a path. What they pass is no path of the
-    runs: its number comes behind those of all paths.
-
-    Args:
-        connection: to the database with the runs.
-        result: of a named query.
-        known: a table with all paths of the runs, where there is one.
+    runs: its number comes behind those of all paths. `known` is a table with all of these.
     """
     if PATH not in result.columns:
         return result
@@ -46,11 +41,7 @@ def with_path_numbers(
 def numbered_path(
     connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], number: int
 ) -> dict[str, list[str]]:
-    """Return the arguments of `Database.query` that choose the path with a number.
-
-    Raises:
-        UsageError: the runs have no such path.
-    """
+    """Return the arguments of `Database.query` that choose the path with a number."""
     every = _every_path(connection, runs)
     if not 1 <= number <= len(every):
         raise UsageError(

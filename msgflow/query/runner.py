@@ -68,22 +68,10 @@ def run_query(
     steps: Steps | None = None,
     runs: tuple[Run, ...] | None = None,
 ) -> QueryResult:
-    """Run the query of `header`.
+    """Run the query of `header` with its own parameters; text is read as the declared type.
 
-    Args:
-        connection: to a database with the public views.
-        header: the query.
-        parameters: its own parameters by name; text is read as the declared type.
-        part: runs and times to read.
-        internal: show the rows of ROS's own topics and services too.
-        selection: which rows are wanted; all when None.
-        steps: tables that it shares with other queries, which stay; its own when None.
-        runs: those of `part`, where they are known.
-
-    Raises:
-        UsageError: a parameter, run, name, id, column or time that does not exist or cannot be
-            read, or rows that the query does not have.
-        QueryError: the database could not run it.
+    `steps` are tables that it shares with other queries, which stay; `runs` are those of `part`,
+    where they are known. A UsageError is about what the user gave, a QueryError about the rest.
     """
     if part.has_window and not header.has_window:
         raise UsageError(

@@ -30,31 +30,18 @@ _SEPARATOR = {PATH: " → "}
 
 @dataclass(frozen=True)
 class Selection:
-    """Which rows of a result are wanted.
+    """Which rows of a result are wanted."""
 
-    Attributes:
-        node: names of nodes, or globs: rows that name any of them.
-        topic: likewise topics.
-        callback: likewise callbacks, as msgflow names them: 'Timer(*)'.
-        host: likewise hosts.
-        via: nodes, topics or services: paths that visit all of them.
-        without: paths that visit none of them.
-        where: a condition in SQL, already known to read only.
-        sort: columns, each with ':desc' or ':asc' behind it or not.
-        limit: most rows; all when None.
-        slowest: so many of the slowest rows; all when None.
-    """
-
-    node: tuple[str, ...] = ()
-    topic: tuple[str, ...] = ()
-    callback: tuple[str, ...] = ()
-    host: tuple[str, ...] = ()
-    via: tuple[str, ...] = ()
-    without: tuple[str, ...] = ()
-    where: str | None = None
-    sort: tuple[str, ...] = ()
-    limit: int | None = None
-    slowest: int | None = None
+    node: tuple[str, ...] = ()  # names of nodes, or globs: rows that name any of them
+    topic: tuple[str, ...] = ()  # likewise topics
+    callback: tuple[str, ...] = ()  # likewise callbacks, as msgflow names them: 'Timer(*)'
+    host: tuple[str, ...] = ()  # likewise hosts
+    via: tuple[str, ...] = ()  # nodes, topics or services: paths that visit all of them
+    without: tuple[str, ...] = ()  # paths that visit none of them
+    where: str | None = None  # a condition in SQL, already known to read only
+    sort: tuple[str, ...] = ()  # columns, each with ':desc' or ':asc' behind it or not
+    limit: int | None = None  # most rows; all when None
+    slowest: int | None = None  # so many of the slowest rows; all when None
 
     def names(self) -> dict[str, tuple[str, ...]]:
         """Return the wanted names by kind; a 'place' is a node, topic or service."""
@@ -226,12 +213,7 @@ def make_selection(
 ) -> Selection:
     """Return the selection that the words of `Database.query` mean.
 
-    Args:
-        given: words and values.
-        names_in: returns the names that a text means, of a kind or 'place'.
-
-    Raises:
-        UsageError: a limit below one, or a word of another kind.
+    `names_in` returns the names that a text means, of a kind or 'place'.
     """
     words: dict[str, object] = {}
     for word, value in given.items():

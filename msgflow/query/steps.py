@@ -17,12 +17,8 @@ class Steps:
     """The tables of the steps of queries: those that several queries share are made once.
 
     Two queries share a table if the same statement makes it, with the same values. The tables are
-    dropped at the end of the `with` block.
-
-    Args:
-        connection: on which the queries run.
-        known: by the name of a table the query that has its rows at less cost, from tables that are
-            there by then.
+    dropped at the end of the `with` block. `known` names for a table the query that has its rows at
+    less cost, from tables that are there by then.
     """
 
     def __init__(
@@ -44,12 +40,7 @@ class Steps:
                 self._connection.execute(f"DROP TABLE IF EXISTS temp.{table}")
 
     def make(self, header: Header, values: Mapping[str, Any]) -> None:
-        """Make the tables of a query that are not there yet.
-
-        Args:
-            header: the query.
-            values: of its parameters, by name.
-        """
+        """Make the tables of a query that are not there yet, for these values of its parameters."""
         for step in header.steps:
             names = self._connection.extract_statements(step.sql)[0].named_parameters
             wanted = step.sql, {name: values[name] for name in names}

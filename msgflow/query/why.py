@@ -112,17 +112,9 @@ def explain(
     times: Slice,
     place: str | None = None,
 ) -> Explanation:
-    """Return why flows are late that end at a topic or node.
+    """Return why flows of a run are late that end at a topic or node, or glob; None: anywhere.
 
-    Args:
-        connection: on which the queries run.
-        run: what is read.
-        times: the same run, and the times that are wanted.
-        place: a topic or node, or a glob; wherever flows end when None.
-
-    Raises:
-        UsageError: there is no such place or time.
-        NoFlowError: no flow arrives there.
+    A NoFlowError says that no flow arrives there.
     """
     with Steps(connection, _KNOWN) as steps:
 

@@ -50,46 +50,27 @@ _LINES_OF_ALL = 10
 
 @dataclass(frozen=True)
 class ShownColumn:
-    """A column as people read it; widths are in cells of the terminal.
+    """A column as people read it; widths are in cells of the terminal."""
 
-    Attributes:
-        name: in the result.
-        title: in the table.
-        cells: one for each row that is shown.
-        is_number: aligned to the right, and never in several lines.
-        width: the width of its content.
-        least: the least width.
-        broken: the least width if names may be broken.
-    """
-
-    name: str
-    title: str
-    cells: tuple[str, ...]
-    is_number: bool
-    width: int
-    least: int
-    broken: int
+    name: str  # in the result
+    title: str  # in the table
+    cells: tuple[str, ...]  # one for each row that is shown
+    is_number: bool  # aligned to the right, and never in several lines
+    width: int  # the width of its content
+    least: int  # the least width
+    broken: int  # the least width if names may be broken
 
 
 @dataclass(frozen=True)
 class Layout:
-    """The part of a result that a terminal shows.
+    """The part of a result that a terminal shows."""
 
-    Attributes:
-        headings: lines above the rows.
-        columns: in the order of the result, after the number of the path.
-        widths: of the columns, in cells; None if each row is a record.
-        paths: the paths, by their numbers.
-        notes: what is left out, a sentence each.
-        not_shown: which columns are left out, in one line; None if none are.
-    """
-
-    headings: tuple[str, ...]
-    columns: tuple[ShownColumn, ...]
-    widths: tuple[int, ...] | None
-    paths: dict[int, str]
-    notes: tuple[str, ...]
-    not_shown: str | None
+    headings: tuple[str, ...]  # lines above the rows
+    columns: tuple[ShownColumn, ...]  # in the order of the result, after the number of the path
+    widths: tuple[int, ...] | None  # of the columns, in cells; None if each row is a record
+    paths: dict[int, str]  # the paths, by their numbers
+    notes: tuple[str, ...]  # what is left out, a sentence each
+    not_shown: str | None  # which columns are left out, in one line; None if none are
 
 
 def screen_width() -> int:

@@ -101,120 +101,77 @@ class HeaderError(ValueError):
 
 @dataclass(frozen=True)
 class Param:
-    """A parameter, bound as `$name`.
+    """A parameter, bound as `$name`."""
 
-    Attributes:
-        name: as written after the dollar sign.
-        type: DuckDB type.
-        default: the value bound when none is given; meaningless unless `has_default`.
-        has_default: false where the caller has to give a value.
-        description: one sentence.
-        choices: the only values allowed, or empty for any.
-        minimum: the least integer allowed, or None for any.
-        maximum: the greatest one, likewise; only what strangers ask for has one.
-    """
-
-    name: str
-    type: str
-    default: Value
-    has_default: bool
-    description: str
-    choices: tuple[str, ...] = ()
-    minimum: int | None = None
-    maximum: int | None = None
+    name: str  # as written after the dollar sign
+    type: str  # DuckDB type
+    default: Value  # the value bound when none is given; meaningless unless `has_default`
+    has_default: bool  # false where the caller has to give a value
+    description: str  # one sentence
+    choices: tuple[str, ...] = ()  # the only values allowed, or empty for any
+    minimum: int | None = None  # the least integer allowed, or None for any
+    maximum: int | None = None  # the greatest one, likewise; only what strangers ask for has one
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column of the output.
-
-    Attributes:
-        name: column name.
-        type: DuckDB type as `DESCRIBE` prints it; empty where only a table says so.
-        unit: 'ns' for a duration, 'epoch ns' for a point in time, another unit, what it names
-            ('node', 'topic', 'callback', 'host', 'path'), or None.
-        description: one sentence.
-    """
+    """A column of the output."""
 
     name: str
-    type: str
+    type: str  # DuckDB type as `DESCRIBE` prints it; empty where only a table says so
+    # 'ns' for a duration, 'epoch ns' for a point in time, another unit, what it names ('node',
+    # 'topic', 'callback', 'host', 'path'), or None
     unit: str | None
-    description: str
+    description: str  # one sentence
 
 
 @dataclass(frozen=True)
 class Step:
-    """A table on the way to the result of a query.
-
-    Attributes:
-        table: its name.
-        sql: the statement that makes it.
-    """
+    """A table on the way to the result of a query."""
 
     table: str
-    sql: str
+    sql: str  # the statement that makes it
 
 
 @dataclass(frozen=True)
 class Header:
-    """The header of an SQL file, and the SQL below it.
+    """The header of an SQL file, and the SQL below it."""
 
-    Attributes:
-        name: object name, equal to the file name.
-        title: a few words for lists; the name where the file has none.
-        description: what it means.
-        grain: "one row per …"; empty for scalar macros.
-        kind: 'view' (the body is a SELECT; in the model a table is made of it), 'inline' (the
-            same, but never made a table) or 'macro' (the body is the whole statement).
-        params: parameters in the order of the file.
-        columns: output columns in the order of the file.
-        severity: severity of a finding, else None.
-        cause: cause of a finding, else None.
-        cure: remedy for a finding, else None.
-        note: 'clocks' where rows compare times of several hosts, 'callbacks' or 'kernel' where they
-            are made of callbacks or of the kernel's events, 'requests' where they compare times of
-            requests to services, else None.
-        body: the SQL below the header; of a query in steps, the statement that returns its rows.
-        path: the file.
-        brief: columns for where not all have a place, the most important first.
-        answer: columns that are shown also where they are 0 or empty throughout.
-        heading: columns that stand once above their rows: the first says which rows these are.
-        slowest: column by which rows are the slowest, else None.
-        zero: column that is 0 in rows that a terminal leaves out, else None.
-        steps: what a query makes before, in order.
-        sources: tables, views and macros of a run, each with a condition on its rows, or with an
-            empty one; if none of them has such a row, this has none.
-        also: objects whose rows are stored in the same table.
-        unites: objects whose rows a macro takes together.
-        variants: parameters that choose between this query and others; their default is this one.
-        chosen: of a variant: the name of the query, and the option that chooses this one.
-        is_command: whether a query has a command of its own name, in place of `msgflow query NAME`.
-    """
-
-    name: str
-    title: str
-    description: str
-    grain: str
+    name: str  # object name, equal to the file name
+    title: str  # a few words for lists; the name where the file has none
+    description: str  # what it means
+    grain: str  # "one row per …"; empty for scalar macros
+    # 'view' (the body is a SELECT; in the model a table is made of it), 'inline' (the same, but
+    # never made a table) or 'macro' (the body is the whole statement)
     kind: str
-    params: tuple[Param, ...]
-    columns: tuple[Column, ...]
-    severity: str | None
-    cause: str | None
-    cure: str | None
+    params: tuple[Param, ...]  # parameters in the order of the file
+    columns: tuple[Column, ...]  # output columns in the order of the file
+    severity: str | None  # severity of a finding, else None
+    cause: str | None  # cause of a finding, else None
+    cure: str | None  # remedy for a finding, else None
+    # 'clocks' where rows compare times of several hosts, 'callbacks' or 'kernel' where they are
+    # made of callbacks or of the kernel's events, 'requests' where they compare times of requests
+    # to services, else None
     note: str | None
-    body: str
+    body: str  # the SQL below the header; of a query in steps, the statement that returns its rows
     path: Path
-    brief: tuple[str, ...] = ()
-    answer: tuple[str, ...] = ()
+    brief: tuple[str, ...] = ()  # columns for where not all have a place, the most important first
+    answer: tuple[str, ...] = ()  # columns that are shown also where they are 0 or empty throughout
+    # columns that stand once above their rows: the first says which rows these are
     heading: tuple[str, ...] = ()
-    slowest: str | None = None
-    zero: str | None = None
-    steps: tuple[Step, ...] = ()
+    slowest: str | None = None  # column by which rows are the slowest, else None
+    zero: str | None = None  # column that is 0 in rows that a terminal leaves out, else None
+    steps: tuple[Step, ...] = ()  # what a query makes before, in order
+    # tables, views and macros of a run, each with a condition on its rows, or with an empty one; if
+    # none of them has such a row, this has none
     sources: tuple[tuple[str, str], ...] = ()
-    also: tuple[str, ...] = ()
-    unites: tuple[str, ...] = ()
+    also: tuple[str, ...] = ()  # objects whose rows are stored in the same table
+    unites: tuple[str, ...] = ()  # objects whose rows a macro takes together
+    # parameters that choose between this query and others; their default is this one
     variants: tuple[Param, ...] = ()
+    # of a variant: the name of the query, and the option that chooses this one
     chosen: str | None = None
+    # whether a query has a command of its own name, in place of `msgflow query NAME`
     is_command: bool = False
 
     @property

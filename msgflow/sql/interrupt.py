@@ -30,9 +30,7 @@ class Terminated(KeyboardInterrupt):
 class Interrupts:
     """The state of Ctrl-C: whether it came, and whether it still counts.
 
-    Args:
-        end_process: ends the process with the exit code of a signal; None where that is not ours
-            to do.
+    `end_process` ends the process with the exit code of a signal, where that is ours to do.
     """
 
     def __init__(
@@ -150,12 +148,9 @@ def interruptible(
     """Return what `work` returns; Ctrl-C interrupts the statement that it runs on `connection`.
 
     DuckDB looks for signals only while the main thread computes a part of the statement, and might
-    never notice Ctrl-C. Hence another thread does the work. Some functions of DuckDB do not notice
-    an interrupt either. Where nothing is written (`only_reads`), the command line ends without them
-    after a second.
-
-    Raises:
-        KeyboardInterrupt: after the statement has ended.
+    never notice Ctrl-C. Hence another thread does the work; KeyboardInterrupt comes when the
+    statement has ended. Some functions of DuckDB do not notice an interrupt either. Where nothing
+    is written (`only_reads`), the command line ends without them after a second.
     """
     if threading.current_thread() is not threading.main_thread():
         return work()

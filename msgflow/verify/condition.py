@@ -50,21 +50,13 @@ _EXAMPLES = {
 
 @dataclass(frozen=True)
 class Condition:
-    """The range of a measured value.
+    """The range of a measured value."""
 
-    Attributes:
-        text: as the user wrote it, with single blanks.
-        statistic: the statistic that is measured; '' if there is one value only.
-        lower: the least value; None: no limit.
-        upper: the largest value; None: no limit.
-        is_strict: equal to a bound is not enough.
-    """
-
-    text: str
-    statistic: str
-    lower: float | None
-    upper: float | None
-    is_strict: bool
+    text: str  # as the user wrote it, with single blanks
+    statistic: str  # the statistic that is measured; '' if there is one value only
+    lower: float | None  # the least value; None: no limit
+    upper: float | None  # the largest value; None: no limit
+    is_strict: bool  # equal to a bound is not enough
 
     def holds(self, value: float) -> bool:
         """Tell whether a measured value, in the unit of its dimension, is in the range."""

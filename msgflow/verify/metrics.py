@@ -12,56 +12,37 @@ _HIGH = ("median", "p95", "p99", "max")
 
 @dataclass(frozen=True)
 class Metric:
-    """A metric.
+    """A metric."""
 
-    Attributes:
-        query: the named query that measures it.
-        value: SQL over its columns; `{}` stands for the statistic.
-        dimension: of the value.
-        statistics: those of the query; empty if there is one value only.
-        samples: SQL over its columns: the number of values behind it.
-        worst: the worst case that explains a value that is too large, a key of `worst_case.KEYS`.
-        missing: why there may be no value, though the recording could have one.
-        lacking: what a recording may lack to have a value at all; None: nothing.
-    """
-
-    query: str
-    value: str
-    dimension: Dimension
-    statistics: tuple[str, ...] = ()
-    samples: str = "count"
+    query: str  # the named query that measures it
+    value: str  # SQL over its columns; `{}` stands for the statistic
+    dimension: Dimension  # of the value
+    statistics: tuple[str, ...] = ()  # those of the query; empty if there is one value only
+    samples: str = "count"  # SQL over its columns: the number of values behind it
+    # the worst case that explains a value that is too large, a key of `worst_case.KEYS`
     worst: str | None = None
+    # why there may be no value, though the recording could have one
     missing: str = "too few values in the time window"
-    lacking: str | None = None
+    lacking: str | None = None  # what a recording may lack to have a value at all; None: nothing
 
 
 @dataclass(frozen=True)
 class Filter:
-    """A field of a target that chooses rows.
+    """A field of a target that chooses rows."""
 
-    Attributes:
-        columns: the columns that it is compared with, by query; one of them has to match.
-        names: SQL that returns the names of a run ($run_id).
-        what: the word for such a name in errors.
-    """
-
+    # the columns that it is compared with, by query; one of them has to match
     columns: dict[str, tuple[str, ...]]
-    names: str
-    what: str
+    names: str  # SQL that returns the names of a run ($run_id)
+    what: str  # the word for such a name in errors
 
 
 @dataclass(frozen=True)
 class Subject:
-    """A kind of thing with requirements.
+    """A kind of thing with requirements."""
 
-    Attributes:
-        metrics: by name.
-        label: SQL that names a row, by query.
-        filters: by field of the file; the first is the subject itself, others are optional.
-    """
-
-    metrics: dict[str, Metric]
-    label: dict[str, str]
+    metrics: dict[str, Metric]  # by name
+    label: dict[str, str]  # SQL that names a row, by query
+    # by field of the file; the first is the subject itself, others are optional
     filters: dict[str, Filter] = field(default_factory=dict)
 
 

@@ -36,13 +36,8 @@ def suggest_targets(
 ) -> str:
     """Return the text of a file that `read_targets` reads, and that the run meets.
 
-    Comments behind its first line say what speaks against the run.
-
-    Args:
-        run: the measured run.
-        results: rows of the named queries `QUERIES`, by name.
-        margin: how much more than measured is allowed, as a share.
-        skipped: seconds at the start of the run that the results leave out, as a warm-up.
+    Comments behind its first line say what speaks against the run. `results` are rows of `QUERIES`,
+    by name, without the first `skipped` seconds; `margin` is a share.
     """
     entries = [
         *_paths(results["e2e-latency"], margin),

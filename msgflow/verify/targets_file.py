@@ -35,59 +35,35 @@ _NAME = "name"
 
 @dataclass(frozen=True)
 class Requirement:
-    """A condition on a metric of a target.
-
-    Attributes:
-        metric: its name.
-        condition: the condition.
-        line: its line, from 1.
-    """
+    """A condition on a metric of a target."""
 
     metric: str
     condition: Condition
-    line: int
+    line: int  # its line, from 1
 
 
 @dataclass(frozen=True)
 class Target:
-    """A subject with its requirements.
+    """A subject with its requirements."""
 
-    Attributes:
-        kind: a key of SUBJECTS.
-        name: its name in the file, else the words that choose its subject.
-        topics: topics of a path, in order; empty for a path that only has a name.
-        path_name: name of a path in the file with named paths.
-        chosen: names or patterns that choose rows, by the name of the field.
-        requirements: at least one.
-    """
-
-    kind: str
-    name: str
-    topics: tuple[Text, ...]
-    chosen: dict[str, Text]
-    requirements: tuple[Requirement, ...]
-    path_name: Text | None = None
+    kind: str  # a key of SUBJECTS
+    name: str  # its name in the file, else the words that choose its subject
+    topics: tuple[Text, ...]  # topics of a path, in order; empty for a path that only has a name
+    chosen: dict[str, Text]  # names or patterns that choose rows, by the name of the field
+    requirements: tuple[Requirement, ...]  # at least one
+    path_name: Text | None = None  # name of a path in the file with named paths
 
 
 @dataclass(frozen=True)
 class TargetsFile:
-    """A file of requirements.
+    """A file of requirements."""
 
-    Attributes:
-        file: for errors, which name the line.
-        targets: its entries, in order.
-    """
-
-    file: YamlFile
-    targets: tuple[Target, ...]
+    file: YamlFile  # for errors, which name the line
+    targets: tuple[Target, ...]  # its entries, in order
 
 
 def read_targets(path: Path) -> TargetsFile:
-    """Read a file of requirements; a run decides later whether its names exist.
-
-    Raises:
-        UsageError: the file cannot be read, is not YAML, or not of the form above.
-    """
+    """Read a file of requirements; a run decides later whether its names exist."""
     file = YamlFile(path, _EXAMPLE, _QUOTING)
     (entries,) = file.entries("targets")
     if not entries:

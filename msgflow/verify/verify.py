@@ -134,17 +134,8 @@ def verify(
 ) -> Verification:
     """Return the verdicts on the requirements of a file.
 
-    Args:
-        connection: to a database with the public views.
-        targets: the requirements.
-        part: one run, and the times to read.
-        paths: for each named path of the requirements, its topics and nodes, or globs, by 'from',
-            'to', 'via' and 'without'.
-        case: the arrivals of paths that count, as in the query flows.
-
-    Raises:
-        UsageError: no such run or time.
-        QueryError: the database could not run a query.
+    `paths` has for each named path of the requirements its topics and nodes, or globs, by 'from',
+    'to', 'via' and 'without'. `case` are the arrivals of paths that count, as in the query flows.
     """
     one = part.one_run(connection, "a verification")
     part = replace(part, run=one.run_id)

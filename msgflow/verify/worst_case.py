@@ -18,17 +18,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class WorstCase:
-    """The worst case.
+    """The worst case."""
 
-    Attributes:
-        duration_ns: how long it took; None if it did not end.
-        at_ns: when it began, epoch ns.
-        command: the command that shows it.
-    """
-
-    duration_ns: int | None
-    at_ns: int
-    command: str
+    duration_ns: int | None  # how long it took; None if it did not end
+    at_ns: int  # when it began, epoch ns
+    command: str  # the command that shows it
 
 
 # The key of a row of the measuring query, by kind of worst case. The longest flow is in that row

@@ -44,15 +44,8 @@ def write_flow_page(
 ) -> int:
     """Write the timeline of everything that a thing led to and came from; return its bytes.
 
-    Args:
-        connection: to a database with the public views.
-        path: the file; one that exists is replaced.
-        run: the run that the thing belongs to.
-        kind: 'publication', 'take', 'callback_instance', 'request' or 'response'.
-        number: its identity.
-        direction: 'forward' (what it caused), 'backward' (what it was caused by) or 'both'.
-        depth: most messages in a row, each way.
-        limit: most vertices, those nearest in time; the page says how many there are beyond.
+    A file that exists is replaced. `kind` and `number` name the thing; `depth` and `limit` are as
+    for a flow, and the page says how many vertices there are beyond.
     """
     pages = Pages()
     params: dict[str, Any] = {"run": str(run.run_id)}

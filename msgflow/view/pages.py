@@ -71,17 +71,11 @@ _LARGEST = 2**62
 
 @dataclass(frozen=True)
 class Extent:
-    """A run on the page: times are offsets from `origin_ns`.
-
-    Attributes:
-        run: the run.
-        origin_ns: its first event, epoch ns.
-        length_ns: from there to its last event.
-    """
+    """A run on the page: times are offsets from `origin_ns`."""
 
     run: Run
-    origin_ns: int
-    length_ns: int
+    origin_ns: int  # its first event, epoch ns
+    length_ns: int  # from there to its last event
 
     def frame(self, window: Window) -> Params:
         """Return the parameters that most page queries need."""
@@ -91,11 +85,8 @@ class Extent:
 class Pages:
     """Answers to what pages ask, each as bytes (see `table_encoding`).
 
-    A pages object may be used by several threads, each with a connection of its own.
-
-    Args:
-        window: the times that pages show.
-        most_bars: bars of a window that are sent one by one.
+    A pages object may be used by several threads, each with a connection of its own. Pages show the
+    times of `window`; a window with more bars than `most_bars` is sent in bins.
     """
 
     def __init__(self, window: Window = WHOLE, *, most_bars: int = MOST_BARS) -> None:

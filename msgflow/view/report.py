@@ -95,19 +95,8 @@ def write_report(
 ) -> Report:
     """Write the pages of a run into one file that any browser opens, or its summary as Markdown.
 
-    Args:
-        connection: to a database with the public views.
-        path: the file; one that exists is replaced. If its name ends with .md, it has the summary.
-        part: one run, and the times to show.
-        compare: another run to compare with; the page is left out when None.
-        verification: verdicts on the run, for the summary.
-        through: only paths with this text in them, and the rows of the timeline on these.
-        max_size: most bytes of the file.
-        progress: called with what is being done.
-
-    Raises:
-        UsageError: no such run or path, a window without events, or a size that is too small.
-        QueryError: the database could not run a query.
+    A file that exists is replaced; one whose name ends with .md gets the summary. `through` leaves
+    paths without this text, and rows that are not on them, out; `max_size` is in bytes.
     """
     one = part.one_run(connection, "a report")
     window = part.window([one])

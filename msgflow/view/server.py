@@ -407,11 +407,7 @@ def serve(
 
 @contextmanager
 def serving(path: Path, sql: Sql, following: Following, *, place: str, port: int) -> Iterator[str]:
-    """Serve the pages of a database that moves on, in a thread, during the block.
-
-    Yields:
-        The address, which has the token.
-    """
+    """Yield the address, with the token, of a database that moves on: a thread serves its pages."""
     with running(
         path, sql, port=port, memory_limit=None, following=following, place=place
     ) as (server, listener, address):  # fmt: skip
@@ -463,9 +459,6 @@ def serve_text(address: str, port: int, make: Callable[[], bytes], media_type: s
     """Serve one text at any path, in a thread, until the process ends.
 
     An address of this machine alone answers no request that names another host.
-
-    Raises:
-        OSError: the port cannot be used.
     """
     family = socket.AF_INET6 if ":" in address else socket.AF_INET
     listener = socket.create_server((address, port), family=family)

@@ -72,32 +72,20 @@ class Ahead:
 
 @dataclass
 class Answers:
-    """Answers from one state of the database, which are kept while it is closed.
+    """Answers from one state of the database, which are kept while it is closed."""
 
-    Attributes:
-        generation: of that state, see `generation_of`.
-        pages: answer questions.
-        turns: of questions.
-    """
-
-    generation: str
-    pages: Pages
-    turns: Turns
+    generation: str  # of that state, see `generation_of`
+    pages: Pages  # answer questions
+    turns: Turns  # of questions
 
 
 @dataclass
 class Opened:
-    """The database as it was opened once.
+    """The database as it was opened once."""
 
-    Attributes:
-        answers: from its state.
-        base: a connection, which those of questions are made of.
-        ahead: the question that comes before those of pages.
-    """
-
-    answers: Answers
-    base: duckdb.DuckDBPyConnection
-    ahead: Ahead
+    answers: Answers  # from its state
+    base: duckdb.DuckDBPyConnection  # a connection, which those of questions are made of
+    ahead: Ahead  # the question that comes before those of pages
 
     def close(self) -> None:
         """Close it; no question may run."""
@@ -106,15 +94,7 @@ class Opened:
 
 
 class SharedDatabase:
-    """The database that all requests share, open while questions are asked.
-
-    Args:
-        path: the database.
-        memory_limit: most memory that DuckDB takes, such as '1GB'; see `serve` for None.
-
-    Raises:
-        DatabaseError: the file is missing, locked, foreign, or of another schema revision.
-    """
+    """The database that all requests share, open while questions are asked."""
 
     def __init__(self, path: Path, memory_limit: str | None) -> None:
         self.path = path

@@ -112,12 +112,7 @@ def encoded_error(message: str, hint: str | None) -> bytes:
 
 
 def words(connection: duckdb.DuckDBPyConnection) -> pa.Table:
-    """Return what the editor completes and colours.
-
-    Returns:
-        `kind` ('view', 'column', 'macro', 'function', 'type' or 'keyword'), `name`, and where there
-        is such: `view` of a column, `detail`, and `description`, a sentence.
-    """
+    """Return what the editor completes and colours."""
     return connection.sql(_WORDS).to_arrow_table()
 
 

@@ -91,20 +91,14 @@ _WHEN_EMPTY = {
 
 @dataclass(frozen=True)
 class Section:
-    """A part of the summary.
+    """A part of the summary."""
 
-    Attributes:
-        name: 'why', 'paths', 'blame', 'drops', 'threads', 'verdicts' or 'change'; of a part of the
-            timeline 'callbacks' or 'usage'.
-        result: its rows.
-        commands: print the same numbers.
-        reading: a line before the rows.
-    """
-
+    # 'why', 'paths', 'blame', 'drops', 'threads', 'verdicts' or 'change'; of a part of the timeline
+    # 'callbacks' or 'usage'
     name: str
-    result: QueryResult
-    commands: tuple[str, ...]
-    reading: str = ""
+    result: QueryResult  # its rows
+    commands: tuple[str, ...]  # print the same numbers
+    reading: str = ""  # a line before the rows
 
     @property
     def title(self) -> str:
@@ -124,15 +118,10 @@ class Section:
 
 @dataclass(frozen=True)
 class Part:
-    """The run and the window that a section is about.
+    """The run and the window that a section is about."""
 
-    Attributes:
-        slice: as queries read it.
-        options: of the command line, which choose the same window.
-    """
-
-    slice: Slice
-    options: Sequence[str] = ()
+    slice: Slice  # as queries read it
+    options: Sequence[str] = ()  # of the command line, which choose the same window
 
 
 def query_section(
