@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.cli.operation import asks
+from msgflow.cli.output import print_result, print_status
 from msgflow.database import Database
 from msgflow.export.formats import Format
 
@@ -22,8 +23,6 @@ def command(
     output: Path | None = None,
 ) -> None:
     """It needs the package rosbags: pip install rosbags, or in a checkout '.[bag]'."""
-    from msgflow.cli.output import print_result, print_status
-
     print_result(result, form, output, wide=wide)
     topics = result.to_arrow()
     joined, messages = (sum(topics[name].to_pylist()) for name in ("joined", "messages"))

@@ -12,9 +12,13 @@ from typing import TYPE_CHECKING
 import typer
 
 from msgflow.cli.operation import operation
+from msgflow.cli.output import is_screen, print_lines, print_next, print_result, print_status
 from msgflow.errors import ExitCode
 from msgflow.export.formats import Format
 from msgflow.files.default_files import DEFAULT_DATABASE
+from msgflow.run.choice import choose_runs
+from msgflow.text.values import count, format_cell
+from msgflow.text.wrapping import wrap
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -45,11 +49,9 @@ def command(
         detail: Also what is worth knowing but not wrong, what the database breaks now, and what
             share of the answers each defect affects.
     """
-    from msgflow.cli.output import print_next
     from msgflow.cli.tracing_cost import part_of_latencies, share_of_cpu
     from msgflow.database import Database
     from msgflow.db.finding import commands_after
-    from msgflow.run.choice import choose_runs
 
     with Database(database) as opened:
         findings = opened.findings(run=run, detail=detail)
@@ -91,10 +93,8 @@ def _report(
     """Print findings and their numbers."""
     import pyarrow as pa
 
-    from msgflow.cli.output import print_lines, print_result, print_status
     from msgflow.db.finding import Finding
     from msgflow.result.query_result import QueryResult
-    from msgflow.text.values import count
 
     if output is None and form in (None, Format.TABLE):
         print_lines(_text(findings, run_labels))
@@ -123,10 +123,6 @@ def _numbered(findings: Sequence[Finding]) -> Iterator[tuple[int, Finding]]:
 
 
 def _text(findings: Sequence[Finding], run_labels: Mapping[int, str]) -> Iterator[str]:
-    from msgflow.cli.output import is_screen
-    from msgflow.text.values import format_cell
-    from msgflow.text.wrapping import wrap
-
     def fitting(text: str, room: int) -> list[str]:
         # In a pipe what people search for stays in one line.
         return wrap(text, room) if is_screen() else [text]

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from msgflow.cli.operation import operation
+from msgflow.cli.output import print_note, print_runs, print_status
 from msgflow.cli.query_command import AskingGroup, print_rows
+from msgflow.database import Database
 from msgflow.files.default_files import DEFAULT_DATABASE
 
 if TYPE_CHECKING:
@@ -21,9 +23,6 @@ class _ClocksGroup(AskingGroup):
 
     def write(self, result: QueryResult, form: Any, given: dict[str, Any]) -> None:
         """Write the clocks, and say whether times compare."""
-        from msgflow.cli.output import print_status
-        from msgflow.database import Database
-
         print_rows(result, form, given)
         if given["own_by"] != "pair":
             with Database(given["database"]) as opened:
@@ -44,9 +43,6 @@ def apply(how: str, *, run: str | None = None, database: Path = DEFAULT_DATABASE
         how (none|messages|FILE): As recorded, by the messages between hosts (and the network
             packets of their kernel traces), or by the offsets in a YAML or TOML file.
     """
-    from msgflow.cli.output import print_note, print_runs, print_status
-    from msgflow.database import Database
-
     with Database(database) as opened:
         runs = opened.apply_clocks(how, run=run)
         print_runs(runs)

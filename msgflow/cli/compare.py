@@ -10,6 +10,7 @@ import typer
 
 from msgflow.cli.operation import asks
 from msgflow.cli.options import OUTPUT
+from msgflow.cli.output import print_error, print_result
 from msgflow.database import Database
 from msgflow.errors import ExitCode
 from msgflow.export.formats import Format
@@ -74,8 +75,6 @@ def print_comparison(
     output: Path | None,
 ) -> None:
     """Print a comparison, and exit with 1 where a condition of `fail_on` holds."""
-    from msgflow.cli.output import print_error, print_result
-
     result = comparison.result
     is_table = form in (None, Format.TABLE) and output is None
     if comparison.parts is not None:

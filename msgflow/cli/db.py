@@ -9,8 +9,10 @@ import typer
 
 from msgflow.cli.completion import complete
 from msgflow.cli.operation import operation
+from msgflow.cli.output import print_result, print_status
 from msgflow.export.formats import Format
 from msgflow.files.default_files import DEFAULT_DATABASE
+from msgflow.text.values import count
 
 app = typer.Typer()
 
@@ -19,9 +21,7 @@ app = typer.Typer()
 @operation
 def upgrade(*, database: Path = DEFAULT_DATABASE) -> None:
     """Upgrade a database to the schema and views of this version of msgflow."""
-    from msgflow.cli.output import print_status
     from msgflow.db.migration import upgrade as upgrade_database
-    from msgflow.text.values import count
 
     done = upgrade_database(database)
     if done.before == done.after and not done.views_changed and not done.rederived_runs:
@@ -47,7 +47,6 @@ def schema(
     Args:
         view ([VIEW]): A view: list its columns.
     """
-    from msgflow.cli.output import print_result
     from msgflow.database import Database
 
     with Database(database) as opened:

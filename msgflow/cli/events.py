@@ -10,9 +10,11 @@ import typer
 
 from msgflow.cli.operation import operation
 from msgflow.cli.options import Reader
+from msgflow.cli.output import data_stream, print_note, print_result, print_status, terminal
 from msgflow.errors import UsageError
 from msgflow.events.formats import TABLES, EventFormat, format_of, is_directory
 from msgflow.export.formats import Format
+from msgflow.text.values import count as counted
 
 if TYPE_CHECKING:
     from msgflow.events.selection import Selection
@@ -51,9 +53,7 @@ def command(
             without suffix) that gets one file per event name, with a column per field.
     """
     from msgflow import trace
-    from msgflow.cli.output import print_note
     from msgflow.events.selection import Selection
-    from msgflow.text.values import count as counted
 
     with trace.open(traces, reader=reader.value, strict=strict) as opened:
         selection = Selection(opened, event or (), start, end)
@@ -77,12 +77,10 @@ def command(
 
 
 def _write(selection: Selection, form: EventFormat, output: Path | None) -> None:
-    from msgflow.cli.output import data_stream, print_note, print_status, terminal
     from msgflow.cli.progress import reading_progress
     from msgflow.events.listing import write_events
     from msgflow.events.tables import write_event_tables
     from msgflow.files.atomic import replacing
-    from msgflow.text.values import count
 
     if output is None:
         if form is EventFormat.PARQUET and sys.stdout.isatty():
@@ -102,13 +100,12 @@ def _write(selection: Selection, form: EventFormat, output: Path | None) -> None
         else:
             with replacing(output) as temporary, temporary.open("wb") as stream:
                 number = write_events(selection, form, stream, progress)
-    print_status(f"{count(number, 'event')} written to {output}")
+    print_status(f"{counted(number, 'event')} written to {output}")
 
 
 def _print_counts(selection: Selection, form: EventFormat | None, output: Path | None) -> None:
     import pyarrow
 
-    from msgflow.cli.output import print_result
     from msgflow.result.query_result import QueryResult
 
     counts = selection.counts()

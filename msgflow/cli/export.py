@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 import typer
 
 from msgflow.cli.operation import asks
+from msgflow.cli.output import print_note, print_runs, print_status
 from msgflow.database import Database
+from msgflow.text.values import count
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -43,9 +45,6 @@ def csv(exported: Sequence[ExportedView], output: Path) -> None:
 @asks(Database.export_perfetto)
 def perfetto(trace: PerfettoTrace, output: Path) -> None:
     """It needs the package perfetto: pip install perfetto, or in a checkout '.[perfetto]'."""
-    from msgflow.cli.output import print_runs, print_status
-    from msgflow.text.values import count
-
     print_runs([trace.run])
     own = f", {count(trace.events, 'event')} of your own" if trace.events else ""
     own += f", {count(trace.states, 'state')} of threads and cores" if trace.states else ""
@@ -61,9 +60,6 @@ def perfetto(trace: PerfettoTrace, output: Path) -> None:
 @asks(Database.export_folded)
 def folded(stacks: FoldedStacks, output: Path) -> None:
     """speedscope.app opens the file, and so does flamegraph.pl."""
-    from msgflow.cli.output import print_runs, print_status
-    from msgflow.text.values import count
-
     print_runs([stacks.run])
     print_status(
         f"{count(stacks.stacks, 'stack')} of {count(stacks.samples, 'sample')} written to {output}"
@@ -74,9 +70,6 @@ def folded(stacks: FoldedStacks, output: Path) -> None:
 @asks(Database.export_mcap)
 def mcap(written: ExportedMcap, output: Path, targets: Path | None) -> None:
     """It needs the package mcap-ros2-support: pip install it, or in a checkout '.[mcap]'."""
-    from msgflow.cli.output import print_runs, print_status
-    from msgflow.text.values import count
-
     print_runs([written.run])
     unmet = f", {count(written.violations, 'violation')}" if targets is not None else ""
     print_status(
@@ -89,9 +82,6 @@ def mcap(written: ExportedMcap, output: Path, targets: Path | None) -> None:
 @asks(Database.export_otlp)
 def otlp(traces: ExportedTraces, output: Path) -> None:
     """Jaeger opens the file, and a collector sends it to others, see docs/export.md."""
-    from msgflow.cli.output import print_runs, print_status
-    from msgflow.text.values import count
-
     print_runs([traces.run])
     print_status(
         f"{count(traces.traces, 'trace')}, {count(traces.spans, 'span')},"
@@ -100,9 +90,6 @@ def otlp(traces: ExportedTraces, output: Path) -> None:
 
 
 def _report(exported: Sequence[ExportedView], directory: Path) -> None:
-    from msgflow.cli.output import print_note, print_status
-    from msgflow.text.values import count
-
     rows = sum(view.row_count for view in exported)
     print_status(f"{count(len(exported), 'view')}, {count(rows, 'row')} written to {directory}")
     names = {view.view for view in exported}

@@ -12,8 +12,10 @@ from msgflow.cli import fleet_queries
 from msgflow.cli.compare import FailOn, OnlyDifferent, print_comparison
 from msgflow.cli.operation import operation
 from msgflow.cli.options import Reader, bytes_of
+from msgflow.cli.output import print_note, print_result, print_status
 from msgflow.errors import ExitCode, UsageError
 from msgflow.export.formats import Format
+from msgflow.text.values import count
 
 if TYPE_CHECKING:
     from msgflow.fleet.ingest import FleetProgress
@@ -109,9 +111,6 @@ def ingest(
 
 
 def _print_report(report: FleetProgress, lake: str, quiet: bool) -> None:
-    from msgflow.cli.output import print_note, print_status
-    from msgflow.text.values import count
-
     if not quiet:
         kinds = {
             "added": report.added,
@@ -148,7 +147,6 @@ def runs(
     wide: bool = False,
 ) -> None:
     """List the runs of a lake."""
-    from msgflow.cli.output import print_result
     from msgflow.fleet.lake import Lake
     from msgflow.fleet.listing import list_runs
 
@@ -165,7 +163,6 @@ def failures(
     wide: bool = False,
 ) -> None:
     """List the recordings that did not go into a lake, and why."""
-    from msgflow.cli.output import print_result
     from msgflow.fleet.lake import Lake
     from msgflow.fleet.listing import list_failures
 
@@ -186,9 +183,7 @@ def remove(keys: list[str], *, lake: str) -> None:
     Args:
         keys (RUN...): Keys of runs.
     """
-    from msgflow.cli.output import print_status
     from msgflow.fleet.lake import Lake
-    from msgflow.text.values import count
 
     removed = Lake.open(lake).remove(keys)
     print_status(f"{count(removed, 'run')} removed from {lake}")
@@ -201,10 +196,8 @@ def pack(*, lake: str) -> None:
 
     Nothing else may use the lake meanwhile: no ingest, and no query.
     """
-    from msgflow.cli.output import print_status
     from msgflow.fleet.lake import Lake
     from msgflow.fleet.pack import pack as packed
-    from msgflow.text.values import count
 
     done = packed(Lake.open(lake))
     print_status(

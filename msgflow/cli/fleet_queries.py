@@ -9,9 +9,11 @@ import typer
 
 from msgflow.cli.operation import operation
 from msgflow.cli.options import one_text
+from msgflow.cli.output import print_list, print_result, print_status
 from msgflow.cli.sql import DEFAULT_LIMIT, FileOption, sql_of
 from msgflow.errors import UsageError
 from msgflow.export.formats import Format
+from msgflow.result.layout import MOST_ROWS
 
 _MOST_WORST = 1_000
 
@@ -54,11 +56,9 @@ def query(
         case: With e2e-latency: flows that count: first or last arrival of each root, newest root of
             each arrival, or all.
     """
-    from msgflow.cli.output import print_list, print_result
     from msgflow.fleet.lake import Lake
     from msgflow.fleet.lake_query import fleet_query, header_of, names
     from msgflow.query.selection import values_of
-    from msgflow.result.layout import MOST_ROWS
 
     if name is None:
         listed = [(header_of(each).words, header_of(each).title) for each in names()]
@@ -111,7 +111,6 @@ def sql(
         file: Read the query from FILE.
         limit (ROWS): Maximum number of rows to print; 0 for all.
     """
-    from msgflow.cli.output import print_result
     from msgflow.fleet.lake import Lake
     from msgflow.fleet.lake_query import fleet_sql
 
@@ -139,7 +138,6 @@ def worst(
         path (PATH): Text of a path, a glob, or a part: a topic.
         limit (N): Number of flows.
     """
-    from msgflow.cli.output import print_result
     from msgflow.fleet.lake import Lake
     from msgflow.fleet.lake_query import fleet_worst
 
@@ -155,7 +153,6 @@ def open_(run: Annotated[str, typer.Argument()], *, lake: str, output: Path | No
         run (RUN): Key of a run, the begin of it, or a name.
         output: New database file; one that exists is not replaced. By default RUN.duckdb.
     """
-    from msgflow.cli.output import print_status
     from msgflow.fleet.lake import Lake
     from msgflow.fleet.run_database import open_run
 

@@ -11,7 +11,16 @@ import typer
 from msgflow.cli.header_options import header_option
 from msgflow.cli.operation import operation
 from msgflow.cli.options import OUTPUT, SELECTION, one_text
+from msgflow.cli.output import (
+    print_drawing,
+    print_note,
+    print_result,
+    print_runs,
+    print_status,
+    print_text,
+)
 from msgflow.errors import UsageError
+from msgflow.export.formats import Format, by_suffix
 from msgflow.files.default_files import DEFAULT_DATABASE
 from msgflow.query.catalogue import load_query
 from msgflow.sql.statement import internal_sql
@@ -94,16 +103,7 @@ def command(
         form (table|json|html): A tree, nodes and edges, or a page with its timeline; by default by
             the suffix of FILE, else table.
     """
-    from msgflow.cli.output import (
-        print_drawing,
-        print_note,
-        print_result,
-        print_runs,
-        print_status,
-        print_text,
-    )
     from msgflow.database import Database
-    from msgflow.export.formats import Format, by_suffix
 
     if form is None and output is not None and output.suffix:
         form = by_suffix(output, _SUFFIXES)

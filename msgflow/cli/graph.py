@@ -6,8 +6,10 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
 from msgflow.cli.operation import parameters_of
+from msgflow.cli.output import print_note, print_runs, print_text
 from msgflow.cli.query_command import build_command, chosen_by, print_rows
 from msgflow.export.formats import Format
+from msgflow.run.choice import choose_one
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -59,9 +61,7 @@ def _form(form: AnyFormat | None, path: Path | None) -> GraphFormat | Format:
 
 
 def _write(result: QueryResult, form: Any, given: dict[str, Any]) -> None:
-    from msgflow.cli.output import print_note, print_runs, print_text
     from msgflow.export.graph import Graph
-    from msgflow.run.choice import choose_one
 
     if isinstance(form, Format):
         print_rows(result, form, given)

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 from msgflow.cli.header_options import header_option
 from msgflow.cli.operation import operation
 from msgflow.cli.options import SELECTION
+from msgflow.cli.output import is_screen, print_note, print_text
 from msgflow.cli.query_command import build_command, choice_of, chosen_by
 from msgflow.cli.sections import (
     SectionsFormat,
@@ -16,8 +17,10 @@ from msgflow.cli.sections import (
     sections_format,
     whole_sections,
 )
+from msgflow.database import Database
 from msgflow.files.default_files import DEFAULT_DATABASE
 from msgflow.query.catalogue import load_query
+from msgflow.result.layout import screen_width
 
 SECTIONS = ("runs", "hosts", "processes", "nodes", "topics", "counts", "findings")
 (_SECTION,) = load_query("info").variants
@@ -46,10 +49,6 @@ def command(
     Args:
         form (table|json|markdown): By default by the suffix of FILE, else table.
     """
-    from msgflow.cli.output import is_screen, print_note, print_text
-    from msgflow.database import Database
-    from msgflow.result.layout import screen_width
-
     form = form or sections_format(output)
     with Database(database) as opened:
         # Its topics are a query of their own.

@@ -11,9 +11,12 @@ from typing import TYPE_CHECKING
 from msgflow.cli.check import PLACES_SHOWN
 from msgflow.cli.operation import operation
 from msgflow.cli.options import Reader
+from msgflow.cli.output import database_option, print_next, print_note, print_status
 from msgflow.errors import UsageError
 from msgflow.files.default_files import DEFAULT_DATABASE
+from msgflow.run.choice import require_run_name
 from msgflow.sql.interrupt import noted_interrupts
+from msgflow.text.values import count
 
 if TYPE_CHECKING:
     from msgflow.ingest import IngestReport
@@ -59,11 +62,9 @@ def command(
     hosts = _hosts(host or [])
     # From before the imports, which may lose Ctrl-C, until the stored run is reported.
     with noted_interrupts():
-        from msgflow.cli.output import print_note
         from msgflow.cli.progress import ingest_progress
         from msgflow.database import Database
         from msgflow.ingest.recordings import Recording, find_recordings
-        from msgflow.run.choice import require_run_name
 
         if name is not None:
             require_run_name(name)
@@ -110,8 +111,6 @@ def command(
 
 def _note_archives(traces: list[str], database: Path) -> None:
     """Say which archives below the given directories were not read, and how to name them."""
-    from msgflow.cli.output import database_option, print_note
-    from msgflow.text.values import count
     from msgflow.trace.discovery import archives_below
 
     archives = [str(path) for path in archives_below(traces)]
@@ -124,21 +123,18 @@ def _note_archives(traces: list[str], database: Path) -> None:
         )
 
 
-def _require_no_word_for_one(count: int, name: str | None, keep_staging: Path | None) -> None:
+def _require_no_word_for_one(number: int, name: str | None, keep_staging: Path | None) -> None:
     given = {"--name": name, "--keep-staging": keep_staging}
     for option, value in given.items():
         if value is not None:
             raise UsageError(
-                f"{option} is for one run, these traces are {count} recordings whose times do not"
+                f"{option} is for one run, these traces are {number} recordings whose times do not"
                 " overlap",
                 f"--together makes one run; or leave out {option}",
             )
 
 
 def _print_report(report: IngestReport, database: Path) -> None:
-    from msgflow.cli.output import print_note, print_status
-    from msgflow.text.values import count
-
     print_status(
         f"{count(report.event_count, 'event')} read into {database} as run"
         f" {report.run_name} ({report.run_id}) in {report.seconds:.1f} s"
@@ -156,7 +152,6 @@ def _print_report(report: IngestReport, database: Path) -> None:
 
 
 def _print_next(reports: list[IngestReport], database: Path) -> None:
-    from msgflow.cli.output import print_next
     from msgflow.db.finding import next_command
 
     words = next_command([each for report in reports for each in report.findings]).split()

@@ -8,8 +8,11 @@ from typing import TYPE_CHECKING
 import typer
 
 from msgflow.cli.operation import operation
+from msgflow.cli.output import print_note, print_runs, print_status
 from msgflow.cli.query_command import AskingGroup
+from msgflow.database import Database
 from msgflow.files.default_files import DEFAULT_DATABASE
+from msgflow.text.values import count
 
 if TYPE_CHECKING:
     from msgflow.database import Database
@@ -33,9 +36,6 @@ def apply(file: Path, *, run: str | None = None, database: Path = DEFAULT_DATABA
     Args:
         file: Links to declare, as YAML.
     """
-    from msgflow.cli.output import print_runs
-    from msgflow.database import Database
-
     with Database(database) as opened:
         for one in opened.apply_links(file, run=run):
             print_runs([one.run])
@@ -44,9 +44,6 @@ def apply(file: Path, *, run: str | None = None, database: Path = DEFAULT_DATABA
 
 def print_applied(opened: Database, one: AppliedLinks) -> None:
     """Print what was declared, and what contradicts it."""
-    from msgflow.cli.output import print_note, print_status
-    from msgflow.text.values import count
-
     known = f", {one.known_count} of them by the trace itself" if one.known_count else ""
     traced = f", and {one.traced_link_count} that the trace declares itself"
     if one.topic_count:

@@ -7,6 +7,7 @@ from typing import Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from msgflow.cli.output import print_list
 from msgflow.cli.query_command import (
     build_command,
     chosen_by,
@@ -56,7 +57,6 @@ def group(context: typer.Context) -> None:
     """List the queries, unless one is named."""
     if context.invoked_subcommand is not None:
         return
-    from msgflow.cli.output import print_list
 
     listed = [(each.words, each.title) for each in load_queries() if not each.is_command]
     print_list(listed, ("query", "title"))

@@ -15,6 +15,7 @@ from typer.core import TyperCommand, TyperOption
 from msgflow.cli.header_options import given_of, header_parameter
 from msgflow.cli.operation import escape, parameters_of, set_parameters
 from msgflow.cli.options import DefaultGroup, one_text
+from msgflow.cli.output import print_lines, print_result
 from msgflow.database import Database
 from msgflow.errors import UsageError
 from msgflow.export.formats import Format, format_of
@@ -94,8 +95,6 @@ def chosen_format(form: Format | None, path: Path | None) -> Format:
 
 def print_rows(result: QueryResult, form: Any, given: dict[str, Any]) -> None:
     """Write the rows as the options of a query say."""
-    from msgflow.cli.output import print_result
-
     print_result(
         result,
         form,
@@ -145,8 +144,6 @@ def build_command(
     def command(**given: Any) -> None:
         own = given_of(given)
         if given["show"]:
-            from msgflow.cli.output import print_lines
-
             print_lines(header.path.read_text(encoding="utf-8").splitlines())
             return
         form = form_of(given["form"], given["output"])

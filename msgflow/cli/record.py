@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from msgflow.cli.operation import operation
+from msgflow.cli.output import print_note, print_result, print_status
 from msgflow.errors import ExitCode
 from msgflow.files.default_files import DEFAULT_DATABASE
+from msgflow.run.choice import require_run_name
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -64,11 +66,9 @@ def command(
         clock_sync (messages|FILE): As msgflow ingest has it.
         ingest: Read the recording into the database.
     """
-    from msgflow.cli.output import print_note, print_status
     from msgflow.clocks import read_clock_sync
     from msgflow.links import read_links
     from msgflow.record import EVENTS, PYTHON_NODES, Channel, read_rate, record
-    from msgflow.run.choice import require_run_name
 
     if print_python_path:
         typer.echo(PYTHON_NODES)
@@ -131,8 +131,6 @@ def _status_shown(*, beside_program: bool) -> Iterator[Callable[[Status], None]]
     """Yield the function that shows how the recording goes, on a terminal only."""
     from rich.console import Console
 
-    from msgflow.cli.output import print_status
-
     console = Console(stderr=True)
     if not console.is_terminal:
         yield lambda status: None
@@ -177,7 +175,6 @@ def _answer(
 ) -> bool:
     """Ingest the recording, print what a user wants to know first; tell whether it has no error."""
     from msgflow.cli import check, ingest
-    from msgflow.cli.output import print_result, print_status
     from msgflow.cli.tracing_cost import part_of_latencies
     from msgflow.database import Database
 

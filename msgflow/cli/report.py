@@ -9,10 +9,12 @@ from typing import Annotated, Unpack
 
 from msgflow.cli.operation import operation
 from msgflow.cli.options import LAKE_PAGE, bytes_of
+from msgflow.cli.output import print_note, print_runs, print_status
 from msgflow.cli.ui import require_no_where
 from msgflow.errors import UsageError
 from msgflow.files.default_files import DEFAULT_DATABASE, DEFAULT_PATHS
 from msgflow.run.slice import SliceWords
+from msgflow.text.values import count
 
 # Browsers unpack larger pages too slowly.
 _MOST = 1_000_000_000
@@ -44,8 +46,6 @@ def command(
             so.
         targets: Requirements, as YAML: the summary has the verdicts on them.
     """
-    from msgflow.cli.output import print_status
-
     with TemporaryDirectory() as directory:
         to_stdout = str(output) == "-"
         target = Path(directory) / "report.html" if to_stdout else output
@@ -71,9 +71,7 @@ def _written(
     part: SliceWords,
 ) -> str:
     """Write the report; return what was done."""
-    from msgflow.cli.output import print_note, print_runs
     from msgflow.database import Database
-    from msgflow.text.values import count
 
     is_page = output.suffix.lower() in (".html", ".htm")
     if not is_page and (lake is not None or output.suffix.lower() != ".md"):

@@ -11,9 +11,11 @@ import typer
 from msgflow.cli.completion import complete
 from msgflow.cli.operation import operation
 from msgflow.cli.options import DefaultGroup
+from msgflow.cli.output import confirm, is_asked, print_result, print_status
 from msgflow.errors import ExitCode, UsageError
 from msgflow.export.formats import Format
 from msgflow.files.default_files import DEFAULT_DATABASE
+from msgflow.run.choice import choose_runs
 
 app = typer.Typer(cls=DefaultGroup)
 _Run = Annotated[str, typer.Argument(metavar="RUN", autocompletion=complete("run"))]
@@ -32,7 +34,6 @@ def list_runs(
     """List the runs of a database."""
     from dataclasses import replace
 
-    from msgflow.cli.output import print_result
     from msgflow.database import Database
 
     with Database(database) as opened:
@@ -50,7 +51,6 @@ def rename(run: _Run, name: str, *, database: Path = DEFAULT_DATABASE) -> None:
         run: Name or id of the run.
         name: Its new name.
     """
-    from msgflow.cli.output import print_status
     from msgflow.database import Database
 
     with Database(database) as opened:
@@ -69,7 +69,6 @@ def label(run: _Runs, labels: list[str], *, database: Path = DEFAULT_DATABASE) -
         run: Name or id of the run, or all.
         labels (KEY=VALUE...): Labels; KEY= takes one away.
     """
-    from msgflow.cli.output import print_status
     from msgflow.database import Database
 
     values: dict[str, str | None] = {}
@@ -106,9 +105,7 @@ def remove(
         run: Name or id of the run, or all.
         yes: Ask nothing on a terminal either.
     """
-    from msgflow.cli.output import confirm, is_asked, print_status
     from msgflow.database import Database
-    from msgflow.run.choice import choose_runs
 
     with Database(database) as opened:
         if not yes and is_asked():

@@ -6,7 +6,9 @@ import json
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
-from msgflow.export.formats import by_suffix
+from msgflow.export.formats import by_suffix, json_rows
+from msgflow.result.layout import lay_out
+from msgflow.text.wrapping import wrap
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -37,8 +39,6 @@ def sections_format(path: Path | None) -> SectionsFormat:
 
 def json_lines(results: Mapping[str, QueryResult]) -> Iterator[str]:
     """Yield the lines of an object with a list of rows for each result."""
-    from msgflow.export.formats import json_rows
-
     yield "{"
     for position, (section, result) in enumerate(results.items(), start=1):
         rows = ",\n    ".join(json_rows(result))
@@ -51,9 +51,7 @@ def screen_sections(
     results: Mapping[str, QueryResult], width: int, *, is_chosen: bool = False
 ) -> Iterator[str]:
     """Yield lines for people, none longer than `width` cells."""
-    from msgflow.result.layout import lay_out
     from msgflow.result.screen import screen_lines
-    from msgflow.text.wrapping import wrap
 
     for position, (section, result) in enumerate(results.items()):
         if position:

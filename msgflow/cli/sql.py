@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from msgflow.cli.operation import operation
+from msgflow.cli.output import print_result
 from msgflow.errors import UsageError
 from msgflow.export.formats import Format
 from msgflow.files.default_files import DEFAULT_DATABASE
@@ -41,7 +42,6 @@ def command(
         file: Read the query from FILE.
         limit (ROWS): Maximum number of rows to print; 0 for all.
     """
-    from msgflow.cli.output import print_result
     from msgflow.database import Database
 
     def answer(query: str) -> QueryResult:

@@ -9,8 +9,17 @@ from typing import Annotated
 import typer
 
 from msgflow.cli.operation import operation
+from msgflow.cli.output import (
+    database_option,
+    print_next,
+    print_note,
+    print_runs,
+    print_status,
+    print_text,
+)
 from msgflow.errors import UsageError
 from msgflow.files.default_files import DEFAULT_DATABASE, DEFAULT_LINKS, DEFAULT_PATHS
+from msgflow.text.values import count
 
 app = typer.Typer()
 
@@ -36,17 +45,8 @@ def links(
         apply: Declare those without a doubt, and write the file (-o, else msgflow-links.yaml).
     """
     from msgflow.cli.links import print_applied
-    from msgflow.cli.output import (
-        database_option,
-        print_next,
-        print_note,
-        print_runs,
-        print_status,
-        print_text,
-    )
     from msgflow.database import Database
     from msgflow.files.atomic import replacing
-    from msgflow.text.values import count
 
     if run == "all":
         raise UsageError(
@@ -98,7 +98,6 @@ def paths(
     *, run: str | None = None, output: Path | None = None, database: Path = DEFAULT_DATABASE
 ) -> None:
     """Print the paths of a run as a file with names, to choose from: paths.yaml."""
-    from msgflow.cli.output import print_next, print_note, print_runs, print_text
     from msgflow.database import Database
     from msgflow.paths import suggest_paths
 
@@ -133,7 +132,6 @@ def targets(
     Args:
         margin (PERCENT): How much more than measured is allowed.
     """
-    from msgflow.cli.output import print_next, print_note, print_text
     from msgflow.database import Database
 
     with Database(database) as opened:

@@ -11,6 +11,7 @@ import typer
 
 from msgflow.cli.operation import operation
 from msgflow.cli.options import LAKE_PAGE
+from msgflow.cli.output import print_note, print_status
 from msgflow.errors import UsageError
 from msgflow.files.default_files import DEFAULT_DATABASE
 
@@ -40,7 +41,6 @@ def command(
         memory_limit: Maximum memory for queries. By default a quarter of the machine's, 500MB to
             4GB.
     """
-    from msgflow.cli.output import print_note, print_status
     from msgflow.cli.sql_process import WarmSql
     from msgflow.view.server import serve, serve_single
     from msgflow.view.sql_page import MOST_SECONDS

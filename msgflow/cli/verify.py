@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING
 import typer
 
 from msgflow.cli.operation import asks
+from msgflow.cli.output import print_result, print_runs, print_status, print_text
 from msgflow.database import Database
 from msgflow.errors import ExitCode
+from msgflow.export.formats import Format
 
 if TYPE_CHECKING:
     from msgflow.verify import Verification
@@ -43,8 +45,6 @@ def command(
         allow_not_measured: Exit with 0 if nothing failed, even if something has no value.
         form (table|json|csv|markdown|junit): By default junit into FILE.xml, else table.
     """
-    from msgflow.cli.output import print_result, print_runs, print_status, print_text
-    from msgflow.export.formats import Format
     from msgflow.verify import Verdict
 
     if form is None and output is not None and output.suffix.lower() == ".xml":

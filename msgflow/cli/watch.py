@@ -18,8 +18,11 @@ from typer.core import TyperCommand
 
 from msgflow.cli.operation import operation
 from msgflow.cli.options import path_of
+from msgflow.cli.output import is_screen, print_lines, print_note, print_status
 from msgflow.errors import ExitCode, TraceError, UsageError
 from msgflow.files.default_files import DEFAULT_PATHS
+from msgflow.run.window import duration_ns
+from msgflow.text.values import printable
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -93,14 +96,11 @@ def command(
         output (DIR): Directory to record COMMAND into; by default a temporary one, of the last
             chunks.
     """
-    from msgflow.cli.output import is_screen, print_lines, print_note
     from msgflow.cli.show.watch_screen import show_screen
     from msgflow.cli.show.window_line import window_line
     from msgflow.clocks import read_clock_sync
     from msgflow.links import read_links
-    from msgflow.run.window import duration_ns
     from msgflow.sql.interrupt import until_interrupted
-    from msgflow.text.values import printable
     from msgflow.verify import Verdict
     from msgflow.watch import (
         Diagnostics,
@@ -254,7 +254,6 @@ def _pages(port: int | None, clock_sync: str) -> Iterator[WindowDatabase | None]
     if port is None:
         yield None
         return
-    from msgflow.cli.output import print_status
     from msgflow.cli.sql_process import WarmSql
     from msgflow.record import temporary_directory
     from msgflow.view.server import serving
@@ -280,7 +279,6 @@ def _published(reports: Iterator[WindowReport], publisher: Diagnostics) -> Itera
 
 def _alarm(targets: Path, paths: Path, *, with_flows: bool) -> Alarm:
     """Return the alarm of a file of targets."""
-    from msgflow.cli.output import print_note
     from msgflow.paths import read_paths
     from msgflow.verify import read_targets
     from msgflow.watch import Alarm
@@ -314,7 +312,6 @@ def _record(
     on_screen: bool,
 ) -> bool:
     """Start a program, record it, and watch the recording until it ends; tell whether it failed."""
-    from msgflow.cli.output import print_note
     from msgflow.record import Channel, record, temporary_directory
 
     name = f"watch-{time.strftime('%Y%m%d-%H%M%S')}-{os.getpid()}"

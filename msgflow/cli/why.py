@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
 from msgflow.cli.operation import asks
+from msgflow.cli.output import database_option, print_note, print_runs, print_status, print_text
 from msgflow.cli.sections import (
     SectionsFormat,
     json_lines,
@@ -18,7 +19,10 @@ from msgflow.cli.sections import (
 )
 from msgflow.database import Database
 from msgflow.files.default_files import DEFAULT_DATABASE
+from msgflow.result.layout import screen_width
 from msgflow.run.slice import SliceWords
+from msgflow.text.values import printable
+from msgflow.text.wrapping import wrap
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -79,9 +83,6 @@ def command(
     Args:
         form (table|json|markdown): By default by the suffix of FILE, else table.
     """
-    from msgflow.cli.output import print_note, print_runs, print_status, print_text
-    from msgflow.result.layout import screen_width
-
     form = form or sections_format(output)
     print_runs([found.run])
     if form is SectionsFormat.JSON:
@@ -100,9 +101,6 @@ def command(
 
 def _verdict(found: Explanation, width: int) -> Iterator[str]:
     """Yield the worst sentences, each with an empty line behind, and who else is to blame."""
-    from msgflow.text.values import printable
-    from msgflow.text.wrapping import wrap
-
     rows = found.verdict.table.to_pylist()
     # What was found of the recording costs nothing, and comes first.
     shown = sum(row["cost_ns"] is None for row in rows) + _CULPRITS
@@ -148,8 +146,6 @@ def _more(found: Explanation, part: SliceWords, database: Path) -> Iterator[str]
 
 def _command(step: tuple[str, ...], part: SliceWords, database: Path) -> str:
     """Return a command that runs as it is printed."""
-    from msgflow.cli.output import database_option
-
     # Of a flow the identity tells the run; suggestions are from all of a run.
     taken = {"query": part, "suggest": {"run": part.get("run")}}.get(step[0], {})
     words = ["msgflow", *step]
