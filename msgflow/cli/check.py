@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from msgflow.db.finding import Finding
-    from msgflow.result.query_result import QueryResult
 
 _WIDTH = 100
 PLACES_SHOWN = 10
@@ -49,9 +48,12 @@ def command(
         detail: Also what is worth knowing but not wrong, what the database breaks now, and what
             share of the answers each defect affects.
     """
+    import pyarrow as pa
+
     from msgflow.cli.tracing_cost import part_of_latencies, share_of_cpu
     from msgflow.database import Database
-    from msgflow.db.finding import commands_after
+    from msgflow.db.finding import Finding, commands_after
+    from msgflow.result.query_result import QueryResult
 
     with Database(database) as opened:
         findings = opened.findings(run=run, detail=detail)
@@ -68,39 +70,11 @@ def command(
         if detail:
             notes += part_of_latencies(opened, opened.query("e2e-latency", run=run))
     labels = {one.run_id: one.title for one in runs} if len(runs) > 1 else {}
-    _report(findings, form, output, run_labels=labels, notes=notes, table=quality)
-    if not runs:
-        print_next(["msgflow", "ingest", "TRACE"], database)
-    else:
-        # Most commands explain one run: what is worst comes first, else what is newest.
-        shown = [one.run_id for one in chosen]
-        about = next((each.run_id for each in findings if each.run_id in shown), shown[-1])
-        for step in commands_after([each for each in findings if each.run_id == about]):
-            print_next(step.split(), database, None if run is None else about)
-    if any(finding.severity == "error" for finding in findings):
-        raise typer.Exit(ExitCode.FAILED)
-
-
-def _report(
-    findings: Sequence[Finding],
-    form: Format | None,
-    output: Path | None,
-    *,
-    run_labels: Mapping[int, str],
-    notes: Sequence[str],
-    table: QueryResult | None,
-) -> None:
-    """Print findings and their numbers."""
-    import pyarrow as pa
-
-    from msgflow.db.finding import Finding
-    from msgflow.result.query_result import QueryResult
-
-    if output is None and form in (None, Format.TABLE):
-        print_lines(_text(findings, run_labels))
-        if table is not None and len(table):
+    if is_text:
+        print_lines(_text(findings, labels))
+        if quality is not None and len(quality):
             print_lines([""] if findings else [])
-            print_result(table, None, None)
+            print_result(quality, None, None)
     else:
         columns = ["number", *Finding.__dataclass_fields__]
         rows = [{"number": number, **asdict(finding)} for number, finding in _numbered(findings)]
@@ -113,6 +87,16 @@ def _report(
         for severity in ("error", "warning")
     ]
     print_status(", ".join(numbers) if findings else "nothing is wrong with the recording")
+    if not runs:
+        print_next(["msgflow", "ingest", "TRACE"], database)
+    else:
+        # Most commands explain one run: what is worst comes first, else what is newest.
+        shown = [one.run_id for one in chosen]
+        about = next((each.run_id for each in findings if each.run_id in shown), shown[-1])
+        for step in commands_after([each for each in findings if each.run_id == about]):
+            print_next(step.split(), database, None if run is None else about)
+    if any(finding.severity == "error" for finding in findings):
+        raise typer.Exit(ExitCode.FAILED)
 
 
 def _numbered(findings: Sequence[Finding]) -> Iterator[tuple[int, Finding]]:

@@ -52,8 +52,14 @@ def print_exception(error: Exception) -> ExitCode:
     if isinstance(error, typer.TyperException):
         print_error(*_usage(error))
         return ExitCode(error.exit_code)
-    if isinstance(error, OSError) and _is_of_stdout(error):
-        return _unwritable(error)
+    # An error of opening a file names it, and those of writing to one are caught where we write.
+    if isinstance(error, OSError) and error.filename is None and error.errno in _CANNOT_WRITE:
+        discard_stdout()
+        reason = (error.strerror or str(error)).lower()
+        print_error(
+            f"cannot write to stdout: {reason}", "write to another place, for instance with -o FILE"
+        )
+        return ExitCode.USAGE
     if isinstance(error, MemoryError) or str(error) == _NO_THREAD:
         print_error(
             "the system gives this process no more memory or threads",
@@ -61,20 +67,6 @@ def print_exception(error: Exception) -> ExitCode:
         )
         return ExitCode.FAILED
     return _unexpected(error)
-
-
-def _is_of_stdout(error: OSError) -> bool:
-    # An error of opening a file names it, and those of writing to one are caught where we write.
-    return error.filename is None and error.errno in _CANNOT_WRITE
-
-
-def _unwritable(error: OSError) -> ExitCode:
-    discard_stdout()
-    reason = (error.strerror or str(error)).lower()
-    print_error(
-        f"cannot write to stdout: {reason}", "write to another place, for instance with -o FILE"
-    )
-    return ExitCode.USAGE
 
 
 def _usage(error: typer.TyperException) -> tuple[str, str | None]:

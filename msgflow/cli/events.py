@@ -77,7 +77,7 @@ def command(
 
 
 def _write(selection: Selection, form: EventFormat, output: Path | None) -> None:
-    from msgflow.cli.progress import reading_progress
+    from msgflow.cli.progress import ingest_progress
     from msgflow.events.listing import write_events
     from msgflow.events.tables import write_event_tables
     from msgflow.files.atomic import replacing
@@ -89,7 +89,7 @@ def _write(selection: Selection, form: EventFormat, output: Path | None) -> None
         if not write_events(selection, form, terminal(stream) if stream.isatty() else stream):
             print_note("no events")
         return
-    with reading_progress() as progress:
+    with ingest_progress(quiet=False) as progress:
         if is_directory(output) and (form in TABLES or output.is_dir()):
             if form not in TABLES:
                 raise UsageError(

@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 from msgflow.cli.header_options import header_option
 from msgflow.cli.operation import operation
 from msgflow.cli.options import SELECTION
-from msgflow.cli.output import is_screen, print_note, print_text
+from msgflow.cli.output import is_screen, print_note
 from msgflow.cli.query_command import build_command, choice_of, chosen_by
-from msgflow.cli.sections import (
-    SectionsFormat,
-    json_lines,
-    screen_sections,
-    sections_format,
-    whole_sections,
-)
+from msgflow.cli.sections import SectionsFormat, print_sections, screen_sections
 from msgflow.database import Database
 from msgflow.files.default_files import DEFAULT_DATABASE
 from msgflow.query.catalogue import load_query
-from msgflow.result.layout import screen_width
 
 SECTIONS = ("runs", "hosts", "processes", "nodes", "topics", "counts", "findings")
 (_SECTION,) = load_query("info").variants
@@ -49,7 +43,6 @@ def command(
     Args:
         form (table|json|markdown): By default by the suffix of FILE, else table.
     """
-    form = form or sections_format(output)
     with Database(database) as opened:
         # Its topics are a query of their own.
         results = {
@@ -63,13 +56,8 @@ def command(
             )
             for section in SECTIONS
         }
-    if form is SectionsFormat.JSON:
-        lines = json_lines(results)
-    elif form is SectionsFormat.TABLE and output is None and is_screen() and not wide:
-        lines = screen_sections(results, screen_width())
-    else:
-        lines = whole_sections(results, form)
-    print_text("\n".join(lines), output)
+    is_brief = output is None and is_screen() and not wide
+    print_sections(results, form, output, partial(screen_sections, results) if is_brief else None)
     for section, result in results.items():
         for note in result.notes:
             print_note(f"{section}: {note}")

@@ -95,7 +95,8 @@ def print_result(
         if form is Format.PARQUET and stdout.isatty():
             raise UsageError("Parquet is not for a terminal", "name a file with -o FILE.parquet")
         on_terminal = stdout.isatty()
-        if form is Format.TABLE and not wide and (on_terminal or _is_brief(result, columns)):
+        is_brief = columns is None and result.header is not None and bool(result.header.brief)
+        if form is Format.TABLE and not wide and (on_terminal or is_brief):
             # A pipe has room for all rows, and people read no more than so many columns.
             _print_for_screen(result, columns is not None, most_rows if on_terminal else None)
         else:
@@ -109,11 +110,6 @@ def print_result(
 def is_screen() -> bool:
     """Tell whether stdout is a terminal."""
     return data_stream().isatty()
-
-
-def _is_brief(result: QueryResult, columns: str | None) -> bool:
-    """Tell whether the header says which columns of the result are important."""
-    return columns is None and result.header is not None and bool(result.header.brief)
 
 
 def _print_for_screen(result: QueryResult, is_chosen: bool, most_rows: int | None) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -17,37 +17,39 @@ if TYPE_CHECKING:
 _SECONDS_BETWEEN_LINES = 30.0
 
 
-class _Bar(Protocol):
-    def __call__(self, stage: str, events: int, fraction: float | None, rate: float) -> None: ...
-
-
 @contextmanager
-def ingest_progress(quiet: bool) -> Iterator[Callable[[IngestProgress], None] | None]:
-    """Yield the function that shows the progress of an ingest; None without a terminal."""
-    with _bar(quiet) as bar:
-        if bar is None:
-            yield None
-            return
+def ingest_progress(
+    quiet: bool,
+) -> Iterator[Callable[[IngestProgress | ReadingProgress], None] | None]:
+    """Yield the function that shows how far reading or an ingest is; None without a terminal."""
+    if quiet or sys.stderr is None or not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-        def show(progress: IngestProgress) -> None:
-            bar(progress.stage, progress.events, progress.fraction, progress.events_per_second)
-
-        yield show
-
-
-@contextmanager
-def reading_progress() -> Iterator[Callable[[ReadingProgress], None] | None]:
-    """Yield the function that shows the progress of reading; None without a terminal."""
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.fields[events]:,} events"),
+        TextColumn("{task.fields[rate]:,.0f}/s"),
+        TimeRemainingColumn(),
+    )
     begin = time.monotonic()
-    with _bar(quiet=False) as bar:
-        if bar is None:
-            yield None
-            return
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("opening", total=None, events=0, rate=0.0)
 
-        def show(progress: ReadingProgress) -> None:
-            seconds = time.monotonic() - begin
-            rate = progress.events / seconds if seconds > 0 else 0.0
-            bar("reading the traces", progress.events, progress.fraction, rate)
+        def show(progress: IngestProgress | ReadingProgress) -> None:
+            # Reading alone has one stage, and its rate is not known there.
+            rate = progress.events / max(time.monotonic() - begin, 0.001)
+            bar.update(
+                task,
+                description=getattr(progress, "stage", "reading the traces"),
+                total=None if progress.fraction is None else 1.0,
+                completed=progress.fraction or 0.0,
+                events=progress.events,
+                rate=getattr(progress, "events_per_second", rate),
+            )
 
         yield show
 
@@ -104,34 +106,3 @@ def _fleet_line(progress: FleetProgress) -> str:
         )
     words += [f"{worker}: {number:,}" for worker, number in progress.workers.most_common(3)]
     return ", ".join(words)
-
-
-@contextmanager
-def _bar(quiet: bool) -> Iterator[_Bar | None]:
-    if quiet or sys.stderr is None or not sys.stderr.isatty():
-        yield None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.fields[events]:,} events"),
-        TextColumn("{task.fields[rate]:,.0f}/s"),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("opening", total=None, events=0, rate=0.0)
-
-        def show(stage: str, events: int, fraction: float | None, rate: float) -> None:
-            bar.update(
-                task,
-                description=stage,
-                total=None if fraction is None else 1.0,
-                completed=0.0 if fraction is None else fraction,
-                events=events,
-                rate=rate,
-            )
-
-        yield show

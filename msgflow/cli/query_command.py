@@ -220,8 +220,15 @@ def _command_class(header: Header, own: Set[str]) -> type[TyperCommand]:
             for param in common:
                 param.hidden = True
             super().format_help(ctx, formatter)
-            _print_columns(header)
-            _print_common(common)
+            # The meanings of the columns alone would fill a screen.
+            columns = ", ".join(column.name for column in header.columns)
+            names = ", ".join(param.opts[0] for param in common if param.name != "help")
+            for text in (
+                f"Columns: {columns}; --show explains them",
+                f"Every query also has {names}: msgflow query --help explains them",
+            ):
+                filled = textwrap.fill(text, 79, initial_indent=" ", subsequent_indent=" ")
+                typer.echo(f"{filled}\n")
 
     return QueryCommand
 
@@ -231,41 +238,23 @@ def _help(header: Header) -> str:
     return escape(f"{header.title}.\n\n{header.description}{grain}")
 
 
-def _print_columns(header: Header) -> None:
-    """Print the names of the columns: their meanings alone would fill a screen."""
-    _print_paragraph(
-        f"Columns: {', '.join(column.name for column in header.columns)}; --show explains them"
-    )
-
-
-def _print_common(params: Sequence[TyperOption]) -> None:
-    names = ", ".join(param.opts[0] for param in params if param.name != "help")
-    _print_paragraph(f"Every query also has {names}: msgflow query --help explains them")
-
-
-def _print_paragraph(text: str) -> None:
-    typer.echo(textwrap.fill(text, 79, initial_indent=" ", subsequent_indent=" ") + "\n")
-
-
 def print_options_of_every_query() -> None:
-    """Print the options that every query has, with their help."""
-    params = build_command(load_query("topics")).params
-    _print_panel(
-        "Options of every query",
-        [(", ".join(param.opts), param.help) for param in params if param.name in _OF_EVERY_QUERY],
-    )
-
-
-def _print_panel(title: str, rows: Sequence[tuple[str, str]]) -> None:
-    """Print names and what they mean in a frame."""
+    """Print the options that every query has, with their help, in a frame."""
     from rich.console import Console
     from rich.panel import Panel
     from rich.table import Table
     from rich.text import Text
 
+    params = [
+        param
+        for param in build_command(load_query("topics")).params
+        if param.name in _OF_EVERY_QUERY
+    ]
+    names = [", ".join(param.opts) for param in params]
     grid = Table.grid(padding=(0, 2))
-    grid.add_column(no_wrap=True, min_width=max(len(name) for name, _ in rows))
+    grid.add_column(no_wrap=True, min_width=max(map(len, names)))
     grid.add_column(overflow="fold")
-    for name, meaning in rows:
-        grid.add_row(Text(name, style="bold cyan"), Text(meaning))
-    Console().print(Panel(grid, title=title, title_align="left", border_style="dim"))
+    for name, param in zip(names, params, strict=True):
+        grid.add_row(Text(name, style="bold cyan"), Text(param.help))
+    panel = Panel(grid, title="Options of every query", title_align="left", border_style="dim")
+    Console().print(panel)

@@ -46,69 +46,50 @@ def command(
             so.
         targets: Requirements, as YAML: the summary has the verdicts on them.
     """
-    with TemporaryDirectory() as directory:
-        to_stdout = str(output) == "-"
-        target = Path(directory) / "report.html" if to_stdout else output
-        status = _written(
-            target, compare, through, max_size, lake, where, targets, paths, database, part
-        )
-        if to_stdout:
-            sys.stdout.buffer.write(target.read_bytes())
-        else:
-            print_status(status)
-
-
-def _written(
-    output: Path,
-    compare: str | None,
-    through: str | None,
-    max_size: str,
-    lake: str | None,
-    where: str | None,
-    targets: Path | None,
-    paths: Path,
-    database: Path,
-    part: SliceWords,
-) -> str:
-    """Write the report; return what was done."""
     from msgflow.database import Database
 
-    is_page = output.suffix.lower() in (".html", ".htm")
+    to_stdout = str(output) == "-"
+    is_page = to_stdout or output.suffix.lower() in (".html", ".htm")
     if not is_page and (lake is not None or output.suffix.lower() != ".md"):
         raise UsageError(
             f"a report is a page, or Markdown: its name ends with .html or .md — {output}",
             "-o FILE.html",
         )
     size = read_size(max_size)
-    if lake is not None:
-        given = (*part.values(), compare, through, targets)
-        if any(value is not None for value in given):
-            raise UsageError(
-                "the page of a lake is of all its runs", "--where chooses some of them"
-            )
-        from msgflow.fleet.lake import Lake
-        from msgflow.fleet.lake_page import write_lake_page
+    given = (*part.values(), compare, through, targets)
+    if lake is None:
+        require_no_where(where)
+    elif any(value is not None for value in given):
+        raise UsageError("the page of a lake is of all its runs", "--where chooses some of them")
+    with TemporaryDirectory() as directory:
+        target = Path(directory) / "report.html" if to_stdout else output
+        if lake is not None:
+            from msgflow.fleet.lake import Lake
+            from msgflow.fleet.lake_page import write_lake_page
 
-        page = write_lake_page(Lake.open(lake), output, where=where, max_size=size)
-        for note in page.notes:
+            page = write_lake_page(Lake.open(lake), target, where=where, max_size=size)
+            notes = page.notes
+            status = f"{count(page.runs, 'run')} of {lake} in {target}"
+        else:
+            with Database(database) as opened:
+                report = opened.report(
+                    target,
+                    compare=compare,
+                    targets=targets,
+                    paths=paths,
+                    through=through,
+                    max_size=size,
+                    **part,
+                )
+            print_runs([report.run])
+            notes = report.notes
+            status = f"{report.size:,} bytes written to {target}"
+        for note in notes:
             print_note(note)
-        return f"{count(page.runs, 'run')} of {lake} in {output}: open it in a browser"
-    require_no_where(where)
-    with Database(database) as opened:
-        report = opened.report(
-            output,
-            compare=compare,
-            targets=targets,
-            paths=paths,
-            through=through,
-            max_size=size,
-            **part,
-        )
-    print_runs([report.run])
-    for note in report.notes:
-        print_note(note)
-    what = ": open it in a browser" if is_page else ""
-    return f"{report.size:,} bytes written to {report.path}{what}"
+        if to_stdout:
+            sys.stdout.buffer.write(target.read_bytes())
+        else:
+            print_status(status + ": open it in a browser" * is_page)
 
 
 def read_size(text: str) -> int:

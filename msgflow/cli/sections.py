@@ -6,12 +6,13 @@ import json
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
+from msgflow.cli.output import print_text
 from msgflow.export.formats import by_suffix, json_rows
-from msgflow.result.layout import lay_out
+from msgflow.result.layout import lay_out, screen_width
 from msgflow.text.wrapping import wrap
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping
     from pathlib import Path
 
     from msgflow.result.query_result import QueryResult
@@ -32,12 +33,25 @@ _SUFFIXES = {
 }
 
 
-def sections_format(path: Path | None) -> SectionsFormat:
-    """Return the format for a file by its suffix, a table for stdout."""
-    return SectionsFormat.TABLE if path is None else by_suffix(path, _SUFFIXES)
+def print_sections(
+    results: Mapping[str, QueryResult],
+    form: SectionsFormat | None,
+    output: Path | None,
+    brief: Callable[[int], Iterator[str]] | None,
+) -> None:
+    """Print results; `brief` returns the lines of a table of a width, where people read it."""
+    if form is None:
+        form = SectionsFormat.TABLE if output is None else by_suffix(output, _SUFFIXES)
+    if form is SectionsFormat.JSON:
+        lines = _json_lines(results)
+    elif form is SectionsFormat.TABLE and brief is not None:
+        lines = brief(screen_width())
+    else:
+        lines = _whole_sections(results, form)
+    print_text("\n".join(lines), output)
 
 
-def json_lines(results: Mapping[str, QueryResult]) -> Iterator[str]:
+def _json_lines(results: Mapping[str, QueryResult]) -> Iterator[str]:
     """Yield the lines of an object with a list of rows for each result."""
     yield "{"
     for position, (section, result) in enumerate(results.items(), start=1):
@@ -66,7 +80,7 @@ def screen_sections(
             yield from wrap(f"({note})", width)
 
 
-def whole_sections(results: Mapping[str, QueryResult], form: SectionsFormat) -> Iterator[str]:
+def _whole_sections(results: Mapping[str, QueryResult], form: SectionsFormat) -> Iterator[str]:
     """Yield lines of tables with all columns."""
     from msgflow.export.table import markdown_lines, table_lines
 

@@ -189,7 +189,13 @@ def command(
                 watcher.on_passed = remove_chunk
             has_failed = _record(program, output, step_ns, live, on_screen=on_screen)
         elif once:
-            show(watch_finished(_finished(word), watcher))
+            finished = path_of(str(word)).absolute()
+            if not finished.is_dir():
+                raise TraceError(
+                    f"no such directory — {word}",
+                    "--once reads the directory of a rotated recording",
+                )
+            show(watch_finished(finished, watcher))
         else:
             place = watched_place(word)
             with (
@@ -237,17 +243,6 @@ def _only_word(
     return words[0] if words else None
 
 
-def _finished(word: str | None) -> Path:
-    """Return the directory of a finished recording."""
-    assert word is not None
-    place = path_of(word).absolute()
-    if not place.is_dir():
-        raise TraceError(
-            f"no such directory — {word}", "--once reads the directory of a rotated recording"
-        )
-    return place
-
-
 @contextmanager
 def _pages(port: int | None, clock_sync: str) -> Iterator[WindowDatabase | None]:
     """Serve pages of the last window during the block, unless there is no port for them."""
@@ -284,15 +279,11 @@ def _alarm(targets: Path, paths: Path, *, with_flows: bool) -> Alarm:
     from msgflow.watch import Alarm
 
     file = read_targets(targets)
-    named = [target.path_name for target in file.targets if target.path_name is not None]
-    known = read_paths(paths) if named else None
+    named = [target.path_name.value for target in file.targets if target.path_name is not None]
     places = {}
-    for name in named:
-        assert known is not None
-        path = known.named(name.value)
-        places[name.value] = {
-            word: [text.value for text in texts] for word, texts in path.places.items()
-        }
+    if named:
+        known = read_paths(paths)
+        places = {name: known.named(name).words() for name in named}
     return Alarm(file, places, print_note, with_flows=with_flows)
 
 

@@ -4,22 +4,15 @@ from __future__ import annotations
 
 import shlex
 from dataclasses import replace
-from itertools import chain
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
 from msgflow.cli.operation import asks
-from msgflow.cli.output import database_option, print_note, print_runs, print_status, print_text
-from msgflow.cli.sections import (
-    SectionsFormat,
-    json_lines,
-    screen_sections,
-    sections_format,
-    whole_sections,
-)
+from msgflow.cli.output import database_option, print_note, print_runs, print_status
+from msgflow.cli.sections import SectionsFormat, print_sections, screen_sections
 from msgflow.database import Database
 from msgflow.files.default_files import DEFAULT_DATABASE
-from msgflow.result.layout import screen_width
 from msgflow.run.slice import SliceWords
 from msgflow.text.values import printable
 from msgflow.text.wrapping import wrap
@@ -83,24 +76,16 @@ def command(
     Args:
         form (table|json|markdown): By default by the suffix of FILE, else table.
     """
-    form = form or sections_format(output)
     print_runs([found.run])
-    if form is SectionsFormat.JSON:
-        lines = json_lines(found.sections)
-    elif wide or form is SectionsFormat.MARKDOWN:
-        lines = whole_sections(found.sections, form)
-    else:
-        width = screen_width()
-        lines = chain(_verdict(found, width), screen_sections(_shown(found), width, is_chosen=True))
-    print_text("\n".join(lines), output)
+    print_sections(found.sections, form, output, None if wide else partial(_brief, found))
     for note in [*_more(found, part, database), *found.notes]:
         print_note(note)
     for step in found.steps:
         print_status(f"next: {_command(step, part, database)}")
 
 
-def _verdict(found: Explanation, width: int) -> Iterator[str]:
-    """Yield the worst sentences, each with an empty line behind, and who else is to blame."""
+def _brief(found: Explanation, width: int) -> Iterator[str]:
+    """Yield the worst sentences, each with an empty line behind, who else is to blame, and why."""
     rows = found.verdict.table.to_pylist()
     # What was found of the recording costs nothing, and comes first.
     shown = sum(row["cost_ns"] is None for row in rows) + _CULPRITS
@@ -110,6 +95,7 @@ def _verdict(found: Explanation, width: int) -> Iterator[str]:
     for sentence in sentences:
         yield from wrap(printable(sentence), width)
         yield ""
+    yield from screen_sections(_shown(found), width, is_chosen=True)
 
 
 def _shown(found: Explanation) -> dict[str, QueryResult]:
