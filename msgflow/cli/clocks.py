@@ -22,7 +22,6 @@ class _ClocksGroup(AskingGroup):
     default = "show"
 
     def write(self, result: QueryResult, form: Any, given: dict[str, Any]) -> None:
-        """Write the clocks, and say whether times compare."""
         print_rows(result, form, given)
         if given["own_by"] != "pair":
             with Database(given["database"]) as opened:

@@ -32,7 +32,6 @@ class _Word(str):
     name: str
 
     def startswith(self, *prefix: Any) -> bool:
-        """Tell whether the name without escapes begins so."""
         return self.name.startswith(*prefix)
 
 

@@ -207,10 +207,7 @@ def _command_class(header: Header, own: Set[str]) -> type[TyperCommand]:
     """Return the class of a command; `own` options are not those of every query."""
 
     class QueryCommand(TyperCommand):
-        """A command whose help ends with the columns of the result."""
-
         def format_help(self, ctx: Any, formatter: Any) -> None:
-            """Print the help of Typer, without what every query has, then the columns."""
             # Completion still offers the options: they are hidden only here.
             common = [
                 param

@@ -52,7 +52,6 @@ def print_sections(
 
 
 def _json_lines(results: Mapping[str, QueryResult]) -> Iterator[str]:
-    """Yield the lines of an object with a list of rows for each result."""
     yield "{"
     for position, (section, result) in enumerate(results.items(), start=1):
         rows = ",\n    ".join(json_rows(result))
@@ -81,7 +80,6 @@ def screen_sections(
 
 
 def _whole_sections(results: Mapping[str, QueryResult], form: SectionsFormat) -> Iterator[str]:
-    """Yield lines of tables with all columns."""
     from msgflow.export.table import markdown_lines, table_lines
 
     for position, (section, result) in enumerate(results.items()):

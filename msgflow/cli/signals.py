@@ -82,7 +82,6 @@ def restore_default_actions() -> None:
 
 
 def _exit_code(kind: type[KeyboardInterrupt]) -> ExitCode:
-    """Return the exit code of a command that a signal ended."""
     return ExitCode.TERMINATED if issubclass(kind, Terminated) else ExitCode.INTERRUPTED
 
 

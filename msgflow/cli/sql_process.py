@@ -101,8 +101,6 @@ class WarmSql:
 
 
 class _Stream:
-    """A file that Arrow writes to."""
-
     closed = False
 
     def __init__(self, write: Write) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from contextlib import closing
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -42,20 +42,23 @@ def command(
             4GB.
     """
     from msgflow.cli.sql_process import WarmSql
-    from msgflow.view.server import serve, serve_single
+    from msgflow.view.server import listening, running, single_application
     from msgflow.view.sql_page import MOST_SECONDS
 
-    def started(address: str) -> None:
+    def serve(server: Any, listener: Any, address: str) -> None:
         print_status(address)
         print_status("Ctrl-C ends it")
         if browser and not _open(address):
             print_note("no browser could be opened here: open the address yourself")
+        server.run(sockets=[listener])
 
     if lake is None:
         require_no_where(where)
-        sql = WarmSql(database, memory_limit=memory_limit, seconds=MOST_SECONDS)
-        with closing(sql):
-            serve(database, sql, port=port, memory_limit=memory_limit, started=started)
+        with (
+            closing(WarmSql(database, memory_limit=memory_limit, seconds=MOST_SECONDS)) as sql,
+            running(database, sql, port=port, memory_limit=memory_limit) as served,
+        ):
+            serve(*served)
         return
     from msgflow.fleet.lake import Lake
     from msgflow.fleet.lake_page import lake_page
@@ -63,12 +66,13 @@ def command(
     opened = Lake.open(lake)
     # Made once before the browser asks, so that errors are printed here.
     first = [lake_page(opened, where=where).content]
-    serve_single(
-        lake if "://" in lake else os.path.realpath(lake),
-        lambda: first.pop() if first else lake_page(opened, where=where).content,
-        port=port,
-        started=started,
-    )
+
+    def page() -> str:
+        return first.pop() if first else lake_page(opened, where=where).content
+
+    place = lake if "://" in lake else os.path.realpath(lake)
+    with listening(place, port, lambda token: single_application(page, token)) as served:
+        serve(*served)
 
 
 def require_no_where(where: str | None) -> None:

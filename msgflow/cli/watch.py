@@ -218,7 +218,6 @@ def command(
 def _only_word(
     words: list[str], program: list[str], *, once: bool, directory: Path | None
 ) -> str | None:
-    """Return the session or directory that is named, if any."""
     if program:
         alone = f"msgflow watch -- {shlex.join(program)} {_START}"
         if words:
@@ -273,7 +272,6 @@ def _published(reports: Iterator[WindowReport], publisher: Diagnostics) -> Itera
 
 
 def _alarm(targets: Path, paths: Path, *, with_flows: bool) -> Alarm:
-    """Return the alarm of a file of targets."""
     from msgflow.paths import read_paths
     from msgflow.verify import read_targets
     from msgflow.watch import Alarm

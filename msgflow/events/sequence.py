@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import duckdb
 import pyarrow as pa
 
-from msgflow.events.values import printable, readable, readable_text
-from msgflow.sql.json_fields import column_name, json_fields, label_of
+from msgflow.sql.json_fields import MOST_LAMBDAS, column_name, json_fields, label_of, member
 from msgflow.sql.quoting import literal
 from msgflow.trace import COMMON_SCHEMA
 from msgflow.trace.columns import BASE
@@ -38,13 +37,15 @@ COLUMNS = (
 """The columns that events of every name have, where a format has columns."""
 
 _WITHOUT = -1
+# Controls, characters without a shape, and line separators: no terminal may obey a trace.
+_UNPRINTABLE = r"[\p{C}\p{Zl}\p{Zp}]"
+_REPLACEMENT = "\N{REPLACEMENT CHARACTER}"
 
 
 class Sequencer:
     """Renders rounds of events; a context manager."""
 
     def __init__(self, traces: Sequence[TraceInfo], rendering: Rendering) -> None:
-        """Prepare to render events of these traces."""
         self._rendering = rendering
         timeless = [str(trace.index) for trace in traces if not trace.has_time]
         self._time = "ts_ns"
@@ -104,7 +105,7 @@ def text_line(name: str, payload: pa.Schema) -> str:
         f", {literal(f' {field.name}=')}, {_readable(column_name(position), field)}"
         for position, field in enumerate(payload)
     )
-    process = printable("nullif(procname, '')")
+    process = _printable("nullif(procname, '')")
     return f"""
     concat(
         coalesce(
@@ -112,11 +113,11 @@ def text_line(name: str, payload: pa.Schema) -> str:
             || format('{{:03d}}Z', ts_ns % 1000),
             '-'
         ),
-        ' ', coalesce({printable("hostname")}, '-'), ' ',
+        ' ', coalesce({_printable("hostname")}, '-'), ' ',
         coalesce({process}, '-'), '/', coalesce(CAST(vpid AS VARCHAR), '-'),
         '/', coalesce(CAST(vtid AS VARCHAR), '-'),
         ' [', coalesce(CAST(cpu_id AS VARCHAR), '-'), '] ',
-        {printable(literal(name))}{fields}
+        {_printable(literal(name))}{fields}
     ) AS line"""
 
 
@@ -142,6 +143,50 @@ def _common(column: str, name: str) -> str:
 
 def _readable(expression: str, field: pa.Field) -> str:
     is_hexadecimal = (field.metadata or {}).get(BASE) == b"16"
-    value = readable(expression, field.type, is_hexadecimal=is_hexadecimal)
+    value = _value(expression, field.type, is_hexadecimal=is_hexadecimal)
     label = label_of(expression, field)
-    return value if label is None else f"coalesce({readable_text(label)}, {value})"
+    return value if label is None else f"coalesce({_readable_text(label)}, {value})"
+
+
+def _printable(expression: str) -> str:
+    """Return the SQL of a text without unprintable characters."""
+    return f"regexp_replace({expression}, '{_UNPRINTABLE}', '{_REPLACEMENT}', 'g')"
+
+
+def _readable_text(expression: str) -> str:
+    """Return the SQL of a text or of JSON as people read it: quoted as in JSON."""
+    return _printable(f"CAST(to_json({expression}) AS VARCHAR)")
+
+
+def _value(
+    expression: str, data_type: pa.DataType, *, is_hexadecimal: bool = False, lambdas: int = 0
+) -> str:
+    """Return the SQL of a value as people read it, never NULL.
+
+    Text is quoted as in JSON, lists are `[1, 2]`, structures `{name=value, …}` without missing
+    members. Values inside more than two lists are as in JSON.
+    """
+    types = pa.types
+    is_deep = types.is_list(data_type) and lambdas == MOST_LAMBDAS
+    if types.is_string(data_type) or is_deep:
+        text = _readable_text(expression)
+    elif types.is_list(data_type):
+        inner = data_type.value_type
+        element = _value("element", inner, is_hexadecimal=is_hexadecimal, lambdas=lambdas + 1)
+        elements = f"list_transform({expression}, lambda element: {element})"
+        text = f"'[' || array_to_string({elements}, ', ') || ']'"
+    elif types.is_struct(data_type):
+        members = ", ".join(
+            f"CASE WHEN {value} IS NOT NULL THEN {literal(f'{field.name}=')} || "
+            f"{_value(value, field.type, lambdas=lambdas)} END"
+            for place, field in enumerate(data_type)
+            for value in [member(expression, place)]
+        )
+        joined = f"concat_ws(', ', {members})" if members else "''"
+        text = f"'{{' || {joined} || '}}'"
+        text = f"CASE WHEN {expression} IS NOT NULL THEN {text} END"
+    elif is_hexadecimal and types.is_unsigned_integer(data_type):
+        text = f"format('0x{{:x}}', {expression})"
+    else:
+        text = f"CAST({expression} AS VARCHAR)"
+    return f"coalesce({text}, 'null')"

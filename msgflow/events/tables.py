@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import re
 import shutil
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
@@ -43,9 +44,9 @@ def write_event_tables(
     """
     with _new_directory(directory) as temporary, contextlib.ExitStack() as opened:
         files = _Files(temporary, form, opened)
-        sequencer = opened.enter_context(
-            Sequencer(selection.traces.traces, _csv_row if form is EventFormat.CSV else _typed_row)
-        )
+        # CSV holds no nested values, Parquet no structure without a member.
+        is_text = pa.types.is_nested if form is EventFormat.CSV else _has_empty_structure
+        sequencer = opened.enter_context(Sequencer(selection.traces.traces, partial(_row, is_text)))
         count = 0
         for events in selection.rounds(progress):
             for item in events:
@@ -69,14 +70,12 @@ class _Files:
         self._bytes = 0
 
     def add(self, name: str, rows: pa.Table) -> None:
-        """Take the next rows of an event."""
         self._held.setdefault(name, []).append(rows)
         self._bytes += rows.nbytes
         if self._bytes > MOST_BYTES_HELD:
             self.flush()
 
     def flush(self) -> None:
-        """Write what is held."""
         for name, parts in self._held.items():
             rows = pa.concat_tables(parts)
             if name not in self._writers:
@@ -98,16 +97,6 @@ class _Files:
         return f"{stem}.{self._form}"
 
 
-def _typed_row(name: str, payload: pa.Schema) -> str:
-    expressions = []
-    for position, field in enumerate(payload):
-        expression = column_name(position)
-        if _has_empty_structure(field.type):  # which Parquet cannot hold
-            expression = f"CAST(to_json({exact(expression, field.type)}) AS VARCHAR)"
-        expressions.append(expression)
-    return _row(name, payload, expressions)
-
-
 def _has_empty_structure(data_type: pa.DataType) -> bool:
     if pa.types.is_list(data_type):
         return _has_empty_structure(data_type.value_type)
@@ -117,20 +106,13 @@ def _has_empty_structure(data_type: pa.DataType) -> bool:
     return False
 
 
-def _csv_row(name: str, payload: pa.Schema) -> str:
-    expressions = []
-    for position, field in enumerate(payload):
-        expression = column_name(position)
-        if pa.types.is_nested(field.type):
-            expression = f"CAST(to_json({exact(expression, field.type)}) AS VARCHAR)"
-        expressions.append(expression)
-    return _row(name, payload, expressions)
-
-
-def _row(name: str, payload: pa.Schema, expressions: list[str]) -> str:
+def _row(is_text: Callable[[pa.DataType], bool], name: str, payload: pa.Schema) -> str:
     taken = set(COLUMNS)
     parts = [common_columns(name)]
-    for field, expression in zip(payload, expressions, strict=True):
+    for position, field in enumerate(payload):
+        expression = column_name(position)
+        if is_text(field.type):
+            expression = f"CAST(to_json({exact(expression, field.type)}) AS VARCHAR)"
         column = field.name
         while column.lower() in taken:
             column = f"field_{column}"

@@ -101,7 +101,6 @@ class _Writer:
                 yield from batch.to_pylist()
 
     def describe(self) -> None:
-        """Write clocks, tracks, and the names that slices refer to."""
         start_ns = self.run.start_ns or 0
         packet = self.builder.create_packet()
         # Timestamps count by the first clock; the second one lets the UI show points in time.
@@ -195,7 +194,6 @@ class _Writer:
         return slices, arrows
 
     def values(self) -> int:
-        """Write what counters show; return how many values."""
         count = 0
         for row in self.rows("perfetto_value"):
             packet = self.event(row, self.packets.TrackEvent.TYPE_COUNTER)
@@ -205,16 +203,13 @@ class _Writer:
         return count
 
     def gaps(self) -> int:
-        """Write a track of gaps for each host that has any; return how many gaps."""
         return self.named_slices("perfetto_gap", "gap", {"lost_events": "event_count"})
 
     def states(self) -> int:
-        """Write states of threads to the kernel, and what cores ran; return how many slices."""
         noted = {name: name for name in ("cpu", "priority", "woken_by")}
         return self.named_slices("perfetto_state", "schedule", noted)
 
     def named_slices(self, query: str, category: str, noted: Mapping[str, str]) -> int:
-        """Write slices that bring their names and tracks; return how many."""
         kind = self.packets.TrackEvent
         count = 0
         known = None
@@ -238,7 +233,6 @@ class _Writer:
         return count
 
     def user_events(self) -> int:
-        """Write the user's events with their fields as arguments; return how many."""
         count = 0
         for row in self.rows("perfetto_event"):
             packet = self.event(row, self.packets.TrackEvent.TYPE_INSTANT)

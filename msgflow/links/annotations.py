@@ -132,7 +132,6 @@ def _key(link: MatchedLink) -> tuple[str, int, tuple[int, ...], tuple[int, ...]]
 
 
 def _link_counts(con: duckdb.DuckDBPyConnection, run_id: int) -> tuple[int, int]:
-    """Return the number of indirect links from files, and from the trace."""
     ((of_file, of_trace),) = internal_sql().run(con, "link_source", {"run_id": run_id}).fetchall()
     return of_file, of_trace
 

@@ -305,7 +305,6 @@ class _Tools:
 
     @contextlib.contextmanager
     def _opened(self) -> Iterator[Database]:
-        """Open the database for one call."""
         with Database(self._path, memory_limit=self._memory_limit) as database:
             bound_process(database.connection)
             try:

@@ -44,6 +44,17 @@ if TYPE_CHECKING:
     from msgflow.sql.value import Value
 
 RESERVED = ("runs", "start_ns", "end_ns")
+# By the note of a header: what has rows where that was recorded, and what to say where it was not.
+_LACKING = {
+    "kernel": (
+        "thread_state",
+        "the kernel was not traced: msgflow record --kernel, see docs/scheduling.md",
+    ),
+    "samples": (
+        "stack_sample",
+        "no functions were sampled: msgflow record --profile 99, see docs/functions.md",
+    ),
+}
 _COLUMN = re.compile(r'Referenced column "([^"]*)"')
 # Errors that a user's condition may cause: the queries themselves are tested.
 _OF_CONDITIONS = (
@@ -101,8 +112,13 @@ def run_query(
         except _OF_CONDITIONS as error:
             if selection.where is None:
                 raise
+            names = [column.name for column in header.columns]
+            unknown = _COLUMN.search(str(error))
             raise UsageError(
-                f"--where cannot be evaluated: {first_line(error)}", _columns_hint(header, error)
+                f"--where cannot be evaluated: {first_line(error)}",
+                did_you_mean(
+                    unknown[1] if unknown else "", names, f"the columns are {', '.join(names)}"
+                ),
             ) from error
     table, missing, has_rows = shown_rows(table, internal=internal, on_hidden=_on_hidden)
     notes = [] if runs else ["the database holds no run yet"]
@@ -174,7 +190,8 @@ def bind(
     for name, value in given.items():
         exact = name if name in names else name.removesuffix("_")
         if exact not in names:
-            raise UsageError(f"{called} has no such parameter — {name}", _parameters(header))
+            known = f"its parameters are {', '.join(names)}" if names else "it has none"
+            raise UsageError(f"{called} has no such parameter — {name}", known)
         by_name[exact] = value
     bound: dict[str, Value] = {}
     for param in header.params:
@@ -237,27 +254,14 @@ def _untraced(
     connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], note: str | None
 ) -> list[str]:
     """Return notes on missing events, if the rows would have come from them."""
-    if note == "kernel" and not _kernel_was_traced(connection, runs):
-        return ["the kernel was not traced: msgflow record --kernel, see docs/scheduling.md"]
-    if note == "samples" and not _were_sampled(connection, runs):
-        return ["no functions were sampled: msgflow record --profile 99, see docs/functions.md"]
-    return _without_layer(connection, runs, note) if note in {"requests", "goals"} else []
-
-
-def _kernel_was_traced(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run]) -> bool:
-    ((known,),) = connection.execute(
-        "SELECT count(*) > 0 FROM main.thread_state WHERE list_contains($runs, run_id)",
-        {"runs": [run.run_id for run in runs]},
-    ).fetchall()
-    return bool(known)
-
-
-def _were_sampled(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run]) -> bool:
-    sampled = connection.execute(
-        "SELECT 1 FROM main.stack_sample WHERE list_contains(?, run_id) LIMIT 1",
+    if note not in _LACKING:
+        return _without_layer(connection, runs, note) if note in {"requests", "goals"} else []
+    view, lacking = _LACKING[note]
+    found = connection.execute(
+        f"SELECT 1 FROM main.{view} WHERE list_contains(?, run_id) LIMIT 1",
         [[run.run_id for run in runs]],
     )
-    return bool(sampled.fetchall())
+    return [] if found.fetchall() else [lacking]
 
 
 def _without_callbacks(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run]) -> list[str]:
@@ -288,18 +292,6 @@ def _without_layer(
     ).fetchall()
     titles = {run.run_id: "" if len(runs) == 1 else f"run {run.title}: " for run in runs}
     return [f"{titles[run_id]}{detail}" for run_id, detail in rows]
-
-
-def _columns_hint(header: Header, error: Exception) -> str:
-    names = [column.name for column in header.columns]
-    found = _COLUMN.search(str(error))
-    return did_you_mean(found[1] if found else "", names, f"the columns are {', '.join(names)}")
-
-
-def _parameters(header: Header) -> str:
-    if not header.params:
-        return "it has none"
-    return f"its parameters are {', '.join(param.name for param in header.params)}"
 
 
 def shown_rows(

@@ -139,7 +139,11 @@ def _explained(
     paths = ask_of("e2e-latency", asked, **ends)
     if not _has_flows(paths):
         raise _nothing(partial(ask_of, part=asked), place)
-    skipped = _warm_up(connection, run) if asked.start is None else 0.0
+    skipped = 0.0
+    if asked.start is None:
+        # Of the flows that were read, as `compare` finds it.
+        ((last_ns,),) = internal_sql().run(connection, "warm_up", {}).fetchall()
+        skipped = warm_up_seconds(None if last_ns is None else last_ns - (run.start_ns or 0))
     # It ends with a step, which may lie behind all that was asked for.
     if (run.start_ns or 0) + skipped * 1e9 >= asked.window([run]).end_ns:
         skipped = 0.0
@@ -202,7 +206,14 @@ def _explained(
             dict.fromkeys(
                 [
                     *_cures(verdict),
-                    *_without(skipped),
+                    *(
+                        [
+                            f"without the first {skipped:g} s, a warm-up: the longest latencies lie"
+                            " there (--start 0s reads them, too)"
+                        ]
+                        if skipped
+                        else []
+                    ),
                     *ends_here,
                     *_outlier(run, paths.table.to_pylist()[0]),
                     *paths.notes,
@@ -239,7 +250,6 @@ def _worst(verdict: pa.Table, paths: QueryResult) -> str:
 
 
 def _cures(verdict: pa.Table) -> Iterator[str]:
-    """Yield how to know what the sentences say is not known."""
     said = " ".join(verdict["sentence"].to_pylist())
     for unknown, cure in _UNKNOWN.items():
         if unknown in said:
@@ -248,21 +258,6 @@ def _cures(verdict: pa.Table) -> Iterator[str]:
 
 def _has_flows(paths: QueryResult) -> bool:
     return any(row["pairs"] for row in paths.table.to_pylist())
-
-
-def _warm_up(connection: duckdb.DuckDBPyConnection, run: Run) -> float:
-    """Return for how many seconds the flows that were read warm up, as `compare` finds it."""
-    ((last_ns,),) = internal_sql().run(connection, "warm_up", {}).fetchall()
-    return warm_up_seconds(None if last_ns is None else last_ns - (run.start_ns or 0))
-
-
-def _without(skipped: float) -> Iterator[str]:
-    """Yield that a warm-up is left out."""
-    if skipped:
-        yield (
-            f"without the first {skipped:g} s, a warm-up: the longest latencies lie there"
-            " (--start 0s reads them, too)"
-        )
 
 
 def _outlier(run: Run, path: dict[str, Any]) -> Iterator[str]:

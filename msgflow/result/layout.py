@@ -390,7 +390,6 @@ def _heights(column: ShownColumn) -> Callable[[int], list[int]]:
 
 
 def _is_alike(column: ShownColumn) -> bool:
-    """Tell whether all rows have the same cell, short enough for a note."""
     return len(column.cells) > 1 and len(set(column.cells)) == 1 and column.width <= _WORD
 
 

@@ -77,7 +77,6 @@ def _seconds(column: Any) -> Any:
 
 
 def _starts(table: pa.Table, runs: Sequence[Run]) -> Any:
-    """Return when the run of each row started."""
     import pyarrow
     from pyarrow import compute
 

@@ -164,8 +164,6 @@ def verify(
 
 
 class _Work:
-    """Measures the targets one after the other."""
-
     def __init__(
         self,
         connection: duckdb.DuckDBPyConnection,
@@ -182,7 +180,6 @@ class _Work:
         self.notes: dict[str, None] = {}
 
     def rows(self, target: Target) -> Iterator[dict[str, Any]]:
-        """Yield the verdicts on a target, in the order of the file."""
         metrics = SUBJECTS[target.kind].metrics
         found: list[tuple[int, int, dict[str, Any]]] = []
         numbered = list(enumerate(target.requirements))
@@ -250,7 +247,6 @@ class _Work:
     def _ask(
         self, name: str, sql: str, target: Target, given: dict[str, Value]
     ) -> list[dict[str, Any]]:
-        """Return the rows of SQL around the body of a named query."""
         header = load_query(name)
         params = tuple(
             Param(key, "VARCHAR[]" if isinstance(value, list) else "VARCHAR", None, True, "")

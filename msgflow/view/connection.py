@@ -1,8 +1,8 @@
 """Connections to the server of `msgflow ui`: one whose request does not arrive is closed.
 
 uvicorn has no limit for the time in which a request arrives. It takes a protocol of asyncio in
-place of its own: ours passes everything on, and closes the connection if its time is over. The
-application tells it when a request has arrived, and when it is answered.
+place of its own: ours closes the connection if its time is over. The application tells it when a
+request has arrived, and when it is answered.
 """
 
 from __future__ import annotations
@@ -19,14 +19,11 @@ if TYPE_CHECKING:
 SECONDS_FOR_A_REQUEST = 10.0
 
 
-class Connection(asyncio.Protocol):
+class Connection(H11Protocol):
     """A connection of uvicorn that is closed if a request takes too long to arrive."""
 
     # By the addresses of both ends, which the application knows as well.
     _open: ClassVar[dict[tuple[Any, Any], Connection]] = {}
-
-    def __init__(self, *given: Any, **named: Any) -> None:
-        self._http = H11Protocol(*given, **named)
 
     @classmethod
     def of(cls, scope: Scope) -> Connection | None:
@@ -35,16 +32,15 @@ class Connection(asyncio.Protocol):
 
     def connection_made(self, transport: Any) -> None:
         """Wait for the first request."""
-        self._transport = transport
         self._ends = tuple(map(transport.get_extra_info, ("peername", "sockname")))
         self._open[self._ends] = self
+        super().connection_made(transport)
         self.wait()
-        self._http.connection_made(transport)
 
     def wait(self) -> None:
         """Wait for a request, and no longer than it may take."""
         loop = asyncio.get_running_loop()
-        self._timer = loop.call_later(SECONDS_FOR_A_REQUEST, self._transport.close)
+        self._timer = loop.call_later(SECONDS_FOR_A_REQUEST, self.transport.close)
 
     def stop(self) -> None:
         """Wait no more: the request has arrived."""
@@ -54,23 +50,7 @@ class Connection(asyncio.Protocol):
         """Forget the connection."""
         self.stop()
         del self._open[self._ends]
-        self._http.connection_lost(exc)
-
-    def data_received(self, data: bytes) -> None:
-        """Pass on what the client sends."""
-        self._http.data_received(data)
-
-    def eof_received(self) -> None:
-        """Pass on that the client sends no more; the transport then closes itself."""
-        self._http.eof_received()
-
-    def pause_writing(self) -> None:
-        """Pass on that the client reads too slowly."""
-        self._http.pause_writing()
-
-    def resume_writing(self) -> None:
-        """Pass on that the client has read."""
-        self._http.resume_writing()
+        super().connection_lost(exc)
 
 
 def timed(app: ASGIApp) -> ASGIApp:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import pyarrow as pa
@@ -10,6 +11,7 @@ from msgflow.query.catalogue import load_query
 from msgflow.query.runner import run_query
 from msgflow.run.slice import Slice
 from msgflow.text.shell import shell_joined
+from msgflow.view.encoded import encoded_result
 from msgflow.view.page_query import run_page_query
 from msgflow.view.table_encoding import encode
 
@@ -52,20 +54,15 @@ def critical_path(
     result = run_query(connection, header, asked, Slice(run.run_id))
     command = ["msgflow", "flow", "--take", str(asked["take"]), "--why"]
     # The page shows the path itself.
-    return encode(
-        result.to_arrow().drop_columns(["path"]),
-        meta={
-            "from": first,
-            "to": end["to_topic"],
-            "take_id": asked["take"],
-            "notes": result.notes,
-            "columns": {
-                column.name: column.description
-                for column in header.columns
-                if column.name != "path"
-            },
-            "command": shell_joined([*command, "--from", first, "--detail", "full"]),
-        },
-        origin_ns=origin_ns,
-        units=result.units,
+    shown = replace(
+        result,
+        table=result.table.drop_columns(["path"]),
+        header=replace(header, columns=tuple(c for c in header.columns if c.name != "path")),
     )
+    meta = {
+        "from": first,
+        "to": end["to_topic"],
+        "take_id": asked["take"],
+        "command": shell_joined([*command, "--from", first, "--detail", "full"]),
+    }
+    return encoded_result(shown, meta, origin_ns)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import threading
 from collections import OrderedDict
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
@@ -21,9 +21,8 @@ from msgflow.run.window import WHOLE, Window
 from msgflow.sql.statement import internal_sql
 from msgflow.text.shell import shell_joined
 from msgflow.view.critical_path import critical_path
-from msgflow.view.encoded import encoded_comparison, encoded_section
-from msgflow.view.page_query import page_query, run_page_query
-from msgflow.view.scratch import Scratch
+from msgflow.view.encoded import encoded_comparison, encoded_result, encoded_section
+from msgflow.view.page_query import Scratch, page_query, run_page_query
 from msgflow.view.sql_page import examples, words
 from msgflow.view.summary import (
     MOST_PATHS,
@@ -141,35 +140,20 @@ class Pages:
 
     def _slice(self, extent: Extent, params: Params) -> Slice:
         """Return the run, and the window that the page asks for; the whole run has no window."""
-        part = Slice(extent.run.run_id)
-        if self._window == WHOLE and not {"start", "end"} & params.keys():
-            return part
         window = self.window(extent, params)
         # Only those ends that were given: a command then has no other ones.
         is_begun = "start" in params or self._window.start_ns != WHOLE.start_ns
         is_ended = "end" in params or self._window.end_ns != WHOLE.end_ns
-        return replace(
-            part,
-            start=window.start_ns if is_begun else None,
-            end=window.end_ns if is_ended else None,
+        return Slice(
+            extent.run.run_id,
+            window.start_ns if is_begun else None,
+            window.end_ns if is_ended else None,
         )
 
     def part(self, extent: Extent, params: Params) -> Part:
         """Return the run and the window that the page asks for."""
         part = self._slice(extent, params)
         return Part(part, _window_options(extent, part))
-
-    def _run(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
-        return encode(run_page_query(connection, "run", {}), units=_units("run"))
-
-    def _word(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
-        return encode(words(connection))
-
-    def _example(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
-        return encode(examples())
-
-    def _query(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
-        return self.named(connection, str(params.get("name")), params)[1]
 
     def named(
         self, connection: duckdb.DuckDBPyConnection, name: str, params: Params
@@ -179,22 +163,15 @@ class Pages:
             raise UsageError(f"pages do not show such a query — {name}")
         header = load_query(name)
         extent = self.extent(connection, params)
-        internal = _is_set(params, "internal")
+        internal = _is_internal(params)
         part = self._slice(extent, params) if header.has_window else Slice(extent.run.run_id)
         result = run_query(connection, header, {}, part, internal=internal)
-        content = encode(
-            result.to_arrow(),
-            meta={
-                "title": header.title,
-                "description": header.description,
-                "notes": result.notes,
-                "columns": {column.name: column.description for column in header.columns},
-                "command": _command(name, extent, part, internal=internal),
-            },
-            origin_ns=extent.origin_ns,
-            units=result.units,
-        )
-        return result, content
+        meta = {
+            "title": header.title,
+            "description": header.description,
+            "command": _command(name, extent, part, internal=internal),
+        }
+        return result, encoded_result(result, meta, extent.origin_ns)
 
     def _warm_up(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
         extent = self.extent(connection, params)
@@ -367,7 +344,7 @@ class Pages:
         table = run_page_query(connection, name, values | _own(name, params, values))
         meta = {}
         if name in _LISTED_BY:
-            part, internal = self._slice(extent, params), _is_set(params, "internal")
+            part, internal = self._slice(extent, params), _is_internal(params)
             meta["command"] = _command(_LISTED_BY[name], extent, part, internal=internal)
         return encode(table, meta=meta, units=_units(name))
 
@@ -380,10 +357,14 @@ class Pages:
 
 
 ANSWERS: dict[str, Callable[[Pages, duckdb.DuckDBPyConnection, Params], bytes]] = {
-    "run": Pages._run,
-    "word": Pages._word,
-    "example": Pages._example,
-    "query": Pages._query,
+    "run": lambda _, connection, params: encode(
+        run_page_query(connection, "run", {}), units=_units("run")
+    ),
+    "word": lambda _, connection, params: encode(words(connection)),
+    "example": lambda _, connection, params: encode(examples()),
+    "query": lambda pages, connection, params: pages.named(
+        connection, str(params.get("name")), params
+    )[1],
     "finding": Pages._finding,
     "summary": Pages._summary,
     "area": Pages._area,
@@ -395,7 +376,7 @@ ANSWERS: dict[str, Callable[[Pages, duckdb.DuckDBPyConnection, Params], bytes]] 
     "critical": Pages._critical,
     "warm_up": Pages._warm_up,
 }
-"""Methods of the answers that are no plain page query, by name."""
+"""The answers that are no plain page query, by name."""
 
 # Sections of the summary that need nothing but the run.
 SUMMARY = ("why", "paths", "blame", "drops", "threads")
@@ -419,8 +400,8 @@ def _window_of_flows(params: Params) -> Params:
     return {name: _whole(params, end) if end in params else None for end, name in names.items()}
 
 
-def _is_set(params: Params, name: str) -> bool:
-    return str(params.get(name, "")) not in ("", "0", "False")
+def _is_internal(params: Params) -> bool:
+    return str(params.get("internal", "")) not in ("", "0", "False")
 
 
 def _command(name: str, extent: Extent, part: Slice, *, internal: bool) -> str:
@@ -431,18 +412,12 @@ def _command(name: str, extent: Extent, part: Slice, *, internal: bool) -> str:
 
 def _window_options(extent: Extent, part: Slice) -> list[str]:
     """Return the options that choose the window of a slice, as offsets in seconds."""
-    ends = {"--start": part.start, "--end": part.end}
-    return [
-        word
-        for option, time_ns in ends.items()
-        if time_ns is not None
-        for word in (option, _seconds(int(time_ns) - extent.origin_ns))
-    ]
-
-
-def _seconds(offset_ns: int) -> str:
-    whole, rest = divmod(max(offset_ns, 0), 1_000_000_000)
-    return f"{whole}.{rest:09d}".rstrip("0").rstrip(".") + "s"
+    options = []
+    for option, time_ns in {"--start": part.start, "--end": part.end}.items():
+        if time_ns is not None:
+            whole, rest = divmod(max(int(time_ns) - extent.origin_ns, 0), 1_000_000_000)
+            options += [option, f"{whole}.{rest:09d}".rstrip("0").rstrip(".") + "s"]
+    return options
 
 
 def _kind(params: Params) -> str:

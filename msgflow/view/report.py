@@ -34,7 +34,6 @@ from msgflow.view.summary_markdown import markdown
 from msgflow.view.table_encoding import encode
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
     from pathlib import Path
 
     import duckdb
@@ -91,7 +90,6 @@ def write_report(
     verification: Verification | None = None,
     through: str | None = None,
     max_size: int,
-    progress: Callable[[str], None] = lambda step: None,
 ) -> Report:
     """Write the pages of a run into one file that any browser opens, or its summary as Markdown.
 
@@ -99,9 +97,7 @@ def write_report(
     paths without this text, and rows that are not on them, out; `max_size` is in bytes.
     """
     one = part.one_run(connection, "a report")
-    window = part.window([one])
-    maker = _Maker(connection, one.run_id, window, through, max_size, progress)
-    maker.verification = verification
+    maker = _Maker(connection, one.run_id, part.window([one]), verification, through, max_size)
     try:
         if path.suffix.lower() == MARKDOWN:
             content, notes = maker.make_markdown(compare)
@@ -126,9 +122,9 @@ class _Maker:
         connection: duckdb.DuckDBPyConnection,
         run: int,
         window: Window,
+        verification: Verification | None,
         through: str | None,
         max_size: int,
-        progress: Callable[[str], None],
     ) -> None:
         self.connection = connection
         self.params: dict[str, Any] = {"run": run}
@@ -137,11 +133,10 @@ class _Maker:
         self.window = window
         self.through = through
         self.max_size = max_size
-        self.progress = progress
         self.notes: list[str] = []
         self.parts = Parts()
         self.named: dict[str, QueryResult] = {}
-        self.verification: Verification | None = None
+        self.verification = verification
 
     def answer(self, name: str, /, **params: Any) -> bytes:
         return self.pages.answer(self.connection, name, self.params | params)
@@ -152,7 +147,6 @@ class _Maker:
 
     def make(self, compare: str | int | None) -> tuple[str, list[str]]:
         shown = self.shown()
-        self.progress("tables")
         other = None if compare is None else self.other(compare)
         self.runs(other)
         self.keep("finding")
@@ -165,25 +159,21 @@ class _Maker:
         ):  # fmt: skip
             self.keep(name)
         self.panels()
-        self.progress("paths")
         chosen = self.paths()
         comparison = None
         if other is not None:
-            self.progress("comparison")
             comparison = self.comparison(other)
             self.compared(other, comparison, chosen)
         sections = self.sections(comparison)
         for section in sections:
             content = encoded_section(section, self.extent.origin_ns)
             self.parts.add(f"summary?part={section.name}", content)
-        self.progress("timeline")
         names = [section.name for section in sections]
         said = {"summary": names, "absent": self.absent(other)}
         head = self.timeline(shown, chosen, said)
         return single_page(self.parts, head), self.notes
 
     def make_markdown(self, compare: str | int | None) -> tuple[str, list[str]]:
-        """Return the summary as Markdown, and what it leaves out."""
         self.shown()
         run = self.extent.run
         if self.through is not None:
@@ -223,11 +213,9 @@ class _Maker:
         return Window(begin, end)
 
     def comparison(self, other: Run) -> Comparison:
-        """Compare the paths of the run with those of another."""
         return compare_runs(self.connection, str(other.run_id), str(self.extent.run.run_id))
 
     def sections(self, comparison: Comparison | None) -> list[Section]:
-        """Return the sections of the summary."""
         through = self.through or ""
         return [
             *(
@@ -263,7 +251,6 @@ class _Maker:
                     self.keep(name, **given)
 
     def other(self, compare: str | int) -> Run:
-        """Return the run to compare with."""
         other = Slice(compare).one_run(self.connection, "the other side")
         if other.run_id == self.extent.run.run_id:
             raise UsageError("a run is not compared with itself", "give another --compare")
@@ -308,7 +295,6 @@ class _Maker:
         return numbers
 
     def chosen(self, paths: pa.Table) -> list[int]:
-        """Return the numbers of the paths that are wanted."""
         numbers: list[int] = paths["path_id"].to_pylist()
         if self.through is None:
             return numbers
@@ -333,7 +319,6 @@ class _Maker:
             self.parts.add(f"critical?id={take}&kind=take", content)
 
     def compared(self, other: Run, comparison: Comparison, chosen: list[int]) -> None:
-        """Keep what the page of the comparison shows."""
         content = encoded_comparison(comparison, "paths")
         self.parts.add(f"compare?other={other.run_id}&what=paths", content)
         for what in ("callbacks", "topics"):
@@ -483,7 +468,6 @@ class _Maker:
         )
 
     def slow_moments(self) -> list[int]:
-        """Return when the slowest flow of each path began, the slowest first."""
         self.pages.fill_flows(self.connection, self.extent)
         worst = self.pages.ask("path_slowest", {"run": self.extent.run.run_id, "limit": 1})
         order = worst.sort_by([("latency", "descending")])

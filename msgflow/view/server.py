@@ -15,7 +15,7 @@ import ipaddress
 import re
 import socket
 import threading
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from functools import partial
 from typing import TYPE_CHECKING, Any, Protocol
 from urllib.parse import urlsplit
@@ -166,9 +166,7 @@ def application(
         except MsgflowError as error:
             return _failure(error, 500, "failed")
         except duckdb.Error as error:
-            return JSONResponse(
-                {"error": first_line(error), "hint": None, "code": "failed"}, status_code=500
-            )
+            return _failure(QueryError(first_line(error)), 500, "failed")
 
     app = Starlette(
         routes=[
@@ -193,25 +191,6 @@ def single_application(make: Callable[[], str], token: str) -> ASGIApp:
 
     # Its data are in the page, which no cookie opens.
     return Guard(Starlette(routes=[Route("/", page)]), token, _POLICY_OF_FILES, has_cookie=False)
-
-
-def serve_single(
-    place: str,
-    make: Callable[[], str],
-    *,
-    port: int | None = None,
-    started: Callable[[str], None] = lambda address: None,
-) -> None:
-    """Serve one page with its data inside until Ctrl-C.
-
-    `place` says what the page shows: its token is kept. `make` is called at each load. `port` and
-    `started` are as for `serve`.
-    """
-    with listening(place, port, lambda token: single_application(make, token)) as (
-        server, listener, address,
-    ):  # fmt: skip
-        started(address)
-        server.run(sockets=[listener])
 
 
 async def _answered(
@@ -284,7 +263,8 @@ class Guard:
         request = Request(scope, receive)
         refusal = self._refusal(request)
         if refusal is not None:
-            await _with_headers(refusal)(scope, receive, send)
+            refusal.headers.update(_HEADERS)
+            await refusal(scope, receive, send)
             return
 
         headers = dict(self._headers)
@@ -319,7 +299,12 @@ class Guard:
         else:
             cookie = request.cookies.get(_cookie_name(request), "")
             is_known = self._has_cookie and _same(cookie, cookie_of(self._token))
-        return None if is_known else _unknown()
+        if is_known:
+            return None
+        return PlainTextResponse(
+            "error: this page needs the address that msgflow ui printed, with its token\n",
+            status_code=403,
+        )
 
 
 def cookie_of(token: str) -> str:
@@ -329,19 +314,6 @@ def cookie_of(token: str) -> str:
 
 def _cookie_name(request: Request) -> str:
     return f"msgflow_{request.url.port or 80}"
-
-
-def _with_headers(response: Response) -> Response:
-    for name, value in _HEADERS.items():
-        response.headers[name] = value
-    return response
-
-
-def _unknown() -> Response:
-    return PlainTextResponse(
-        "error: this page needs the address that msgflow ui printed, with its token\n",
-        status_code=403,
-    )
 
 
 def _same(given: str, token: str) -> bool:
@@ -369,13 +341,9 @@ def listen(port: int | None) -> socket.socket:
     Port 0 means any free one, None the usual one, or any free one where that is taken.
     """
     wanted = DEFAULT_PORT if port is None else port
-    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
-        listener.bind((HOST, wanted))
-        listener.listen(128)
+        return socket.create_server((HOST, wanted), backlog=128)
     except OSError as error:
-        listener.close()
         if port is None:
             return listen(0)
         reason = (error.strerror or str(error)).lower()
@@ -383,26 +351,6 @@ def listen(port: int | None) -> socket.socket:
             f"cannot listen on the port: {reason} — {wanted}",
             "give another port, or 0: then a free one is taken",
         ) from error
-    return listener
-
-
-def serve(
-    path: Path,
-    sql: Sql,
-    *,
-    port: int | None = None,
-    memory_limit: str | None = None,
-    started: Callable[[str], None] = lambda address: None,
-) -> None:
-    """Serve the pages of a database until Ctrl-C.
-
-    `port` is as for `listen`. `started` gets the address, with the token, once it can be opened.
-    Without `memory_limit`, DuckDB takes a quarter of the machine's memory, at least 500 MB and at
-    most 4 GB.
-    """
-    with running(path, sql, port=port, memory_limit=memory_limit) as (server, listener, address):
-        started(address)
-        server.run(sockets=[listener])
 
 
 @contextmanager
@@ -430,17 +378,17 @@ def running(
     following: Following | None = None,
     place: str | None = None,
 ) -> Iterator[tuple[uvicorn.Server, socket.socket, str]]:
-    """Prepare a server; see `serve` and `serving`."""
-    shared = SharedDatabase(path, memory_limit)
-    try:
-        with listening(
-            place or str(path.resolve()),
-            port,
-            lambda token: application(shared, token, sql, following),
-        ) as server:
-            yield server
-    finally:
-        shared.close()
+    """Prepare a server of the pages of a database; yield it, with its socket and address.
+
+    `port` is as for `listen`. The address has the token. Without `memory_limit`, DuckDB takes a
+    quarter of the machine's memory, at least 500 MB and at most 4 GB.
+    """
+    place = place or str(path.resolve())
+    with (
+        closing(SharedDatabase(path, memory_limit)) as shared,
+        listening(place, port, lambda token: application(shared, token, sql, following)) as server,
+    ):
+        yield server
 
 
 @contextmanager

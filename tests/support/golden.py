@@ -59,8 +59,7 @@ from msgflow.result.query_result import QueryResult
 from msgflow.run.slice import Slice
 from msgflow.sql.quoting import literal
 from msgflow.sql.statement import Statements, internal_sql
-from msgflow.view.page_query import DIRECTORY, run_page_query
-from msgflow.view.scratch import Scratch
+from msgflow.view.page_query import DIRECTORY, Scratch, run_page_query
 
 Rows = list[list[str | None]]
 

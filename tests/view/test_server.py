@@ -29,9 +29,8 @@ from msgflow.errors import QueryError, UsageError
 from msgflow.view import pages
 from msgflow.view.connection import timed
 from msgflow.view.pages import Pages
-from msgflow.view.server import is_local, listen, serve
-from msgflow.view.shared_database import Ahead
-from msgflow.view.turns import Turns
+from msgflow.view.server import is_local, listen, running
+from msgflow.view.shared_database import Ahead, Turns
 
 Serve = Callable[[Path], Served]
 
@@ -293,8 +292,10 @@ def test_a_port_in_use_is_said(demo: Path, tmp_path: Path) -> None:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = taken.getsockname()[1]
-        with pytest.raises(UsageError, match="cannot listen on the port"):
-            serve(path, WarmSql(path, memory_limit=None, seconds=1), port=port)
+        sql = WarmSql(path, memory_limit=None, seconds=1)
+        said = pytest.raises(UsageError, match="cannot listen on the port")
+        with said, running(path, sql, port=port, memory_limit=None):
+            pass
     with listen(None) as first, listen(None) as second:
         assert first.getsockname() != second.getsockname()
         assert first.getsockname()[0] == "127.0.0.1"

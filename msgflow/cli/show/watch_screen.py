@@ -56,7 +56,6 @@ class WatchScreen:
     """
 
     def __init__(self, console: Console) -> None:
-        """Start before the first window."""
         self._console = console
         self._slowest: dict[str, deque[int]] = {}
         self._violations: deque[str] = deque(maxlen=_VIOLATIONS)
@@ -204,7 +203,6 @@ def _heading(report: WindowReport) -> Text:
 
 
 def _fates(path: Row) -> Text:
-    """Return what became of the flows of a path that was picked."""
     counts = ", ".join(f"{path[name]:,} {name.replace('_', ' ')}" for name in _FATES if path[name])
     text = Text(printable(path["path"]), style="bold")
     reasons = f" ({path['reasons']})" if path["reasons"] else ""
@@ -264,7 +262,6 @@ def _table(first: str, *others: str) -> Table:
 
 
 def _duration(value: int | None) -> str:
-    """Return a duration with three digits."""
     if value is None:
         return NULL
     number, unit = format_duration(value).split(" ")
