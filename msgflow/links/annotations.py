@@ -53,7 +53,7 @@ def apply_links(
             AppliedLinks(
                 run,
                 *counts[run.run_id],
-                *_link_counts(con, run.run_id),
+                *internal_sql().run(con, "link_source", {"run_id": run.run_id}).fetchall()[0],
                 tuple(_without_effect(con, run.run_id)),
             )
             for run in runs
@@ -77,11 +77,9 @@ def declare_links(
     topic_count = declare_topics(con, run_id, file)
     matched = match_links(con, run_id, file, leave_out)
     # Before we delete any: one transaction cannot use a key twice.
-    first = int(
-        con.execute("SELECT coalesce(max(annotation_id), 0) + 1 FROM store.annotation").fetchall()[
-            0
-        ][0]
-    )
+    ((first,),) = con.execute(
+        "SELECT coalesce(max(annotation_id), 0) + 1 FROM store.annotation"
+    ).fetchall()
     for table in ("annotation_input", "annotation_output", "annotation"):
         con.execute(
             f"DELETE FROM store.{table} WHERE run_id = $run_id AND annotation_id IN "
@@ -129,11 +127,6 @@ def _key(link: MatchedLink) -> tuple[str, int, tuple[int, ...], tuple[int, ...]]
         tuple(endpoint.id for endpoint in link.inputs),
         tuple(endpoint.id for endpoint in link.outputs),
     )
-
-
-def _link_counts(con: duckdb.DuckDBPyConnection, run_id: int) -> tuple[int, int]:
-    ((of_file, of_trace),) = internal_sql().run(con, "link_source", {"run_id": run_id}).fetchall()
-    return of_file, of_trace
 
 
 def _without_effect(con: duckdb.DuckDBPyConnection, run_id: int) -> Iterator[str]:

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from msgflow.links.links_file import DeclaredLink, LinksFile
 
 _NODES = """
-SELECT n.node_id, main.node_name(n.full_name), n.process_id, p.name, p.pid, h.hostname
+SELECT
+    n.node_id, main.node_name(n.full_name), n.process_id, coalesce(p.name, '?'), p.pid, h.hostname
 FROM main.node AS n
 JOIN main.process AS p ON n.process_id = p.process_id
 JOIN main.host AS h ON p.host_id = h.host_id
@@ -99,18 +100,8 @@ def _read_nodes(con: duckdb.DuckDBPyConnection, run_id: int) -> tuple[Node, ...]
     subscriptions = _read_endpoints(con, run_id, "subscription")
     publishers = _read_endpoints(con, run_id, "publisher")
     return tuple(
-        Node(
-            name,
-            process_id,
-            process or "?",
-            pid,
-            host,
-            tuple(subscriptions.get(node_id, ())),
-            tuple(publishers.get(node_id, ())),
-        )
-        for node_id, name, process_id, process, pid, host in con.execute(
-            _NODES, [run_id]
-        ).fetchall()
+        Node(*named, tuple(subscriptions.get(node_id, ())), tuple(publishers.get(node_id, ())))
+        for node_id, *named in con.execute(_NODES, [run_id]).fetchall()
     )
 
 

@@ -76,8 +76,19 @@ def make_server(path: Path, *, seconds: float = MOST_SECONDS) -> MCPServer[Any]:
     server = StrictServer(
         "msgflow", instructions=INSTRUCTIONS, version=__version__, log_level="ERROR"
     )
+    # One child process, which stays for the next call.
+    process, lock = ConfinedProcess(__name__, seconds=seconds), threading.Lock()
+
+    def confined(tool: Callable[..., str]) -> Callable[..., str]:
+        @functools.wraps(tool)
+        def call(**given: Any) -> str:
+            about = {"path": str(path), "memory_limit": MEMORY_LIMIT, "tool": tool.__name__}
+            with lock, _as_tool_errors():
+                return process.call("answer", {**about, "given": given}).decode()
+
+        return call
+
     tools = _Tools(path)
-    caller = _Caller(path, seconds)
     for tool in (
         tools.info,
         tools.check,
@@ -90,33 +101,8 @@ def make_server(path: Path, *, seconds: float = MOST_SECONDS) -> MCPServer[Any]:
         tools.compare,
         tools.verify,
     ):
-        server.tool(structured_output=False)(caller.confined(tool))
+        server.tool(structured_output=False)(confined(tool))
     return server
-
-
-class _Caller:
-    """Calls tools in one child process, which stays for the next call."""
-
-    def __init__(self, path: Path, seconds: float) -> None:
-        self._path = path
-        self._process = ConfinedProcess(__name__, seconds=seconds)
-        self._lock = threading.Lock()
-
-    def confined(self, tool: Callable[..., str]) -> Callable[..., str]:
-        """Return a function with the signature of a tool that calls it in the child."""
-
-        @functools.wraps(tool)
-        def call(**given: Any) -> str:
-            arguments = {
-                "path": str(self._path),
-                "memory_limit": MEMORY_LIMIT,
-                "tool": tool.__name__,
-                "given": given,
-            }
-            with self._lock, _as_tool_errors():
-                return self._process.call("answer", arguments).decode()
-
-        return call
 
 
 def answer(
@@ -244,7 +230,7 @@ class _Tools:
                 direction=direction,
                 limit=_capped(limit),
             )
-            text = tree_text(flow, is_absolute=False, width=None, color=False)
+            text = tree_text(flow)
         notes = [f"note: {note}" for note in flow.notes]
         if len(text) > MOST_CHARACTERS:
             text = text[:MOST_CHARACTERS].rpartition("\n")[0]

@@ -21,7 +21,7 @@ from msgflow.text.values import MOMENT, NULL, column_title, format_cell, short_s
 from msgflow.text.wrapping import ARROW, longest_piece, longest_word, wrap
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     import pyarrow as pa
 
@@ -133,11 +133,6 @@ def _without_zero_rows(result: Rows) -> tuple[Rows, int]:
     return (replace(result, table=table), count) if table.num_rows else (result, 0)
 
 
-def _free(columns: Sequence[ShownColumn]) -> int:
-    """Return how many columns are shown besides those of `brief`: paths and runs."""
-    return sum(column.name in (PATH, RUN) for column in columns)
-
-
 def _that_say_something(result: Rows, keeps_all: bool) -> tuple[list[str], list[str]]:
     """Return the columns with content, and the titles of those that are 0 or empty in all rows."""
     if keeps_all or not len(result):
@@ -184,7 +179,10 @@ def _column(result: Rows, name: str, values: pa.ChunkedArray, lines: int) -> Sho
     title, cells = _title(result, name), None
     is_number = bool(types.is_integer(kind) or types.is_floating(kind) or types.is_decimal(kind))
     listed = values.to_pylist()
-    if name == RUN and (names := _run_names(result)):
+    # Rows that are runs themselves have their names already, and begin at different times.
+    are_runs = result.header is None or result.header.grain == "one row per run"
+    names = {} if are_runs else {run.run_id: run.name for run in result.runs}
+    if name == RUN and names and len(set(names.values())) == len(names):
         title, is_number = "run", False
         cells = [format_cell(names.get(value, value)) for value in listed]
     elif name in _SYMBOLS:
@@ -192,7 +190,8 @@ def _column(result: Rows, name: str, values: pa.ChunkedArray, lines: int) -> Sho
     else:
         unit = result.units.get(name)
         is_handle = name.endswith("_handle")
-        begin = _begin(result) if unit == MOMENT else None
+        is_since = unit == MOMENT and not are_runs and len(result.runs) == 1
+        begin = result.runs[0].start_ns if is_since else None
         cells = [
             format_cell(value, unit, is_handle=is_handle)
             if begin is None or value is None
@@ -218,21 +217,6 @@ def _measured(
         )
         least = width if width <= _SHORT else min(width, max(broken, min(word, _WORD)))
     return ShownColumn(name, title, tuple(cells), is_number, width, least, broken)
-
-
-def _run_names(result: Rows) -> dict[int, str]:
-    """Return the name of each run by its id; nothing if the rows themselves are runs."""
-    if result.header is None or result.header.grain == "one row per run":
-        return {}
-    names = {run.run_id: run.name for run in result.runs}
-    return names if len(set(names.values())) == len(names) else {}
-
-
-def _begin(result: Rows) -> int | None:
-    """Return the start of the only run, from which times count; None if the rows are runs."""
-    if len(result.runs) != 1 or result.header is None or result.header.grain == "one row per run":
-        return None
-    return result.runs[0].start_ns
 
 
 def _since(duration_ns: int) -> str:
@@ -316,7 +300,8 @@ def _that_fit(result: Rows, columns: list[ShownColumn], width: int) -> list[Show
         return columns
     ranked = _by_importance(result, columns)
     chosen = _greedy(ranked, width)
-    first = ranked[: _WANTED + _free(columns)]
+    # Paths and runs are shown besides those of `brief`.
+    first = ranked[: _WANTED + sum(column.name in (PATH, RUN) for column in columns)]
     if any(column not in chosen for column in first):
         # Names are broken for the wanted columns only.
         wanted = {column.name for column in _greedy(_broken(first), width)}
@@ -364,10 +349,11 @@ def _widths(columns: list[ShownColumn], width: int) -> list[int]:
 def _balanced(columns: list[ShownColumn], widths: list[int]) -> list[int]:
     """Return widths of the same sum with which the rows take the fewest lines."""
     texts = [place for place, column in enumerate(columns) if not column.is_number]
-    heights = [_heights(columns[place]) for place in range(len(columns))]
+    first = [column.cells[:MOST_ROWS] for column in columns]
+    heights = cache(lambda place, width: [len(wrap(cell, width)) for cell in first[place]])
 
     def lines(tried: list[int]) -> int:
-        return sum(map(max, zip(*(heights[place](tried[place]) for place in texts), strict=True)))
+        return sum(map(max, zip(*(heights(place, tried[place]) for place in texts), strict=True)))
 
     best = lines(widths)
     improves = len(texts) > 1
@@ -382,11 +368,6 @@ def _balanced(columns: list[ShownColumn], widths: list[int]) -> list[int]:
                     best, widths, improves = count, tried, True
                     break
     return widths
-
-
-def _heights(column: ShownColumn) -> Callable[[int], list[int]]:
-    """Return a function of a width: the number of lines of each of the first cells."""
-    return cache(lambda width: [len(wrap(cell, width)) for cell in column.cells[:MOST_ROWS]])
 
 
 def _is_alike(column: ShownColumn) -> bool:

@@ -41,7 +41,7 @@ def _labelled(label: str, text: str, width: int) -> list[str]:
 
 def result_html(result: Rows) -> str:
     """Return the first rows as an HTML table; names from a trace are always text in it."""
-    names, columns, right = cells(_first(result))
+    names, columns, right = cells(replace(result, table=result.table.slice(0, MOST_ROWS)))
     styles = [_STYLE.format("right" if is_right else "left") for is_right in right]
     parts = ["<table>"]
     if result.header is not None:
@@ -60,17 +60,7 @@ def result_html(result: Rows) -> str:
         ]
         parts.append("</tr>")
     parts.append("</tbody></table>")
-    parts += [f"<p>{escape(note)}</p>" for note in _notes(result)]
+    notes = [f"the first {MOST_ROWS} of {len(result):,} rows"] if len(result) > MOST_ROWS else []
+    notes += [*([] if len(result) else [result.when_empty]), *result.notes]
+    parts += [f"<p>{escape(note)}</p>" for note in notes]
     return "".join(parts)
-
-
-def _first(result: Rows) -> Rows:
-    return replace(result, table=result.table.slice(0, MOST_ROWS))
-
-
-def _notes(result: Rows) -> list[str]:
-    count = len(result)
-    if not count:
-        return [result.when_empty, *result.notes]
-    cut = [f"the first {MOST_ROWS} of {count:,} rows"] if count > MOST_ROWS else []
-    return [*cut, *result.notes]

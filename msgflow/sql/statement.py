@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -11,40 +10,55 @@ from msgflow.files.resources import resource_directory
 from msgflow.sql.header import Header, read
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Iterator, Mapping
     from pathlib import Path
 
     import duckdb
     import pyarrow as pa
 
 
-@dataclass(frozen=True)
 class Statements:
     """The statements of a folder and those below it.
 
-    Attributes:
-        directory: the folder. A statement that reads from another of kind 'inline', by its file
-            name, has that one in front.
+    One that reads from another of kind 'inline', by its file name, has that one in front.
     """
 
-    directory: Path
+    def __init__(self, directory: Path) -> None:
+        self.directory = directory
+        self._paths = {path.stem: path for path in directory.rglob("*.sql")}
+        self._headers: dict[str, Header] = {}
+        self._texts: dict[str, str] = {}
 
     def names(self) -> tuple[str, ...]:
         """Return the names of all statements, sorted; reads no file."""
-        return tuple(sorted(_paths(self)))
+        return tuple(sorted(self._paths))
 
     def header(self, name: str) -> Header:
         """Return the header of a statement."""
-        return _header(self, name)
+        if name not in self._headers:
+            self._headers[name] = read(self._paths[name])
+        return self._headers[name]
 
     def text(self, name: str) -> str:
         """Return the SQL of a statement, with what it needs of the others in front."""
-        return _text(self, name)
+        if name not in self._texts:
+            body = self.header(name).body
+            needed = self._needed(self.header(name))
+            parts = [f"{part} AS (\n{self.header(part).body}\n)" for part in needed]
+            if parts:
+                gap = ",\n" if body.startswith("WITH ") else "\n"
+                body = "WITH " + ",\n".join(parts) + gap + body.removeprefix("WITH ")
+            self._texts[name] = body
+        return self._texts[name]
 
-    def parts(self, names: Iterable[str]) -> tuple[str, ...]:
-        """Return what these statements need of the others, as a WITH clause lists it, in order."""
-        needed = (part for name in names for part in _parts(self, self.header(name)))
-        return tuple(f"{part} AS (\n{self.header(part).body}\n)" for part in dict.fromkeys(needed))
+    def _needed(self, header: Header) -> list[str]:
+        # Each after those that it needs.
+        names: list[str] = []
+        for name in sorted(header.relations & self._paths.keys()):
+            part = self.header(name)
+            if part.kind == "inline" and part is not header:
+                names += [*self._needed(part), name]
+        return list(dict.fromkeys(names))
 
     def run(
         self, connection: duckdb.DuckDBPyConnection, name: str, values: Mapping[str, Any]
@@ -85,34 +99,3 @@ def registered(connection: duckdb.DuckDBPyConnection, **tables: pa.Table) -> Ite
 def internal_sql() -> Statements:
     """Return what the program asks for itself: rows that become files, pictures or sentences."""
     return Statements(resource_directory("schema") / "internal")
-
-
-@cache
-def _paths(statements: Statements) -> Mapping[str, Path]:
-    return {path.stem: path for path in statements.directory.rglob("*.sql")}
-
-
-@cache
-def _header(statements: Statements, name: str) -> Header:
-    return read(_paths(statements)[name])
-
-
-@cache
-def _text(statements: Statements, name: str) -> str:
-    body = statements.header(name).body
-    parts = statements.parts([name])
-    if not parts:
-        return body
-    if body.startswith("WITH "):
-        return "WITH " + ",\n".join(parts) + ",\n" + body.removeprefix("WITH ")
-    return "WITH " + ",\n".join(parts) + "\n" + body
-
-
-def _parts(statements: Statements, header: Header) -> list[str]:
-    # Each after those that it needs.
-    names: list[str] = []
-    for name in sorted(header.relations & _paths(statements).keys()):
-        part = statements.header(name)
-        if part.kind == "inline" and part is not header:
-            names += [*_parts(statements, part), name]
-    return list(dict.fromkeys(names))

@@ -78,8 +78,12 @@ def _target(file: YamlFile, node: Any) -> Target:
     subject = SUBJECTS[kind]
     choosing = tuple(name for name in subject.filters if name != kind)
     metrics = tuple(subject.metrics)
+    known = (kind, _NAME, *choosing, *metrics)
     for key, _ in node.value:
-        _refuse_unknown(file, key, kind, (kind, _NAME, *choosing, *metrics))
+        name = str(key.value) if key.id == "scalar" else "…"
+        if name not in known:
+            hint = meant_or(nearest(name, known)[:1], f"it has {', '.join(known)}")
+            file.fail(line_of(key), f"a {_word(kind)} has no {name}", hint)
     required = (kind, "to") if kind == ENDS else (kind,)
     fields = file.mapping(node, f"a {_word(kind)}", required, (*choosing, *metrics, _NAME))
     path_name = _path_name(file, fields[kind]) if kind == PATH else None
@@ -140,13 +144,6 @@ def _kind(file: YamlFile, node: Any) -> str:
                 "make two targets of them",
             )
     return found[0]
-
-
-def _refuse_unknown(file: YamlFile, key: Any, kind: str, known: tuple[str, ...]) -> None:
-    name = str(key.value) if key.id == "scalar" else "…"
-    if name not in known:
-        hint = meant_or(nearest(name, known)[:1], f"it has {', '.join(known)}")
-        file.fail(line_of(key), f"a {_word(kind)} has no {name}", hint)
 
 
 def _path_name(file: YamlFile, node: Any) -> Text | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from fnmatch import fnmatchcase
 from itertools import groupby
@@ -163,21 +163,14 @@ def verify(
     return Verification(QueryResult(table, _HEADER, (one,), notes), one, str(targets.file.path))
 
 
+@dataclass
 class _Work:
-    def __init__(
-        self,
-        connection: duckdb.DuckDBPyConnection,
-        part: Slice,
-        window: Window,
-        paths: Mapping[str, Mapping[str, Sequence[str]]],
-        case: str,
-    ) -> None:
-        self._connection = connection
-        self._case = case
-        self._paths = paths
-        self._part = part
-        self._window = window
-        self.notes: dict[str, None] = {}
+    connection: duckdb.DuckDBPyConnection
+    part: Slice
+    window: Window
+    paths: Mapping[str, Mapping[str, Sequence[str]]]
+    case: str
+    notes: dict[str, None] = field(default_factory=dict)
 
     def rows(self, target: Target) -> Iterator[dict[str, Any]]:
         metrics = SUBJECTS[target.kind].metrics
@@ -214,7 +207,7 @@ class _Work:
             columns.append(AMBIGUOUS)
         given: dict[str, Value] = {}
         if target.path_name is not None:
-            places = self._paths[target.path_name.value]
+            places = self.paths[target.path_name.value]
             visited = Selection(
                 via=tuple(places.get("via", ())), without=tuple(places.get("without", ()))
             )
@@ -261,16 +254,16 @@ class _Work:
         )
         own: dict[str, Value] = dict(given)
         if target.path_name is not None:
-            places = self._paths[target.path_name.value]
+            places = self.paths[target.path_name.value]
             own |= {word: [*places[word]] for word in ("from", "to") if word in places}
         elif target.kind == PATH:
             own |= {"from": [target.topics[0].value], "to": [target.topics[-1].value]}
         elif target.kind == ENDS:
             own = {field: text.value for field, text in target.chosen.items()}
         if any(param.name == "case" for param in header.params):
-            own["case"] = self._case
-        part = self._part if header.has_window else Slice(self._part.run)
-        result = run_query(self._connection, around, own, part, internal=True)
+            own["case"] = self.case
+        part = self.part if header.has_window else Slice(self.part.run)
+        result = run_query(self.connection, around, own, part, internal=True)
         self.notes.update(dict.fromkeys(result.notes))
         rows: list[dict[str, Any]] = result.to_arrow().to_pylist()
         return rows
@@ -337,7 +330,7 @@ class _Work:
         if kind == "lost_flow":
             rows = self._ask("flows", LOST_FLOW, target, {"subject": subject})
             return worst_case_of(list(rows[0].values())) if rows else None
-        return find_worst_case(self._connection, kind, key, self._window)
+        return find_worst_case(self.connection, kind, key, self.window)
 
 
 def _doubt(row: Mapping[str, Any]) -> str | None:
@@ -366,24 +359,19 @@ def _vanished(connection: duckdb.DuckDBPyConnection, file: TargetsFile, run: Run
 
     def require(place: int, text: Text, sql: str, what: str, *, is_exact: bool) -> None:
         there = names(sql)
-        if text.value in there:
+        if text.value in there or (
+            not is_exact and any(fnmatchcase(name, text.value) for name in there)
+        ):
             return
-        if not is_exact and any(fnmatchcase(name, text.value) for name in there):
-            return
-        hint = did_you_mean(text.value, there, _some(what, there))
+        more = f" and {len(there) - 5} more" if len(there) > 5 else ""
+        some = f"it has {', '.join(there[:5])}{more}" if there else f"it has no {what} at all"
+        hint = did_you_mean(text.value, there, some)
         found.setdefault(place, f"the run has no such {what} — {text.value}; {hint}")
 
     for place, target in enumerate(file.targets):
         for topic in target.topics:
             require(place, topic, topics.names, topics.what, is_exact=True)
-        for field, text in target.chosen.items():
-            one = SUBJECTS[target.kind].filters[field]
+        for word, text in target.chosen.items():
+            one = SUBJECTS[target.kind].filters[word]
             require(place, text, one.names, one.what, is_exact=False)
     return found
-
-
-def _some(what: str, names: list[str]) -> str:
-    if not names:
-        return f"it has no {what} at all"
-    more = f" and {len(names) - 5} more" if len(names) > 5 else ""
-    return f"it has {', '.join(names[:5])}{more}"
