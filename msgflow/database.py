@@ -1031,13 +1031,13 @@ class Database:
                 written, requirements that cannot be read, or the package mcap-ros2-support is not
                 installed.
         """
-        from msgflow.export.mcap import Violation, write_mcap
+        from msgflow.export.mcap import write_mcap
 
-        violations: list[Violation] = []
+        violations = []
         if targets is not None:
             verdicts = self.verify(targets, paths=paths, **part)
             violations = [
-                Violation(
+                (
                     row["worst_at_ns"],
                     row["subject"] or row["target"],
                     f"{row['metric']} is {row['measured']}, required is {row['condition']}",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
@@ -25,9 +25,6 @@ from msgflow.files.default_files import DEFAULT_DATABASE
 from msgflow.query.catalogue import load_query
 from msgflow.sql.statement import internal_sql
 from msgflow.text.values import format_duration
-
-if TYPE_CHECKING:
-    from msgflow.database import Database
 
 
 class FlowFormat(StrEnum):
@@ -147,7 +144,15 @@ def command(
                 raise UsageError(
                     f"--slowest chooses the message itself — {named[0]}", "leave out one of them"
                 )
-            rows = _slowest(opened, slowest, from_, to, case, run, internal)
+            choice: dict[str, Any] = {"from_": one_text(from_), "to": one_text(to)}
+            choice |= {} if case is None else {"case": case}
+            listed = opened.query("flows", run=run, internal=internal, slowest=slowest, **choice)
+            rows = [row for row in listed.to_arrow().to_pylist() if row["take_id"] is not None]
+            if not rows:
+                raise UsageError(
+                    "no flow arrived at the end of a path",
+                    "msgflow query e2e-latency lists the paths",
+                )
             ends = dict.fromkeys(row["take_id"] for row in rows)
             found = [{"take_id": number} for number in ends]
         if why:
@@ -190,25 +195,3 @@ def command(
         )
     for note in dict.fromkeys(note for flow in flows for note in flow.notes):
         print_note(note)
-
-
-def _slowest(
-    database: Database,
-    number: int,
-    from_: list[str] | None,
-    to: list[str] | None,
-    case: str | None,
-    run: str | None,
-    internal: bool,
-) -> list[dict[str, Any]]:
-    """Return the rows of the slowest flows, the slowest first, as the query flows has them."""
-    words: dict[str, Any] = {"from_": one_text(from_), "to": one_text(to)}
-    if case is not None:
-        words["case"] = case
-    found = database.query("flows", run=run, internal=internal, slowest=number, **words)
-    rows = [row for row in found.to_arrow().to_pylist() if row["take_id"] is not None]
-    if not rows:
-        raise UsageError(
-            "no flow arrived at the end of a path", "msgflow query e2e-latency lists the paths"
-        )
-    return rows

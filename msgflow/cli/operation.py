@@ -48,7 +48,9 @@ def asks(method: Callable[..., Any]) -> Callable[[Command], Command]:
     def decorate(show: Command) -> Command:
         answer, *_ = signature(show).parameters
         shown = list(parameters_of(show, skipped=(answer,)))
-        parameters = {each.name: each for each in [*asked, *shown, _database()]}
+        plain = Parameter("database", Parameter.KEYWORD_ONLY, default=DEFAULT_DATABASE)
+        database = plain.replace(annotation=_annotated(plain, Path, None))
+        parameters = {each.name: each for each in [*asked, *shown, database]}
         parameters |= {each.name: each for each in asked}
 
         def command(**given: Any) -> None:
@@ -70,7 +72,10 @@ def asks(method: Callable[..., Any]) -> Callable[[Command], Command]:
 
 def set_parameters(command: Command, parameters: Sequence[Parameter]) -> None:
     """Give a command the parameters from which Typer makes its arguments and options."""
-    ordered = sorted(parameters, key=lambda each: (each.kind, _panel(each) == ADVANCED))
+    ordered = sorted(
+        parameters,
+        key=lambda each: (each.kind, get_args(each.annotation)[1].rich_help_panel == ADVANCED),
+    )
     command.__signature__ = Signature(ordered)  # type: ignore[attr-defined]
     command.__annotations__ = {each.name: each.annotation for each in parameters}
 
@@ -107,16 +112,6 @@ def escape(text: str) -> str:
     from rich import markup
 
     return markup.escape(text)
-
-
-def _panel(parameter: Parameter) -> Any:
-    _, info = get_args(parameter.annotation)
-    return info.rich_help_panel
-
-
-def _database() -> Parameter:
-    plain = Parameter("database", Parameter.KEYWORD_ONLY, default=DEFAULT_DATABASE)
-    return plain.replace(annotation=_annotated(plain, Path, None))
 
 
 def _annotated(

@@ -66,7 +66,11 @@ def command(
         clock_sync (messages|FILE): As msgflow ingest has it.
         ingest: Read the recording into the database.
     """
+    from msgflow.cli import check
+    from msgflow.cli import ingest as ingest_command
+    from msgflow.cli.tracing_cost import part_of_latencies
     from msgflow.clocks import read_clock_sync
+    from msgflow.database import Database
     from msgflow.links import read_links
     from msgflow.record import EVENTS, PYTHON_NODES, Channel, read_rate, record
 
@@ -101,8 +105,30 @@ def command(
     print_status(f"recorded into {target}: {_words(recorded.last)}")
     if program and recorded.exit_code:
         print_note(f"{program[0]} ended with exit code {recorded.exit_code}")
-    is_sound = not ingest or _answer(target, name, events or [], links, clock_sync, database)
-    if recorded.exit_code or not is_sound:
+    has_failed = bool(recorded.exit_code)
+    if ingest:
+        # What is wrong is printed by check.
+        ingest_command.command(
+            [str(target)],
+            name=name,
+            together=True,
+            events=events or [],
+            links=links,
+            clock_sync=clock_sync,
+            quiet=True,
+            database=database,
+        )
+        print_status(f"read into {database} as run {name}")
+        try:
+            check.command(database=database)
+        except typer.Exit:  # of errors in the recording, which it has printed
+            has_failed = True
+        with Database(database) as opened:
+            latencies = opened.query("e2e-latency")
+            print_result(latencies, None, None)
+            for sentence in part_of_latencies(opened, latencies):
+                print_status(sentence)
+    if has_failed:
         raise typer.Exit(ExitCode.FAILED)
 
 
@@ -163,41 +189,3 @@ def _words(status: Status) -> str:
         f"{status.free_bytes / 1e9:,.0f} GB free",
     ]
     return ", ".join(words)
-
-
-def _answer(
-    directory: Path,
-    name: str,
-    events: list[str],
-    links: Path | None,
-    clock_sync: str,
-    database: Path,
-) -> bool:
-    """Ingest the recording, print what a user wants to know first; tell whether it has no error."""
-    from msgflow.cli import check, ingest
-    from msgflow.cli.tracing_cost import part_of_latencies
-    from msgflow.database import Database
-
-    # What is wrong is printed by check.
-    ingest.command(
-        [str(directory)],
-        name=name,
-        together=True,
-        events=events,
-        links=links,
-        clock_sync=clock_sync,
-        quiet=True,
-        database=database,
-    )
-    print_status(f"read into {database} as run {name}")
-    is_sound = True
-    try:
-        check.command(database=database)
-    except typer.Exit:  # of errors in the recording, which it has printed
-        is_sound = False
-    with Database(database) as opened:
-        latencies = opened.query("e2e-latency")
-        print_result(latencies, None, None)
-        for sentence in part_of_latencies(opened, latencies):
-            print_status(sentence)
-    return is_sound

@@ -14,6 +14,7 @@ from msgflow.errors import UsageError
 from msgflow.events.formats import EventFormat, table_writer
 from msgflow.events.sequence import COLUMNS, Sequencer, common_columns
 from msgflow.files.temporary_owner import mark
+from msgflow.result.plain import any_within
 from msgflow.sql.json_fields import column_name, exact
 from msgflow.sql.quoting import identifier
 
@@ -98,12 +99,7 @@ class _Files:
 
 
 def _has_empty_structure(data_type: pa.DataType) -> bool:
-    if pa.types.is_list(data_type):
-        return _has_empty_structure(data_type.value_type)
-    if pa.types.is_struct(data_type):
-        inner = [field.type for field in data_type]
-        return not inner or any(map(_has_empty_structure, inner))
-    return False
+    return any_within(data_type, lambda kind: pa.types.is_struct(kind) and not kind.num_fields)
 
 
 def _row(is_text: Callable[[pa.DataType], bool], name: str, payload: pa.Schema) -> str:

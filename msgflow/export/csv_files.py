@@ -19,33 +19,25 @@ def export_csv(
     directory: Path,
     selection: Selection,
     *,
-    force: bool = False,
+    force: bool,
 ) -> tuple[ExportedView, ...]:
     """Write views to `directory/VIEW.csv`, all of them or none, rows sorted by all columns.
 
     Text stands in quotes, a missing value is an empty field without; bytes are hexadecimal. With
     `force`, files that exist are replaced.
     """
-    names = {view: f"{view}.csv" for view in selection.views}
-    counts: dict[str, int] = {}
-    with replacing_entries(directory, list(names.values()), force=force) as aside:
-        for view, name in names.items():
-            counts[view] = _write(connection, selection, view, aside / name)
-    return tuple(ExportedView(view, directory / names[view], counts[view]) for view in names)
-
-
-def _write(
-    connection: duckdb.DuckDBPyConnection, selection: Selection, view: str, path: Path
-) -> int:
     import pyarrow.csv
 
     from msgflow.trace.numpy_arrow import empty_batch
 
-    row_count = 0
-    with selection.read(connection, view, selection.runs) as reader:
-        empty = csv_batch(empty_batch(reader.schema))
-        with pyarrow.csv.CSVWriter(path, empty.schema) as writer:
-            for batch in reader:
-                writer.write_batch(csv_batch(batch))
-                row_count += batch.num_rows
-    return row_count
+    names = {view: f"{view}.csv" for view in selection.views}
+    counts = dict.fromkeys(names, 0)
+    with replacing_entries(directory, list(names.values()), force=force) as aside:
+        for view, name in names.items():
+            with selection.read(connection, view, selection.runs) as reader:
+                empty = csv_batch(empty_batch(reader.schema))
+                with pyarrow.csv.CSVWriter(aside / name, empty.schema) as writer:
+                    for batch in reader:
+                        writer.write_batch(csv_batch(batch))
+                        counts[view] += batch.num_rows
+    return tuple(ExportedView(view, directory / names[view], counts[view]) for view in names)

@@ -105,7 +105,7 @@ class _Painter:
 
     def title(self) -> Text:
         start = self.flow.nodes[self.flow.start_key]
-        text = f"{self.flow.start.kind} {self.flow.start.id}, {_printable(start['label'])}"
+        text = f"{self.flow.start.kind} {self.flow.start.id}, {format_cell(start['label'])}"
         if not self.is_absolute:
             text += f"; times count from {format_epoch(self.zero_ns)}"
         return Text(text, style="bold")
@@ -117,16 +117,14 @@ class _Painter:
         grid.add_column(overflow="fold")
         room = self.width - _INDENT * branch.depth - self.time_width - _GAP
         for line in branch.lines:
-            grid.add_row(self._time(line.item.node), self._text(line, room))
-            if line.item.node["otherwise_published"] and not line.is_reference:
-                grid.add_row("", self._ending(line.item.node, room))
+            node = line.item.node
+            grid.add_row(self._time(node), self._text(line, room))
+            # All messages of a topic end here: something may be missing.
+            if node["otherwise_published"] and not line.is_reference:
+                place, published = map(format_cell, (node["node"], node["otherwise_published"]))
+                text = f"ends here; {place} publishes {published}: msgflow suggest links"
+                grid.add_row("", Text(_bound(text, room), style="dim"))
         return grid
-
-    def _ending(self, node: Row, room: int) -> Text:
-        """Return what may be missing at a node where all messages of a topic end."""
-        place, published = _printable(node["node"]), _printable(node["otherwise_published"])
-        text = f"ends here; {place} publishes {published}: msgflow suggest links"
-        return Text(_bound(text, room), style="dim")
 
     def _text(self, line: Line, room: int) -> Text:
         item = line.item
@@ -139,12 +137,10 @@ class _Painter:
         text.append(self._name(item, line.link), style="yellow" if is_absent else "bold")
         for detail in self._details(item, line.link):
             text.append("  ").append(_bound(detail, room))
-        if self.flow.direction == "both" and self._is_start(item):
+        start = self.flow.nodes[self.flow.start_key]
+        if self.flow.direction == "both" and start in (item.node, item.take):
             text.append("  ◀", style="bold green")
         return text
-
-    def _is_start(self, item: Item) -> bool:
-        return self.flow.nodes[self.flow.start_key] in (item.node, item.take)
 
     def _time(self, node: Row) -> str:
         start_ns = node["start_ns"]
@@ -159,11 +155,11 @@ class _Painter:
         """Return what the user's own code recorded in a callback instance, and when."""
         times = f" {event['event_count']} times, first" if event["event_count"] > 1 else ""
         at = self._time({"start_ns": event["first_ns"]})
-        return f"{_printable(event['name'])}{times} at {at}"
+        return f"{format_cell(event['name'])}{times} at {at}"
 
     def _name(self, item: Item, link: Row | None) -> str:
         node = item.node
-        label, place = _printable(node["label"]), _printable(node["node"])
+        label, place = format_cell(node["label"]), format_cell(node["node"])
         if node["kind"] in ("publication", "request"):
             what = f"{'publishes' if node['kind'] == 'publication' else 'requests'} {label}"
             return f"{place}  {what}" if link is None or _is_alone(item) else what
@@ -205,10 +201,10 @@ class _Painter:
                 why = f", {_reason(vertex)}" if vertex["missing"] == "publication" else ""
                 details.append(f"NA: {_NOT_SEEN[vertex['kind']][vertex['missing']]}{why}")
         if node["kind"] not in ("publication", "request") or _is_alone(item):
-            host = f" on {_printable(node['host'])}" if self.has_hosts else ""
-            details.append(f"thread {_printable(node['thread'])}{host}")
+            host = f" on {format_cell(node['host'])}" if self.has_hosts else ""
+            details.append(f"thread {format_cell(node['thread'])}{host}")
         if node["symbol"]:
-            details.append(_printable(short_symbol(node["symbol"])))
+            details.append(format_cell(short_symbol(node["symbol"])))
         number = node["cut_count"] + (item.take["cut_count"] if item.take else 0)
         if number:
             details.append(f"… {number} more")
@@ -275,7 +271,3 @@ def _sending(node: Row) -> list[str]:
 def _reason(row: Row | None) -> str:
     reason = None if row is None else row["reason"]
     return "reason unknown" if reason is None else str(reason)
-
-
-def _printable(value: object) -> str:
-    return format_cell(value)

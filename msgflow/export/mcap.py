@@ -47,15 +47,6 @@ _ERROR = 40
 
 
 @dataclass(frozen=True)
-class Violation:
-    """A requirement that the run does not meet."""
-
-    at_ns: int | None  # when its worst case began, epoch ns; None if it has none, such as a rate
-    subject: str  # what of the run it is
-    message: str  # what was required and measured
-
-
-@dataclass(frozen=True)
 class ExportedMcap:
     """An MCAP file that was written."""
 
@@ -71,9 +62,13 @@ def write_mcap(
     connection: duckdb.DuckDBPyConnection,
     path: Path,
     part: Slice,
-    violations: Sequence[Violation] = (),
+    violations: Sequence[tuple[int | None, str, str]] = (),
 ) -> ExportedMcap:
-    """Write values and losses of a run as an MCAP file, batch by batch."""
+    """Write values and losses of a run as an MCAP file, batch by batch.
+
+    A violation is when its worst case began (epoch ns; None if it has none, such as a rate), its
+    subject, and what was required and measured.
+    """
     run = part.one_run(connection, "an MCAP file")
     bindings = {"runs": [run.run_id], **part.window([run]).bindings}
     try:
@@ -101,9 +96,9 @@ def write_mcap(
             message = _log(row["at_ns"], _WARNING, row["node"], row["message"])
             writer.write_message(LOG_TOPIC, schema, message, row["at_ns"])
             losses += 1
-        for each in violations:
-            at_ns = end_ns if each.at_ns is None else each.at_ns
-            message = _log(at_ns, _ERROR, each.subject, each.message)
+        for began_ns, subject, text in violations:
+            at_ns = end_ns if began_ns is None else began_ns
+            message = _log(at_ns, _ERROR, subject, text)
             writer.write_message(LOG_TOPIC, schema, message, at_ns)
         writer.finish()
     return ExportedMcap(path, run, len(topics), values, losses, len(violations))

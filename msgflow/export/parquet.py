@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 from msgflow.export.views import ExportedView, Selection
@@ -15,7 +16,6 @@ if TYPE_CHECKING:
     import duckdb
     import pyarrow as pa
 
-    from msgflow.run.choice import Run
 
 # Readers take this column from the name of the partition: the file must not have it.
 _PARTITION = "run_id"
@@ -26,7 +26,7 @@ def export_parquet(
     directory: Path,
     selection: Selection,
     *,
-    force: bool = False,
+    force: bool,
 ) -> tuple[ExportedView, ...]:
     """Write views to `directory/VIEW/run_id=ID/data.parquet`, all of them or none.
 
@@ -35,47 +35,30 @@ def export_parquet(
     that keep integers exact beside missing values. With `force`, views that an export has written
     there are replaced.
     """
+    import pyarrow.parquet
+
     from msgflow.db.connection import recorded_revision
 
     metadata = {
         "msgflow.version": __version__,
         "msgflow.schema_revision": recorded_revision(connection.cursor()) or "",
     }
-    counts: dict[str, int] = {}
+    counts = dict.fromkeys(selection.views, 0)
     with replacing_entries(directory, selection.views, force=force) as aside:
-        for view in selection.views:
-            about = metadata | {"msgflow.view": view}
-            counts[view] = sum(
-                _write(connection, selection, view, run, aside / view, about)
-                for run in selection.runs
-            )
+        for view, run in product(selection.views, selection.runs):
+            partition = aside / view / f"{_PARTITION}={run.run_id}"
+            partition.mkdir(parents=True)
+            with selection.read(connection, view, [run]) as reader:
+                names = [name for name in reader.schema.names if name != _PARTITION]
+                schema = pyarrow.schema([reader.schema.field(name) for name in names])
+                about = metadata | {"msgflow.view": view, "pandas": _pandas_types(schema)}
+                with pyarrow.parquet.ParquetWriter(
+                    partition / PARTITION_FILE, schema.with_metadata(about), compression="zstd"
+                ) as writer:
+                    for batch in reader:
+                        writer.write_batch(batch.select(names))
+                        counts[view] += batch.num_rows
     return tuple(ExportedView(view, directory / view, count) for view, count in counts.items())
-
-
-def _write(
-    connection: duckdb.DuckDBPyConnection,
-    selection: Selection,
-    view: str,
-    run: Run,
-    directory: Path,
-    metadata: dict[str, str],
-) -> int:
-    import pyarrow.parquet
-
-    partition = directory / f"{_PARTITION}={run.run_id}"
-    partition.mkdir(parents=True)
-    row_count = 0
-    with selection.read(connection, view, [run]) as reader:
-        names = [name for name in reader.schema.names if name != _PARTITION]
-        schema = pyarrow.schema([reader.schema.field(name) for name in names])
-        schema = schema.with_metadata(metadata | {"pandas": _pandas_types(schema)})
-        with pyarrow.parquet.ParquetWriter(
-            partition / PARTITION_FILE, schema, compression="zstd"
-        ) as writer:
-            for batch in reader:
-                writer.write_batch(batch.select(names))
-                row_count += batch.num_rows
-    return row_count
 
 
 def _pandas_types(schema: pa.Schema) -> str:

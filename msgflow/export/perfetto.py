@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
     from msgflow.run.choice import Run
     from msgflow.run.slice import Slice
-    from msgflow.run.window import Window
 
 _AT_ONCE = 20_000
 _SEQUENCE = 1
@@ -58,8 +57,9 @@ class PerfettoTrace:
 def write_perfetto(connection: duckdb.DuckDBPyConnection, path: Path, part: Slice) -> PerfettoTrace:
     """Write a run as a Perfetto trace, event by event: memory never holds all of it."""
     run = part.one_run(connection, "a Perfetto trace")
-    window = part.window([run])
+    bindings = {"run_id": run.run_id, **part.window([run]).bindings}
     try:
+        from perfetto.protos.perfetto.trace import perfetto_trace_pb2
         from perfetto.trace_builder.proto_builder import StreamingTraceProtoBuilder
     except ImportError:
         raise UsageError(
@@ -67,32 +67,26 @@ def write_perfetto(connection: duckdb.DuckDBPyConnection, path: Path, part: Slic
             "pip install perfetto; or in a checkout of msgflow: uv tool install '.[perfetto]'",
         ) from None
     with format_errors(run.name), replacing(path) as temporary, temporary.open("wb") as file:
-        writer = _Writer(StreamingTraceProtoBuilder(file), connection, run, window)
+        builder = StreamingTraceProtoBuilder(file)
+        writer = _Writer(builder, perfetto_trace_pb2, connection, run, bindings)
         writer.describe()
         slices, arrows = writer.slices()
         values = writer.values()
-        gaps = writer.gaps()
+        gaps = writer.named_slices("perfetto_gap", "gap", {"lost_events": "event_count"})
         events = writer.user_events()
-        states = writer.states()
+        noted = {name: name for name in ("cpu", "priority", "woken_by")}
+        states = writer.named_slices("perfetto_state", "schedule", noted)
         samples = writer.samples()
     return PerfettoTrace(path, run, slices, arrows, values, gaps, events, states, samples)
 
 
+@dataclass(frozen=True)
 class _Writer:
-    def __init__(
-        self,
-        builder: Any,
-        connection: duckdb.DuckDBPyConnection,
-        run: Run,
-        window: Window,
-    ) -> None:
-        from perfetto.protos.perfetto.trace import perfetto_trace_pb2
-
-        self.builder = builder
-        self.connection = connection
-        self.run = run
-        self.bindings = {"run_id": run.run_id, **window.bindings}
-        self.packets = perfetto_trace_pb2
+    builder: Any
+    packets: Any  # the module with the types of packets
+    connection: duckdb.DuckDBPyConnection
+    run: Run
+    bindings: dict[str, Any]
 
     def rows(self, name: str) -> Iterator[dict[str, Any]]:
         relation = internal_sql().run(self.connection, name, self.bindings)
@@ -167,7 +161,7 @@ class _Writer:
         return packet
 
     def slices(self) -> tuple[int, int]:
-        """Write slices; return how many, and how many arrows begin at them."""
+        """Return how many slices were written, and how many arrows begin at them."""
         kind = self.packets.TrackEvent
         kinds = (kind.TYPE_SLICE_END, kind.TYPE_SLICE_BEGIN, kind.TYPE_INSTANT)
         slices = arrows = 0
@@ -201,13 +195,6 @@ class _Writer:
             self.builder.write_packet(packet)
             count += 1
         return count
-
-    def gaps(self) -> int:
-        return self.named_slices("perfetto_gap", "gap", {"lost_events": "event_count"})
-
-    def states(self) -> int:
-        noted = {name: name for name in ("cpu", "priority", "woken_by")}
-        return self.named_slices("perfetto_state", "schedule", noted)
 
     def named_slices(self, query: str, category: str, noted: Mapping[str, str]) -> int:
         kind = self.packets.TrackEvent

@@ -50,14 +50,11 @@ class YamlFile:
         lists = self.mapping(root, "the file", (), names, may_be_null=names)
         if not lists:
             self.fail(line_of(root), f"the file lacks {' or '.join(names)}", self.example)
-        return tuple(self._list(name, lists.get(name)) for name in names)
-
-    def _list(self, name: str, entries: Any) -> list[Any]:
-        if entries is None or is_null(entries):
-            return []
-        if entries.id != "sequence":
-            self.fail(line_of(entries), f"{name} is not a list", self.example)
-        return list(entries.value)
+        there = {name: node for name, node in lists.items() if not is_null(node)}
+        for name, node in there.items():
+            if node.id != "sequence":
+                self.fail(line_of(node), f"{name} is not a list", self.example)
+        return tuple(list(there[name].value) if name in there else [] for name in names)
 
     def mapping(
         self,

@@ -27,11 +27,12 @@ def cells(result: Rows) -> tuple[list[str], list[list[str]], list[bool]]:
         # Most texts of a column repeat.
         texts = cache(cell) if pyarrow.types.is_string(field.type) else cell
         columns.append(list(map(texts, column.to_pylist())))
-        right.append(_is_number(field.type))
+        right.append(is_number(field.type))
     return names, columns, right
 
 
-def _is_number(kind: pa.DataType) -> bool:
+def is_number(kind: pa.DataType) -> bool:
+    """Tell whether values of an Arrow type are numbers."""
     import pyarrow.types
 
     return bool(

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 from rich.cells import cell_len
 
+from msgflow.result.cells import is_number
 from msgflow.text.values import MOMENT, NULL, column_title, format_cell, short_symbol
 from msgflow.text.wrapping import ARROW, longest_piece, longest_word, wrap
 
@@ -160,7 +161,7 @@ def _is_nothing(column: pa.ChunkedArray) -> bool:
     kind = column.type
     if types.is_boolean(kind):
         return not compute.any(column).as_py()
-    if types.is_integer(kind) or types.is_floating(kind) or types.is_decimal(kind):
+    if is_number(kind):
         ends = compute.min_max(column).as_py()
         return bool(ends["min"] == 0 == ends["max"])
     if types.is_list(kind):
@@ -173,17 +174,14 @@ def _title(result: Rows, name: str) -> str:
 
 
 def _column(result: Rows, name: str, values: pa.ChunkedArray, lines: int) -> ShownColumn:
-    import pyarrow.types as types
-
-    kind = values.type
     title, cells = _title(result, name), None
-    is_number = bool(types.is_integer(kind) or types.is_floating(kind) or types.is_decimal(kind))
+    has_numbers = is_number(values.type)
     listed = values.to_pylist()
     # Rows that are runs themselves have their names already, and begin at different times.
     are_runs = result.header is None or result.header.grain == "one row per run"
     names = {} if are_runs else {run.run_id: run.name for run in result.runs}
     if name == RUN and names and len(set(names.values())) == len(names):
-        title, is_number = "run", False
+        title, has_numbers = "run", False
         cells = [format_cell(names.get(value, value)) for value in listed]
     elif name in _SYMBOLS:
         cells = [NULL if value is None else format_cell(short_symbol(value)) for value in listed]
@@ -198,7 +196,7 @@ def _column(result: Rows, name: str, values: pa.ChunkedArray, lines: int) -> Sho
             else _since(value - begin)
             for value in listed
         ]
-    return _measured(name, title, cells, is_number, lines)
+    return _measured(name, title, cells, has_numbers, lines)
 
 
 def _measured(

@@ -23,15 +23,16 @@ def plain(connection: duckdb.DuckDBPyConnection, table: pa.Table) -> pa.Table:
     import pyarrow as pa
 
     for at, (field, column) in enumerate(zip(table.schema, table.columns, strict=True)):
-        if _within(field.type, _is_unknown) or not _has_python_times(column):
+        if any_within(field.type, _is_unknown) or not _has_python_times(column):
             texts = connection.from_arrow(pa.table({"it": column})).project("it::VARCHAR")
             table = table.set_column(at, field.name, texts.to_arrow_table().column(0))
     return table
 
 
-def _within(kind: pa.DataType, is_meant: Callable[[pa.DataType], bool]) -> bool:
+def any_within(kind: pa.DataType, is_meant: Callable[[pa.DataType], bool]) -> bool:
+    """Tell whether a type is meant, or one inside of it."""
     inside = (kind.field(at).type for at in range(kind.num_fields))
-    return is_meant(kind) or any(_within(one, is_meant) for one in inside)
+    return is_meant(kind) or any(any_within(one, is_meant) for one in inside)
 
 
 def _is_unknown(kind: pa.DataType) -> bool:
@@ -56,7 +57,7 @@ def _has_python_times(column: pa.ChunkedArray) -> bool:
     try:
         if types.is_temporal(column.type):
             compute.min_max(column).as_py()
-        elif _within(column.type, types.is_temporal):
+        elif any_within(column.type, types.is_temporal):
             column.to_pylist()
     except (OverflowError, ValueError):
         return False

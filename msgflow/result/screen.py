@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import takewhile
 from typing import TYPE_CHECKING
 
 from rich.cells import cell_len
@@ -99,19 +100,11 @@ def _most_shared(
     most, of = 0, 0
     for number, other in before.items():
         one, two = (steps[::-1], other[::-1]) if is_end else (steps, other)
-        count = _shared(one, two)
+        alike = takewhile(lambda steps: steps[0] == steps[1], zip(one, two, strict=False))
+        count = len(list(alike))
         # A topic may have the name of its node: the cut is clear only behind both.
         while 0 < count < len(two) and two[count] == two[count - 1]:
             count -= 1
         if count > max(most, _SPARED):
             most, of = count, number
     return most, of
-
-
-def _shared(left: Sequence[str], right: Sequence[str]) -> int:
-    count = 0
-    for one, other in zip(left, right, strict=False):
-        if one != other:
-            break
-        count += 1
-    return count

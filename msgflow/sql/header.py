@@ -119,9 +119,7 @@ class Column:
 
     name: str
     type: str  # DuckDB type as `DESCRIBE` prints it; empty where only a table says so
-    # 'ns' for a duration, 'epoch ns' for a point in time, another unit, what it names ('node',
-    # 'topic', 'callback', 'host', 'path'), or None
-    unit: str | None
+    unit: str | None  # 'ns' for a duration, 'epoch ns' for a point in time, what it names, …
     description: str  # one sentence
 
 
@@ -135,7 +133,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Header:
-    """The header of an SQL file, and the SQL below it."""
+    """The header of an SQL file, and the SQL below it; the grammar above explains the rest."""
 
     name: str  # object name, equal to the file name
     title: str  # a few words for lists; the name where the file has none
@@ -149,25 +147,18 @@ class Header:
     severity: str | None  # severity of a finding, else None
     cause: str | None  # cause of a finding, else None
     cure: str | None  # remedy for a finding, else None
-    # 'clocks' where rows compare times of several hosts, 'callbacks' or 'kernel' where they are
-    # made of callbacks or of the kernel's events, 'requests' where they compare times of requests
-    # to services, else None
     note: str | None
     body: str  # the SQL below the header; of a query in steps, the statement that returns its rows
     path: Path
-    brief: tuple[str, ...] = ()  # columns for where not all have a place, the most important first
-    answer: tuple[str, ...] = ()  # columns that are shown also where they are 0 or empty throughout
-    # columns that stand once above their rows: the first says which rows these are
+    brief: tuple[str, ...] = ()
+    answer: tuple[str, ...] = ()
     heading: tuple[str, ...] = ()
     slowest: str | None = None  # column by which rows are the slowest, else None
     zero: str | None = None  # column that is 0 in rows that a terminal leaves out, else None
     steps: tuple[Step, ...] = ()  # what a query makes before, in order
-    # tables, views and macros of a run, each with a condition on its rows, or with an empty one; if
-    # none of them has such a row, this has none
-    sources: tuple[tuple[str, str], ...] = ()
+    sources: tuple[tuple[str, str], ...] = ()  # of `when`, each with its condition or ''
     also: tuple[str, ...] = ()  # objects whose rows are stored in the same table
     unites: tuple[str, ...] = ()  # objects whose rows a macro takes together
-    # parameters that choose between this query and others; their default is this one
     variants: tuple[Param, ...] = ()
     # of a variant: the name of the query, and the option that chooses this one
     chosen: str | None = None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from glob import escape
 from typing import TYPE_CHECKING, Any
 
 from msgflow.files.yaml_file import in_quotes
@@ -117,9 +118,7 @@ def _timers(rows: Sequence[Row], margin: float) -> Iterator[Entry]:
             late = max(_LEAST_LATENESS_NS, *(row["lateness_p99_ns"] for row in known))
             requirements["lateness"] = f"p99 < {_time(late, margin)}"
         if requirements:
-            name = in_quotes(_literal(node))
-            label = in_quotes(_literal(callback))
-            yield "timer", f"{name}\n    callback: {label}", requirements
+            yield "timer", f"{_quoted(node)}\n    callback: {_quoted(callback)}", requirements
 
 
 def _callbacks(rows: Sequence[Row], margin: float) -> Iterator[Entry]:
@@ -130,13 +129,11 @@ def _callbacks(rows: Sequence[Row], margin: float) -> Iterator[Entry]:
             continue
         slow = max(row["running_p99_ns"] for row in group)
         lost = max((row["preempted_ns"] / row["total_ns"] for row in known), default=0)
-        label = in_quotes(_literal(callback))
-        name = in_quotes(_literal(node))
         requirements = {"cpu": f"p99 < {_time(slow, margin)}"}
         most = math.floor(100 * lost * (1 + margin)) + 1
         if most < 100:
             requirements["preempted"] = f"< {most} %"
-        yield "callback", f"{label}\n    node: {name}", requirements
+        yield "callback", f"{_quoted(callback)}\n    node: {_quoted(node)}", requirements
 
 
 def _processes(rows: Sequence[Row], margin: float) -> Iterator[Entry]:
@@ -146,8 +143,7 @@ def _processes(rows: Sequence[Row], margin: float) -> Iterator[Entry]:
         called = nodes if nodes.startswith("/") else process
         if called and any(row["count"] >= LEAST_VALUES for row in group):
             slow = max(row["p99_ns"] for row in group)
-            name = in_quotes(_literal(called))
-            yield "process", name, {"wakeup": f"p99 < {_time(slow, margin)}"}
+            yield "process", _quoted(called), {"wakeup": f"p99 < {_time(slow, margin)}"}
 
 
 def _topics(rows: Sequence[Row]) -> Iterator[Entry]:
@@ -158,9 +154,8 @@ def _topics(rows: Sequence[Row]) -> Iterator[Entry]:
         if row["count"] < LEAST_VALUES or row["period_deviation_ns"] is None:
             continue
         if row["period_deviation_ns"] * row["rate_hz"] <= _STEADY * 1e9:
-            name = in_quotes(_literal(topic))
-            publisher = in_quotes(_literal(node))
-            yield "topic", f"{name}\n    node: {publisher}", {"rate": _around([row["rate_hz"]])}
+            rate = {"rate": _around([row["rate_hz"]])}
+            yield "topic", f"{_quoted(topic)}\n    node: {_quoted(node)}", rate
 
 
 def _calls(
@@ -175,8 +170,7 @@ def _calls(
         if any(row[samples] < LEAST_VALUES for row in group):
             continue
         slow = max(row[f"{column}_p99_ns"] for row in group)
-        name = in_quotes(_literal(called))
-        yield kind, name, {metric: f"p99 < {_time(slow, margin)}"}
+        yield kind, _quoted(called), {metric: f"p99 < {_time(slow, margin)}"}
 
 
 def _grouped(rows: Sequence[Row], *keys: str) -> list[tuple[tuple[Any, ...], list[Row]]]:
@@ -186,9 +180,9 @@ def _grouped(rows: Sequence[Row], *keys: str) -> list[tuple[tuple[Any, ...], lis
     return list(groups.items())
 
 
-def _literal(name: str) -> str:
-    """Return a pattern that means one name only."""
-    return "".join(f"[{character}]" if character in "*?[" else character for character in name)
+def _quoted(name: str) -> str:
+    """Return a pattern in quotes that means one name only."""
+    return in_quotes(escape(name))
 
 
 def _around(rates: Sequence[float]) -> str:

@@ -436,7 +436,11 @@ class _Maker:
         room -= size
         each = window.end_ns - window.start_ns
         share = max(room, 0) / (count * _BYTES_PER_BAR)
-        middles = self.slow_moments()[:_STRETCHES] or [window.start_ns - origin + each // 2]
+        # When the slowest flow of each path began, the slowest first.
+        self.pages.fill_flows(self.connection, self.extent)
+        worst = self.pages.ask("path_slowest", {"run": self.extent.run.run_id, "limit": 1})
+        begins = worst.sort_by([("latency", "descending")])["root_at"].to_pylist()
+        middles = begins[:_STRETCHES] or [window.start_ns - origin + each // 2]
         length = max(int(each * share / len(middles)), 1)
         stretches: list[Window] = []
         for middle in sorted(middles):
@@ -466,9 +470,3 @@ class _Maker:
             f" ({held:,} bars), the rest in bins of {bin_ns / 1e6:.3f} ms. A larger --max-size, or"
             " --start and --end, keep more; msgflow ui has everything."
         )
-
-    def slow_moments(self) -> list[int]:
-        self.pages.fill_flows(self.connection, self.extent)
-        worst = self.pages.ask("path_slowest", {"run": self.extent.run.run_id, "limit": 1})
-        order = worst.sort_by([("latency", "descending")])
-        return [int(at) for at in order["root_at"].to_pylist()]

@@ -74,11 +74,9 @@ class Following(Protocol):
 
     def prepare(self) -> None:
         """Write its next state beside the database; this may take long."""
-        ...
 
     def show(self) -> None:
         """Put what was prepared in place of the database."""
-        ...
 
 
 class Interruptible(Protocol):
@@ -86,7 +84,6 @@ class Interruptible(Protocol):
 
     def interrupt(self) -> None:
         """End the question."""
-        ...
 
 
 def application(

@@ -133,11 +133,6 @@ class Opened:
     base: duckdb.DuckDBPyConnection  # a connection, which those of questions are made of
     ahead: Ahead  # the question that comes before those of pages
 
-    def close(self) -> None:
-        """Close it; no question may run."""
-        self.ahead.stop()
-        self.base.close()
-
 
 class SharedDatabase:
     """The database that all requests share, open while questions are asked."""
@@ -260,7 +255,8 @@ class SharedDatabase:
 
     def _free(self) -> None:
         if self._opened is not None:
-            self._opened.close()
+            self._opened.ahead.stop()
+            self._opened.base.close()
             self._opened = None
 
     def _forget(self) -> None:

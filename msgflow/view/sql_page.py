@@ -75,11 +75,9 @@ class Sql(Protocol):
 
     def __call__(self, text: str, limit: int) -> QueryResult:
         """Return the rows of a query, `limit` at most; a note says if there are more."""
-        ...
 
     def interrupt(self) -> None:
         """End the query that runs."""
-        ...
 
 
 def most_rows(params: Mapping[str, Any]) -> int:
