@@ -43,21 +43,20 @@ def prompt(database: Path, ask: Callable[[str], None]) -> None:
             return
         if not lines and line.strip().rstrip("; ").lower() in _END:
             return
-        if not lines and line.lstrip().startswith("."):
-            try:
-                _answer(database, line.strip().rstrip("; "))
-            except MsgflowError as error:
-                print_exception(error)
-            continue
         if line.strip():
             lines.append(line)
-        if lines and (not line.strip() or line.rstrip().endswith(";")):
-            query = "\n".join(lines)
-            lines.clear()
-            try:
+        is_word = len(lines) == 1 and line.lstrip().startswith(".")
+        if not is_word and (not lines or (line.strip() and not line.rstrip().endswith(";"))):
+            continue
+        query = "\n".join(lines)
+        lines.clear()
+        try:
+            if is_word:
+                _answer(database, query.strip().rstrip("; "))
+            else:
                 ask(query)
-            except MsgflowError as error:
-                print_exception(error)
+        except MsgflowError as error:
+            print_exception(error)
 
 
 def _answer(database: Path, line: str) -> None:

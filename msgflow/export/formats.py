@@ -7,10 +7,10 @@ from enum import StrEnum
 from typing import IO, TYPE_CHECKING, TypeVar
 
 from msgflow.errors import UsageError
-from msgflow.text.json_value import json_value
+from msgflow.text.json_value import json_text, json_value
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Iterator, Mapping
     from pathlib import Path
 
     import pyarrow as pa
@@ -74,7 +74,15 @@ def write_result(result: QueryResult, form: Format, stream: IO[bytes]) -> None:
 
         pyarrow.parquet.write_table(result.table, stream, compression="zstd")
     else:
-        for line in _lines(result, form):
+        from msgflow.export.table import markdown_lines, table_lines
+
+        writers = {
+            Format.TABLE: table_lines,
+            Format.MARKDOWN: markdown_lines,
+            Format.JSONL: json_rows,
+            Format.JSON: _json_array,
+        }
+        for line in writers[form](result):
             stream.write(f"{line}\n".encode())
 
 
@@ -84,18 +92,6 @@ def json_rows(result: QueryResult) -> Iterator[str]:
     for batch in result.table.to_batches(max_chunksize=_ROWS_AT_ONCE):
         for row in batch.to_pylist():
             yield encode(json_value(row))
-
-
-def _lines(result: QueryResult, form: Format) -> Iterable[str]:
-    from msgflow.export.table import markdown_lines, table_lines
-
-    writers = {
-        Format.TABLE: table_lines,
-        Format.MARKDOWN: markdown_lines,
-        Format.JSONL: json_rows,
-        Format.JSON: _json_array,
-    }
-    return writers[form](result)
 
 
 def _json_array(result: QueryResult) -> Iterator[str]:
@@ -162,11 +158,4 @@ def _csv_column(column: pa.Array) -> pa.Array:
         return column
     if types.is_decimal(kind) and kind.scale == 0:
         return column
-    return texts_to_arrow(list(map(_csv_text, column.to_pylist())))
-
-
-def _csv_text(value: object) -> str | None:
-    simple = json_value(value)
-    if simple is None or isinstance(simple, str):
-        return simple
-    return json.dumps(simple, ensure_ascii=False)
+    return texts_to_arrow(list(map(json_text, column.to_pylist())))

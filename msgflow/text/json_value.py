@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from datetime import date, datetime, time
 from decimal import Decimal
@@ -28,3 +29,11 @@ def json_value(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [json_value(item) for item in value]
     return str(value)
+
+
+def json_text(value: Any) -> str | None:
+    """Return a value as text: JSON, unless it is a text itself, or missing."""
+    simple = json_value(value)
+    if simple is None or isinstance(simple, str):
+        return simple
+    return json.dumps(simple, ensure_ascii=False)

@@ -60,6 +60,7 @@ SELECT action_name FROM main.action_server WHERE run_id = $run_id
 UNION SELECT action_name FROM main.action_client WHERE run_id = $run_id
 """
 _NODES = "SELECT DISTINCT node FROM main.callback_label WHERE run_id = $run_id"
+_OF_NODE = "SELECT DISTINCT full_name FROM main.node WHERE run_id = $run_id", "node"
 _TIMERS = """
 SELECT DISTINCT l.node
 FROM main.callback_label AS l
@@ -215,7 +216,7 @@ SUBJECTS: dict[str, Subject] = {
                     "topics-latency": ("subscriber",),
                     "topics-delivery": ("subscriber",),
                 },
-                "SELECT DISTINCT full_name FROM main.node WHERE run_id = $run_id", "node",
+                *_OF_NODE,
             ),
         },
     ),
@@ -231,10 +232,7 @@ SUBJECTS: dict[str, Subject] = {
         {"service-latency": "coalesce(client, '?') || ' → ' || service_name"},
         {
             "service": Filter({"service-latency": ("service_name",)}, _SERVICES, "service"),
-            "node": Filter(
-                {"service-latency": ("client",)},
-                "SELECT DISTINCT full_name FROM main.node WHERE run_id = $run_id", "node",
-            ),
+            "node": Filter({"service-latency": ("client",)}, *_OF_NODE),
         },
     ),
     "action": Subject(
@@ -247,10 +245,7 @@ SUBJECTS: dict[str, Subject] = {
         {"action-latency": "coalesce(client, '?') || ' → ' || action_name"},
         {
             "action": Filter({"action-latency": ("action_name",)}, _ACTIONS, "action"),
-            "node": Filter(
-                {"action-latency": ("client",)},
-                "SELECT DISTINCT full_name FROM main.node WHERE run_id = $run_id", "node",
-            ),
+            "node": Filter({"action-latency": ("client",)}, *_OF_NODE),
         },
     ),
     "process": Subject(

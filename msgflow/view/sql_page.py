@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -11,7 +10,7 @@ from pyarrow import compute
 
 from msgflow.errors import UsageError
 from msgflow.files.resources import resource_directory
-from msgflow.text.json_value import json_value
+from msgflow.text.json_value import json_text, json_value
 from msgflow.view.table_encoding import encode
 
 if TYPE_CHECKING:
@@ -134,7 +133,7 @@ def _sendable(column: pa.ChunkedArray) -> pa.Array:
         return _of_decimals(array)
     if pa.types.is_string(kind) or pa.types.is_large_string(kind) or pa.types.is_dictionary(kind):
         return compute.cast(array, pa.string())
-    return pa.array(map(_as_text, array.to_pylist()), pa.string())
+    return pa.array(map(json_text, array.to_pylist()), pa.string())
 
 
 def _of_decimals(array: pa.Array) -> pa.Array:
@@ -145,10 +144,3 @@ def _of_decimals(array: pa.Array) -> pa.Array:
         return compute.cast(array, pa.int64())
     except pa.ArrowInvalid:
         return compute.cast(array, pa.string())
-
-
-def _as_text(value: Any) -> str | None:
-    value = json_value(value)
-    if value is None or isinstance(value, str):
-        return value
-    return json.dumps(value, ensure_ascii=False)
