@@ -41,11 +41,7 @@ def write_events(
     stream: IO[bytes],
     progress: Callable[[Progress], None] | None = None,
 ) -> int:
-    """Write the selected events in order of time, text as UTF-8, and return their number.
-
-    CSV and Parquet have the columns event_id, ts_ns (epoch ns), trace_index, hostname, name,
-    cpu_id, vpid, vtid, procname, pid_ns and fields, a JSON object. JSON objects have the same.
-    """
+    """Write the selected events in order of time, text as UTF-8, and return their number."""
     if form in TABLES:
         return _write_table(selection, form, stream, progress)
     rendering = text_line if form is EventFormat.TEXT else json_line

@@ -31,7 +31,7 @@ _TIME = COMMON_SCHEMA.get_field_index("ts_ns")
 
 
 class Selection:
-    """The events of a set of traces with certain names and times.
+    """The events of a set of traces with certain names, or all, from a start to before an end.
 
     Attributes:
         traces: the set.
@@ -45,12 +45,6 @@ class Selection:
         start: str | int | None = None,
         end: str | int | None = None,
     ) -> None:
-        """Choose events.
-
-        Without `patterns`, such as 'ros2:rcl_*', all names are chosen. `start` and `end` are epoch
-        ns, ISO times, or offsets from the begin of the traces ('2.5s', '100ms'). Events at `start`
-        are chosen, events at `end` are not.
-        """
         self.traces = traces
         self.lost_event_count = 0
         for trace in traces.traces:

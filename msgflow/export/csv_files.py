@@ -21,11 +21,7 @@ def export_csv(
     *,
     force: bool,
 ) -> tuple[ExportedView, ...]:
-    """Write views to `directory/VIEW.csv`, all of them or none, rows sorted by all columns.
-
-    Text stands in quotes, a missing value is an empty field without; bytes are hexadecimal. With
-    `force`, files that exist are replaced.
-    """
+    """Write views to `directory/VIEW.csv`, all of them or none, rows sorted by all columns."""
     import pyarrow.csv
 
     from msgflow.trace.numpy_arrow import empty_batch

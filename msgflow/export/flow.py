@@ -24,10 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, repr=False)
 class Flow(FlowVertices):
-    """The causes and effects of one message, as `FlowVertices` describes them.
-
-    `str` of it is the tree that `msgflow flow` prints.
-    """
+    """The causes and effects of one message; `str` of it is the tree of `msgflow flow`."""
 
     def to_arrow(self) -> pa.Table:
         """Return the rows, as `table` has them, as a pyarrow.Table."""

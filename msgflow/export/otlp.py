@@ -134,10 +134,7 @@ def write_otlp(
     part: Slice,
     choice: Mapping[str, Value] | None = None,
 ) -> ExportedTraces:
-    """Write a run, or some of its flows, as traces of OpenTelemetry, batch by batch.
-
-    `choice` has parameters of `internal.otlp_flow`; everything is written when it is None.
-    """
+    """Write a run, or the flows of `internal.otlp_flow` that are chosen, batch by batch."""
     if str(target).startswith(("http:/", "https:/")):
         raise UsageError(
             f"traces of OpenTelemetry are written to a file — {target}",

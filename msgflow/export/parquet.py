@@ -28,13 +28,7 @@ def export_parquet(
     *,
     force: bool,
 ) -> tuple[ExportedView, ...]:
-    """Write views to `directory/VIEW/run_id=ID/data.parquet`, all of them or none.
-
-    Rows are sorted by all columns, so that equal content gives equal files. The metadata of a
-    file hold `msgflow.view`, `msgflow.version`, `msgflow.schema_revision` and, for pandas, types
-    that keep integers exact beside missing values. With `force`, views that an export has written
-    there are replaced.
-    """
+    """Write views to `directory/VIEW/run_id=ID/data.parquet`, all or none, rows in order."""
     import pyarrow.parquet
 
     from msgflow.db.connection import recorded_revision

@@ -39,11 +39,7 @@ class AppliedLinks:
 def apply_links(
     path: Path, file: LinksFile, *, run: str | int | None, memory_limit: str | None = None
 ) -> tuple[AppliedLinks, ...]:
-    """Declare the links of a file for runs of a database and derive their links anew.
-
-    Links that an earlier file declared for these runs are removed. Everything happens in one
-    transaction.
-    """
+    """Declare the links of a file for runs of a database and derive their links anew."""
 
     def apply(con: duckdb.DuckDBPyConnection, runs: tuple[Run, ...]) -> tuple[AppliedLinks, ...]:
         counts = {run.run_id: declare_links(con, run.run_id, file) for run in runs}

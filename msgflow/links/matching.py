@@ -78,11 +78,7 @@ def match_links(
     file: LinksFile,
     leave_out: Callable[[DeclaredLink, UsageError], None] | None = None,
 ) -> tuple[MatchedLink, ...]:
-    """Return the links of a file with the nodes and topics of a run.
-
-    `leave_out` gets each link that does not fit the run, with its error. If it is None, the error
-    is raised.
-    """
+    """Return the links of a file with the nodes and topics of a run; see `declare_links`."""
     nodes = _read_nodes(con, run_id)
     matched: list[MatchedLink] = []
     for link in file.links:

@@ -18,11 +18,7 @@ if TYPE_CHECKING:
 
 
 def clock_notes(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run]) -> list[str]:
-    """Return notes on how far times of several hosts can be compared, a sentence each.
-
-    A run with several clocks that are not synchronised: their number; clocks that are corrected to
-    the same one count as one. A corrected clock: its largest error.
-    """
+    """Return notes on how far times of several hosts can be compared, a sentence each."""
     chosen = {"runs": [run.run_id for run in runs]}
     # Most runs have one clock and need no note: this first statement takes no time.
     several = connection.execute(

@@ -87,10 +87,7 @@ def find_start(
     at: str | int | None = None,
     run: str | int | None = None,
 ) -> Start:
-    """Return the first publication of a topic, or what a node did first, at or after a time.
-
-    Of a node, its first callback instance counts, or its first publication where that is earlier.
-    """
+    """Return the first publication of a topic, or what a node did first, at or after a time."""
     one = Slice(run).one_run(connection, "a message")
     require_names(connection, (one,), "place", [place])
     at_ns = MINIMUM_NS if at is None else time_point(at, (one,), "--at")
@@ -113,10 +110,7 @@ def find_start(
 
 
 def find_take(connection: duckdb.DuckDBPyConnection, start: Start) -> tuple[int, str, int]:
-    """Return the take that a start means, its topic, and the id of its run.
-
-    Of a publication it is the take with the longest latency.
-    """
+    """Return the take of longest latency that a start means, its topic, and the id of its run."""
     found = connection.execute(_TAKE, {"kind": start.kind, "id": start.id}).fetchall()
     if not found:
         is_message = start.kind == "publication"

@@ -66,10 +66,7 @@ WHERE NOT EXISTS (
 def require_places(
     connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], bound: Mapping[str, Value]
 ) -> dict[str, Value]:
-    """Return the topics and nodes among the parameters of a query, as lists.
-
-    Raise unless the chosen runs have each of them. Without runs, every name passes.
-    """
+    """Return topics and nodes among the parameters of a query, which the runs must have."""
     places: dict[str, Value] = {}
     for key in PLACE_PARAMETERS:
         given = bound.get(key)
@@ -133,10 +130,7 @@ def require_names(
 def require_ids(
     connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], bound: Mapping[str, Value]
 ) -> None:
-    """Raise unless the chosen runs have every id among the parameters of a query.
-
-    Without runs, every id passes.
-    """
+    """Raise unless the chosen runs, if any, have every id among the parameters of a query."""
     for key, (view, column, hint) in _IDS.items():
         number = bound.get(key)
         if number is None or not runs:

@@ -25,8 +25,8 @@ def with_path_numbers(
 ) -> QueryResult:
     """Return a result with the numbers of its paths, if it has several.
 
-    A query may ask for flows that end in the middle of a path. What they pass is no path of the
-    runs: its number comes behind those of all paths. `known` is a table with all of these.
+    What ends in the middle of a path is no path of the runs: its number comes behind those of all
+    paths. `known` is a table with all of these.
     """
     if PATH not in result.columns:
         return result

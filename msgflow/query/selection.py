@@ -211,10 +211,7 @@ def make_selection(
     given: Mapping[str, object],
     names_in: Callable[[str, str], Sequence[str]] = lambda _, text: values_of(text),
 ) -> Selection:
-    """Return the selection that the words of `Database.query` mean.
-
-    `names_in` returns the names that a text means, of a kind or 'place'.
-    """
+    """Return what words of `Database.query` mean; `names_in`: the names in a text, by kind."""
     words: dict[str, object] = {}
     for word, value in given.items():
         if word in ("limit", "slowest"):

@@ -112,10 +112,7 @@ def explain(
     times: Slice,
     place: str | None = None,
 ) -> Explanation:
-    """Return why flows of a run are late that end at a topic or node, or glob; None: anywhere.
-
-    A NoFlowError says that no flow arrives there.
-    """
+    """Return why flows of a run are late that end at a place; raise NoFlowError if none does."""
     with Steps(connection, _KNOWN) as steps:
 
         def ask(name: str, part: Slice, **given: Value) -> QueryResult:

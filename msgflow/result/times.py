@@ -19,12 +19,7 @@ _SECOND = 1e9
 
 
 class Times(StrEnum):
-    """How times are written.
-
-    All but `ns` have durations in seconds; `seconds` counts from the epoch (a floating-point
-    number, exact to a quarter of a microsecond), `relative` from the start of the run, `iso` is
-    UTC.
-    """
+    """How times are written; with all but `ns`, durations are in seconds."""
 
     NS = "ns"
     SECONDS = "seconds"
@@ -35,10 +30,7 @@ class Times(StrEnum):
 def converted(
     table: pa.Table, units: Mapping[str, str], runs: Sequence[Run], times: Times
 ) -> pa.Table:
-    """Return rows with their times in another form; `_ns` becomes `_s` or `_utc` in names.
-
-    `units` names the columns that are times: 'ns' are durations, 'epoch ns' points in time.
-    """
+    """Return rows with their times in another form; `_ns` becomes `_s` or `_utc` in names."""
     if times is Times.NS:
         return table
     columns, names = [], []

@@ -28,10 +28,7 @@ class Terminated(KeyboardInterrupt):
 
 
 class Interrupts:
-    """The state of Ctrl-C: whether it came, and whether it still counts.
-
-    `end_process` ends the process with the exit code of a signal, where that is ours to do.
-    """
+    """The state of Ctrl-C: whether it came, and still counts; `end_process` where that is ours."""
 
     def __init__(
         self, end_process: Callable[[type[KeyboardInterrupt]], None] | None = None

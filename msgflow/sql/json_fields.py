@@ -26,10 +26,7 @@ def column_name(position: int) -> str:
 
 
 def json_fields(payload: pa.Schema) -> str:
-    """Return the SQL of a JSON object with all fields, over the columns `column_name` names.
-
-    An enumeration is its label, where exactly one belongs to the value.
-    """
+    """Return the SQL of a JSON object with all fields; an enumeration is its only label."""
     members = (
         f"{literal(field.name)}, {_labelled(column_name(position), field)}"
         for position, field in enumerate(payload)

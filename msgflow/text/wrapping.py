@@ -14,10 +14,7 @@ _PIECE = re.compile(r"[/(]?[^/(]*\(?")
 
 
 def wrap(text: str, width: int) -> list[str]:
-    """Return lines of at most `width` cells, broken at spaces, and within names if need be.
-
-    A number stays with its unit.
-    """
+    """Return lines of at most `width` cells, broken at spaces, and within names if need be."""
     if cell_len(text) <= width:
         return [text]
     lines: list[str] = []

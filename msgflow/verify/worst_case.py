@@ -57,10 +57,7 @@ def find_worst_case(
 
 
 def take_of(command: str | None) -> int | None:
-    """Return the take at the end of the flow that the command of a worst case shows.
-
-    None where it shows something else.
-    """
+    """Return the take at the end of the flow that a command shows; None where it shows none."""
     match shlex.split(command or ""):
         case ["msgflow", "flow", "--take", identity]:
             return int(identity)

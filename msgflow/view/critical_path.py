@@ -31,11 +31,8 @@ def critical_path(
 ) -> bytes:
     """Return the pieces of the critical path as bytes, with the command that prints them.
 
-    It belongs to the longest flow that ends where the picked one does, see critical_end.sql.
-
-    Times count from `origin_ns`, in epoch ns. `kind` is 'publication', 'take', 'callback_instance',
-    'request' or 'response'. The flow starts on `from_topic`, or when None on the topic of its first
-    message.
+    It belongs to the longest flow that ends where the picked one does, see critical_end.sql. It
+    starts on `from_topic`, or when None on the topic of its first message.
     """
     ends = run_page_query(connection, "critical_end", {"kind": kind, "id": number}).to_pylist()
     if not ends:

@@ -42,11 +42,7 @@ def write_flow_page(
     depth: int,
     limit: int,
 ) -> int:
-    """Write the timeline of everything that a thing led to and came from; return its bytes.
-
-    A file that exists is replaced. `kind` and `number` name the thing; `depth` and `limit` are as
-    for a flow, and the page says how many vertices there are beyond.
-    """
+    """Write the timeline of everything that a thing led to and came from; return its bytes."""
     pages = Pages()
     params: dict[str, Any] = {"run": str(run.run_id)}
     extent = pages.extent(connection, params)

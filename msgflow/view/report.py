@@ -91,11 +91,7 @@ def write_report(
     through: str | None = None,
     max_size: int,
 ) -> Report:
-    """Write the pages of a run into one file that any browser opens, or its summary as Markdown.
-
-    A file that exists is replaced; one whose name ends with .md gets the summary. `through` leaves
-    paths without this text, and rows that are not on them, out; `max_size` is in bytes.
-    """
+    """Write the pages of a run into one file that any browser opens, or its summary as Markdown."""
     one = part.one_run(connection, "a report")
     maker = _Maker(connection, one.run_id, part.window([one]), verification, through, max_size)
     try:
