@@ -180,7 +180,7 @@ def command(
     if form is FlowFormat.JSON:
         print_text(flows[0].to_json(), output)
     else:
-        from msgflow.export.flow_tree import tree_text
+        from msgflow.export.flow import tree_text
 
         print_drawing(
             lambda width, color: "\n\n".join(

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections import defaultdict
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
-
-from msgflow.export.flow_vertices import NOT_TAKEN
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
-    from msgflow.export.flow_vertices import FlowVertices, Key, Row
+Key = tuple[str, int]
+Row = dict[str, Any]
+# What a subscription did not take has such a vertex, and the status of the message as its link.
+NOT_TAKEN = "subscription"
 
 
 @dataclass(eq=False)
@@ -46,14 +47,13 @@ class Branch:
     children: list[Branch] = field(default_factory=list)
 
 
-def lay_out_flow(flow: FlowVertices) -> list[Branch]:
+def lay_out_flow(
+    nodes: Mapping[Key, Row], edges: Sequence[Row], start: Key, direction: str
+) -> list[Branch]:
     """Return a branch for each first item: all items without a cause, or the start."""
-    items = _items(flow)
-    if flow.direction == "both":
-        tops = _tops(items, items[flow.start_key])
-    else:
-        tops = [items[flow.start_key]]
-    return _grow(tops, is_backward=flow.direction == "backward")
+    items = _items(nodes, edges)
+    tops = _tops(items, items[start]) if direction == "both" else [items[start]]
+    return _grow(tops, is_backward=direction == "backward")
 
 
 def walk(branches: Sequence[Branch]) -> Iterator[Branch]:
@@ -65,16 +65,16 @@ def walk(branches: Sequence[Branch]) -> Iterator[Branch]:
         stack += reversed(branch.children)
 
 
-def _items(flow: FlowVertices) -> dict[Key, Item]:
+def _items(nodes: Mapping[Key, Row], edges: Sequence[Row]) -> dict[Key, Item]:
     calls: dict[Key, list[Row]] = defaultdict(list)
-    for edge in flow.edges:
+    for edge in edges:
         if edge["link_kind"] == "callback":
             calls[edge["from_kind"], edge["from_id"]].append(edge)
     items: dict[Key, Item] = {}
-    for key, node in flow.nodes.items():
+    for key, node in nodes.items():
         if node["kind"] not in ("take", "subscription"):
             items[key] = Item(node)
-    for key, node in flow.nodes.items():
+    for key, node in nodes.items():
         if node["kind"] != "take":
             continue
         callback = None
@@ -85,10 +85,10 @@ def _items(flow: FlowVertices) -> dict[Key, Item]:
             items[key] = callback
         else:
             items[key] = Item(node)
-    for edge in flow.edges:
+    for edge in edges:
         cause = items[edge["from_kind"], edge["from_id"]]
         target = (edge["to_kind"], edge["to_id"])
-        effect = Item(flow.nodes[target]) if edge["to_kind"] == NOT_TAKEN else items[target]
+        effect = Item(nodes[target]) if edge["to_kind"] == NOT_TAKEN else items[target]
         if edge is not effect.handover:
             cause.effects.append((effect, edge))
             effect.causes.append((cause, edge))

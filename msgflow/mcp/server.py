@@ -217,7 +217,7 @@ class _Tools:
         Give a topic (at: first message at or after that time, seconds from the start of the run) or
         one of the ids. direction: 'forward', 'backward' or 'both'.
         """
-        from msgflow.export.flow_tree import tree_text
+        from msgflow.export.flow import tree_text
 
         with self._opened() as database:
             flow = database.flow(

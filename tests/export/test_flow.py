@@ -13,7 +13,7 @@ import pytest
 from golden import fill_case, insert
 
 from msgflow import Database, UsageError
-from msgflow.export.flow_tree import tree_text
+from msgflow.export.flow import tree_text
 
 CASES = Path(__file__).resolve().parents[1] / "schema" / "cases" / "main.flow_step"
 
