@@ -24,12 +24,18 @@ OWN = "own_"
 def header_option(param: Param, panel: str = PARAMETERS) -> Any:
     """Return the option for a parameter; the default stands in the header."""
     flag = f"--{param.name.replace('_', '-')}"
+    metavar = {"BOOLEAN": "", "VARCHAR": "TEXT"}.get(param.type, "NUMBER")
+    completion: Callable[..., list[str]] | None = None
+    if param.name in PLACE_PARAMETERS:
+        metavar, completion = "NAME", complete("place")
+    elif param.choices:
+        metavar, completion = "WORD", lambda: list(param.choices)
     return typer.Option(
         f"{flag}/--no-{flag[2:]}" if param.type == "BOOLEAN" else flag,
-        metavar=_metavar(param),
+        metavar=metavar,
         help=escape(_describe(param)),
         show_default=False,
-        autocompletion=_completion(param),
+        autocompletion=completion,
         rich_help_panel=ADVANCED if param.name in ADVANCED_NAMES else panel,
     )
 
@@ -47,21 +53,6 @@ def header_parameter(param: Param, panel: str = PARAMETERS) -> Parameter:
             kind | None if param.has_default else kind, header_option(param, panel)
         ],
     )
-
-
-def _completion(param: Param) -> Callable[..., list[str]] | None:
-    if param.name in PLACE_PARAMETERS:
-        return complete("place")
-    return (lambda: list(param.choices)) if param.choices else None
-
-
-def _metavar(param: Param) -> str:
-    """Return what the help shows for the type of a parameter."""
-    if param.name in PLACE_PARAMETERS:
-        return "NAME"
-    if param.choices:
-        return "WORD"
-    return {"BOOLEAN": "", "VARCHAR": "TEXT"}.get(param.type, "NUMBER")
 
 
 def _describe(param: Param) -> str:

@@ -141,8 +141,16 @@ def write_otlp(
             "a collector sends the file on, with its receiver otlpjsonfile: docs/export.md",
         )
     run = part.one_run(connection, "traces of OpenTelemetry")
+    of_run = {"runs": [run.run_id], "run_id": run.run_id, **part.window([run]).bindings}
+    ((identity,),) = internal_sql().run(connection, "run_identity", of_run).fetchall()
+    chosen = {**of_run, "identity": identity or run.name}
+    if choice is not None:
+        places = require_places(connection, [run], choice)
+        flows = internal_sql().run(connection, "otlp_flow", {**of_run, **choice, **places})
+        chosen["keys"] = [key for (key,) in flows.fetchall()]
     try:
-        batches, traces, spans, links = _keep_spans(connection, run, part, choice)
+        internal_sql().keep(connection, "otlp_span", chosen)
+        ((batches, traces, spans, links),) = connection.sql(_COUNTS).fetchall()
         values = {"run": run.name, "version": __version__}
         with replacing(target) as temporary, temporary.open("w", encoding="utf-8") as file:
             for batch in range(batches):
@@ -152,19 +160,3 @@ def write_otlp(
     finally:
         connection.execute("DROP TABLE IF EXISTS temp.otlp_span")
     return ExportedTraces(run, traces, spans, links)
-
-
-def _keep_spans(
-    connection: duckdb.DuckDBPyConnection, run: Run, part: Slice, choice: Mapping[str, Value] | None
-) -> tuple[int, int, int, int]:
-    """Make the table of spans; return the number of batches, traces, spans and links."""
-    of_run = {"runs": [run.run_id], "run_id": run.run_id, **part.window([run]).bindings}
-    ((identity,),) = internal_sql().run(connection, "run_identity", of_run).fetchall()
-    values = {**of_run, "identity": identity or run.name}
-    if choice is not None:
-        places = require_places(connection, [run], choice)
-        flows = internal_sql().run(connection, "otlp_flow", {**of_run, **choice, **places})
-        values["keys"] = [key for (key,) in flows.fetchall()]
-    internal_sql().keep(connection, "otlp_span", values)
-    (counts,) = connection.sql(_COUNTS).fetchall()
-    return counts

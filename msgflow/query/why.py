@@ -12,8 +12,7 @@ from msgflow.errors import NoFlowError
 from msgflow.query.catalogue import load_query
 from msgflow.query.compare import warm_up_seconds
 from msgflow.query.path_numbers import only_path, with_path_numbers
-from msgflow.query.runner import run_query
-from msgflow.query.steps import Steps
+from msgflow.query.runner import Steps, run_query
 from msgflow.sql.statement import internal_sql, registered
 from msgflow.text.values import format_duration
 

@@ -49,10 +49,11 @@ def suggest_targets(
         *_calls(results["action-latency"], "action", "goal", "result", margin),
         *_processes(results["scheduling-wakeup"], margin),
     ]
+    warm_up = f"# Without its first {skipped:g} s, a warm-up: verify with --start, too."
     lines = [
         f"# What run {in_quotes(run.name)} met, and {100 * margin:.4g} % more: review it, keep"
         " what matters.",
-        *_warm_up(skipped),
+        *[warm_up] * bool(skipped),
         *_undelivered(results["topics-delivery"]),
         "targets:" if entries else "targets: []",
     ]
@@ -60,11 +61,6 @@ def suggest_targets(
         lines.append(f"  - {kind}: {name}")
         lines += [f'    {metric}: "{text}"' for metric, text in requirements.items()]
     return "\n".join(lines)
-
-
-def _warm_up(seconds: float) -> Iterator[str]:
-    if seconds:
-        yield f"# Without its first {seconds:g} s, a warm-up: verify with --start, too."
 
 
 Entry = tuple[str, str, dict[str, str]]

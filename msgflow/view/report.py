@@ -255,11 +255,8 @@ class _Maker:
     def runs(self, other: Run | None) -> None:
         table = run_page_query(self.connection, "run", {})
         wanted = [*([] if other is None else [other.run_id]), self.extent.run.run_id]
-        rows = table.filter(compute.is_in(table["run_id"], pa.array(wanted)))
-        order = sorted(
-            range(rows.num_rows), key=lambda row: wanted.index(rows["run_id"][row].as_py())
-        )
-        self.parts.add("run", encode(rows.take(pa.array(order, pa.int64()))))
+        rows = [table.filter(compute.equal(table["run_id"], run_id)) for run_id in wanted]
+        self.parts.add("run", encode(pa.concat_tables(rows)))
 
     def paths(self) -> list[int]:
         """Keep the pictures of paths; return the numbers of those kept."""

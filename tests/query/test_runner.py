@@ -8,9 +8,8 @@ import pytest
 from msgflow.db import objects
 from msgflow.errors import QueryError, UsageError
 from msgflow.query.catalogue import load_query
-from msgflow.query.runner import bind, run_query
+from msgflow.query.runner import Steps, bind, run_query
 from msgflow.query.selection import make_selection
-from msgflow.query.steps import Steps
 from msgflow.run.slice import Slice
 from msgflow.sql.header import Header, parse
 from msgflow.sql.value import Value
