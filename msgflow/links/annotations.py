@@ -49,7 +49,7 @@ def apply_links(
                 run,
                 *counts[run.run_id],
                 *internal_sql().run(con, "link_source", {"run_id": run.run_id}).fetchall()[0],
-                tuple(_without_effect(con, run.run_id)),
+                without_effect=tuple(_without_effect(con, run.run_id)),
             )
             for run in runs
         )

@@ -96,7 +96,11 @@ def _read_nodes(con: duckdb.DuckDBPyConnection, run_id: int) -> tuple[Node, ...]
     subscriptions = _read_endpoints(con, run_id, "subscription")
     publishers = _read_endpoints(con, run_id, "publisher")
     return tuple(
-        Node(*named, tuple(subscriptions.get(node_id, ())), tuple(publishers.get(node_id, ())))
+        Node(
+            *named,
+            subscriptions=tuple(subscriptions.get(node_id, ())),
+            publishers=tuple(publishers.get(node_id, ())),
+        )
         for node_id, *named in con.execute(_NODES, [run_id]).fetchall()
     )
 

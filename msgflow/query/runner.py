@@ -156,12 +156,12 @@ def run_query(
         except _OF_CONDITIONS as error:
             if selection.where is None:
                 raise
-            names = [column.name for column in header.columns]
+            known = [column.name for column in header.columns]
             unknown = _COLUMN.search(str(error))
             raise UsageError(
                 f"--where cannot be evaluated: {first_line(error)}",
                 did_you_mean(
-                    unknown[1] if unknown else "", names, f"the columns are {', '.join(names)}"
+                    unknown[1] if unknown else "", known, f"the columns are {', '.join(known)}"
                 ),
             ) from error
     table, missing, has_rows = shown_rows(table, internal=internal, on_hidden=_on_hidden)
