@@ -44,15 +44,13 @@ def apply_links(
         counts = {run.run_id: declare_links(con, run.run_id, file) for run in runs}
         for run in runs:
             derive(con, run.run_id)
-        return tuple(
-            AppliedLinks(
-                run,
-                *counts[run.run_id],
-                *internal_sql().run(con, "link_source", {"run_id": run.run_id}).fetchall()[0],
-                without_effect=tuple(_without_effect(con, run.run_id)),
-            )
-            for run in runs
-        )
+        applied = []
+        for run in runs:
+            sources = internal_sql().run(con, "link_source", {"run_id": run.run_id})
+            ((of_file, of_trace),) = sources.fetchall()
+            sentences = tuple(_without_effect(con, run.run_id))
+            applied.append(AppliedLinks(run, *counts[run.run_id], of_file, of_trace, sentences))
+        return tuple(applied)
 
     return change_runs(path, run, apply, memory_limit=memory_limit)
 

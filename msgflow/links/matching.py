@@ -51,13 +51,13 @@ class Endpoint:
 class Node:
     """A node of a run, with its subscriptions and publishers."""
 
+    subscriptions: tuple[Endpoint, ...]
+    publishers: tuple[Endpoint, ...]
     name: str
     process_id: int
     process: str
     pid: int
     host: str
-    subscriptions: tuple[Endpoint, ...]
-    publishers: tuple[Endpoint, ...]
 
 
 @dataclass(frozen=True)
@@ -96,11 +96,7 @@ def _read_nodes(con: duckdb.DuckDBPyConnection, run_id: int) -> tuple[Node, ...]
     subscriptions = _read_endpoints(con, run_id, "subscription")
     publishers = _read_endpoints(con, run_id, "publisher")
     return tuple(
-        Node(
-            *named,
-            subscriptions=tuple(subscriptions.get(node_id, ())),
-            publishers=tuple(publishers.get(node_id, ())),
-        )
+        Node(tuple(subscriptions.get(node_id, ())), tuple(publishers.get(node_id, ())), *named)
         for node_id, *named in con.execute(_NODES, [run_id]).fetchall()
     )
 
