@@ -20,6 +20,7 @@ from msgflow.text.values import count
 
 if TYPE_CHECKING:
     from msgflow.fleet.ingest import FleetProgress
+    from msgflow.fleet.lake import Lake
 
 app = typer.Typer()
 
@@ -149,10 +150,9 @@ def runs(
     wide: bool = False,
 ) -> None:
     """List the runs of a lake."""
-    from msgflow.fleet.lake import Lake
     from msgflow.fleet.listing import list_runs
 
-    print_result(list_runs(Lake.open(lake)), form, output, wide=wide)
+    print_result(list_runs(_opened(lake)), form, output, wide=wide)
 
 
 @app.command("failures")
@@ -165,10 +165,9 @@ def failures(
     wide: bool = False,
 ) -> None:
     """List the recordings that did not go into a lake, and why."""
-    from msgflow.fleet.lake import Lake
     from msgflow.fleet.listing import list_failures
 
-    print_result(list_failures(Lake.open(lake)), form, output, wide=wide)
+    print_result(list_failures(_opened(lake)), form, output, wide=wide)
 
 
 @app.command("query")
@@ -210,7 +209,6 @@ def query(
         case: With e2e-latency: flows that count: first or last arrival of each root, newest root of
             each arrival, or all.
     """
-    from msgflow.fleet.lake import Lake
     from msgflow.fleet.lake_query import fleet_query, header_of, names
     from msgflow.query.selection import values_of
 
@@ -221,9 +219,8 @@ def query(
     words = {"case": case, "measure": measure, "section": section}
     own = {word: value for word, value in words.items() if value is not None}
     header_of(name, own)
-    _require_lake(lake)
     result = fleet_query(
-        Lake.open(lake),
+        _opened(lake),
         name,
         where=where,
         group_by=values_of(one_text(group_by)),
@@ -266,12 +263,10 @@ def sql(
         file: Read the query from FILE.
         limit (ROWS): Maximum number of rows to print; 0 for all.
     """
-    from msgflow.fleet.lake import Lake
     from msgflow.fleet.lake_query import fleet_sql
 
     query = sql_of(text, file, "msgflow fleet sql 'FROM run'")
-    _require_lake(lake)
-    result = fleet_sql(Lake.open(lake), query, where=where, limit=limit or None)
+    result = fleet_sql(_opened(lake), query, where=where, limit=limit or None)
     print_result(result, form, output, wide=wide)
 
 
@@ -294,10 +289,9 @@ def worst(
         path (PATH): Text of a path, a glob, or a part: a topic.
         limit (N): Number of flows.
     """
-    from msgflow.fleet.lake import Lake
     from msgflow.fleet.lake_query import fleet_worst
 
-    result = fleet_worst(Lake.open(lake), path, where=where, limit=limit)
+    result = fleet_worst(_opened(lake), path, where=where, limit=limit)
     print_result(result, form, output, wide=wide, columns=columns, most_rows=limit)
 
 
@@ -310,10 +304,9 @@ def open_(run: Annotated[str, typer.Argument()], *, lake: str, output: Path | No
         run (RUN): Key of a run, the begin of it, or a name.
         output: New database file; one that exists is not replaced. By default RUN.duckdb.
     """
-    from msgflow.fleet.lake import Lake
     from msgflow.fleet.run_database import open_run
 
-    done = open_run(Lake.open(lake), run, output)
+    done = open_run(_opened(lake), run, output)
     more = f", upgraded from schema revision {done.before}" if done.before else ""
     print_status(f"run {done.name} ({done.run}) is in {done.path}: {done.size:,} bytes{more}")
 
@@ -326,9 +319,7 @@ def remove(keys: list[str], *, lake: str) -> None:
     Args:
         keys (RUN...): Keys of runs.
     """
-    from msgflow.fleet.lake import Lake
-
-    removed = Lake.open(lake).remove(keys)
+    removed = _opened(lake).remove(keys)
     print_status(f"{count(removed, 'run')} removed from {lake}")
 
 
@@ -339,10 +330,9 @@ def pack(*, lake: str) -> None:
 
     Nothing else may use the lake meanwhile: no ingest, and no query.
     """
-    from msgflow.fleet.lake import Lake
     from msgflow.fleet.pack import pack as packed
 
-    done = packed(Lake.open(lake))
+    done = packed(_opened(lake))
     print_status(
         f"files of {count(done.runs, 'run')} put into {count(done.packs, 'part')};"
         f" {count(done.deleted, 'file')} deleted, {done.size / 1e6:,.1f} MB"
@@ -386,10 +376,9 @@ def compare(
         at_least: Smallest change that matters: less is about equal.
     """
     from msgflow.fleet.compare import compare as compared
-    from msgflow.fleet.lake import Lake
 
     comparison = compared(
-        Lake.open(lake),
+        _opened(lake),
         by,
         base,
         other,
@@ -443,7 +432,10 @@ def _time(text: str) -> float:
     return float(match[1]) * _SECONDS[match[2]]
 
 
-def _require_lake(lake: str) -> None:
-    """Raise an error if no lake is named; some commands do something without one, too."""
+def _opened(lake: str) -> Lake:
+    # Some commands do something without a lake, too.
     if not lake:
         raise UsageError("no lake is named", "--lake PATH, or MSGFLOW_LAKE")
+    from msgflow.fleet.lake import Lake
+
+    return Lake.open(lake)
