@@ -77,7 +77,13 @@ def command(
             if not together and clock_sync == "none":
                 recordings = find_recordings(traces, hosts, reader=reader.value)
             if len(recordings) > 1:
-                _require_no_word_for_one(len(recordings), name, keep_staging)
+                for option, given in (("--name", name), ("--keep-staging", keep_staging)):
+                    if given is not None:
+                        raise UsageError(
+                            f"{option} is for one run, these traces are {len(recordings)}"
+                            " recordings whose times do not overlap",
+                            f"--together makes one run; or leave out {option}",
+                        )
                 if not quiet:
                     print_note(
                         f"{len(recordings)} recordings, whose times do not overlap, become as many"
@@ -121,17 +127,6 @@ def _note_archives(traces: list[str], database: Path) -> None:
             f"{count(len(archives), 'archive')} beside the traces {verb} not read; to read what is"
             f" of the same recording: {shlex.join([*words, *database_option(database)])}"
         )
-
-
-def _require_no_word_for_one(number: int, name: str | None, keep_staging: Path | None) -> None:
-    given = {"--name": name, "--keep-staging": keep_staging}
-    for option, value in given.items():
-        if value is not None:
-            raise UsageError(
-                f"{option} is for one run, these traces are {number} recordings whose times do not"
-                " overlap",
-                f"--together makes one run; or leave out {option}",
-            )
 
 
 def _print_report(report: IngestReport, database: Path) -> None:

@@ -42,39 +42,24 @@ def suggest_paths(rows: Sequence[Mapping[str, Any]]) -> str:
         siblings = [set(steps[other]) for other in alike[first, last]]
         name = f"{_slug(first)}-to-{_slug(last)}"
         taken[name] += 1
-        lines += _entry(
-            name if taken[name] == 1 else f"{name}-{taken[name]}",
-            first,
-            last,
-            [step for step in dict.fromkeys(steps[text]) if not all(step in s for s in siblings)],
-            sorted(set().union(*siblings) - set(steps[text])),
-            evidence[text],
-        )
+        row = evidence[text]
+        seen = f"{row['reached']} of {row['roots']} arrived"
+        if row["p99_ns"] is not None:
+            seen += f", p99 {format_duration(row['p99_ns'])}"
+        lines += [
+            *(f"  # {line}" for line in wrap_path(printable(row["path"]), _WIDTH)),
+            f"  # {seen}",
+            f"  - name: {quoted(name if taken[name] == 1 else f'{name}-{taken[name]}')}",
+            f"    from: {quoted(first)}",
+            f"    to: {quoted(last)}",
+        ]
+        own = dict.fromkeys(steps[text])
+        via = [step for step in own if not all(step in other for other in siblings)]
+        without = sorted(set().union(*siblings) - own.keys())
+        for word, places in (("via", via), ("without", without)):
+            if places:
+                lines += list_lines(f"    {word}", [quoted(place) for place in places])
     return "\n".join(lines)
-
-
-def _entry(
-    name: str,
-    first: str,
-    last: str,
-    via: Sequence[str],
-    without: Sequence[str],
-    row: Mapping[str, Any],
-) -> list[str]:
-    seen = f"{row['reached']} of {row['roots']} arrived"
-    if row["p99_ns"] is not None:
-        seen += f", p99 {format_duration(row['p99_ns'])}"
-    lines = [
-        *(f"  # {line}" for line in wrap_path(printable(row["path"]), _WIDTH)),
-        f"  # {seen}",
-        f"  - name: {quoted(name)}",
-        f"    from: {quoted(first)}",
-        f"    to: {quoted(last)}",
-    ]
-    for word, places in (("via", via), ("without", without)):
-        if places:
-            lines += list_lines(f"    {word}", [quoted(place) for place in places])
-    return lines
 
 
 def _slug(name: str) -> str:
