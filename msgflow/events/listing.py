@@ -42,11 +42,24 @@ def write_events(
     progress: Callable[[Progress], None] | None = None,
 ) -> int:
     """Write the selected events in order of time, text as UTF-8, and return their number."""
+    count = 0
     if form in TABLES:
-        return _write_table(selection, form, stream, progress)
+        with (
+            Sequencer(selection.traces.traces, json_column) as sequencer,
+            table_writer(form, stream, _SCHEMA) as writer,
+        ):
+            held = _SCHEMA.empty_table()
+            for events in selection.rounds(progress):
+                held = pa.concat_tables([held, sequencer.rows(events).cast(_SCHEMA)])
+                if form is EventFormat.CSV or len(held) >= _ROW_GROUP_ROWS:
+                    writer.write_table(held)
+                    count += len(held)
+                    held = held.slice(0, 0)
+            if len(held):
+                writer.write_table(held)
+        return count + len(held)
     rendering = text_line if form is EventFormat.TEXT else json_line
     first, between, last = ("[", ",\n ", "]\n") if form is EventFormat.JSON else ("", "\n", "\n")
-    count = 0
     with Sequencer(selection.traces.traces, rendering) as sequencer:
         for events in selection.rounds(progress):
             lines = sequencer.rows(events).column("line")
@@ -68,26 +81,3 @@ def _joined(lines: pa.ChunkedArray, between: str) -> Iterator[memoryview]:
             yield memoryview(between.encode())
         whole = pa.LargeListArray.from_arrays([0, len(chunk)], chunk)
         yield memoryview(pc.binary_join(whole, between)[0].as_buffer())
-
-
-def _write_table(
-    selection: Selection,
-    form: EventFormat,
-    stream: IO[bytes],
-    progress: Callable[[Progress], None] | None,
-) -> int:
-    count = 0
-    with (
-        Sequencer(selection.traces.traces, json_column) as sequencer,
-        table_writer(form, stream, _SCHEMA) as writer,
-    ):
-        held = _SCHEMA.empty_table()
-        for events in selection.rounds(progress):
-            held = pa.concat_tables([held, sequencer.rows(events).cast(_SCHEMA)])
-            if form is EventFormat.CSV or len(held) >= _ROW_GROUP_ROWS:
-                writer.write_table(held)
-                count += len(held)
-                held = held.slice(0, 0)
-        if len(held):
-            writer.write_table(held)
-    return count + len(held)

@@ -298,8 +298,17 @@ def _untraced(
     connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], note: str | None
 ) -> list[str]:
     """Return notes on missing events, if the rows would have come from them."""
+    if note in {"requests", "goals"}:
+        # Other events of a run may show that this layer was not traced.
+        rows = connection.execute(
+            "SELECT run_id, detail FROM main.finding WHERE list_contains($runs, run_id) "
+            "AND name = 'missing_layer' AND subject = $layer ORDER BY run_id",
+            {"runs": [run.run_id for run in runs], "layer": note},
+        ).fetchall()
+        titles = {run.run_id: "" if len(runs) == 1 else f"run {run.title}: " for run in runs}
+        return [f"{titles[run_id]}{detail}" for run_id, detail in rows]
     if note not in _LACKING:
-        return _without_layer(connection, runs, note) if note in {"requests", "goals"} else []
+        return []
     view, lacking = _LACKING[note]
     found = connection.execute(
         f"SELECT 1 FROM main.{view} WHERE list_contains(?, run_id) LIMIT 1",
@@ -323,19 +332,6 @@ def _without_callbacks(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run
         f"{len(rows)} {what} no callbacks, without rclcpp (as those of rclpy): {names};"
         " path-breakdown has their times from take to publication"
     ]
-
-
-def _without_layer(
-    connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], layer: str
-) -> list[str]:
-    """Return a note for each run whose other events show that this layer was not traced."""
-    rows = connection.execute(
-        "SELECT run_id, detail FROM main.finding WHERE list_contains($runs, run_id) "
-        "AND name = 'missing_layer' AND subject = $layer ORDER BY run_id",
-        {"runs": [run.run_id for run in runs], "layer": layer},
-    ).fetchall()
-    titles = {run.run_id: "" if len(runs) == 1 else f"run {run.title}: " for run in runs}
-    return [f"{titles[run_id]}{detail}" for run_id, detail in rows]
 
 
 def shown_rows(

@@ -157,11 +157,15 @@ def _explained(
     # What is lost while a system warms up is lost.
     losses = ask_of("topics-delivery", asked)
     shown = paths.table["path"].to_pylist()
-    verdict = _verdict(
-        connection,
-        values,
-        {"path_row": paths.table, "breakdown": parts.table, "delivery": losses.table},
-    )
+    tables = {"path_row": paths.table, "breakdown": parts.table, "delivery": losses.table}
+    with registered(connection, **tables):
+        try:
+            for name in _OF_VERDICT:
+                internal_sql().keep(connection, name, values)
+            verdict = internal_sql().run(connection, "verdict", values).to_arrow_table()
+        finally:
+            for name in _OF_VERDICT:
+                connection.execute(f"DROP TABLE IF EXISTS temp.{name}")
     path = _worst(verdict, paths)
     places = path.split(" → ")
     # No path may pass what only others do.
@@ -169,14 +173,15 @@ def _explained(
     pieces = flow.table.to_pylist()
     parts = _chosen(parts, lambda row: row["path"] == path)
     callbacks = {(row["node"], row["what"]) for row in parts.table.to_pylist()}
-    ends_here = list(
-        dict.fromkeys(
-            _ending(
-                connection.execute(_DEAD_ENDS, [values["runs"]]).fetchall(),
-                [path] if place is None else shown,
-            )
-        )
+    # What is said of paths that end at a node which publishes.
+    ends_of = [each.split(" → ")[-2:] for each in ([path] if place is None else shown)]
+    dead_ends = connection.execute(_DEAD_ENDS, [values["runs"]]).fetchall()
+    said = (
+        detail
+        for node, detail in dead_ends
+        if any(node == last and f" on {topic} " in detail for topic, last in ends_of)
     )
+    ends_here = list(dict.fromkeys(said))
     waits = _chosen(waits, lambda row: (row["node"], row["callback"]) in callbacks)
     losses = _chosen(
         losses,
@@ -218,22 +223,6 @@ def _explained(
             )
         ),
     )
-
-
-def _verdict(
-    connection: duckdb.DuckDBPyConnection,
-    values: dict[str, Any],
-    tables: dict[str, pa.Table],
-) -> pa.Table:
-    """Return the sentences: what was found, and who delays or loses messages."""
-    with registered(connection, **tables):
-        try:
-            for name in _OF_VERDICT:
-                internal_sql().keep(connection, name, values)
-            return internal_sql().run(connection, "verdict", values).to_arrow_table()
-        finally:
-            for name in _OF_VERDICT:
-                connection.execute(f"DROP TABLE IF EXISTS temp.{name}")
 
 
 def _worst(verdict: pa.Table, paths: QueryResult) -> str:
@@ -282,14 +271,6 @@ def _nothing(ask: Ask, place: str | None) -> NoFlowError:
     else:
         message = f"no flow arrives — {place}"
     return NoFlowError(message, "msgflow check says where flows break off")
-
-
-def _ending(dead_ends: Sequence[tuple[str, str]], paths: Sequence[str]) -> Iterator[str]:
-    """Yield what is said of paths that end at a node which publishes."""
-    ends = [path.split(" → ")[-2:] for path in paths]
-    for node, detail in dead_ends:
-        if any(node == last and f" on {topic} " in detail for topic, last in ends):
-            yield detail
 
 
 def _chosen(result: QueryResult, is_wanted: Callable[[dict[str, Any]], bool]) -> QueryResult:
