@@ -86,12 +86,14 @@ def command(
     if ingest:
         _require_database(database, name)
     target = output or Path(name)
+    left_out = (event.strip() for text in without or () for event in text.split(","))
+    full_names = tuple(event if ":" in event else f"ros2:{event}" for event in left_out if event)
     with _status_shown(beside_program=bool(program)) as show:
         recorded = record(
             target.absolute(),
             name=name,
             channel=Channel(
-                (*EVENTS, *(events or [])), subbuf_size, num_subbuf, without=_full_names(without)
+                (*EVENTS, *(events or [])), subbuf_size, num_subbuf, without=full_names
             ),
             program=program or (),
             seconds=duration,
@@ -130,11 +132,6 @@ def command(
                 print_status(sentence)
     if has_failed:
         raise typer.Exit(ExitCode.FAILED)
-
-
-def _full_names(without: list[str] | None) -> tuple[str, ...]:
-    names = (name.strip() for text in without or () for name in text.split(","))
-    return tuple(name if ":" in name else f"ros2:{name}" for name in names if name)
 
 
 def _require_database(database: Path, name: str) -> None:

@@ -127,25 +127,18 @@ def _grow(tops: Sequence[Item], *, is_backward: bool) -> list[Branch]:
             else:
                 branch.lines.append(line)
                 drawn.add(line.item)
-                following = _following(line.item, is_backward)
+                pairs = line.item.causes if is_backward else line.item.effects
+                ordered = sorted(pairs, key=lambda pair: _order(pair[0]))
+                following = [Line(other, link) for other, link in ordered]
         branch.children = [Branch(branch.depth + 1) for _ in following]
         stack += reversed(list(zip(branch.children, following, strict=True)))
-    _number(branches, referred)
-    return branches
-
-
-def _following(item: Item, is_backward: bool) -> list[Line]:
-    pairs = item.causes if is_backward else item.effects
-    return [Line(other, link) for other, link in sorted(pairs, key=lambda pair: _order(pair[0]))]
-
-
-def _number(branches: Sequence[Branch], referred: set[Item]) -> None:
     number = 0
     for branch in walk(branches):
         for line in branch.lines:
             if line.item in referred and not line.is_reference:
                 number += 1
                 line.item.number = number
+    return branches
 
 
 def _order(item: Item) -> tuple[bool, int, str, int]:

@@ -286,14 +286,9 @@ def _mermaid(graph: Graph) -> str:
             lines.append("  end")
     for edge in graph.edges:
         label = f'|"{_coded(edge.label)}"|' if edge.label else ""
-        lines.append(f"  {edge.source} {_arrow(edge)}{label} {edge.target}")
+        arrow = "-.->" if edge.indirect else "==>" if edge.is_call else "-->"
+        lines.append(f"  {edge.source} {arrow}{label} {edge.target}")
     return "\n".join(lines)
-
-
-def _arrow(edge: Edge) -> str:
-    if edge.indirect:
-        return "-.->"
-    return "==>" if edge.is_call else "-->"
 
 
 def _groups(graph: Graph) -> Iterator[tuple[str | None, list[Vertex]]]:

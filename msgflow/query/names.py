@@ -124,7 +124,12 @@ def require_names(
     where = "the run" if len(runs) == 1 else "these runs"
     is_pattern = any(character in name for character in "*?[")
     problem = f"no {what} in {where} fits" if is_pattern else f"there is no such {what} in {where}"
-    raise UsageError(f"{problem} — {name}", _hint(name, ordinary, known, what, source))
+    more = len(known) - _SHOWN
+    rest = f" and {more} more ({source})" if more > 0 else ""
+    plural = "topics and nodes" if what == "topic or node" else f"{what}s"
+    shown = f"the {plural} are {', '.join(known[:_SHOWN])}{rest}" if known else source
+    hint = did_you_mean(name, ordinary, did_you_mean(name, known, shown))
+    raise UsageError(f"{problem} — {name}", hint)
 
 
 def require_ids(
@@ -142,13 +147,3 @@ def require_ids(
         if not known:
             where = "the run" if len(runs) == 1 else "these runs"
             raise UsageError(f"there is no such {view} in {where} — {number}", f"see {hint}")
-
-
-def _hint(name: str, ordinary: list[str], known: list[str], what: str, source: str) -> str:
-    if not known:
-        return source
-    more = len(known) - _SHOWN
-    rest = f" and {more} more ({source})" if more > 0 else ""
-    plural = "topics and nodes" if what == "topic or node" else f"{what}s"
-    there = f"the {plural} are {', '.join(known[:_SHOWN])}{rest}"
-    return did_you_mean(name, ordinary, did_you_mean(name, known, there))

@@ -222,12 +222,12 @@ def make_selection(
             words[word] = value
         elif isinstance(value, str) and word != "sort":
             words[word] = tuple(names_in(word if word in KINDS else "place", value))
-        elif value is None or isinstance(value, str) or _is_texts(value):
+        elif (
+            value is None
+            or isinstance(value, str)
+            or (isinstance(value, list | tuple) and all(isinstance(each, str) for each in value))
+        ):
             words[word] = values_of(value)  # type: ignore[arg-type]
         else:
             raise UsageError(f"{word} is a name or several — {value}", f"{word}='/a*'")
     return Selection(**words)  # type: ignore[arg-type]
-
-
-def _is_texts(value: object) -> bool:
-    return isinstance(value, list | tuple) and all(isinstance(each, str) for each in value)

@@ -275,6 +275,9 @@ class _Work:
         condition = requirement.condition
         value = row[f"value_{place}"]
         verdict = _without_value(metric)
+        # It is made of links that may be other ones.
+        doubted = row.get(AMBIGUOUS)
+        doubt = f"values by links that may be other ones: {doubted:,}" if doubted else None
         worst: WorstCase | None = None
         if value is not None:
             verdict = Verdict.PASSED if condition.holds(value) else Verdict.FAILED
@@ -287,7 +290,7 @@ class _Work:
             "measured": None if value is None else format_value(value, metric.dimension),
             "value": value,
             "samples": row[f"samples_{place}"],
-            "reason": (metric.lacking or metric.missing) if value is None else _doubt(row),
+            "reason": (metric.lacking or metric.missing) if value is None else doubt,
             "worst_ns": worst.duration_ns if worst else None,
             "worst_at_ns": worst.at_ns if worst else None,
             "see": worst.command if worst else None,
@@ -331,12 +334,6 @@ class _Work:
             rows = self._ask("flows", LOST_FLOW, target, {"subject": subject})
             return worst_case_of(list(rows[0].values())) if rows else None
         return find_worst_case(self.connection, kind, key, self.window)
-
-
-def _doubt(row: Mapping[str, Any]) -> str | None:
-    """Return why a value may be wrong: it is made of links that may be other ones."""
-    doubted = row.get(AMBIGUOUS)
-    return f"values by links that may be other ones: {doubted:,}" if doubted else None
 
 
 def _without_value(metric: Metric) -> Verdict:
