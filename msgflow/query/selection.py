@@ -227,7 +227,7 @@ def make_selection(
             or isinstance(value, str)
             or (isinstance(value, list | tuple) and all(isinstance(each, str) for each in value))
         ):
-            words[word] = values_of(value)  # type: ignore[arg-type]
+            words[word] = values_of(value)
         else:
             raise UsageError(f"{word} is a name or several — {value}", f"{word}='/a*'")
     return Selection(**words)  # type: ignore[arg-type]
