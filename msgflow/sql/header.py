@@ -246,8 +246,6 @@ def parse(text: str, path: Path) -> Header:
         for name in _names(single.get(key, "")):
             if name not in [column.name for column in columns]:
                 raise _error(path, 1, f"{key} names a column that there is not: {name!r}")
-    when = single.get("when", "")
-    sources = (part.partition(" WHERE ") for part in _NEXT_SOURCE.split(when) if part)
     return Header(
         name=single["name"],
         title=single.get("title", single["name"]),
@@ -268,7 +266,7 @@ def parse(text: str, path: Path) -> Header:
         slowest=single.get("slowest"),
         zero=single.get("zero"),
         steps=steps,
-        sources=tuple((name, condition) for name, _, condition in sources),
+        sources=_sources(single.get("when", "")),
         also=_names(single.get("also", "")),
         unites=_names(single.get("unites", "")),
         variants=variants,
@@ -329,6 +327,11 @@ def _code(text: str) -> str:
 
 def _names(text: str) -> tuple[str, ...]:
     return tuple(part.strip() for part in text.split(",") if part.strip())
+
+
+def _sources(text: str) -> tuple[tuple[str, str], ...]:
+    parts = (part.partition(" WHERE ") for part in _NEXT_SOURCE.split(text) if part)
+    return tuple((name, condition) for name, _, condition in parts)
 
 
 def _param(field: _Field, path: Path) -> Param:
