@@ -12,6 +12,7 @@ from __future__ import annotations
 import hmac
 import html
 import ipaddress
+import os
 import re
 import socket
 import threading
@@ -343,7 +344,8 @@ def listen(port: int | None) -> socket.socket:
     except OSError as error:
         if port is None:
             return listen(0)
-        reason = (error.strerror or str(error)).lower()
+        # The function adds the address, which is below.
+        reason = (os.strerror(error.errno) if error.errno else str(error)).lower()
         raise UsageError(
             f"cannot listen on the port: {reason} — {wanted}",
             "give another port, or 0: then a free one is taken",
