@@ -82,7 +82,14 @@ def write_flow_page(
         critical_path(connection, run, extent.origin_ns, kind, number),
     )
     parts.add("detail?place=0", encode(shown))
-    parts.add("links?place=0", encode(_between(links, bars)))
+    # Arrows that lead to a bar of the flow, from a row of it.
+    to_bars = links.filter(compute.is_in(links["from_row"], bars["row_key"])).join(
+        bars.select(["row_key", "start_at"]).group_by(["row_key", "start_at"]).aggregate([]),
+        keys=["to_row", "to_at"],
+        right_keys=["row_key", "start_at"],
+        join_type="left semi",
+    )
+    parts.add("links?place=0", encode(to_bars))
     parts.add("edge?", encode(edges.rename_columns(["to_kind", "to_id", *edges.column_names[2:]])))
     pages.close()
     head = {
@@ -98,12 +105,3 @@ def write_flow_page(
     with replacing(path) as temporary:
         temporary.write_bytes(page)
     return len(page)
-
-
-def _between(links: pa.Table, bars: pa.Table) -> pa.Table:
-    """Return the arrows that lead to a bar of the flow, from a row of it."""
-    ends = bars.select(["row_key", "start_at"]).group_by(["row_key", "start_at"]).aggregate([])
-    inside = links.filter(compute.is_in(links["from_row"], bars["row_key"]))
-    return inside.join(
-        ends, keys=["to_row", "to_at"], right_keys=["row_key", "start_at"], join_type="left semi"
-    )

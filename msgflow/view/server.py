@@ -344,7 +344,7 @@ def listen(port: int | None) -> socket.socket:
     except OSError as error:
         if port is None:
             return listen(0)
-        # The function adds the address, which is below.
+        # Its own text has the address, too.
         reason = (os.strerror(error.errno) if error.errno else str(error)).lower()
         raise UsageError(
             f"cannot listen on the port: {reason} — {wanted}",
