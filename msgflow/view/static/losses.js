@@ -18,8 +18,8 @@ const FATES_OF_MESSAGES = [
   ["orphan", "taken, and its publication is not known", "service"],
 ];
 
-const OF_DELIVERIES = [
-  "topic_name",
+// What became of the messages of a subscription, as topics-delivery says it.
+export const OF_DELIVERIES = [
   "subscriber",
   "published",
   "delivered",
@@ -114,7 +114,7 @@ export async function losses(app) {
     h("h3", {}, "What became of the messages, by subscription"),
     dataTable(delivery, {
       label: "delivery",
-      columns: OF_DELIVERIES,
+      columns: ["topic_name", ...OF_DELIVERIES],
       sort: { name: "dropped", down: true },
     }),
     notes(delivery.meta.notes),

@@ -5,7 +5,7 @@ import { shellQuoted } from "./labels.js";
 import { dataTable } from "./table.js";
 import { commands, failed, notes, sqlText, waiting } from "./notice.js";
 import { redrawCharts } from "./chart.js";
-import { losses } from "./losses.js";
+import { losses, OF_DELIVERIES } from "./losses.js";
 import { Chooser, onTimeline, overTime, ratesOverTime, searchField, slowestOnes } from "./panel.js";
 import { Sections } from "./sections.js";
 
@@ -38,19 +38,7 @@ const PARTS_OF_TOPIC = [
     "period_p95_ns",
     "period_max_ns",
   ]],
-  ["topics-delivery", "What became of the messages", [
-    "subscriber",
-    "published",
-    "delivered",
-    "dropped",
-    "lost",
-    "reasons",
-    "not_connected",
-    "cut_by_recording",
-    "unknown",
-    "orphans",
-    "orphan_reasons",
-  ]],
+  ["topics-delivery", "What became of the messages", OF_DELIVERIES],
   ["topics-latency", "Latency from publication to take", [
     "subscriber",
     "takes",

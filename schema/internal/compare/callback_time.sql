@@ -12,23 +12,15 @@
 -- param: b_window BIGINT[] = NULL  The same for run B
 WITH mean AS (
     SELECT
-        w.side,
-        l.node || ' · ' || l.label AS subject,
+        i.side,
+        i.node || ' · ' || i.label AS subject,
         avg(i.end_ns - i.start_ns) AS duration_ns,
         avg(s.running_ns) AS running_ns,
         avg(s.preempted_ns + s.runnable_ns) AS queue_ns,
         avg(s.sleeping_ns + s.uninterruptible_ns) AS blocked_ns
-    FROM main.callback_instance AS i
+    FROM derive.compared_instance($run_a, $run_b, $a_window, $b_window, $skip_first) AS i
     JOIN main.callback_schedule AS s ON i.callback_instance_id = s.callback_instance_id
-    JOIN main.callback_label AS l ON i.callback_id = l.callback_id
-    JOIN main.run AS r ON i.run_id = r.run_id
-    JOIN (
-        VALUES ('a', $run_a, $a_window::BIGINT[]), ('b', $run_b, $b_window::BIGINT[])
-    ) AS w (side, run_id, time_window)
-        ON i.run_id = w.run_id
-    WHERE i.start_ns >= greatest(w.time_window[1], r.start_ns) + $skip_first * 1e9
-        AND i.start_ns < coalesce(w.time_window[2], 9223372036854775807)
-        AND list_contains($subjects, l.node || ' · ' || l.label)
+    WHERE list_contains($subjects, i.node || ' · ' || i.label)
     GROUP BY ALL
 )
 SELECT

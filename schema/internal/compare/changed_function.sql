@@ -18,16 +18,8 @@
 -- column: a_samples BIGINT  Samples of it in run A
 -- column: b_samples BIGINT  Samples of it in run B
 WITH instance AS (
-    SELECT w.side = 'a' AS is_a, l.node, l.label, i.callback_instance_id
-    FROM main.callback_instance AS i
-    JOIN main.callback_label AS l ON i.callback_id = l.callback_id
-    JOIN main.run AS r ON i.run_id = r.run_id
-    JOIN (
-        VALUES ('a', $run_a, $a_window::BIGINT[]), ('b', $run_b, $b_window::BIGINT[])
-    ) AS w (side, run_id, time_window)
-        ON i.run_id = w.run_id
-    WHERE i.start_ns >= greatest(w.time_window[1], r.start_ns) + $skip_first * 1e9
-        AND i.start_ns < coalesce(w.time_window[2], 9223372036854775807)
+    SELECT side = 'a' AS is_a, node, label, callback_instance_id
+    FROM derive.compared_instance($run_a, $run_b, $a_window, $b_window, $skip_first)
 ),
 sample AS (
     SELECT i.is_a, i.node, i.label, f.function, s.cpu_ns
