@@ -6,8 +6,9 @@
 --     Unless detail is full, those below 1 % are summed up as 'rest'. Flows with a stored message
 --     have no latency, and are left out.
 -- grain: one row per flow and piece, node or activity
+-- like: e2e-latency
 -- param: from VARCHAR = NULL  Topics or nodes where flows start
--- param: to VARCHAR = NULL  Topics or nodes where flows end, likewise
+-- param: to
 -- param: via VARCHAR = NULL  Only flows through all of these topics or nodes
 -- param: without VARCHAR = NULL  Only flows through none of these
 -- param: slowest BIGINT {1..} = 1  Number of flows
@@ -15,18 +16,12 @@
 --     the latency
 -- param: take BIGINT = NULL  Instead, the longest flow to this take_id; on the command line:
 --     msgflow flow --take ID --why
--- param: case VARCHAR {first|last|newest|every_pair} = 'first'  Arrivals that count: the
---     first or last of each root, that of the newest root, or all
+-- param: case
 -- param: by VARCHAR {piece|node|part} = 'piece'  Rows by piece, by node, or by activity
 --     and state
 -- param: detail VARCHAR {short|full} = 'short'  full: every piece and layer of publishing
--- param: from_event VARCHAR {callback_start|publish} = 'callback_start'  Event that starts
---     the clock
--- param: to_event VARCHAR {take|callback_start|callback_end} = 'callback_end'  Event that
---     stops it
--- param: max_depth BIGINT {1..} = 32     Longest path
--- param: max_paths BIGINT {1..} = 1000   Most paths, shortest first, and chains of a length
--- column: run_id BIGINT            Run
+-- param: from_event, to_event, max_depth, max_paths
+-- column: run_id
 -- column: rank BIGINT              Number of the flow, the slowest first
 -- column: at_ns BIGINT [ns]        Start, since the start of the flow; empty for several pieces
 -- column: duration_ns BIGINT [ns]  Duration; negative if parts of the flow overlap

@@ -6,20 +6,14 @@
 --     effect. The newest root that an arrival reflects says how old the data were. Give --from and
 --     --to: else there is a row for each two topics between which a path leads.
 -- grain: one row per topic where flows start, topic where they end, and node that takes it
--- param: from VARCHAR = NULL  Topics or nodes where flows start: globs, with commas between
--- param: to VARCHAR = NULL  Topics or nodes where flows end, likewise
--- param: from_event VARCHAR {callback_start|publish} = 'callback_start'  Event that starts
---     the clock
--- param: to_event VARCHAR {take|callback_start|callback_end} = 'callback_end'  Event that
---     stops it
--- param: max_depth BIGINT {1..} = 32     Longest path
--- param: max_paths BIGINT {1..} = 1000   Most paths, shortest first, and chains of a length
--- column: run_id BIGINT            Run
+-- like: e2e-latency
+-- param: from, to, from_event, to_event, max_depth, max_paths
+-- column: run_id
 -- column: first_topic VARCHAR [topic]  Topic of the first message
 -- column: last_topic VARCHAR [topic]  Topic of the last message
 -- column: node VARCHAR [node]      Node that takes it
 -- column: paths BIGINT             Paths between them
--- column: roots BIGINT             Flows that began in the time window
+-- column: roots
 -- column: reached BIGINT           Roots that arrived, by any path
 -- column: superseded BIGINT        Others, replaced by a newer input before they were used
 -- column: dropped BIGINT           Others, that ended in a full queue
@@ -29,8 +23,7 @@
 --     subscription were connected
 -- column: unknown BIGINT           Others, that end where the trace does not show
 -- column: cut_by_recording BIGINT  Others, too close to the start or end of the recording to know
--- column: loss_affected BIGINT     Roots with a gap of a trace in their time: their status may be
---     wrong
+-- column: loss_affected
 -- column: ambiguous BIGINT         Pairs of root and arrival that no path leads to without a link
 --     that may be another one (a candidate_count above 1)
 -- column: messages BIGINT          Messages at the end that reflect a root

@@ -7,14 +7,9 @@
 --     an input is lost, the reaction waits for an output of a later one. The time window applies to
 --     the later input.
 -- grain: one row per path
--- param: from VARCHAR = NULL  Topics or nodes where flows start: globs, with commas between
--- param: to VARCHAR = NULL  Topics or nodes where flows end, likewise
--- param: from_event VARCHAR {callback_start|publish} = 'callback_start'  Event that is the input
--- param: to_event VARCHAR {take|callback_start|callback_end} = 'callback_end'  Event that is the
---     output
--- param: max_depth BIGINT {1..} = 32     Longest path, in topics
--- param: max_paths BIGINT {1..} = 1000   Most paths, shortest first, and chains of a length
--- column: run_id BIGINT            Run
+-- like: e2e-latency-age
+-- param: from, to, from_event, to_event, max_depth, max_paths
+-- column: run_id
 -- column: inputs BIGINT            Inputs in the time window
 -- column: intervals BIGINT         Intervals between inputs that the times are computed from
 -- column: unanswered BIGINT        Inputs that no output followed
@@ -28,10 +23,7 @@
 -- column: p99_ns BIGINT [ns]       99 % of the reaction times are at most this
 -- column: max_ns BIGINT [ns]       Maximum reaction time
 -- column: event_mean_ns BIGINT [ns]  Mean over events at any moment of the intervals
--- column: sink_event VARCHAR       Event that is the output: to_event, or 'take' where the sink
---     never shows a callback
--- column: is_cut BOOLEAN           The path goes on or has siblings beyond max_depth or max_paths
--- column: path VARCHAR [path]  Nodes and topics
+-- column: sink_event, is_cut, path
 -- brief: path, inputs, median_ns, p99_ns, max_ns, unanswered, ambiguous, loss_affected, p95_ns,
 --     event_mean_ns, intervals, mean_ns, min_ns
 -- note: clocks

@@ -8,14 +8,9 @@
 --     newest input of the cycle. CARET measures with --from-event publish --to-event
 --     callback_start.
 -- grain: one row per path and response time
--- param: from VARCHAR = NULL  Topics or nodes where flows start: globs, with commas between
--- param: to VARCHAR = NULL  Topics or nodes where flows end, likewise
--- param: from_event VARCHAR {callback_start|publish} = 'callback_start'  Event that is the input
--- param: to_event VARCHAR {take|callback_start|callback_end} = 'callback_end'  Event that is the
---     output
--- param: max_depth BIGINT {1..} = 32     Longest path, in topics
--- param: max_paths BIGINT {1..} = 1000   Most paths, shortest first, and chains of a length
--- column: run_id BIGINT            Run
+-- like: e2e-latency-age
+-- param: from, to, from_event, to_event, max_depth, max_paths
+-- column: run_id
 -- column: response VARCHAR         'all', 'best', 'worst' or 'worst-with-external-latency'
 -- column: count BIGINT             Response times: inputs for 'all', else outputs
 -- column: ambiguous BIGINT         Those whose output passes a link that may be another one (a
@@ -26,10 +21,7 @@
 -- column: p95_ns BIGINT [ns]       95 % of them are at most this
 -- column: p99_ns BIGINT [ns]       99 % of them are at most this
 -- column: max_ns BIGINT [ns]       Longest
--- column: sink_event VARCHAR       Event that is the output: to_event, or 'take' where the sink
---     never shows a callback
--- column: is_cut BOOLEAN           The path goes on or has siblings beyond max_depth or max_paths
--- column: path VARCHAR [path]  Nodes and topics
+-- column: sink_event, is_cut, path
 -- brief: path, response, count, median_ns, p99_ns, max_ns, ambiguous, p95_ns, mean_ns, min_ns
 -- note: clocks
 CREATE OR REPLACE TEMP TABLE path_chain AS

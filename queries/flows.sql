@@ -3,22 +3,13 @@
 -- description: Every flow: when the callback or publication that begins it (its root) started, and
 --     when the end of the path was reached and how long that took, or why it was not.
 -- grain: one row per path and root, or per pair of root and arrival
--- param: from VARCHAR = NULL  Topics or nodes where flows start: globs, with commas between
--- param: to VARCHAR = NULL  Topics or nodes where flows end, likewise
--- param: from_event VARCHAR {callback_start|publish} = 'callback_start'  Event that starts
---     the clock
--- param: to_event VARCHAR {take|callback_start|callback_end} = 'callback_end'  Event that
---     stops it
--- param: case VARCHAR {first|last|newest|every_pair} = 'first'  Arrivals that count: the
---     first or last of each root, that of the newest root, or all
+-- like: e2e-latency, main.end_to_end
+-- param: from, to, from_event, to_event, case
 -- param: max_depth BIGINT {1..} = 32     Longest path, in topics
--- param: max_paths BIGINT {1..} = 1000   Most paths, shortest first, and chains of a length
--- column: run_id BIGINT            Run
--- column: root_kind VARCHAR        'callback_instance', 'publication' or 'take'
--- column: root_id BIGINT           Identity of the root
--- column: root_ns BIGINT [epoch ns]  Start of the root
+-- param: max_paths
+-- column: run_id, root_kind, root_id, root_ns
 -- column: take_id BIGINT           Take at the end of the path; empty: not reached
--- column: sink_ns BIGINT [epoch ns]  End of the flow
+-- column: sink_ns
 -- column: latency_ns BIGINT [ns]   From the start of the root to the end; empty: not reached, or a
 --     message on the way was stored until its subscription existed
 -- column: status VARCHAR           'reached', 'superseded', 'dropped', 'lost', 'no_output',
@@ -26,8 +17,7 @@
 -- column: reason VARCHAR           Why it did not arrive
 -- column: is_ambiguous BOOLEAN     It passes a link that may be another one (a candidate_count
 --     above 1), so that it may be none
--- column: is_cut BOOLEAN           The path goes on or has siblings beyond max_depth or max_paths
--- column: path VARCHAR [path]  Nodes and topics
+-- column: is_cut, path
 -- column: size_bytes BIGINT [bytes]  Size of the message at the end; empty: no bag has it
 -- column: age_from_stamp_ns BIGINT [ns]  From header.stamp of the message at the end, which nodes
 --     pass on from the sensor's message, to the end; empty: no bag has it

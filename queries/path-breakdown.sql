@@ -11,17 +11,11 @@
 --     CPU) and executor instead. A part is negative if the next one began before it ended
 --     (overlaps).
 -- grain: one row per path, hop, part, and callback that it belongs to
--- param: from VARCHAR = NULL  Topics or nodes where flows start: globs, with commas between
--- param: to VARCHAR = NULL  Topics or nodes where flows end, likewise
--- param: from_event VARCHAR {callback_start|publish} = 'callback_start'  Event that starts
---     the clock
--- param: to_event VARCHAR {take|callback_start|callback_end} = 'callback_end'  Event that
---     stops it
--- param: case VARCHAR {first|last|newest|every_pair} = 'first'  Arrivals that count: the
---     first or last of each root, that of the newest root, or all
+-- like: e2e-latency
+-- param: from, to, from_event, to_event, case
 -- param: max_depth BIGINT {1..} = 32     Longest path, in topics
--- param: max_paths BIGINT {1..} = 1000   Most paths, shortest first, and chains of a length
--- column: run_id BIGINT            Run
+-- param: max_paths
+-- column: run_id
 -- column: path_id BIGINT           Number of the path
 -- column: hop BIGINT               Number of the message on the path that it belongs or leads to
 -- column: part VARCHAR             'callback', 'cache', 'service', a layer of publishing
@@ -43,8 +37,7 @@
 -- column: share DOUBLE [share]     Part of the time of all flows of the path, rounded to 4
 --     places
 -- column: total_ns BIGINT [ns]     Sum over all flows; all parts add up to their time
--- column: is_cut BOOLEAN           The path goes on or has siblings beyond max_depth or max_paths
--- column: path VARCHAR [path]  Nodes and topics
+-- column: is_cut, path
 -- brief: path, hop, part, node, what, median_ns, share, max_ns, ambiguous, p95_ns, mean_ns,
 --     total_ns, flows, overlaps
 -- zero: total_ns

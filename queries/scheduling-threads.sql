@@ -4,14 +4,10 @@
 --     (docs/scheduling.md). Without kernel traces there are no rows. Threads that ran longest come
 --     first.
 -- grain: one row per thread with known states
--- column: run_id BIGINT             Run
--- column: host VARCHAR [host]  Host
--- column: nodes VARCHAR             First two nodes of its process, and how many more; without
---     nodes its name and id
--- column: process VARCHAR           Process name
--- column: pid INTEGER               Process id
+-- like: executor-usage
+-- column: run_id, host, nodes, process, pid
 -- column: thread VARCHAR            Thread name
--- column: tid INTEGER               Thread id
+-- column: tid
 -- column: running_ns BIGINT [ns]    On a CPU
 -- column: preempted_ns BIGINT [ns]  Ready, but another thread had the CPU
 -- column: runnable_ns BIGINT [ns]   Woken, waiting for a CPU
@@ -22,7 +18,7 @@
 -- column: priority INTEGER          Most urgent priority that it ran with, as the kernel has it: 0
 --     to 99 real-time, 100 to 139 nice -20 to 19
 -- column: loss_affected BIGINT      States during which kernel events were lost
--- column: thread_id BIGINT          Identity of the thread
+-- column: thread_id
 -- brief: nodes, thread, tid, running_ns, preempted_ns, runnable_ns, sleeping_ns, preemptions,
 --     priority, uninterruptible_ns, process, pid, host
 -- note: kernel

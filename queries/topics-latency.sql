@@ -6,8 +6,8 @@
 --     means that the clocks of two hosts are apart. Takes without a known publication are counted,
 --     but not measured, and neither are messages that were stored until their subscription existed.
 -- grain: one row per topic, receiving node and subscription
--- column: run_id BIGINT             Run
--- column: topic_name VARCHAR [topic]  Topic
+-- like: e2e-latency, topics-delivery
+-- column: run_id, topic_name
 -- column: subscriber VARCHAR [node]  Node that received
 -- column: takes BIGINT              Messages received in the time window
 -- column: linked BIGINT             Takes whose publication is known
@@ -15,16 +15,10 @@
 --     before the subscription existed, and stored until then
 -- column: ambiguous BIGINT          Links with more than one candidate
 -- column: negative BIGINT           Links with negative latency
--- column: min_ns BIGINT [ns]        Shortest latency
--- column: median_ns BIGINT [ns]     Median latency
--- column: mean_ns BIGINT [ns]       Mean latency
+-- column: min_ns, median_ns, mean_ns
 -- column: busy_mean_min_ns BIGINT [ns]  Part of the mean for which the executor was busy, at least
 -- column: busy_mean_max_ns BIGINT [ns]  Part of the mean for which the executor was busy, at most
--- column: p95_ns BIGINT [ns]        95 % of the latencies are at most this
--- column: p99_ns BIGINT [ns]        99 % of the latencies are at most this
--- column: max_ns BIGINT [ns]        Longest latency
--- column: subscription_id BIGINT    Identity of the subscription
--- column: is_internal BOOLEAN       ROS uses the topic for itself
+-- column: p95_ns, p99_ns, max_ns, subscription_id, is_internal
 -- brief: topic_name, subscriber, median_ns, p99_ns, max_ns, takes, p95_ns, busy_mean_min_ns,
 --     busy_mean_max_ns, linked, stored, negative, ambiguous, mean_ns, min_ns
 -- note: clocks

@@ -18,6 +18,8 @@
     -- also: derive.a_b
     -- unites: derive.a_c, derive.a_d
     -- variant: measure VARCHAR {latency|age} = 'latency'  What is measured
+    -- like: main.end_to_end, main.flow_path
+    -- column: run_id, path_id, root_ns
 
 The header ends at the first line that is not a `--` comment. Two spaces end a parameter's default.
 
@@ -42,6 +44,8 @@ The header ends at the first line that is not a `--` comment. Two spaces end a p
 - `unites`: objects whose rows a macro reads as one table. Its first argument is the name of that
   table, its second the run. An object whose `when` finds no row is left out.
 
+- `like`: other files of the folder, or of `schema/public` (main.NAME). A `param` or a `column` may be
+  a list of names: the first of these files that has it declares it.
 - `variant`: a parameter whose values are queries of their own. The default is this file, and `age`
   stands in the file of the same name with `-age` behind it; a BOOLEAN `each`, in that with `-each`.
   A query may have several: each value of them is one file.
@@ -52,6 +56,10 @@ column may stand by its name alone: the table declares the rest. Files in `schem
 `severity`, a `cause` and a `cure`. An object is made after all objects that its statement, its
 `when`, its `also` or its `unites` names.
 
+Outside of `schema/public`, what most statements take needs no declaration: the run (`run`, `run_id`,
+or `only_run` of a macro) or `runs`; `start_ns` and `end_ns`, a window of time in epoch ns, without its
+end; `origin_ns`, the moment from which times of pages count.
+
 The tables that a statement looks up stay in memory until it ends. A query may therefore go in
 steps: other statements stand before its own, each of the form
 `CREATE OR REPLACE TEMP TABLE name AS SELECT …;`.
@@ -61,18 +69,20 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import TYPE_CHECKING
 
+from msgflow.files.resources import resource_directory
 from msgflow.sql.value import Value, is_integer, parse_literal
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
     from pathlib import Path
 
 _FIELD = re.compile(r"-- (?P<key>[a-z_]+):(?: +(?P<value>\S.*))?")
 _CONTINUATION = re.compile(r"-- {4,}(?P<value>\S.*)")
 _NAME = r"(?P<name>[A-Za-z_][A-Za-z0-9_]*)"
+_NAMES = re.compile(r"\w+(?:, *\w+)*")
 _TYPE = r"(?P<type>[A-Za-z_][A-Za-z0-9_]*(?:\([0-9, ]+\))?(?:\[\])*)"
 _CHOICES = r"(?: +\{(?P<choices>[^{}]+)\})?"
 _DEFAULT = r"(?: += +(?P<default>'(?:[^']|'')*'|\[[^\]]*\]|[^'\s\[]\S*))?"
@@ -89,7 +99,7 @@ _RANGE = re.compile(r"(-?\d+)\.\.(-?\d+)?")
 _REPEATABLE = ("param", "column", "variant")
 _SINGLE = (
     "name", "title", "description", "cause", "cure", "grain", "kind", "severity", "note", "when",
-    "also", "unites", "brief", "answer", "heading", "slowest", "zero",
+    "also", "unites", "brief", "answer", "heading", "slowest", "zero", "like",
 )  # fmt: skip
 _KINDS = ("view", "inline", "macro")
 _NOTES = ("clocks", "callbacks", "kernel", "requests", "goals", "samples")
@@ -237,9 +247,10 @@ def parse(text: str, path: Path) -> Header:
     note = single.get("note")
     if note is not None and note not in _NOTES:
         raise _error(path, 1, f"note {note!r} is not one of {', '.join(_NOTES)}")
-    params = tuple(_param(field, path) for field in fields if field.key == "param")
+    like = [_like(name, path) for name in _names(single.get("like", ""))]
+    params = tuple(_params(fields, like, path))
     variants = tuple(_param(field, path) for field in fields if field.key == "variant")
-    columns = tuple(_column(field, path) for field in fields if field.key == "column")
+    columns = tuple(_columns(fields, like, path))
     _check_names(params, path)
     _check_names(columns, path)
     for key in ("brief", "answer", "heading", "slowest", "zero"):
@@ -334,6 +345,41 @@ def _sources(text: str) -> tuple[tuple[str, str], ...]:
     return tuple((name, condition) for name, _, condition in parts)
 
 
+def _like(name: str, path: Path) -> Header:
+    schema, _, stem = name.rpartition(".")
+    folder = resource_directory("schema") / "public" if schema == "main" else path.parent
+    return _declaring(folder / f"{stem}.sql")
+
+
+@cache
+def _declaring(path: Path) -> Header:
+    return read(path)
+
+
+def _params(fields: Sequence[_Field], like: Sequence[Header], path: Path) -> Iterator[Param]:
+    known = {param.name: param for header in reversed(like) for param in header.params}
+    for field in fields:
+        if field.key != "param":
+            continue
+        names = _names(field.value)
+        if known.keys() >= set(names):
+            yield from (known[name] for name in names)
+        else:
+            yield _param(field, path)
+
+
+def _columns(fields: Sequence[_Field], like: Sequence[Header], path: Path) -> Iterator[Column]:
+    known = {column.name: column for header in reversed(like) for column in header.columns}
+    for field in fields:
+        if field.key != "column":
+            continue
+        if _NAMES.fullmatch(field.value):
+            # Of a public view its table may declare them.
+            yield from (known.get(name, Column(name, "", None, "")) for name in _names(field.value))
+        else:
+            yield _column(field, path)
+
+
 def _param(field: _Field, path: Path) -> Param:
     match = _PARAM.fullmatch(field.value)
     if match is None or (match["default"] is not None and len(match["gap"]) < 2):
@@ -378,8 +424,6 @@ def _param(field: _Field, path: Path) -> Param:
 
 
 def _column(field: _Field, path: Path) -> Column:
-    if re.fullmatch(_NAME, field.value):
-        return Column(field.value, "", None, "")
     match = _COLUMN.fullmatch(field.value)
     if match is None:
         raise _error(

@@ -3,7 +3,6 @@
 -- description: Publications that a take without a link could come from: its stamp fits them, but
 --     none of them could be chosen.
 -- grain: one row per take without a link and publication
--- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.take_candidate(only_run) AS TABLE
 WITH orphan AS (
     SELECT t.run_id, t.take_id, t.source_timestamp_ns, s.topic_name

@@ -2,7 +2,6 @@
 -- kind: macro
 -- description: Takes whose publication is not known.
 -- grain: one row per such take
--- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.unlinked_take(only_run) AS TABLE
 SELECT t.take_id
 FROM (SELECT take_id FROM store.take WHERE run_id = only_run) AS t

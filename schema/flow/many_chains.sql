@@ -4,7 +4,6 @@
 --     limits. Chains are only counted, by the subscription that they lead to, so that this costs
 --     little. One that comes to a subscription twice counts, too: there may be fewer.
 -- grain: one row, if there may be more chains than the limits allow
--- param: only_run BIGINT  Run to look at
 -- param: max_depth INTEGER = 32  Longest chain, in topics
 -- param: max_paths INTEGER = 1000  Most chains
 CREATE OR REPLACE MACRO derive.many_chains(only_run, max_depth := 32, max_paths := 1000) AS TABLE

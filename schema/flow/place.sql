@@ -4,7 +4,6 @@
 --     topic means topics. Any other one means nodes, as a node is often called like the topic that
 --     it publishes.
 -- grain: one row per topic, and per node
--- param: runs BIGINT[]  Runs to look at
 -- param: names VARCHAR[]  Names or globs: a list, or a text with commas between
 CREATE OR REPLACE MACRO derive.place(runs, names) AS TABLE
 WITH wanted AS (

@@ -16,7 +16,6 @@
 --     is_cached: the last step of each beginning
 -- param: reached VARCHAR  Name of rows of path_id, root_key, take_id: how far roots came
 -- param: arrived VARCHAR  Name of rows of path_id, take_id: takes at which paths ended
--- param: runs BIGINT[]  Runs that they are of
 CREATE OR REPLACE MACRO derive.stuck_root(
     missing, lineages, prefixes, reached, arrived, runs
 ) AS TABLE

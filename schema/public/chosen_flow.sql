@@ -4,25 +4,12 @@
 --     rows of main.end_to_end that are kept in a table. A flow with a stored message has no
 --     latency: it is among them only if its take is asked for.
 -- grain: one row per flow that reached the sink
+-- like: main.end_to_end_flow
 -- param: outcomes VARCHAR  Name of a table with the rows of main.end_to_end
--- param: flow_case VARCHAR = 'first'  Pairs of root and arrival: 'first', 'last', 'newest', or
---     'every_pair'
--- param: sink_take_id BIGINT = NULL  Only flows that end with this take
--- param: most_flows INTEGER = NULL  How many of these, the slowest first; NULL: all
--- param: at_quantile DOUBLE = NULL  In their place the flow with this quantile of the latency,
---     0 to 1
--- param: path_ids BIGINT[] = NULL  Only these paths; NULL: all
--- column: flow_id BIGINT  Number of the flow in this result
--- column: run_id BIGINT  Run
+-- param: flow_case, sink_take_id, most_flows, at_quantile, path_ids
+-- column: flow_id, run_id
 -- column: path_id BIGINT  Path, as in these rows
--- column: root_kind VARCHAR  'callback_instance', 'publication' or 'take'
--- column: root_id BIGINT  Identity of the root
--- column: root_ns BIGINT [epoch ns]  Start of the root
--- column: take_id BIGINT  Take at the end of the path
--- column: sink_event VARCHAR  Event that ended the flow, as in main.end_to_end
--- column: sink_ns BIGINT [epoch ns]  End of the flow
--- column: latency_ns BIGINT [ns]  From the start of the root to the end
--- column: is_ambiguous BOOLEAN  It passes a link that may be another one, as in main.end_to_end
+-- column: root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns, is_ambiguous
 CREATE OR REPLACE MACRO main.chosen_flow(
     outcomes, flow_case := 'first', sink_take_id := NULL, most_flows := NULL, at_quantile := NULL,
     path_ids := NULL

@@ -10,10 +10,8 @@
 --     recorded for longer than any flow of the path took. It also cuts a root whose message has an
 --     unknown status where no earlier or no later message passed the step.
 -- grain: one row per path, root and take at the sink; one per path and root that did not reach it
--- param: runs BIGINT[]  Runs to look at
--- param: from_topic VARCHAR = NULL  Topics or nodes where flows start: names or globs, separated by
---     commas; NULL: any
--- param: to_topic VARCHAR = NULL  Topics or nodes where flows end, in the same form; NULL: any
+-- like: main.flow_chain
+-- param: runs, from_topic, to_topic
 -- param: from_event VARCHAR = 'callback_start'  Event that starts the clock: 'callback_start' or
 --     'publish'; others are an error
 -- param: to_event VARCHAR = 'callback_end'  Event that stops it: 'take', 'callback_start' or
@@ -21,12 +19,10 @@
 -- param: window_start_ns BIGINT = NULL  Start of the time window of roots, epoch ns; NULL: any
 -- param: window_end_ns BIGINT = NULL  End of the time window of roots, epoch ns, exclusive;
 --     NULL: any
--- param: max_depth INTEGER = 32  Longest chain, in topics
--- param: max_paths INTEGER = 1000  Maximum number of paths, shortest first; also the limit on
---     chains of each length
+-- param: max_depth, max_paths
 -- param: chains VARCHAR = 'chain_here'  Name of a table with the rows of main.flow_chain for the
 --     same arguments, where there is one
--- column: run_id BIGINT  Run
+-- column: run_id
 -- column: path_id BIGINT  Path, as main.flow_path numbers it for the same arguments
 -- column: root_kind VARCHAR  'callback_instance', 'publication' or 'take'
 -- column: root_id BIGINT  Identity of the root

@@ -4,36 +4,23 @@
 --     first of three steps of main.end_to_end_part, which need less memory one by one: keep its
 --     rows as a table, then those of main.end_to_end_trail, and ask main.end_to_end_piece.
 -- grain: one row per flow that reached the sink
--- param: runs BIGINT[]  Runs to look at
--- param: from_topic VARCHAR = NULL  Topics or nodes where flows start: names or globs, separated by
---     commas; NULL: any
--- param: to_topic VARCHAR = NULL  Topics or nodes where flows end, in the same form; NULL: any
--- param: from_event VARCHAR = 'callback_start'  Event that starts the clock: 'callback_start' or
---     'publish'; others are an error
--- param: to_event VARCHAR = 'callback_end'  Event that stops it: 'take', 'callback_start' or
---     'callback_end'; others are an error
--- param: window_start_ns BIGINT = NULL  Start of the time window of roots, epoch ns; NULL: any
--- param: window_end_ns BIGINT = NULL  End of the time window of roots, epoch ns, exclusive;
---     NULL: any
+-- like: main.flow_chain, main.end_to_end
+-- param: runs, from_topic, to_topic, from_event, to_event, window_start_ns, window_end_ns
 -- param: flow_case VARCHAR = 'first'  Pairs of root and arrival: 'first', 'last', 'newest', or
 --     'every_pair'
 -- param: sink_take_id BIGINT = NULL  Only flows that end with this take
--- param: max_depth INTEGER = 32  Longest chain, in topics
--- param: max_paths INTEGER = 1000  Maximum number of paths, shortest first; also the limit on
---     chains of each length
+-- param: max_depth, max_paths
 -- param: most_flows INTEGER = NULL  How many of these, the slowest first; NULL: all
 -- param: at_quantile DOUBLE = NULL  In their place the flow with this quantile of the latency,
 --     0 to 1
 -- param: path_ids BIGINT[] = NULL  Only these paths; NULL: all
 -- column: flow_id BIGINT  Number of the flow in this result
--- column: run_id BIGINT  Run
+-- column: run_id
 -- column: path_id BIGINT  Path, as main.flow_path numbers it for the same arguments
--- column: root_kind VARCHAR  'callback_instance', 'publication' or 'take'
--- column: root_id BIGINT  Identity of the root
--- column: root_ns BIGINT [epoch ns]  Start of the root
+-- column: root_kind, root_id, root_ns
 -- column: take_id BIGINT  Take at the end of the path
 -- column: sink_event VARCHAR  Event that ended the flow, as in main.end_to_end
--- column: sink_ns BIGINT [epoch ns]  End of the flow
+-- column: sink_ns
 -- column: latency_ns BIGINT [ns]  From the start of the root to the end
 -- column: is_ambiguous BOOLEAN  It passes a link that may be another one, as in main.end_to_end
 CREATE OR REPLACE MACRO main.end_to_end_flow(

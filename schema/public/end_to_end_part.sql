@@ -5,32 +5,10 @@
 --     clocks of two hosts are apart, a message was taken before the publishing call returned, or a
 --     callback published for an input whose own callback was still running.
 -- grain: one row per flow that reached the sink and part
--- param: runs BIGINT[]  Runs to look at
--- param: from_topic VARCHAR = NULL  Topics or nodes where flows start: names or globs, separated by
---     commas; NULL: any
--- param: to_topic VARCHAR = NULL  Topics or nodes where flows end, in the same form; NULL: any
--- param: from_event VARCHAR = 'callback_start'  Event that starts the clock: 'callback_start' or
---     'publish'; others are an error
--- param: to_event VARCHAR = 'callback_end'  Event that stops it: 'take', 'callback_start' or
---     'callback_end'; others are an error
--- param: window_start_ns BIGINT = NULL  Start of the time window of roots, epoch ns; NULL: any
--- param: window_end_ns BIGINT = NULL  End of the time window of roots, epoch ns, exclusive;
---     NULL: any
--- param: flow_case VARCHAR = 'first'  Pairs of root and arrival: 'first', 'last', 'newest', or
---     'every_pair'
--- param: sink_take_id BIGINT = NULL  Only flows that end with this take
--- param: max_depth INTEGER = 32  Longest chain, in topics
--- param: max_paths INTEGER = 1000  Maximum number of paths, shortest first; also the limit on
---     chains of each length
--- param: most_flows INTEGER = NULL  How many of these, the slowest first; NULL: all
--- param: at_quantile DOUBLE = NULL  In their place the flow with this quantile of the latency,
---     0 to 1
--- param: path_ids BIGINT[] = NULL  Only these paths; NULL: all
--- column: run_id BIGINT  Run
--- column: path_id BIGINT  Path, as main.flow_path numbers it for the same arguments
--- column: flow_id BIGINT  Number of the flow in this result
--- column: root_kind VARCHAR  'callback_instance', 'publication' or 'take'
--- column: root_id BIGINT  Identity of the root
+-- like: main.end_to_end, main.end_to_end_flow
+-- param: runs, from_topic, to_topic, from_event, to_event, window_start_ns, window_end_ns,
+--     flow_case, sink_take_id, max_depth, max_paths, most_flows, at_quantile, path_ids
+-- column: run_id, path_id, flow_id, root_kind, root_id
 -- column: take_id BIGINT  Take at the end of the path
 -- column: latency_ns BIGINT [ns]  From the start of the root to the end
 -- column: hop BIGINT  Number of the message on the path that it belongs or leads to; one more than

@@ -4,34 +4,16 @@
 --     the executor was busy with other callbacks while the message waited. A parameter gives the
 --     callback instances, so that they need not be looked up for each part.
 -- grain: one row per flow and part
+-- like: main.end_to_end_part
 -- param: flows VARCHAR  Name of the rows of main.end_to_end_flow: a table, or a part of the query
 -- param: trail VARCHAR  Likewise of main.end_to_end_trail
 -- param: callbacks VARCHAR  Likewise of all callback instances of these runs:
 --     callback_instance_id, callback_id, take_id, start_ns and end_ns of main.callback_instance,
 --     busy_min_ns and busy_max_ns of main.executor_wait (NULL: not known)
 -- param: runs BIGINT[]  Runs that they are of
--- column: run_id BIGINT  Run
--- column: path_id BIGINT  Path, as main.flow_path numbers it for the same arguments
--- column: flow_id BIGINT  Number of the flow in this result
--- column: root_kind VARCHAR  'callback_instance', 'publication' or 'take'
--- column: root_id BIGINT  Identity of the root
--- column: take_id BIGINT  Take at the end of the path
--- column: latency_ns BIGINT [ns]  From the start of the root to the end
--- column: hop BIGINT  Number of the message on the path that it belongs or leads to; one more than
---     the last for the callback at the end
--- column: position BIGINT  Order within the flow, from 1
+-- column: run_id, path_id, flow_id, root_kind, root_id, take_id, latency_ns, hop, position
 -- column: rank BIGINT  Order within the hop, from 1
--- column: part VARCHAR  'callback' (from its start, or the take where none shows, to what it
---     publishes or calls), 'cache' (until the callback instance that publishes for it), 'intra',
---     'rclcpp', 'rcl', 'rmw', 'dds' (publishing, to the next layer), 'publish' (layer not known),
---     'stored' (until the subscription existed), 'publish_to_take', 'take_to_callback',
---     'request_to_take', 'service' (from the start of its callback to what it sends) or
---     'response_to_take'
--- column: from_ns BIGINT [epoch ns]  Begin
--- column: to_ns BIGINT [epoch ns]  End
--- column: duration_ns BIGINT [ns]  to_ns - from_ns
--- column: callback_instance_id BIGINT  Callback instance that it is, or that it waits for
--- column: publication_id BIGINT  Message that is published or under way
+-- column: part, from_ns, to_ns, duration_ns, callback_instance_id, publication_id
 -- column: callback_id BIGINT  Its callback
 -- column: busy_min_ns BIGINT [ns]  Least time for which its executor was busy with other callbacks
 --     while a message or request waited

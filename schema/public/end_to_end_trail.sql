@@ -3,14 +3,9 @@
 -- description: The messages on the way of each flow (main.end_to_end_flow), from its root to its
 --     end. Of several ways it is that whose list of publications, then of takes, comes first.
 -- grain: one row per flow and message on its way
+-- like: main.flow_chain
 -- param: flows VARCHAR  Name of the rows of main.end_to_end_flow: a table, or a part of the query
--- param: runs BIGINT[]  Runs to look at
--- param: from_topic VARCHAR = NULL  Topics or nodes where flows start: names or globs, separated by
---     commas; NULL: any
--- param: to_topic VARCHAR = NULL  Topics or nodes where flows end, in the same form; NULL: any
--- param: max_depth INTEGER = 32  Longest chain, in topics
--- param: max_paths INTEGER = 1000  Maximum number of paths, shortest first; also the limit on
---     chains of each length
+-- param: runs, from_topic, to_topic, max_depth, max_paths
 -- param: chains VARCHAR = 'chain_here'  Name of a table with the rows of main.flow_chain for the
 --     same arguments, where there is one
 -- column: flow_id BIGINT  Number of the flow

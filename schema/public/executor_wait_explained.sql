@@ -5,33 +5,13 @@
 --     at once take hardly longer than one of them. Where a kernel trace or CARET shows exactly
 --     when a message arrived (main.arrival), it was ready then: the bounds are one.
 -- grain: one row per callback instance that is not nested in another
+-- like: main.executor_wait
 -- param: runs BIGINT[]  Runs to look at
 -- param: arrivals VARCHAR = 'arrival_here'  Name of a table with take_id, until_arrival_ns,
 --     run_queue_ns and executor_ns of the exact rows of main.arrival, where there is one
--- column: run_id BIGINT  Run that the row belongs to
--- column: callback_instance_id BIGINT  Callback instance that waited
--- column: executor_id BIGINT  Its executor
--- column: thread_id BIGINT  Thread that ran it
--- column: callback_id BIGINT  Its callback
--- column: since VARCHAR  What origin_ns is: 'publication' (its end), 'stamp' (of a message whose
---     publication is not known, by the clock of its host), 'request' (sent), 'timer' (due);
---     NULL: not known
--- column: origin_ns BIGINT [epoch ns]  Moment from which it can have been due
--- column: earliest_ns BIGINT [epoch ns]  It was not ready before; NULL: not known
--- column: latest_ns BIGINT [epoch ns]  It was ready by then
--- column: start_ns BIGINT [epoch ns]  callback_start
--- column: wait_ns BIGINT [ns]  From origin_ns to start_ns
--- column: busy_min_ns BIGINT [ns]  Executor busy with other callbacks from latest_ns on
--- column: busy_max_ns BIGINT [ns]  Executor busy with other callbacks from earliest_ns on
--- column: blocked_max_ns BIGINT [ns]  Part of busy_max_ns for which a thread was free, but a
---     callback ran that never runs beside this one
--- column: idle_ns BIGINT [ns]  Executor waiting for work from earliest_ns on, until a thread
---     picked this callback; NULL: not known
--- column: is_loss_affected BOOLEAN  A gap of the trace lies in it
--- column: held_max_ns BIGINT [ns]  From earliest_ns on, no thread of an executor of several waited
---     for work, though not all ran callbacks; or the thread that ran this callback had picked it,
---     and did not start it yet. Not part of busy_max_ns. Of one thread: the time between two waits
---     without a callback, if that is a millisecond or more. NULL: not known, or less
+-- column: run_id, callback_instance_id, executor_id, thread_id, callback_id, since, origin_ns,
+--     earliest_ns, latest_ns, start_ns, wait_ns, busy_min_ns, busy_max_ns, blocked_max_ns, idle_ns,
+--     is_loss_affected, held_max_ns
 -- column: meanwhile_callback_ids BIGINT[]  Callbacks that ran meanwhile, the longest first;
 --     NULL: none
 -- column: meanwhile_ns BIGINT[] [ns]  For how long each of them did, from earliest_ns on (from

@@ -3,13 +3,9 @@
 -- description: Everything that caused a publication, take, callback instance, request or response,
 --     directly or through other things, and the thing itself.
 -- grain: one row per vertex
--- param: start_kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or
---     'response'
--- param: start_id BIGINT  Identity of the vertex to start from
--- param: max_depth INTEGER = NULL  Maximum number of steps; NULL: no limit
--- column: kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or
---     'response'
--- column: id BIGINT  Identity of the vertex
+-- like: main.flow_forward
+-- param: start_kind, start_id, max_depth
+-- column: kind, id
 CREATE OR REPLACE MACRO main.flow_backward(start_kind, start_id, max_depth := NULL) AS TABLE
 SELECT kind, id
 FROM derive.graph_reachable(

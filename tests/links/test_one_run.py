@@ -17,11 +17,7 @@ links:
     inputs: [/a, /b]
     outputs: [/c, /d]
 """
-MACROS = [
-    header
-    for header in objects.load("link")
-    if [param.name for param in header.params] == ["only_run"]
-]
+MACROS = [header for header in objects.load("link") if "(only_run) AS TABLE" in header.body]
 FILLED = {
     "derive.annotated_publication",
     "derive.annotated_run",

@@ -147,6 +147,17 @@ def test_a_bad_line_is_named(line: str, message: str) -> None:
     assert message in str(raised.value)
 
 
+def test_names_alone_are_declared_by_the_first_file_that_has_them(tmp_path: Path) -> None:
+    head = "-- name: x\n-- description: x\n"
+    for name in ("a", "b"):
+        text = f"{head}-- param: depth BIGINT = 1  Of {name}\n-- column: {name} BIGINT  Of {name}\n"
+        (tmp_path / f"{name}.sql").write_text(f"{text}SELECT 1\n")
+    text = f"{head}-- like: b, a\n-- param: depth\n-- column: a, b,\n--     c\nSELECT 1\n"
+    header = parse(text, tmp_path / "x.sql")
+    assert header.params == (Param("depth", "BIGINT", 1, True, "Of b"),)
+    assert [column.description for column in header.columns] == ["Of a", "Of b", ""]
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [

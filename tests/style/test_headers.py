@@ -41,6 +41,8 @@ TABLES = {
     "of_samples": "(SELECT 1::BIGINT AS group_id, stack_id, cpu_ns FROM main.stack_sample)",
     "vertices": "(SELECT 8::BIGINT AS key, 'take' AS kind, 1::BIGINT AS id, 0 AS depth)",
 }
+# What many statements take; see `msgflow.sql.header`.
+UNDECLARED = {"run", "run_id", "runs", "start_ns", "end_ns", "origin_ns"}
 INTERNAL = [file for file in FILES if file.layer == "internal"]
 PAGE_QUERIES = [page_query(path.stem) for path in sorted(DIRECTORY.glob("*.sql"))]
 LAYER_OF = {file.header.name: file.layer for file in FILES}
@@ -192,7 +194,8 @@ def test_headers_of_what_the_program_asks_are_those_of_its_sql(
 ) -> None:
     name = file.path.stem
     (statement,) = connection.extract_statements(internal_sql().text(name))
-    assert {param.name for param in file.header.params} == statement.named_parameters
+    named = {param.name for param in file.header.params}
+    assert named | UNDECLARED == statement.named_parameters | UNDECLARED
     values = {"run_id": 1, "runs": [1], "start_ns": 0, "end_ns": 1, "kind": "take", "id": 1}
     values |= {p.name: [1, 1] if p.type.endswith("[]") else 1 for p in file.header.params} | values
     # Those without columns say of what they have the columns; some read what is made for them.

@@ -508,8 +508,10 @@ def _finding_rows(
     connection: duckdb.DuckDBPyConnection, name: str, given: dict[str, Any]
 ) -> pa.Table:
     (header,) = (header for header in kinds() if header.name == name)
-    values = {param.name: (_FRAME | given)[param.name] for param in header.params}
-    rows = connection.sql(f"FROM ({statement([header])}) ORDER BY ALL", params=values)
+    text = f"FROM ({statement([header])}) ORDER BY ALL"
+    (parsed,) = connection.extract_statements(text)
+    values = {key: (_FRAME | given)[key] for key in parsed.named_parameters}
+    rows = connection.sql(parsed, params=values)
     return rows.to_arrow_table()
 
 

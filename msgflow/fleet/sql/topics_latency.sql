@@ -4,6 +4,7 @@
 --     subscriptions
 --     are off by less than 1 %, means by less than 1 ns, all else is exact.
 -- grain: one row per topic, receiving node and group of runs
+-- like: e2e_latency
 -- column: label_group BIGINT        Group of runs
 -- column: topic_name VARCHAR [topic]  Topic
 -- column: subscriber VARCHAR [node]  Node that received
@@ -12,12 +13,7 @@
 -- column: linked BIGINT             Takes whose publication is known
 -- column: ambiguous BIGINT          Links with more than one candidate
 -- column: negative BIGINT           Links with negative latency
--- column: min_ns BIGINT [ns]        Shortest latency
--- column: median_ns BIGINT [ns]     Median latency
--- column: mean_ns BIGINT [ns]       Mean latency
--- column: p95_ns BIGINT [ns]        95 % of the latencies are at most this
--- column: p99_ns BIGINT [ns]        99 % of the latencies are at most this
--- column: max_ns BIGINT [ns]        Longest latency
+-- column: min_ns, median_ns, mean_ns, p95_ns, p99_ns, max_ns
 -- column: is_internal BOOLEAN       ROS uses the topic for itself
 -- brief: topic_name, subscriber, median_ns, p95_ns, max_ns, runs, takes, linked, negative,
 --     ambiguous, mean_ns, p99_ns, min_ns

@@ -2,7 +2,6 @@
 -- title: Callbacks and what triggers them
 -- description: The callbacks of a run, each with its subscription, timer or service.
 -- grain: one row per callback
--- param: run BIGINT  Run
 -- column: callback_id BIGINT  The callback
 -- column: kind VARCHAR  'timer', 'subscription', 'service' or 'unknown'
 -- column: subscription_id BIGINT  Its subscription

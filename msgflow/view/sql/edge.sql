@@ -3,9 +3,6 @@
 -- description: Links of a run whose ends begin in a window, for a page without a database to follow
 --     flows by: the same as main.flow_both follows.
 -- grain: one row per link
--- param: run BIGINT  Run
--- param: start_ns BIGINT  Begin of the window, epoch ns
--- param: end_ns BIGINT  Its end, epoch ns, exclusive
 -- column: to_kind UTINYINT  Effect, as in bar.sql
 -- column: to_id BIGINT  Its identity
 -- column: from_kind UTINYINT  Cause

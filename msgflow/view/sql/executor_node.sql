@@ -2,7 +2,6 @@
 -- title: Nodes of executors
 -- description: Nodes, and the executors that ran their callbacks.
 -- grain: one row per node and executor that ran a callback of it
--- param: run BIGINT  Run
 -- column: node VARCHAR  Full name of the node, or its process in brackets
 -- column: host VARCHAR  Machine or container
 -- column: process VARCHAR  Name of the process and its pid

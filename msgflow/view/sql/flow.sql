@@ -3,7 +3,6 @@
 -- description: Everything that the picked thing caused, or was caused by, or both
 --     (main.flow_both), as bars, and the links between them.
 -- grain: one row per vertex of the flow and link that leads to it; one for a vertex without
--- param: origin_ns BIGINT  What times count from, epoch ns
 -- param: kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or 'response'
 -- param: id BIGINT  Its identity
 -- param: direction VARCHAR = 'both'  'forward' (effects), 'backward' (causes) or 'both'

@@ -2,8 +2,6 @@
 -- title: Gaps of the recording
 -- description: Where events are missing, by host.
 -- grain: one row per gap of a trace
--- param: run BIGINT  Run
--- param: origin_ns BIGINT  What times count from, epoch ns
 -- param: limit BIGINT {1..50000} = 20000  Most gaps, the longest
 -- column: host VARCHAR  Machine or container
 -- column: kind VARCHAR  'loss', 'packets' or 'pause'

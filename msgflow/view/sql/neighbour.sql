@@ -2,8 +2,6 @@
 -- title: The next or previous of its kind
 -- description: The bar on the same row of the timeline that begins next, or before.
 -- grain: one row per bar found
--- param: run BIGINT  Run
--- param: origin_ns BIGINT  What times count from, epoch ns
 -- param: row BIGINT  Row of the timeline
 -- param: kind BIGINT  Kind of the bar
 -- param: id BIGINT  Identity of the thing

@@ -2,7 +2,6 @@
 -- title: Paths by number
 -- description: The paths that e2e-latency and path-breakdown show, with the objects on them.
 -- grain: one row per path
--- param: run BIGINT  Run
 -- column: path_id BIGINT  Number of the path
 -- column: path VARCHAR  Nodes and topics
 -- column: topics VARCHAR[]  Topics in order

@@ -2,7 +2,6 @@
 -- title: Histogram of a path
 -- description: How many flows of a path took how long, in bins of one width.
 -- grain: one row per bin with flows
--- param: run BIGINT  Run
 -- param: path BIGINT  Number of the path
 -- param: bins BIGINT {1..2000} = 60  Number of bins
 -- param: begin_at BIGINT = NULL  Only flows that began at this time or later, ns since origin

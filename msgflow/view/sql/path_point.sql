@@ -3,7 +3,6 @@
 -- description: Flows of a path one by one, or, where they are many, the slowest of each piece of
 --     time with the median of the piece.
 -- grain: one row per flow, or per piece of time with flows
--- param: run BIGINT  Run
 -- param: path BIGINT  Number of the path
 -- param: limit BIGINT {1..50000} = 2000  Most rows
 -- param: begin_at BIGINT = NULL  Only flows that began at this time or later, ns since origin

@@ -3,7 +3,6 @@
 -- description: The distribution of the latency of a path: latencies that occurred, such that a
 --     share of the flows took no longer.
 -- grain: one row per share
--- param: run BIGINT  Run
 -- param: path BIGINT  Number of the path
 -- param: steps BIGINT {1..2000} = 200  Number of shares
 -- param: begin_at BIGINT = NULL  Only flows that began at this time or later, ns since origin

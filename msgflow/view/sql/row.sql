@@ -5,7 +5,6 @@
 --     events of the user, and below each process the threads of its executors. Where the kernel was
 --     traced: below that each thread as the kernel saw it, and at the end of a host its cores.
 -- grain: one row per row of the timeline
--- param: run BIGINT  Run
 -- column: row_key BIGINT  Identity of the row: eight times that of the object, plus its kind; of
 --     events see event_row.sql; of states -4 times that of the node, less 1, of threads to the
 --     kernel -4 times that of the thread, less 2, of cores -4 times the object_id, less 3

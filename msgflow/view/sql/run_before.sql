@@ -3,7 +3,6 @@
 -- description: The run of the same system that was recorded last before a run. Two runs are of one
 --     system if at least half of the nodes of both are in both.
 -- grain: one row, none where there is no such run
--- param: run BIGINT  Run
 -- column: run_id BIGINT  The run before it
 WITH known AS (
     SELECT DISTINCT run_id, full_name FROM main.node WHERE full_name IS NOT NULL

@@ -2,8 +2,5 @@
 -- title: How many bars a window has
 -- description: Number of bars in a window, which decides whether they are drawn one by one.
 -- grain: one row per window
--- param: run BIGINT  Run
--- param: start_ns BIGINT  Begin of the window, epoch ns
--- param: end_ns BIGINT  Its end, epoch ns, exclusive
 -- column: count BIGINT  Bars
 SELECT count(*) AS count FROM segment ORDER BY count

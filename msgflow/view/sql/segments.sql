@@ -3,19 +3,11 @@
 -- description: What the timeline draws in a window. With a bin, bars shorter than it are counted
 --     per row, kind and bin, and only longer ones come one by one.
 -- grain: one row per bar, or per row of the timeline, kind and bin with shorter ones
--- param: run BIGINT  Run
--- param: origin_ns BIGINT  What times count from, epoch ns
--- param: start_ns BIGINT  Begin of the window, epoch ns
--- param: end_ns BIGINT  Its end, epoch ns, exclusive
+-- like: level
 -- param: bin_ns BIGINT = NULL  Length of a bin; NULL: every bar comes one by one
--- column: row_key BIGINT  Row of the timeline
--- column: kind UTINYINT  Kind of the bar
--- column: id BIGINT  Identity of the thing; NULL: several in one bin
--- column: start_at BIGINT [ns since origin]  Begin of the bar, or of the bin
--- column: length BIGINT [ns]  Length of the bar, or of the bin
+-- column: row_key, kind, id, start_at, length
 -- column: flags UTINYINT  As in segment.sql
--- column: count BIGINT  Bars in the bin; 1 for a bar
--- column: busy BIGINT [ns]  Sum of their lengths
+-- column: count, busy
 SELECT
     row_key,
     kind,

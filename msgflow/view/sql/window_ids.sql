@@ -3,9 +3,6 @@
 -- description: Bounds of the identities of what a window shows. Identities follow time on the clock
 --     of each host, so that links.sql reads little beyond them.
 -- grain: one row
--- param: run BIGINT  Run
--- param: start_ns BIGINT  Begin of the window, epoch ns
--- param: end_ns BIGINT  Its end, epoch ns, exclusive
 -- column: first_take BIGINT  Least identity of a take in the window or after it
 -- column: last_take BIGINT  Greatest of a take in the window or before it
 -- column: first_publication BIGINT  Least of a publication that ends in the window or after it

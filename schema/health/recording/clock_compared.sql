@@ -3,7 +3,6 @@
 -- description: Clocks that messages or packets went between, if messages were to bring those of the
 --     run together.
 -- grain: one row per pair of clocks
--- param: run_id BIGINT  Run
 SELECT
     p.clock_id, p.other_clock_id, c.name, o.name AS other_name, p.received_count, p.sent_count,
     p.received_packet_count, p.sent_packet_count, p.offset_ns, p.uncertainty_ns, p.is_even

@@ -8,7 +8,6 @@
 -- grain: one row per clock or pair of clocks
 -- severity: warning
 -- when: derive.clocks_to_synchronise
--- param: run_id BIGINT  Run
 WITH sync AS MATERIALIZED (
     SELECT clock_id, coalesce(reference_clock_id, clock_id) AS reference_clock_id
     FROM store.clock

@@ -9,7 +9,6 @@
 -- grain: one row per host and step; it counts messages that were received
 -- severity: warning
 -- when: store.stamp_clock
--- param: run_id BIGINT  Run
 WITH step AS (
     SELECT
         *,

@@ -7,7 +7,6 @@
 -- grain: one row per pair of clocks
 -- severity: warning
 -- when: derive.clocks_to_synchronise
--- param: run_id BIGINT  Run
 SELECT
     $run_id AS run_id,
     p.other_name || ' and ' || p.name AS subject,

@@ -11,7 +11,6 @@
 -- grain: one row per node
 -- severity: warning
 -- when: derive.unanswered_subscription
--- param: run_id BIGINT  Run
 WITH dead_end AS MATERIALIZED (FROM main.dead_end([$run_id])),
 input AS (
     SELECT

@@ -9,7 +9,6 @@
 --     use a tracetools and a middleware that have them.
 -- grain: one row per run and kind
 -- severity: warning
--- param: run_id BIGINT  Run
 WITH seen AS MATERIALIZED (
     SELECT
         EXISTS (FROM store.publication WHERE run_id = $run_id) AS has_publications,

@@ -7,7 +7,6 @@
 -- grain: one row, if there are any
 -- severity: warning
 -- when: derive.many_chains
--- param: run_id BIGINT  Run
 SELECT
     $run_id AS run_id,
     count(*) AS count,

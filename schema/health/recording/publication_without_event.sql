@@ -12,7 +12,6 @@
 -- grain: one row per topic
 -- severity: info
 -- when: store.nearest_message
--- param: run_id BIGINT  Run
 SELECT
     $run_id AS run_id,
     p.topic_name AS subject,

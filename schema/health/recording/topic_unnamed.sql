@@ -10,7 +10,6 @@
 -- severity: warning
 -- when: store.publisher WHERE topic_name IS NULL OR is_topic_learned OR is_topic_declared,
 --     store.subscription WHERE topic_name IS NULL OR is_topic_learned OR is_topic_declared
--- param: run_id BIGINT  Run
 SELECT
     run_id,
     CASE WHEN publishers IS NULL THEN 'to ' || subscribers

@@ -7,7 +7,6 @@
 --     its uncertainty, in either direction. A message is joined if exactly one publication of its
 --     topic was sent in that time, and no other message of the bag may be that one too.
 -- grain: one row per message of the bag
--- param: run_id BIGINT  Run
 -- column: message BIGINT  Number of the message in the bag
 -- column: topic_name VARCHAR  Name of the topic
 -- column: type_name VARCHAR  Type of the message

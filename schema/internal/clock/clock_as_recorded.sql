@@ -3,7 +3,6 @@
 -- description: What store.clock holds of the clocks of a run that nothing corrects: their times are
 --     as recorded, counted from the begin of their first trace.
 -- grain: one row per clock
--- param: run_id BIGINT  Run
 -- column: clock_id BIGINT  Clock
 -- column: offset_ns BIGINT [ns]  As in store.clock, like those below
 -- column: drift_ppb BIGINT [1e-9]  None

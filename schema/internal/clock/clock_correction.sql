@@ -2,7 +2,6 @@
 -- title: How far corrected clocks can be wrong
 -- description: Clocks that are corrected to another one, and how well that is known.
 -- grain: one row per clock that is corrected
--- param: runs BIGINT[]  Runs
 -- column: run_id BIGINT  Run
 -- column: reference VARCHAR  Hosts of the clock that it is corrected to
 -- column: hosts VARCHAR  Its hosts

@@ -4,7 +4,6 @@
 --     together; whether they connect the clock with another one, since it stays as it is if not;
 --     and how far it can be wrong at some moments, a list.
 -- grain: one row per clock
--- param: run_id BIGINT  Run
 SELECT
     clock_id,
     offset_ns,

@@ -3,7 +3,6 @@
 -- description: Clocks that are corrected to the same one. The bound of two clocks is the sum of
 --     theirs, and that of the reference is 0.
 -- grain: one row per clock that others are corrected to, or that stands alone
--- param: runs BIGINT[]  Runs
 -- column: run_id BIGINT  Run
 -- column: hosts VARCHAR  Hosts of the clocks
 -- column: clocks BIGINT  How many

@@ -3,7 +3,6 @@
 -- description: By what a file can name the clocks of a run: their UUID, and the hosts that they are
 --     of.
 -- grain: one row per clock
--- param: run_id BIGINT  Run
 -- column: clock_id BIGINT  Clock
 -- column: uuid VARCHAR  Its UUID
 -- column: hostnames VARCHAR[]  Hosts

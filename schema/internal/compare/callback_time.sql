@@ -4,12 +4,10 @@
 --     did. Only callbacks whose duration is known to differ, and that the kernel's trace of both
 --     runs shows, the greatest difference first.
 -- grain: one row per callback that two runs have
--- param: run_a BIGINT  Run that the other one is compared with
--- param: run_b BIGINT  The other one
+-- like: compared_instance
+-- param: run_a, run_b
 -- param: subjects VARCHAR[]  Callbacks, as main.comparison names them
--- param: skip_first DOUBLE = 0.0  Skip the first seconds of each run
--- param: a_window BIGINT[] = NULL  Begin and end of a time window of run A, epoch ns
--- param: b_window BIGINT[] = NULL  The same for run B
+-- param: skip_first, a_window, b_window
 WITH mean AS (
     SELECT
         i.side,
@@ -18,7 +16,7 @@ WITH mean AS (
         avg(s.running_ns) AS running_ns,
         avg(s.preempted_ns + s.runnable_ns) AS queue_ns,
         avg(s.sleeping_ns + s.uninterruptible_ns) AS blocked_ns
-    FROM derive.compared_instance($run_a, $run_b, $a_window, $b_window, $skip_first) AS i
+    FROM compared_instance AS i
     JOIN main.callback_schedule AS s ON i.callback_instance_id = s.callback_instance_id
     WHERE list_contains($subjects, i.node || ' · ' || i.label)
     GROUP BY ALL

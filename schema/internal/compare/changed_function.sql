@@ -4,12 +4,10 @@
 --     run, what they call not counted. Only callbacks that samples of perf saw in both, and
 --     differences beyond what is chance in so few samples (three standard deviations).
 -- grain: one row per callback and function, the greatest difference first
--- param: run_a BIGINT  Run that the other one is compared with
--- param: run_b BIGINT  The other one
+-- like: compared_instance
+-- param: run_a, run_b
 -- param: at_least DOUBLE  Smallest difference that counts as one, as a share of A
--- param: skip_first DOUBLE = 0.0  Skip the first seconds of each run
--- param: a_window BIGINT[] = NULL  Begin and end of a time window of run A, epoch ns
--- param: b_window BIGINT[] = NULL  The same for run B
+-- param: skip_first, a_window, b_window
 -- column: node VARCHAR [node]  Node of the callback
 -- column: callback VARCHAR [callback]  What triggers it
 -- column: function VARCHAR  The function
@@ -19,7 +17,7 @@
 -- column: b_samples BIGINT  Samples of it in run B
 WITH instance AS (
     SELECT side = 'a' AS is_a, node, label, callback_instance_id
-    FROM derive.compared_instance($run_a, $run_b, $a_window, $b_window, $skip_first)
+    FROM compared_instance
 ),
 sample AS (
     SELECT i.is_a, i.node, i.label, f.function, s.cpu_ns

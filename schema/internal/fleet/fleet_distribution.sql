@@ -5,7 +5,6 @@
 --     value. Bucket b > 0 holds times above 1.02^(b-2) ns up to 1.02^(b-1) ns, for which
 --     2 / 2.02 * 1.02^(b-1) ns stands; bucket 0 holds zero, -b the times below zero.
 -- grain: one row per measure, node, callback or topic, and bucket
--- param: runs BIGINT[]  Runs
 -- column: run_id BIGINT  Run
 -- column: measure VARCHAR  'callback_duration', 'callback_period' (from one start to the next),
 --     'callback_wait' (as waits has it) or 'transport_latency' (publication to take)

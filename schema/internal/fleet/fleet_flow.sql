@@ -4,7 +4,6 @@
 --     of one), each with its path. The query e2e-latency summarises these rows for a run. The rows
 --     of several runs together give its answer for all of them.
 -- grain: one row per path, root and arrival; one per path and root that did not arrive
--- param: runs BIGINT[]  Runs
 -- column: run_id BIGINT  Run
 -- column: path VARCHAR  Nodes and topics of the path
 -- column: path_id BIGINT  Number of the path in the run: several paths may have one text

@@ -5,7 +5,6 @@
 --     count that publish towards the other place. If there are none, those count where a link may
 --     be missing (main.dead_end). If there are none either, those that publish count, else all.
 -- grain: one row, or none if there is a path
--- param: runs BIGINT[]  Runs to look at
 -- param: from VARCHAR  Topics or nodes where flows start: names or globs, separated by commas
 -- param: to VARCHAR  Topics or nodes where they end, in the same form
 -- column: last VARCHAR  Nodes where flows from the one place end; NULL: nothing was received

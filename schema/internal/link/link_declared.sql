@@ -3,7 +3,6 @@
 -- description: The annotations of a run that its trace declares, with their endpoints: those among
 --     a file are not stored again.
 -- grain: one row per annotation
--- param: run_id BIGINT  Run
 -- column: kind VARCHAR  Kind of the link
 -- column: process_id BIGINT  Process that declares it
 -- column: inputs BIGINT[]  Subscriptions, in order; NULL: none

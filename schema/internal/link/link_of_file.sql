@@ -3,7 +3,6 @@
 -- description: The annotations of a run that a file declared, as an entry of a file has them: what
 --     is suggested stands beside them.
 -- grain: one row per annotation of a file
--- param: run_id BIGINT  Run
 -- column: kind VARCHAR  Kind of the link
 -- column: node VARCHAR  Node that publishes
 -- column: inputs VARCHAR[]  Topics of its inputs

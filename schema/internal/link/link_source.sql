@@ -2,7 +2,6 @@
 -- title: Indirect links by who declares them
 -- description: How many indirect links of a run a file declares, and how many its trace.
 -- grain: one row
--- param: run_id BIGINT  Run
 -- column: of_file BIGINT  Links that a file declares
 -- column: of_trace BIGINT  Links that the trace declares
 SELECT

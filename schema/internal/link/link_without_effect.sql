@@ -3,7 +3,6 @@
 -- description: The indirect links that a file declared for a run and that no message took, with the
 --     reason.
 -- grain: one row per such annotation
--- param: run_id BIGINT  Run
 -- column: kind VARCHAR  Kind of the link
 -- column: inputs VARCHAR  Topics of its inputs
 -- column: outputs VARCHAR  Topics of its outputs

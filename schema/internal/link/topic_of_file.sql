@@ -3,7 +3,6 @@
 -- description: What a file named for a run, and topics that still have no name, as entries of a
 --     file have them: both stand in the file of suggestions.
 -- grain: one row per named publisher or subscription, and per unnamed topic
--- param: run_id BIGINT  Run
 -- column: name VARCHAR  Topic; NULL: it has no name
 -- column: entry VARCHAR  What the entry knows it by
 -- column: publishers VARCHAR  Nodes that publish on a topic without a name

@@ -2,7 +2,6 @@
 -- title: Publishers and subscriptions that a file of links can name
 -- description: Those whose topic the trace does not name, with what messages tell about it.
 -- grain: one row per publisher or subscription
--- param: run_id BIGINT  Run
 -- column: kind VARCHAR  'publisher' or 'subscription'
 -- column: id BIGINT  Its identity
 -- column: handle UBIGINT  Its handle

@@ -2,9 +2,6 @@
 -- title: Losses of an MCAP file
 -- description: Messages that a subscription did not get, though it was connected.
 -- grain: one row per publication and subscription that did not get it
--- param: runs BIGINT[]  Runs
--- param: start_ns BIGINT  Begin of the window, epoch ns
--- param: end_ns BIGINT  End of the window, epoch ns
 -- column: at_ns BIGINT [epoch ns]  When it was published
 -- column: node VARCHAR [node]  Node that did not get it
 -- column: message VARCHAR  What became of it, in words

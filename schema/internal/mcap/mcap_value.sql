@@ -7,9 +7,6 @@
 --     several have them, their identity comes behind. Flows that pass a link that may be another
 --     one are a series of their own, /ambiguous.
 -- grain: one row per value
--- param: runs BIGINT[]  Runs
--- param: start_ns BIGINT  Begin of the window, epoch ns
--- param: end_ns BIGINT  End of the window, epoch ns
 -- column: topic VARCHAR  Topic in the file; characters that no topic of ROS has are underscores
 -- column: at_ns BIGINT [epoch ns]  When
 -- column: value_ms DOUBLE [ms]  The value

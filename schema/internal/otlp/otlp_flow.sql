@@ -3,7 +3,6 @@
 -- description: What belongs to flows that reached the end of their paths: callback instances,
 --     publications, takes, and the requests and responses between them.
 -- grain: one row per vertex
--- param: runs BIGINT[]  Runs
 -- param: start_ns BIGINT  Begin of the window of roots, epoch ns
 -- param: end_ns BIGINT  End of the window of roots, epoch ns
 -- param: from VARCHAR = NULL  Topics or nodes where flows start: globs, with commas between

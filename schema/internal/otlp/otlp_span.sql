@@ -5,7 +5,6 @@
 --     else the latest. The others are links. A trace is a span without a parent and all that
 --     descends from it. ROS's own topics and services are left out.
 -- grain: one row per span
--- param: run_id BIGINT  Run
 -- param: start_ns BIGINT  Begin of the window, epoch ns; does not count where keys are given
 -- param: end_ns BIGINT  End of the window, epoch ns, likewise
 -- param: keys BIGINT[] = NULL  Only these vertices, those of flows; NULL: all that begins in the

@@ -2,7 +2,6 @@
 -- title: Counters in Perfetto
 -- description: The tracks of rates and of queues.
 -- grain: one row per publisher and subscription
--- param: run_id BIGINT  Run
 -- column: track BIGINT  Its track
 -- column: parent BIGINT  Track of its process
 -- column: name VARCHAR  What Perfetto calls it

@@ -2,9 +2,6 @@
 -- title: Events of the user in Perfetto
 -- description: Events of the user's own tracepoints, as moments on their threads.
 -- grain: one row per event
--- param: run_id BIGINT  Run
--- param: start_ns BIGINT  Begin of the window, epoch ns
--- param: end_ns BIGINT  End of the window, epoch ns
 -- column: track BIGINT  Track of its thread
 -- column: at_ns BIGINT [epoch ns]  When
 -- column: name VARCHAR  Provider and event

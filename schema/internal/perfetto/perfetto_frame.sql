@@ -2,7 +2,6 @@
 -- title: Functions in Perfetto
 -- description: Functions of stacks.
 -- grain: one row per function and file
--- param: run_id BIGINT  Run
 -- column: id BIGINT  Function
 -- column: name VARCHAR  Its name
 -- column: file VARCHAR  Its library, program or source file

@@ -2,9 +2,6 @@
 -- title: Gaps in Perfetto
 -- description: Gaps of a host, those that touch as one: slices of a track are disjoint or nested.
 -- grain: one row per gap of a host
--- param: run_id BIGINT  Run
--- param: start_ns BIGINT  Begin of the window, epoch ns
--- param: end_ns BIGINT  End of the window, epoch ns
 -- column: track BIGINT  Its track
 -- column: track_name VARCHAR  What Perfetto calls the track
 -- column: name VARCHAR  What it calls the gap

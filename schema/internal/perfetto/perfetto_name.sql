@@ -3,7 +3,6 @@
 -- description: Names of slices. A slice refers to its name by code and id; id 0 is what is not
 --     known.
 -- grain: one row per name
--- param: run_id BIGINT  Run
 -- column: code INTEGER  What kind of slice has it
 -- column: id BIGINT  Of the callback, publisher, subscription, client, service or activity
 -- column: name VARCHAR  The name

@@ -4,7 +4,6 @@
 -- description: The tracks of processes. Two processes (of two hosts, or lives) may have one pid;
 --     Perfetto would take them for one.
 -- grain: one row per process
--- param: run_id BIGINT  Run
 -- column: track BIGINT  Its track
 -- column: pid BIGINT  Its pid, or a number of its own where several have that pid
 -- column: name VARCHAR  What Perfetto calls it

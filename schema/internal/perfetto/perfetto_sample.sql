@@ -2,9 +2,6 @@
 -- title: Samples of stacks in Perfetto
 -- description: Samples of what threads ran, with their stacks.
 -- grain: one row per sample of a thread that has a track
--- param: run_id BIGINT  Run
--- param: start_ns BIGINT  Begin of the window, epoch ns
--- param: end_ns BIGINT  End of the window, epoch ns
 -- column: at_ns BIGINT [epoch ns]  When
 -- column: pid BIGINT  Pid that Perfetto knows the process by
 -- column: tid BIGINT  Tid that Perfetto knows the thread by

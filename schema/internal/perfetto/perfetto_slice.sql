@@ -4,9 +4,6 @@
 --     with the links between them. A link begins at the last and ends at the first moment of a
 --     request or response that was traced.
 -- grain: one row per begin and end of a slice, and per moment
--- param: run_id BIGINT  Run
--- param: start_ns BIGINT  Begin of the window, epoch ns
--- param: end_ns BIGINT  End of the window, epoch ns
 -- column: track BIGINT  Its track
 -- column: at_ns BIGINT [epoch ns]  When
 -- column: rank INTEGER  0 an end, 1 a begin, 2 a moment

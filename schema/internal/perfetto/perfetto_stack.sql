@@ -2,7 +2,6 @@
 -- title: Stacks in Perfetto
 -- description: The stacks of samples, the outermost call first.
 -- grain: one row per stack
--- param: run_id BIGINT  Run
 -- column: stack_id BIGINT  The stack
 -- column: frames BIGINT[]  Its functions
 SELECT stack_id, list(stack_frame_id ORDER BY position) AS frames

@@ -3,9 +3,6 @@
 -- description: States of threads, as the kernel recorded them, and what of that ran on which core.
 --     Slices of a track are disjoint.
 -- grain: one row per state of a thread, and per stretch in which a thread ran on a core
--- param: run_id BIGINT  Run
--- param: start_ns BIGINT  Begin of the window, epoch ns
--- param: end_ns BIGINT  End of the window, epoch ns
 -- column: track BIGINT  Its track
 -- column: parent BIGINT  Track of its thread; NULL: of a core
 -- column: track_name VARCHAR  What Perfetto calls the track

@@ -2,7 +2,6 @@
 -- title: Symbols in Perfetto
 -- description: Symbols of callbacks, which slices refer to by number.
 -- grain: one row per callback with a symbol
--- param: run_id BIGINT  Run
 -- column: id BIGINT  Callback
 -- column: name VARCHAR  Its symbol
 SELECT callback_id AS id, symbol AS name

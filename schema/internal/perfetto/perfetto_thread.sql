@@ -3,7 +3,6 @@
 -- kind: inline
 -- description: The tracks of threads, and of what their executors did on them.
 -- grain: one row per thread
--- param: run_id BIGINT  Run
 -- column: track BIGINT  Its track
 -- column: parent BIGINT  Track of its process
 -- column: pid BIGINT  Pid that Perfetto knows the process by

@@ -3,9 +3,6 @@
 -- description: The rate of each publisher, from the time since its publication before; and how many
 --     messages of each subscription were published and not yet taken, of those that it took later.
 -- grain: one row per value
--- param: run_id BIGINT  Run
--- param: start_ns BIGINT  Begin of the window, epoch ns
--- param: end_ns BIGINT  End of the window, epoch ns
 -- column: track BIGINT  Track of the counter
 -- column: at_ns BIGINT [epoch ns]  When
 -- column: value DOUBLE  In the unit of the track

@@ -3,9 +3,6 @@
 -- description: Stacks that samples saw, below their node and callback, with how often: as tools for
 --     flame graphs read them, the outermost call first.
 -- grain: one row per node, callback and stack
--- param: run_id BIGINT  Run
--- param: start_ns BIGINT  Begin of the window, epoch ns
--- param: end_ns BIGINT  End of the window, epoch ns
 -- column: stack VARCHAR  Node, callback and functions, with semicolons between
 -- column: samples BIGINT  How many samples
 WITH sample AS (

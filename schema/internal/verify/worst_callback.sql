@@ -3,8 +3,6 @@
 -- description: Of the instances of a callback that ended, the longest that began in the window.
 -- grain: one row, or none
 -- param: key BIGINT  Callback
--- param: start_ns BIGINT  Begin of the window, epoch ns
--- param: end_ns BIGINT  End of the window, epoch ns
 -- column: duration_ns BIGINT [ns]  How long it took
 -- column: at_ns BIGINT [epoch ns]  When it began
 -- column: id BIGINT  Its identity

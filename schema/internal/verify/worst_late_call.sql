@@ -3,8 +3,6 @@
 -- description: Of the calls of a timer in the window, the one that came latest after it was due.
 -- grain: one row, or none
 -- param: key BIGINT  Its callback
--- param: start_ns BIGINT  Begin of the window, epoch ns
--- param: end_ns BIGINT  End of the window, epoch ns
 -- column: duration_ns BIGINT [ns]  How long it took
 -- column: at_ns BIGINT [epoch ns]  When it began
 -- column: id BIGINT  Its identity

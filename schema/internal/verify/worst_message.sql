@@ -4,8 +4,6 @@
 --     its way.
 -- grain: one row, or none
 -- param: key BIGINT  Subscription that took it
--- param: start_ns BIGINT  Begin of the window, epoch ns
--- param: end_ns BIGINT  End of the window, epoch ns
 -- column: duration_ns BIGINT [ns]  How long it took
 -- column: at_ns BIGINT [epoch ns]  When it began
 -- column: id BIGINT  Its identity

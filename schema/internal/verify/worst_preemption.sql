@@ -4,8 +4,6 @@
 --     threads had the CPU for longest.
 -- grain: one row, or none
 -- param: key BIGINT  Callback
--- param: start_ns BIGINT  Begin of the window, epoch ns
--- param: end_ns BIGINT  End of the window, epoch ns
 -- column: duration_ns BIGINT [ns]  How long it had lost the CPU
 -- column: at_ns BIGINT [epoch ns]  When it began
 -- column: id BIGINT  Its identity

@@ -4,9 +4,6 @@
 --     matters or not. The cost is by how much the data at the end of the path are older because of
 --     it: 95 % of the messages are delayed by no more. It reads what an explanation has by then.
 -- grain: one row per kind, culprit and path
--- param: runs BIGINT[]  Runs to look at
--- param: start_ns BIGINT  Begin of the time window, epoch ns
--- param: end_ns BIGINT  Its end, exclusive
 -- param: asked_ns BIGINT  Begin of what was asked for: with the warm-up, which start_ns leaves out
 -- column: kind VARCHAR  'callback', 'executor', 'cpu', 'service', 'queue', 'lost', 'late_start',
 --     'stale' or 'way'

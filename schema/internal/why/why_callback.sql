@@ -3,9 +3,6 @@
 -- description: How long the callbacks on the paths of an explanation ran and waited, and for what.
 --     95 % of their instances took no longer.
 -- grain: one row per node and callback
--- param: runs BIGINT[]  Runs to look at
--- param: start_ns BIGINT  Begin of the time window, epoch ns
--- param: end_ns BIGINT  Its end, exclusive
 -- column: node VARCHAR  Node
 -- column: label VARCHAR  What triggers the callback
 -- column: usual_ns BIGINT [ns]  Median duration

@@ -4,7 +4,6 @@
 --     instance that they were made in and its subscription. The cut, before which an input has to
 --     be there, is the start of that instance, else that of the publication itself.
 -- grain: one row per annotation and publication by one of its outputs
--- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.annotated_publication(only_run) AS TABLE
 SELECT
     a.run_id,

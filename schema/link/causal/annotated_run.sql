@@ -4,7 +4,6 @@
 --     callback of the subscription was traced (rclpy), its takes stand for them: each is over as
 --     soon as it began, and has the negative of its identity.
 -- grain: one row per instance of such a callback, or take
--- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.annotated_run(only_run) AS TABLE
 WITH instance AS (
     SELECT

@@ -12,7 +12,6 @@
 --     beyond the usual number per message is doubtful. So is what one node publishes after a
 --     message to another; of a publisher that does so more than now and then, all is.
 -- grain: one row per publication that is not surely an answer
--- param: only_run BIGINT  Run to look at
 -- param: links VARCHAR  Name of the rows of derive.link_causal_take_adjacent
 CREATE OR REPLACE MACRO derive.answer_doubtful(only_run, links) AS TABLE
 WITH message AS (

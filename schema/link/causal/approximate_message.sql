@@ -8,7 +8,6 @@
 --     header may come from a message that no callback was called with: an annotation leads to the
 --     publication, or its callback, or its thread outside of callbacks, took messages itself.
 -- grain: one row per annotation and callback instance of one of its inputs
--- param: only_run BIGINT  Run to look at
 -- param: runs VARCHAR  Name of the rows of derive.annotated_run
 CREATE OR REPLACE MACRO derive.approximate_message(only_run, runs) AS TABLE
 WITH RECURSIVE input AS MATERIALIZED (

@@ -11,7 +11,6 @@
 --     is better if the stamps in the headers are older, as derive.approximate_message says, or the
 --     stamps of an input are not in the order in which its messages came.
 -- grain: one row per annotation, pivot of a set that was proven, and input
--- param: only_run BIGINT  Run to look at
 -- param: messages VARCHAR  Name of the rows of derive.approximate_message
 CREATE OR REPLACE MACRO derive.approximate_set(only_run, messages) AS TABLE
 WITH follower AS MATERIALIZED (

@@ -7,7 +7,6 @@
 --     closest in time: links of the kind `direct` go. Where messages are said to be kept,
 --     `take_adjacent` is no longer a guess worth making.
 -- grain: one row per link that is not declared away
--- param: only_run BIGINT  Run to look at
 -- param: links VARCHAR  Name of rows of run_id, callback_instance_id, take_id, publication_id,
 --     publisher_id, kind, annotation_id, candidate_count, is_loss_affected
 CREATE OR REPLACE MACRO derive.causal_link(only_run, links) AS TABLE

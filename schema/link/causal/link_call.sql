@@ -13,7 +13,6 @@
 --     where nothing was taken may do so here as well: then "nothing" is one more candidate. So is
 --     another process, where several with equal ids cannot be told apart.
 -- grain: one row per publication, request or response sent in such a turn
--- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.link_call(only_run) AS TABLE
 WITH taken AS (
     SELECT

@@ -5,7 +5,6 @@
 --     inside of another callback follows from the response (derive.link_call).
 -- grain: one row per publication made by a callback instance
 -- also: derive.link_causal_by_hand, derive.link_causal_annotated
--- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.link_causal(only_run) AS TABLE
 WITH link AS (
     SELECT

@@ -5,7 +5,6 @@
 --     message, or the publication.
 -- grain: one row per callback instance, publication that it led to, and annotation
 -- when: store.annotation
--- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.link_causal_annotated(only_run) AS TABLE
 WITH link AS (
     SELECT

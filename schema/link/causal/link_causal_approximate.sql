@@ -10,7 +10,6 @@
 --     second set, or if headers that are older than the publication would make another set.
 --     `since_ns`: from when on a message that is missing might have changed the choice.
 -- grain: one row per annotation, publication of a firing, and input
--- param: only_run BIGINT  Run to look at
 -- param: publications VARCHAR  Name of the rows of derive.annotated_publication
 -- param: runs VARCHAR  Name of the rows of derive.annotated_run
 CREATE OR REPLACE MACRO derive.link_causal_approximate(only_run, publications, runs) AS TABLE

@@ -8,7 +8,6 @@
 --     that a publisher answers a subscription (`direct`). Then there is no doubt.
 -- grain: one row per take, and publication that it caused
 -- when: derive.take_by_hand
--- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.link_causal_by_hand(only_run) AS TABLE
 WITH adjacent AS MATERIALIZED (
     FROM derive.link_causal_take_adjacent(only_run)

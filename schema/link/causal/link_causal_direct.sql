@@ -7,7 +7,6 @@
 --     not over. Where the end of one inside was lost, it may have been that one: then there are two
 --     candidates. What a later step of a call publishes is the first one's.
 -- grain: one row per publication made inside a callback instance
--- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.link_causal_direct(only_run) AS TABLE
 WITH RECURSIVE around AS (
     SELECT

@@ -17,7 +17,6 @@
 --     record of either thread. Messages of rclpy have no callback instance: derive.annotated_run
 --     says what stands for it.
 -- grain: one row per annotation, publication by one of its outputs, and other input with a message
--- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.link_causal_indirect(only_run) AS TABLE
 WITH RECURSIVE annotated AS MATERIALIZED (
     FROM derive.annotated_publication(only_run)

@@ -5,7 +5,6 @@
 --     An executor that spins inside of a callback takes messages there, too: each has a callback
 --     of its own, but for the copies of messages that come through intra-process buffers.
 -- grain: one row per publication inside a callback instance, and subscription it took from before
--- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.link_causal_polled(only_run) AS TABLE
 WITH RECURSIVE buffered AS (
     SELECT DISTINCT c.subscription_id

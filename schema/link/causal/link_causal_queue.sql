@@ -10,7 +10,6 @@
 --     subscription whose creation was not traced, since messages may have waited already, and those
 --     behind a gap, where a message may be missing.
 -- grain: one row per annotation, input, and publication by one of its outputs that answers it
--- param: only_run BIGINT  Run to look at
 -- param: publications VARCHAR  Name of the rows of derive.annotated_publication
 -- param: runs VARCHAR  Name of the rows of derive.annotated_run
 CREATE OR REPLACE MACRO derive.link_causal_queue(only_run, publications, runs) AS TABLE

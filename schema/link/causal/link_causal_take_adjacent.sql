@@ -9,7 +9,6 @@
 --     rclpy do not show: what they publish is among the rows, and derive.answer_doubtful tells it
 --     apart.
 -- grain: one row per publication made after a take without a callback
--- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.link_causal_take_adjacent(only_run) AS TABLE
 WITH by_hand AS (
     SELECT run_id, thread_id, start_event_id AS event_id, take_id, subscription_id, taken_ns

@@ -3,7 +3,6 @@
 -- description: Publications under ids that several processes share: nothing says which of these
 --     processes published.
 -- grain: one row per such publication
--- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.mixed_publication(only_run) AS TABLE
 SELECT publication_id
 FROM store.publication

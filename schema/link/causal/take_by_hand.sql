@@ -2,7 +2,6 @@
 -- kind: macro
 -- description: Takes of messages that no callback was called with.
 -- grain: one row per such take
--- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.take_by_hand(only_run) AS TABLE
 SELECT
     t.run_id, t.take_id, t.subscription_id, t.trace_id, t.process_id, t.thread_id, t.taken_ns,

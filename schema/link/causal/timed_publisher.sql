@@ -13,7 +13,6 @@
 --     A timer is due at its initialisation plus whole periods. Executors of rclpy initialise a
 --     timer for every wait that may time out: the first of each period stands for all.
 -- grain: one row per publisher and period of a timer of its process that explains it
--- param: only_run BIGINT  Run to look at
 -- param: followers VARCHAR  Name of rows of publisher_id, process_id, start_ns, delay_ns (since the
 --     take), rest_ns (until the next take; NULL: none), interval_ns and message_count (since the
 --     publisher's publication before)

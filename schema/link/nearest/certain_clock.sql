@@ -6,7 +6,6 @@
 --     stretch tells nothing, the clock went on between those beside it: it does not jump there and
 --     back within a stretch.
 -- grain: one row per clock and stretch of time
--- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.certain_clock(only_run) AS TABLE
 WITH told AS (
     SELECT

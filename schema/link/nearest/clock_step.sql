@@ -5,7 +5,6 @@
 --     side or on one only, all that is known on the other is within the step. A stamp from a step
 --     may be by any of the differences that showed.
 -- grain: one row per clock and step, or steps with nothing certain between them
--- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.clock_step(only_run) AS TABLE
 WITH known AS (
     FROM derive.certain_clock(only_run) WHERE is_known

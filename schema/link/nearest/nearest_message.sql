@@ -14,7 +14,6 @@
 --     write, and the difference of the clocks may be wrong by that time. Nor has it one where the
 --     difference of the clocks is not known, or explains less than half of the messages.
 -- grain: one row per message that has, or might have, a publication
--- param: only_run BIGINT  Run to look at
 -- when: store.stamp_clock
 CREATE OR REPLACE MACRO derive.nearest_message(only_run) AS TABLE
 WITH course AS MATERIALIZED (

@@ -8,7 +8,6 @@
 --     within microseconds.
 -- grain: one row per clock and stretch of time with messages; message_count is 0 where the
 --     difference is not known
--- param: only_run BIGINT  Run to look at
 -- when: derive.unstamped_call
 CREATE OR REPLACE MACRO derive.stamp_clock(only_run) AS TABLE
 WITH pair AS MATERIALIZED (

@@ -12,7 +12,6 @@
 --     whatever publication it may be of: else chance gives a wrong difference more messages than
 --     the right one.
 -- grain: one row per clock, message in the sample and publication that it may be of
--- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.stamp_pair(only_run) AS TABLE
 WITH published AS MATERIALIZED (
     SELECT

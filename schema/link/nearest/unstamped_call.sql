@@ -5,7 +5,6 @@
 --     event though nothing was lost (rmw_zenoh, which writes messages with buffers to several
 --     channels). Any other call without a stamp has lost an event.
 -- grain: one row per such call
--- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.unstamped_call(only_run) AS TABLE
 WITH unstamped_process AS (
     SELECT process_id

@@ -6,7 +6,6 @@
 --     subscription on its own, with another stamp each time: there, each is looked for alone.
 -- grain: one row per message, subscription if that counts (else 0), and clock of a process that
 --     took it
--- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.unstamped_message(only_run) AS TABLE
 WITH topic AS (
     SELECT topic_name, bool_or(is_without_event) AS is_divided

@@ -2,7 +2,6 @@
 -- kind: macro
 -- description: Publications whose message can only be found by time.
 -- grain: one row per publish() call without a stamp, on a known topic
--- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.unstamped_publication(only_run) AS TABLE
 SELECT
     b.run_id,

@@ -7,7 +7,6 @@
 --     group has the name of those members that have one; if they have several names, nothing is
 --     learned. A pair that hardly any message of both sides speaks for is chance.
 -- grain: one row per publisher or subscription without a topic of its own that messages join
--- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.topic_group(only_run) AS TABLE
 WITH RECURSIVE endpoint AS (
     SELECT

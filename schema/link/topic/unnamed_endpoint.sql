@@ -3,7 +3,6 @@
 -- description: Publishers and subscriptions whose topic the trace does not name, and what an entry
 --     of a file of links knows them by. A handle that occurs twice needs its process and host.
 -- grain: one row per publisher or subscription that was used, and not seen to be initialised
--- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.unnamed_endpoint(only_run) AS TABLE
 WITH endpoint AS (
     SELECT

@@ -14,7 +14,6 @@
 -- unites: derive.link_transport_exact, derive.link_transport_nearest,
 --     derive.link_transport_ring_buffer, derive.link_transport_agnocast
 -- param: links VARCHAR  Name of the rows of all methods
--- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.link_transport(links, only_run) AS TABLE
 WITH link AS (
     SELECT

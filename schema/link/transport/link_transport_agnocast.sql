@@ -9,7 +9,6 @@
 --     memory), the one that is nearest in time is chosen.
 -- grain: one row per take of Agnocast whose publication is known
 -- when: store.agnocast_entry
--- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.link_transport_agnocast(only_run) AS TABLE
 WITH published AS (
     SELECT

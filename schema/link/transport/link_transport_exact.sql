@@ -9,7 +9,6 @@
 --     than publications, some publications were lost, and each take may be of one of those. Equal
 --     values need no clocks: a take may seem to come before its publication.
 -- grain: one row per take whose publication is known by its stamp
--- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.link_transport_exact(only_run) AS TABLE
 WITH unnamed AS (
     SELECT kind, id, 'group ' || group_id AS topic_name

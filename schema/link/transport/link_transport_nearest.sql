@@ -6,7 +6,6 @@
 --     be lost around the moment of publishing.
 -- grain: one row per take whose publication is known by time
 -- when: store.nearest_message
--- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.link_transport_nearest(only_run) AS TABLE
 WITH received AS (
     SELECT

@@ -7,7 +7,6 @@
 --     gap, messages are assumed to come no faster than where nothing is missing.
 -- grain: one row per dequeue whose publication is known
 -- when: store.ring_buffer_event
--- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.link_transport_ring_buffer(only_run) AS TABLE
 WITH slot_use AS (
     SELECT
