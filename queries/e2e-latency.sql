@@ -74,6 +74,27 @@ CREATE OR REPLACE TEMP TABLE named_path AS
 SELECT run_id, path_id, subscription_id, is_path, is_cut, path, topics, publishers, subscriptions
 FROM main.flow_path($runs, only_paths := true, chains := 'path_chain');
 
+-- Only where the end of a path goes on can anything come back to it.
+-- when: named_path WHERE subscription_id IN (FROM main.continued_subscription($runs))
+CREATE OR REPLACE TEMP TABLE looped_path AS
+SELECT path_id, count(*) AS number
+FROM main.looped_arrival(
+    $runs,
+    (
+        SELECT list([path_id, take_id])
+        FROM (
+            SELECT DISTINCT path_id, take_id
+            FROM path_outcome
+            WHERE take_id IS NOT NULL AND path_id IN (
+                SELECT path_id
+                FROM named_path
+                WHERE subscription_id IN (FROM main.continued_subscription($runs))
+            )
+        )
+    )
+)
+GROUP BY path_id;
+
 WITH flow AS (
     SELECT
         run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, latency_ns, status,
@@ -136,28 +157,6 @@ latency AS (
     FROM flow
     WHERE status = 'reached' AND is_counted
     GROUP BY run_id, path_id
-),
--- Only where the end of a path goes on can anything come back to it.
-looped AS (
-    SELECT path_id, count(*) AS number
-    FROM main.looped_arrival(
-        $runs,
-        (
-            SELECT list([path_id, take_id])
-            FROM (
-                SELECT DISTINCT path_id, take_id
-                FROM flow
-                WHERE take_id IS NOT NULL AND path_id IN (
-                    SELECT path_id
-                    FROM named_path
-                    WHERE subscription_id IN (
-                        SELECT subscription_id FROM main.continued_subscription($runs)
-                    )
-                )
-            )
-        )
-    )
-    GROUP BY path_id
 )
 SELECT
     p.run_id,
@@ -192,5 +191,5 @@ LEFT JOIN completeness AS c ON p.path_id = c.path_id
 LEFT JOIN affected AS a ON p.path_id = a.path_id
 LEFT JOIN latency AS l ON p.path_id = l.path_id
 LEFT JOIN reason AS r ON p.path_id = r.path_id
-LEFT JOIN looped AS o ON p.path_id = o.path_id
+LEFT JOIN looped_path AS o ON p.path_id = o.path_id
 ORDER BY p.run_id, p.path, p.path_id

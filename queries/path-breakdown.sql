@@ -84,6 +84,7 @@ LEFT JOIN breakdown_wait AS w ON i.callback_instance_id = w.callback_instance_id
 LEFT JOIN main.executor AS e ON w.executor_id = e.executor_id
 WHERE list_contains($runs, i.run_id);
 
+-- when: main.thread_state, main.data_arrival
 CREATE OR REPLACE TEMP TABLE exact_arrival AS
 SELECT take_id, until_arrival_ns, run_queue_ns, executor_ns
 FROM main.arrival

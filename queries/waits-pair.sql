@@ -25,6 +25,8 @@
 -- column: is_internal BOOLEAN       The callback that waited is infrastructure of ROS
 -- brief: node, meanwhile_node, worst_ns, share, meanwhile_thread, callback, meanwhile_callback,
 --     waits, overlap_max_ns, overlap_min_ns, instances
+
+-- when: main.thread_state, main.data_arrival
 CREATE OR REPLACE TEMP TABLE exact_arrival AS
 SELECT take_id, until_arrival_ns, run_queue_ns, executor_ns
 FROM main.arrival

@@ -27,7 +27,7 @@ from msgflow.result.query_result import QueryResult
 from msgflow.run.slice import LATEST, Slice
 from msgflow.run.window import format_epoch
 from msgflow.sql.failure import first_line, query_errors
-from msgflow.sql.statement import internal_sql
+from msgflow.sql.statement import internal_sql, may_have_rows
 from msgflow.sql.value import described_type, parse_text
 from msgflow.text.name_suggestions import did_you_mean
 from msgflow.text.values import format_duration
@@ -106,10 +106,17 @@ class Steps:
                 self._made |= dict.fromkeys(made[made.index(step.table) :], ("", {}))
             self._made[step.table] = "", {}
             if known := self._known.get(step.table):
-                self._connection.execute(f"CREATE OR REPLACE TEMP TABLE {step.table} AS {known}")
-            else:
+                self._execute(f"CREATE OR REPLACE TEMP TABLE {step.table} AS {known}", values)
+            elif may_have_rows(self._connection, step.sources, values):
                 self._connection.execute(*wanted)
+            else:
+                self._execute(f"{step.sql.removesuffix(';')}\nLIMIT 0", values)
             self._made[step.table] = wanted
+
+    def _execute(self, sql: str, values: Mapping[str, Any]) -> None:
+        (statement,) = self._connection.extract_statements(sql)
+        bound = {name: values[name] for name in statement.named_parameters}
+        self._connection.execute(statement, bound)
 
 
 def run_query(

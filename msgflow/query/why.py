@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     Ask = Callable[..., QueryResult]
 
 _PIECES = 5
-_OF_VERDICT = ("why_callback", "suspect")
+_OF_VERDICT = ("open_end", "why_callback", "suspect")
 _WAITS = 3
 # By what took longest in a slow flow: the query that shows more of it, by node or by topic.
 _BY_NODE = {
@@ -49,10 +49,20 @@ _LINKS = ("suggest", "links")
 _DEAD_ENDS = (
     "SELECT subject, detail FROM main.finding WHERE name = 'dead_end' AND list_contains(?, run_id)"
 )
-# The waits explained are those of the breakdown, and more.
+# What an explanation has by then takes less: waits explained are those of the breakdown, and more;
+# the flow that is shown is one of those broken down.
 _KNOWN = {
+    "explained_wait": "FROM main.executor_wait_explained("
+    "$runs, arrivals := 'exact_arrival', waits := 'ready_wait')",
     "breakdown_wait": "SELECT callback_instance_id, executor_id, busy_min_ns, busy_max_ns,"
-    " held_max_ns FROM explained_wait"
+    " held_max_ns FROM explained_wait",
+    "critical_trail": "SELECT c.flow_id, t.hop, t.take_id, t.publication_id, t.previous_take_id,"
+    " t.next_take_id FROM critical_flow AS c JOIN breakdown_flow AS b ON c.path_id = b.path_id"
+    " AND c.root_kind = b.root_kind AND c.root_id = b.root_id AND c.take_id = b.take_id"
+    " JOIN breakdown_trail AS t ON b.flow_id = t.flow_id",
+    "critical_part": "FROM main.end_to_end_piece_explained("
+    "'critical_flow', 'critical_trail', 'breakdown_callback', $runs)",
+    "critical_piece": "FROM main.critical_piece('critical_part', $runs, waits := 'ready_wait')",
 }
 # How to know what a sentence says is not known.
 _UNKNOWN = {
@@ -121,7 +131,11 @@ def explain(
                 return result
             return with_path_numbers(connection, result, *([] if given else ["named_path"]))
 
-        return _explained(connection, ask, run, times, place)
+        try:
+            return _explained(connection, ask, run, times, place)
+        finally:
+            for name in ("ready_wait", *_OF_VERDICT):
+                connection.execute(f"DROP TABLE IF EXISTS temp.{name}")
 
 
 def _explained(
@@ -152,6 +166,7 @@ def _explained(
     ask = partial(ask_of, part=times)
     values = {"runs": [run.run_id], **times.window([run]).bindings}
     values["asked_ns"] = asked.window([run]).start_ns
+    internal_sql().keep(connection, "ready_wait", values)
     waits = ask("waits-pair")
     parts = ask("path-breakdown", **ends)
     # What is lost while a system warms up is lost.
@@ -159,13 +174,9 @@ def _explained(
     shown = paths.table["path"].to_pylist()
     tables = {"path_row": paths.table, "breakdown": parts.table, "delivery": losses.table}
     with registered(connection, **tables):
-        try:
-            for name in _OF_VERDICT:
-                internal_sql().keep(connection, name, values)
-            verdict = internal_sql().run(connection, "verdict", values).to_arrow_table()
-        finally:
-            for name in _OF_VERDICT:
-                connection.execute(f"DROP TABLE IF EXISTS temp.{name}")
+        for name in _OF_VERDICT:
+            internal_sql().keep(connection, name, values)
+        verdict = internal_sql().run(connection, "verdict", values).to_arrow_table()
     path = _worst(verdict, paths)
     places = path.split(" → ")
     # No path may pass what only others do.

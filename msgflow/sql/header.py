@@ -44,8 +44,8 @@ The header ends at the first line that is not a `--` comment. Two spaces end a p
 - `unites`: objects whose rows a macro reads as one table. Its first argument is the name of that
   table, its second the run. An object whose `when` finds no row is left out.
 
-- `like`: other files of the folder, or of `schema/public` (main.NAME). A `param` or a `column` may be
-  a list of names: the first of these files that has it declares it.
+- `like`: other files of the folder, or of `schema/public` (main.NAME). A `param` or a `column` may
+  be a list of names: the first of these files that has it declares it.
 - `variant`: a parameter whose values are queries of their own. The default is this file, and `age`
   stands in the file of the same name with `-age` behind it; a BOOLEAN `each`, in that with `-each`.
   A query may have several: each value of them is one file.
@@ -56,13 +56,15 @@ column may stand by its name alone: the table declares the rest. Files in `schem
 `severity`, a `cause` and a `cure`. An object is made after all objects that its statement, its
 `when`, its `also` or its `unites` names.
 
-Outside of `schema/public`, what most statements take needs no declaration: the run (`run`, `run_id`,
-or `only_run` of a macro) or `runs`; `start_ns` and `end_ns`, a window of time in epoch ns, without its
-end; `origin_ns`, the moment from which times of pages count.
+Outside of `schema/public`, what most statements take needs no declaration: the run (`run`,
+`run_id`, or `only_run` of a macro) or `runs`; `start_ns` and `end_ns`, a window of time in epoch
+ns, without its end; `origin_ns`, the moment from which times of pages count.
 
 The tables that a statement looks up stay in memory until it ends. A query may therefore go in
 steps: other statements stand before its own, each of the form
-`CREATE OR REPLACE TEMP TABLE name AS SELECT …;`.
+`CREATE OR REPLACE TEMP TABLE name AS SELECT …;`. A line `-- when: main.a, main.b` above one names
+what it has its rows from, as in the header: where that has no row, the table is empty, and DuckDB
+does not plan the SQL.
 """
 
 from __future__ import annotations
@@ -89,7 +91,9 @@ _DEFAULT = r"(?: += +(?P<default>'(?:[^']|'')*'|\[[^\]]*\]|[^'\s\[]\S*))?"
 _PARAM = re.compile(rf"{_NAME} +{_TYPE}{_CHOICES}{_DEFAULT}(?P<gap> +)(?P<description>\S.*)")
 _COLUMN = re.compile(rf"{_NAME} +{_TYPE}(?: +\[(?P<unit>[^\]]+)\])? +(?P<description>\S.*)")
 _STEP = re.compile(
-    r"(?:--[^\n]*\n)*CREATE OR REPLACE TEMP TABLE (?P<table>[a-z_]+) AS\n.*?;\n+", re.DOTALL
+    r"(?:-- when: (?P<when>[^\n]*)\n|--[^\n]*\n)*"
+    r"CREATE OR REPLACE TEMP TABLE (?P<table>[a-z_]+) AS\n.*?;\n+",
+    re.DOTALL,
 )
 _COMMENT = re.compile(r"--[^\n]*")
 _OBJECT = re.compile(r"\b(?:raw|staging|store|derive|main)\.[a-z_0-9]+\b")
@@ -139,6 +143,9 @@ class Step:
 
     table: str
     sql: str  # the statement that makes it
+    # Tables and views, each with a condition on its rows, or with an empty one: if none of them has
+    # such a row, the table has none. Not known when empty.
+    sources: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -327,7 +334,7 @@ def _split(text: str, path: Path) -> tuple[list[_Field], str]:
 def _steps(body: str) -> tuple[tuple[Step, ...], str]:
     steps: list[Step] = []
     while match := _STEP.match(body):
-        steps.append(Step(match["table"], match[0].rstrip()))
+        steps.append(Step(match["table"], match[0].rstrip(), _sources(match["when"] or "")))
         body = body[match.end() :]
     return tuple(steps), body
 

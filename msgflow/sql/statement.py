@@ -73,6 +73,8 @@ class Statements:
     ) -> None:
         """Make a temporary table of the rows of a statement, which has its name."""
         text = f"CREATE OR REPLACE TEMP TABLE {name} AS\n{self.text(name)}"
+        if not may_have_rows(connection, self.header(name).sources, values):
+            text += "LIMIT 0"
         (statement,) = connection.extract_statements(text)
         connection.execute(statement, self._bound(name, statement, values))
 
@@ -81,6 +83,21 @@ class Statements:
     ) -> dict[str, Any]:
         inherited = {p.name: p.default for p in self.header(name).params if p.has_default}
         return {key: values.get(key, inherited.get(key)) for key in statement.named_parameters}
+
+
+def may_have_rows(
+    connection: duckdb.DuckDBPyConnection,
+    sources: Iterable[tuple[str, str]],
+    values: Mapping[str, Any],
+) -> bool:
+    """Return whether any of the sources of a header or step has a row; true where there is none."""
+    found = [f"EXISTS (FROM {name} WHERE {condition or 'true'})" for name, condition in sources]
+    if not found:
+        return True
+    (statement,) = connection.extract_statements(f"SELECT {' OR '.join(found)}")
+    bound = {key: values[key] for key in statement.named_parameters}
+    ((answer,),) = connection.execute(statement, bound).fetchall()
+    return bool(answer)
 
 
 @contextmanager

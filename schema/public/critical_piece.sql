@@ -6,6 +6,8 @@
 -- grain: one row per piece of a flow
 -- param: parts VARCHAR  Name of the rows of main.end_to_end_part: a table, or a part of the query
 -- param: runs BIGINT[]  Runs that they are of
+-- param: waits VARCHAR = 'wait_here'  Name of a table of when inputs became ready, by the clocks of
+--     the executors, where there is one
 -- column: run_id BIGINT  Run
 -- column: path_id BIGINT  Path, as main.flow_path numbers it for the same arguments
 -- column: root_kind VARCHAR  'callback_instance', 'publication' or 'take'
@@ -38,7 +40,7 @@
 -- column: by_thread_id BIGINT  That thread, of a ROS process
 -- column: by_other_thread_id BIGINT  That thread, of another process
 -- column: by_priority INTEGER  Its priority; known for what took the CPU
-CREATE OR REPLACE MACRO main.critical_piece(parts, runs) AS TABLE
+CREATE OR REPLACE MACRO main.critical_piece(parts, runs, waits := 'wait_here') AS TABLE
 -- Here positions go on from flow to flow.
 WITH part AS MATERIALIZED (
     SELECT
@@ -63,12 +65,13 @@ waited AS MATERIALIZED (
     WHERE i.callback_instance_id IN (SELECT callback_instance_id FROM waiting)
     GROUP BY x.executor_id
 ),
+wait_here AS NOT MATERIALIZED (FROM derive.callback_ready('waited')),
 ready AS MATERIALIZED (
     SELECT
         run_id, executor_id, thread_id, callback_id, callback_instance_id, since, origin_ns,
         earliest_ns, latest_ns, start_ns, picked_ns, thread_count, previous_wait_end_ns,
         wait_start_ns, is_loss_affected
-    FROM derive.callback_ready('waited')
+    FROM query_table(waits)
     WHERE callback_instance_id IN (SELECT callback_instance_id FROM waiting)
 ),
 wait AS MATERIALIZED (
@@ -160,13 +163,12 @@ full_house AS (
         b.executor_id,
         derive.corrected_ns(b.start_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS start_ns,
         derive.corrected_ns(b.end_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS end_ns
-    FROM derive.executor_busy AS b
-    JOIN derive.executor_size AS s ON b.executor_id = s.executor_id
+    FROM derive.executor_full AS b
     JOIN (SELECT DISTINCT executor_id, process_id FROM meanwhile) AS p
         ON b.executor_id = p.executor_id
     JOIN derive.process_clock AS c ON p.process_id = c.process_id
-    WHERE s.thread_count > 1
 ),
+exclusion AS MATERIALIZED (FROM derive.callback_exclusion),
 occupied AS (
     SELECT
         m.callback_instance_id, 1 AS priority, 'executor_busy' AS activity, m.from_ns, m.to_ns,
@@ -189,8 +191,8 @@ occupied AS (
     SELECT
         m.callback_instance_id, 2, 'blocked', m.from_ns, m.to_ns, m.latest_ns, m.meanwhile_id
     FROM meanwhile AS m
-    JOIN derive.callback_exclusion AS w ON m.callback_id = w.callback_id
-    JOIN derive.callback_exclusion AS r
+    JOIN exclusion AS w ON m.callback_id = w.callback_id
+    JOIN exclusion AS r
         ON m.meanwhile_callback_id = r.callback_id
         AND w.kind = r.kind
         AND w.exclusion_id = r.exclusion_id

@@ -9,6 +9,8 @@
 -- param: runs BIGINT[]  Runs to look at
 -- param: arrivals VARCHAR = 'arrival_here'  Name of a table with take_id, until_arrival_ns,
 --     run_queue_ns and executor_ns of the exact rows of main.arrival, where there is one
+-- param: waits VARCHAR = 'wait_here'  Name of a table of when inputs became ready, by the clocks of
+--     the executors, where there is one
 -- column: run_id, callback_instance_id, executor_id, thread_id, callback_id, since, origin_ns,
 --     earliest_ns, latest_ns, start_ns, wait_ns, busy_min_ns, busy_max_ns, blocked_max_ns, idle_ns,
 --     is_loss_affected, held_max_ns
@@ -27,7 +29,7 @@
 -- column: cpu_taken_by VARCHAR[]  Threads that had the CPU in both, the longest first; NULL: none
 -- column: cpu_taken_ns BIGINT[] [ns]  For how long each of them did
 CREATE OR REPLACE MACRO main.executor_wait_explained(
-    runs, arrivals := 'arrival_here'
+    runs, arrivals := 'arrival_here', waits := 'wait_here'
 ) AS TABLE
 WITH executor AS (
     SELECT executor_id, NULL::BIGINT AS until_ns
@@ -39,6 +41,7 @@ arrival_here AS MATERIALIZED (
     FROM main.arrival
     WHERE list_contains(runs, run_id) AND is_exact AND executor_ns IS NOT NULL
 ),
+wait_here AS NOT MATERIALIZED (FROM derive.callback_ready('executor')),
 arrived AS (
     SELECT
         i.callback_instance_id, a.until_arrival_ns,
@@ -54,7 +57,7 @@ ready AS MATERIALIZED (
         coalesce(a.arrived_ns, r.latest_ns) AS latest_ns, r.start_ns, r.thread_count, r.picked_ns,
         r.wait_start_ns, r.wait_end_ns, r.wait_before_ns, r.previous_wait_end_ns,
         r.is_loss_affected, a.until_arrival_ns
-    FROM derive.callback_ready('executor') AS r
+    FROM query_table(waits) AS r
     LEFT JOIN arrived AS a ON r.callback_instance_id = a.callback_instance_id
 ),
 -- Of bursts there are far more pairs than waits: nothing may keep them all.

@@ -565,6 +565,17 @@ def test_a_step_is_made_of_what_is_known(connection: duckdb.DuckDBPyConnection) 
     assert found.to_arrow()["topic"].to_pylist() == ["/known"]
 
 
+@pytest.mark.parametrize(("least", "topics"), [(1_000_000, []), (0, ["/a", "/b", "/c"])])
+def test_a_step_has_no_rows_where_its_sources_have_none(
+    connection: duckdb.DuckDBPyConnection, least: int, topics: list[str]
+) -> None:
+    when = f"-- A comment.\n-- when: message WHERE start_ns > {least} AND list_contains($runs, 1)\n"
+    asked = header(STEPS.replace("-- A comment.\n", when))
+    assert (
+        run_query(connection, asked, {}, Slice("first")).to_arrow()["topic"].to_pylist() == topics
+    )
+
+
 def test_the_queries_of_flows_make_their_tables_alike() -> None:
     """Else they could not share them."""
     names = ("critical-path", "e2e-latency", "flows", "path-breakdown")

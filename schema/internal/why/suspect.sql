@@ -166,14 +166,13 @@ sampled AS (
     SELECT
         n.full_name, printf('Timer(%.10g ms)', t.period_ns / 1e6), p.path, p.path_ns, t.period_ns,
         c.period_ns, t.period_ns, d.topic_name, false
-    FROM main.dead_end($runs) AS d
+    FROM open_end AS d
     JOIN main.node AS n ON d.node_id = n.node_id
     JOIN main.timer AS t ON d.timer_id = t.timer_id
     JOIN (SELECT DISTINCT path, path_ns FROM place) AS p
         ON ends_with(p.path, ' → ' || d.topic_name || ' → ' || n.full_name)
     JOIN why_callback AS c
         ON n.full_name = c.node AND c.label = 'Subscription(' || d.topic_name || ')'
-    WHERE d.is_likely
 ),
 -- Executors of several threads that look for work again and again.
 awake AS (

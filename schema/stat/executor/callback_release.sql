@@ -34,6 +34,9 @@ started AS (
     WHERE i.depth = 1
         AND x.executor_id IN (SELECT executor_id FROM query_table(executors))
 ),
+-- Used by messages and requests, at both ends.
+clock AS MATERIALIZED (FROM derive.process_clock),
+pair AS MATERIALIZED (FROM derive.clock_comparable),
 message AS (
     SELECT
         t.take_id,
@@ -51,13 +54,13 @@ message AS (
         CASE WHEN l.publication_id IS NULL THEN 'stamp' ELSE 'publication' END AS since,
         CASE WHEN b.thread_id = t.thread_id THEN t.taken_ns - d.waited_ns END AS returned_ns
     FROM store.take AS t
-    JOIN derive.process_clock AS tc ON t.process_id = tc.process_id
+    JOIN clock AS tc ON t.process_id = tc.process_id
     LEFT JOIN store.subscription AS s ON t.subscription_id = s.subscription_id
     LEFT JOIN store.link_transport AS l ON t.take_id = l.take_id
     LEFT JOIN store.publication AS b ON l.publication_id = b.publication_id
     LEFT JOIN store.data_arrival AS d ON t.take_id = d.take_id
-    LEFT JOIN derive.process_clock AS bc ON b.process_id = bc.process_id
-    LEFT JOIN derive.clock_comparable AS p
+    LEFT JOIN clock AS bc ON b.process_id = bc.process_id
+    LEFT JOIN pair AS p
         ON b.process_id = p.process_id AND t.process_id = p.other_process_id
 ),
 request AS (
@@ -72,10 +75,10 @@ request AS (
     FROM store.request AS q
     LEFT JOIN store.thread AS sender ON q.sender_thread_id = sender.thread_id
     JOIN store.thread AS receiver ON q.receiver_thread_id = receiver.thread_id
-    LEFT JOIN derive.clock_comparable AS p
+    LEFT JOIN pair AS p
         ON sender.process_id = p.process_id AND receiver.process_id = p.other_process_id
-    LEFT JOIN derive.process_clock AS sc ON sender.process_id = sc.process_id
-    JOIN derive.process_clock AS rc ON receiver.process_id = rc.process_id
+    LEFT JOIN clock AS sc ON sender.process_id = sc.process_id
+    JOIN clock AS rc ON receiver.process_id = rc.process_id
 )
 SELECT
     i.run_id,

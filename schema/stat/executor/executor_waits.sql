@@ -9,6 +9,7 @@ WITH stretch AS MATERIALIZED (
     SELECT executor_id, start_ns, end_ns, before_ns, callback_instance_id, previous_end_ns
     FROM derive.executor_busy
 ),
+exclusion AS MATERIALIZED (FROM derive.callback_exclusion),
 -- The one thread of an executor starts a callback when nothing else runs: up to there it was busy
 -- for as long as it was in all before, and not at all from the end of the last one.
 ready AS MATERIALIZED (
@@ -24,7 +25,7 @@ ready AS MATERIALIZED (
             AS latest_busy_ns
     FROM query_table(waits) AS r
     -- What others may exclude needs all its moments.
-    LEFT JOIN (SELECT DISTINCT callback_id FROM derive.callback_exclusion) AS e
+    LEFT JOIN (SELECT DISTINCT callback_id FROM exclusion) AS e
         ON r.callback_id = e.callback_id
     LEFT JOIN stretch AS b
         ON r.callback_instance_id = b.callback_instance_id AND e.callback_id IS NULL
@@ -60,6 +61,37 @@ busy AS MATERIALIZED (
             AND start_ns <= (SELECT max(at_ns) FROM moment)
     ) AS b ON m.executor_id = b.executor_id AND m.at_ns >= b.start_ns
 ),
+-- Callback instances that kept others from starting although a thread of their executor was free,
+-- because a callback of one excludes that of the other. With the sum of all such time before.
+excluding AS (
+    SELECT
+        r.run_id, r.executor_id, e.kind, e.exclusion_id, r.callback_instance_id, r.start_ns,
+        r.end_ns
+    FROM derive.executor_run AS r
+    JOIN derive.executor_size AS s ON r.executor_id = s.executor_id
+    JOIN exclusion AS e ON r.callback_id = e.callback_id
+    WHERE r.end_ns > r.start_ns AND s.thread_count > 1
+),
+blocking AS (
+    SELECT
+        kind, exclusion_id, start_ns, end_ns, start_busy_ns,
+        end_ns - start_ns - (end_busy_ns - start_busy_ns) AS blocked_ns,
+        coalesce(sum(end_ns - start_ns - (end_busy_ns - start_busy_ns)) OVER (
+            PARTITION BY run_id, kind, exclusion_id ORDER BY start_ns, callback_instance_id
+            ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING
+        ), 0)::BIGINT AS before_ns
+    FROM (
+        SELECT
+            r.*,
+            coalesce(s.before_ns + least(r.start_ns, s.end_ns) - s.start_ns, 0) AS start_busy_ns,
+            coalesce(e.before_ns + least(r.end_ns, e.end_ns) - e.start_ns, 0) AS end_busy_ns
+        FROM excluding AS r
+        ASOF LEFT JOIN stretch AS s
+            ON r.executor_id = s.executor_id AND r.start_ns >= s.start_ns
+        ASOF LEFT JOIN stretch AS e
+            ON r.executor_id = e.executor_id AND r.end_ns >= e.start_ns
+    )
+),
 blocked AS (
     SELECT
         m.callback_instance_id,
@@ -72,9 +104,9 @@ blocked AS (
     FROM (
         SELECT y.callback_instance_id, y.which, y.at_ns, y.until_ns, e.kind, e.exclusion_id
         FROM busy AS y
-        JOIN derive.callback_exclusion AS e ON y.callback_id = e.callback_id
+        JOIN exclusion AS e ON y.callback_id = e.callback_id
     ) AS m
-    ASOF LEFT JOIN derive.executor_blocked AS b
+    ASOF LEFT JOIN blocking AS b
         ON m.kind = b.kind AND m.exclusion_id = b.exclusion_id AND m.at_ns >= b.start_ns
 ),
 -- With one thread the last wait is over when a callback starts. Since the wait before there is
