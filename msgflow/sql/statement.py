@@ -10,7 +10,7 @@ from msgflow.files.resources import resource_directory
 from msgflow.sql.header import Header, read
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping
     from pathlib import Path
 
     import duckdb
