@@ -52,3 +52,10 @@ def test_files_end_with_one_line_break() -> None:
         if text and (not text.endswith("\n") or text.endswith("\n\n")):
             wrong.append(str(path.relative_to(ROOT)))
     assert not wrong
+
+
+def test_commands_ask_a_database_by_its_methods() -> None:
+    """On a bare connection an error of a damaged file would look like a mistake of ours."""
+    bare = re.compile(r"\bdatabase\.connection\.\w+\(")
+    commands = (ROOT / "msgflow" / "cli").rglob("*.py")
+    assert [path.name for path in commands if bare.search(path.read_text())] == []
