@@ -122,12 +122,17 @@ unidentified AS MATERIALIZED (
     ANTI JOIN store.link_transport AS l ON t.take_id = l.take_id
     WHERE t.run_id = only_run AND t.subscription_id IN (SELECT subscription_id FROM missing)
 ),
--- Before Iron only the callback tells what comes from a buffer.
-first_from_buffer AS (
-    SELECT u.subscription_id, min(u.taken_ns) AS taken_ns
+-- The first that may be of a message from before: a stamp would identify one that was kept. Before
+-- Iron only the callback tells what comes from a buffer.
+first_unidentified AS (
+    SELECT
+        u.subscription_id,
+        min(u.taken_ns) FILTER (u.is_from_buffer OR c.is_intra_process) AS from_buffer_ns,
+        min(u.taken_ns) FILTER (
+            u.has_no_stamp AND (u.is_from_buffer OR c.is_intra_process) IS NOT TRUE
+        ) AS other_ns
     FROM unidentified AS u
     LEFT JOIN store.callback_instance AS c ON u.take_id = c.take_id
-    WHERE u.is_from_buffer OR c.is_intra_process
     GROUP BY u.subscription_id
 ),
 -- The order of messages matters only where a take is not identified.
@@ -191,14 +196,15 @@ known AS (
         ) AS introduced_ns,
         e.arrival_ns IS NOT NULL AS is_connected,
         s.only_thread_id IS NOT NULL AND t.publisher_id IS NOT NULL AS is_in_order,
-        b.process_id = s.process_id
-        AND k.taken_ns <= coalesce(n.taken_ns, k.taken_ns) AS may_be_kept
+        least(CASE WHEN b.process_id = s.process_id THEN k.from_buffer_ns END, k.other_ns)
+            AS unidentified_ns,
+        unidentified_ns <= coalesce(n.taken_ns, unidentified_ns) AS may_be_kept
     FROM missing AS m
     JOIN life AS s ON m.subscription_id = s.subscription_id
     JOIN store.publisher AS b ON m.publisher_id = b.publisher_id
     LEFT JOIN pace AS c ON m.subscription_id = c.subscription_id
     LEFT JOIN one_thread AS t ON m.publisher_id = t.publisher_id
-    LEFT JOIN first_from_buffer AS k ON m.subscription_id = k.subscription_id
+    LEFT JOIN first_unidentified AS k ON m.subscription_id = k.subscription_id
     LEFT JOIN earliest AS e
         ON m.subscription_id = e.subscription_id AND m.publisher_id = e.publisher_id
     ASOF LEFT JOIN later_of_publisher AS p

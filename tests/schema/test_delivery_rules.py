@@ -426,13 +426,17 @@ def test_created_before_the_message_arrived(delivery: Delivery, created: int, re
         # The first is one of those that were kept; the second is of what was published later.
         ("ring_buffer", 1, 302 * MS + 1, 302 * MS, "before_subscription"),
         ("ring_buffer", 2, 302 * MS, 303 * MS, "before_subscription"),
-        ("rmw", 1, 302 * MS, 303 * MS, "before_subscription"),
+        # A message without a stamp may have come from any process; a stamp would identify it.
+        ("rmw", 2, 302 * MS, 302 * MS, "unknown"),
+        ("rmw", 2, 302 * MS, None, "unknown"),
+        ("rmw", 2, 302 * MS + 1, 302 * MS, "before_subscription"),
+        ("stamped", 2, 302 * MS, 303 * MS, "before_subscription"),
         # Before Iron, a callback that is handed what comes from a buffer.
         ("callback_only", 1, 302 * MS, 302 * MS, "unknown"),
         ("callback_only", 1, 302 * MS + 1, 302 * MS, "before_subscription"),
     ],
 )
-def test_what_a_publisher_of_the_same_process_may_have_kept(
+def test_what_a_publisher_may_have_kept(
     delivery: Delivery, method: str, process: int, taken: int, later: int | None, reason: str
 ) -> None:
     """For subscriptions that come later (transient local)."""
@@ -442,8 +446,8 @@ def test_what_a_publisher_of_the_same_process_may_have_kept(
     for take, at in ((98, 400 * MS), (99, taken)):
         delivery.con.execute(
             "INSERT INTO store.take (take_id, taken_ns, source_timestamp_ns, method)"
-            " VALUES (?, ?, NULL, ?)",
-            [take, at, method],
+            " VALUES (?, ?, ?, ?)",
+            [take, at, 7 if method == "stamped" else None, method],
         )
         delivery.con.execute(
             "INSERT INTO store.callback_instance VALUES (?, ?)", [take, method == "callback_only"]
