@@ -9,11 +9,13 @@
 --     millisecond. A reader that gets no CPU seems to wait, too, but takes the message when it
 --     wakes up. Only the depth of the queue tells `overwritten` from `lost_in_transport`. A take
 --     that cannot be identified may have been of the message. Then the reason is unknown: if it
---     came before a later message was taken, or within ten times the usual time. Messages are in
---     order only if one thread sends them with one publisher, and one thread takes them. A
---     publisher may keep messages for subscriptions that come later. Those of its process take them
---     from a ring buffer, where nothing identifies them. Agnocast loses nothing: what a reader
---     passed over was overwritten.
+--     came before a later message was taken, or within ten times the usual time. What came from
+--     another clock may have come before it seems to: known messages tell how far the clocks are
+--     apart, and one that is not known may have been faster. Messages are in order only if one
+--     thread sends them with one publisher, and one thread takes them. A publisher may keep
+--     messages for subscriptions that come later. Those of its process take them from a ring
+--     buffer, where nothing identifies them. Agnocast loses nothing: what a reader passed over was
+--     overwritten.
 -- grain: one row per publication and subscription of its topic that is not known to have taken it
 CREATE OR REPLACE MACRO derive.undelivered(only_run) AS TABLE
 WITH arrival AS MATERIALIZED (
@@ -181,6 +183,11 @@ known AS (
         m.publication_id, m.publisher_id, m.subscription_id, m.topic_name, m.clock_id,
         m.arrival_ns, m.has_no_stamp, s.process_id, s.queue_depth, s.created_ns,
         s.last_seen_ns, s.replaced_ns, s.host_end_ns, s.shows_takes, s.is_agnocast,
+        m.arrival_ns
+            - CASE
+                WHEN m.has_one_clock OR e.arrival_ns IS NULL THEN 0
+                ELSE derive.delivery_limit().stamp_slack_ns
+            END AS least_arrival_ns,
         coalesce(c.longest_ns, derive.delivery_limit().longest_ns) AS longest_ns,
         coalesce(c.patience_ns, derive.delivery_limit().longest_ns) AS patience_ns,
         c.usual_ns,
@@ -346,7 +353,7 @@ facts AS (
     ) AS u
         ON b.subscription_id = u.subscription_id
         AND b.has_no_stamp = u.for_no_stamp
-        AND b.arrival_ns <= u.taken_ns
+        AND b.least_arrival_ns <= u.taken_ns
     ASOF LEFT JOIN ordered AS q
         ON b.topic_name = q.topic_name
         AND b.clock_id = q.clock_id

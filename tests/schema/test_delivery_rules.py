@@ -244,6 +244,20 @@ def test_a_take_without_a_message_may_be_of_a_pair_that_seems_to_have_none(
     ]
 
 
+def test_of_a_pair_that_seems_to_have_none_an_earlier_take_is_no_message(
+    delivery: Delivery,
+) -> None:
+    """Nothing shows that the two were connected, though another clock leaves room for it."""
+    delivery.lives(queue_depth=1)
+    missing = delivery.publish(300 * MS)
+    delivery.con.execute(
+        "INSERT INTO store.take (take_id, taken_ns, source_timestamp_ns) VALUES (99, ?, NULL)",
+        [300 * MS - 1],
+    )
+    delivery.con.execute("UPDATE derive.expected_arrival SET has_one_clock = false")
+    assert delivery.reason(missing) == "never_taken"
+
+
 @pytest.mark.parametrize(("late", "reason"), [(0, "not_delivered"), (1, "lost_in_transport")])
 def test_a_message_that_is_taken_late_shows_a_reader_without_cpu(
     delivery: Delivery, late: int, reason: str
@@ -506,22 +520,25 @@ def test_a_take_without_a_message_leaves_open_what_failed(delivery: Delivery) ->
 
 
 @pytest.mark.parametrize(
-    ("taken", "reason"),
+    ("taken", "has_one_clock", "reason"),
     [
-        (300 * MS - 1, "lost_in_transport"),
-        (300 * MS, "unknown"),
-        (320 * MS, "unknown"),
-        (320 * MS + 1, "lost_in_transport"),
+        (300 * MS - 1, True, "lost_in_transport"),
+        (300 * MS, True, "unknown"),
+        (299 * MS - 1, False, "lost_in_transport"),
+        (299 * MS, False, "unknown"),
+        (320 * MS, True, "unknown"),
+        (320 * MS + 1, True, "lost_in_transport"),
     ],
 )
 def test_a_take_without_a_message_was_before_a_later_one(
-    delivery: Delivery, taken: int, reason: str
+    delivery: Delivery, taken: int, has_one_clock: bool, reason: str
 ) -> None:
-    """It had no stamp, so that it may be of any message."""
+    """It had no stamp, so that it may be of any message; of another clock, of an earlier one."""
     delivery.lives()
     missing = delivery.miss()
     delivery.publish(310 * MS, 320 * MS)
     delivery.takes_without_message(taken)
+    delivery.con.execute("UPDATE derive.expected_arrival SET has_one_clock = ?", [has_one_clock])
     assert delivery.reason(missing) == reason
 
 
