@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,8 @@ import pytest
 from ingested import Ingested
 
 from msgflow.ingest import ingest
+from msgflow_sim import scenarios, simulate
+from msgflow_sim.system import KernelTrace
 
 # How long the kernel saw each thread in each state while it is said to have waited.
 _WAITED = """
@@ -82,3 +85,44 @@ def test_simulated_events_executors(simulations: Callable[[str], Ingested]) -> N
         "FROM callback_instance AS i WHERE i.thread_id = t.thread_id)"
     )
     assert own == exact > 100
+
+
+# As above, with what the simulator knows in place of a kernel trace.
+_TRULY_WAITED = """
+SELECT s.state = 'sleeping', sum(least(s.end_ns, a.end_ns) - greatest(s.start_ns, a.start_ns))
+FROM executor_activity AS a
+JOIN executor AS e USING (executor_id)
+JOIN thread AS t USING (thread_id)
+JOIN read_parquet('{thread_state}') AS s
+    ON t.tid = s.tid AND s.start_ns < a.end_ns AND s.end_ns > a.start_ns
+WHERE a.activity = 'wait' AND e.kind = 'events'
+GROUP BY ALL
+"""
+_TRULY_OUT_OF_BOUNDS = """
+SELECT count(*), count(*) FILTER (k.arrived_ns NOT BETWEEN w.earliest_ns AND w.latest_ns)
+FROM executor_wait AS w
+JOIN executor AS e ON w.executor_id = e.executor_id
+JOIN callback_instance AS i USING (callback_instance_id)
+JOIN take AS t ON i.take_id = t.take_id
+JOIN thread AS h ON t.thread_id = h.thread_id
+JOIN read_parquet('{take}') AS r ON h.tid = r.tid AND t.taken_ns = r.rmw_ns
+JOIN read_parquet('{arrival}') AS k ON r.take_id = k.take_id
+WHERE e.kind = 'events'
+"""
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_bounds_of_simulated_events_executors(tmp_path: Path, seed: int) -> None:
+    """Without a kernel trace: the true arrivals are within the bounds, and its waits are sleep."""
+    scenario = scenarios()["events_executors"]
+    (host,) = scenario.hosts
+    known = replace(scenario, hosts=(replace(host, kernel=KernelTrace()),))
+    simulated = simulate(known, tmp_path / "simulated", factor=0.4, seed=seed)
+    path = tmp_path / "run.duckdb"
+    ingest([one for one in simulated.trace_directories if "kernel" not in one.parts], path)
+    with duckdb.connect(str(path)) as con:
+        found, wrong = con.execute(_TRULY_OUT_OF_BOUNDS.format_map(simulated.truth)).fetchall()[0]
+        assert (found > 1000, wrong) == (True, 0)
+        waited = dict(con.execute(_TRULY_WAITED.format_map(simulated.truth)).fetchall())
+    assert waited[False] < waited[True] / 200
