@@ -4,7 +4,8 @@
 --     threads to the kernel, states of managed nodes, and, without a length, events of the user's own tracepoints and messages that
 --     were not taken. Threads have their states as recorded, but
 --     for the time in which they are blocked: main.executor_activity would take far longer for a window.
---     Those of executors without states (events executors) have their callbacks.
+--     Those of executors without states (events executors) have their callbacks; segment.sql has
+--     their pauses.
 -- grain: one row per bar
 -- kind: inline
 -- column: run_id BIGINT  Run
