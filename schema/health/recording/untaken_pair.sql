@@ -1,7 +1,7 @@
 -- name: finding.untaken_pair
 -- kind: inline
 -- description: Publishers and subscriptions between which messages ended for one reason: who they
---     are, in words, and how many messages.
+--     are, in words and by their ids, and how many messages.
 -- grain: one row per topic, publishing node, subscribing node and reason
 SELECT
     u.run_id,
@@ -12,6 +12,7 @@ SELECT
         coalesce(sn.full_name, '?'), coalesce(sp.name, '?'), sp.pid
     ) AS subject,
     count(*) AS number,
+    list(DISTINCT (u.publisher_id, u.subscription_id)) AS pairs,
     derive.counted(count(*), 'message')
     || CASE WHEN count(DISTINCT u.subscription_id) > 1
         THEN printf(' to %d subscriptions', count(DISTINCT u.subscription_id)) ELSE '' END

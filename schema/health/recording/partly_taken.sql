@@ -1,0 +1,38 @@
+-- name: finding.partly_taken
+-- title: A subscription that gets only a part of the messages of a publisher
+-- description: Between messages that it took, many others did not reach it, although its queue had
+--     room. They count as lost (not_delivered, lost_in_transport). A content filter leaves no
+--     event, so that what it holds back looks the same: then nothing is lost.
+-- cause: The subscription has a content filter (content_filter_options), or the middleware a filter
+--     by time; or a best-effort connection is overloaded, or a lifespan too short.
+-- cure: None needed for a filter. Else see the QoS of both with ros2 topic info --verbose, and
+--     where the messages are large, the buffers of the network (net.core.rmem_max).
+-- grain: one row per topic, publishing node and subscribing node
+-- severity: info
+-- when: store.undelivered WHERE reason IN ('not_delivered', 'lost_in_transport')
+WITH pair AS (
+    SELECT run_id, subject, sum(number)::BIGINT AS missing, flatten(list(pairs)) AS pairs
+    FROM untaken_pair
+    WHERE reason IN ('not_delivered', 'lost_in_transport')
+    GROUP BY run_id, subject
+),
+taken AS (
+    SELECT publisher_id, subscription_id, count(*) AS number
+    FROM store.link_transport
+    GROUP BY publisher_id, subscription_id
+),
+counted AS (
+    SELECT p.run_id, p.subject, p.missing, sum(t.number)::BIGINT AS taken
+    FROM pair AS p
+    JOIN taken AS t ON list_contains(p.pairs, (t.publisher_id, t.subscription_id))
+    GROUP BY p.run_id, p.subject, p.missing
+)
+SELECT
+    run_id, subject, missing AS count,
+    printf(
+        '%d of %d messages reached it (%.0f %%)',
+        taken, taken + missing, 100 * taken / (taken + missing)
+    ) AS detail
+FROM counted
+-- A few may get lost at any time.
+WHERE missing >= 10 AND missing * 5 >= taken + missing
