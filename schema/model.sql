@@ -235,6 +235,7 @@ CREATE TABLE staging.service_inferred (event_id BIGINT, process_id BIGINT, servi
 CREATE TABLE staging.service_known (event_id BIGINT, process_id BIGINT, service_name VARCHAR,
     service_handle UBIGINT, rmw_handle UBIGINT, created_ns BIGINT);
 CREATE TABLE staging.service_use (client_event_id BIGINT, service_event_id BIGINT);
+CREATE TABLE staging.simulated_time (process_id BIGINT, at_ns BIGINT, simulated_ns BIGINT);
 CREATE TABLE staging.single_packet (event_id BIGINT, trace_id INTEGER, clock_id BIGINT,
     ts_ns BIGINT, is_sent BOOLEAN, key UBIGINT);
 CREATE TABLE staging.stack (stack_id BIGINT, stack_frame_id BIGINT, depth INTEGER,
@@ -290,6 +291,7 @@ CREATE TABLE staging.timer_use (event_id BIGINT, process_id BIGINT, timer_handle
 CREATE TABLE staging.trace (trace_id INTEGER, host_id BIGINT, path VARCHAR, uuid VARCHAR,
     tracer VARCHAR, domain VARCHAR, start_ns BIGINT, end_ns BIGINT, event_count BIGINT,
     discarded_event_count BIGINT, has_request_events BOOLEAN);
+CREATE TABLE staging.untraced_reader (process_id BIGINT, topic_name VARCHAR, created_ns BIGINT);
 CREATE TABLE staging.user_event (user_event_id BIGINT, trace_id INTEGER, process_id BIGINT,
     thread_id BIGINT, cpu INTEGER, at_ns BIGINT, name VARCHAR, callback_instance_id BIGINT,
     fields VARCHAR, is_loss_affected BOOLEAN);

@@ -406,6 +406,16 @@ CREATE TABLE store.lifecycle_transition (
     goal_state VARCHAR  -- State that was entered
 );
 
+-- One row per moment at which the time of a simulation is known
+-- view: What time it was in the simulation, as CARET's clock recorder tells about once a second.
+-- Between two moments it runs evenly: query --times sim writes times in it.
+CREATE TABLE store.simulated_time (
+    run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
+    process_id BIGINT NOT NULL,  -- Process it lives in {to process}
+    at_ns BIGINT NOT NULL,  -- When it was recorded [epoch ns] {clock process_id}
+    simulated_ns BIGINT NOT NULL  -- Time of the simulation [ns]
+);
+
 -- One row per gap in the record of a thread
 -- view: Where the record of a thread breaks: events of the thread may be missing before these
 -- moments. No executor state reaches across a break, and pairs of events that do are marked.
@@ -720,6 +730,16 @@ CREATE TABLE store.subscription (
     is_topic_declared BOOLEAN DEFAULT false NOT NULL,  -- Its topic was given by a file of links
     is_agnocast BOOLEAN DEFAULT false NOT NULL  -- Its messages pass through the shared memory of
         -- Agnocast
+);
+
+-- One row per reader of DDS that belongs to no traced subscription
+-- view: Who else subscribes: readers that an instrumented DDS created for topics of ROS, in
+-- processes without a traced subscription of the topic, such as programs without ROS.
+CREATE TABLE store.untraced_reader (
+    run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
+    process_id BIGINT NOT NULL,  -- Process it lives in {to process}
+    topic_name VARCHAR NOT NULL,  -- Topic of ROS that it reads
+    created_ns BIGINT NOT NULL  -- dds:create_reader [epoch ns] {clock process_id}
 );
 
 -- One row per timer

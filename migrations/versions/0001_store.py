@@ -90,6 +90,10 @@ CREATE TABLE store.clock_uncertainty (
     run_id BIGINT NOT NULL, clock_id BIGINT NOT NULL, at_ns BIGINT NOT NULL,
     uncertainty_ns BIGINT NOT NULL
 );
+CREATE TABLE store.simulated_time (
+    run_id BIGINT NOT NULL, process_id BIGINT NOT NULL, at_ns BIGINT NOT NULL,
+    simulated_ns BIGINT NOT NULL
+);
 CREATE TABLE store.stamp_clock (
     run_id BIGINT NOT NULL, clock_id BIGINT NOT NULL, at_ns BIGINT NOT NULL,
     start_ns BIGINT NOT NULL, end_ns BIGINT NOT NULL, difference_ns BIGINT NOT NULL,
@@ -246,6 +250,10 @@ CREATE TABLE store.subscription (
     is_inferred BOOLEAN DEFAULT false NOT NULL, is_topic_learned BOOLEAN DEFAULT false NOT NULL,
     is_topic_declared BOOLEAN DEFAULT false NOT NULL,
     is_agnocast BOOLEAN DEFAULT false NOT NULL, PRIMARY KEY (subscription_id)
+);
+CREATE TABLE store.untraced_reader (
+    run_id BIGINT NOT NULL, process_id BIGINT NOT NULL, topic_name VARCHAR NOT NULL,
+    created_ns BIGINT NOT NULL
 );
 CREATE TABLE store.timer (
     timer_id BIGINT NOT NULL, run_id BIGINT NOT NULL, process_id BIGINT NOT NULL, node_id BIGINT,

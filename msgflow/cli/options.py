@@ -141,7 +141,8 @@ SHARED: dict[str, Any] = {
     "wide": _printed(help="Show all columns and rows of a table, however wide"),
     "times": _printed(
         help="Points in time: ns since the epoch, seconds since it, seconds since the start of the"
-        " run (relative), or UTC as text (iso); with all but ns, durations are in seconds",
+        " run (relative) or of a simulation (sim), or UTC as text (iso); with all but ns,"
+        " durations are in seconds",
         show_default="ns; tables have units",
     ),
     "links": typer.Option(help="Indirect links to declare, as YAML"),

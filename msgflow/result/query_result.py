@@ -54,7 +54,8 @@ class QueryResult(Rows):
 
         Args:
             times: 'ns', 'seconds' (since the epoch), 'relative' (seconds since the start of the
-                run) or 'iso' (UTC as text). With all but 'ns' durations are in seconds.
+                run), 'sim' (seconds of a simulation) or 'iso' (UTC as text). With all but 'ns'
+                durations are in seconds.
 
         Raises:
             UsageError: no such form, or the rows do not say which columns are times.

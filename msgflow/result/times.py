@@ -6,6 +6,7 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
 from msgflow.errors import UsageError
+from msgflow.run.simulated import known_moments
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -24,6 +25,7 @@ class Times(StrEnum):
     NS = "ns"
     SECONDS = "seconds"
     RELATIVE = "relative"
+    SIM = "sim"
     ISO = "iso"
 
 
@@ -57,6 +59,8 @@ def _moment(column: Any, times: Times, table: pa.Table, runs: Sequence[Run]) -> 
         return _seconds(column), "_s"
     if times is Times.RELATIVE:
         return _seconds(compute.subtract(column, _starts(table, runs))), "_s"
+    if times is Times.SIM:
+        return _simulated(column, known_moments(runs)), "_s"
     stamps = column.cast(pyarrow.timestamp("ns"))
     return compute.strftime(stamps, format="%Y-%m-%dT%H:%M:%SZ"), "_utc"
 
@@ -66,6 +70,22 @@ def _seconds(column: Any) -> Any:
     from pyarrow import compute
 
     return compute.divide(column.cast(pyarrow.float64(), safe=False), _SECOND)
+
+
+def _simulated(column: Any, moments: Sequence[tuple[int, int]]) -> Any:
+    """Return seconds of simulated time."""
+    import numpy
+    import pyarrow
+    from pyarrow import compute
+
+    origin = moments[0][0]
+    recorded = numpy.array([at - origin for at, _ in moments], dtype=numpy.float64)
+    simulated = numpy.array([then for _, then in moments], dtype=numpy.float64)
+    times = compute.subtract(column, origin).cast(pyarrow.float64()).to_numpy()
+    piece = numpy.clip(numpy.searchsorted(recorded, times, "right") - 1, 0, len(moments) - 2)
+    pace = numpy.diff(simulated) / numpy.diff(recorded)
+    found = simulated[piece] + (times - recorded[piece]) * pace[piece]
+    return pyarrow.array(found / _SECOND, from_pandas=True)
 
 
 def _starts(table: pa.Table, runs: Sequence[Run]) -> Any:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import defaultdict
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -28,6 +29,7 @@ class Run:
         start_ns: time of its first event, epoch ns; None for a run without events.
         labels: KEY=VALUE each.
         end_ns: time of its last event, epoch ns; None for a run without events.
+        simulated: time of a simulation at known moments, in order: (epoch ns, simulated ns).
     """
 
     run_id: int
@@ -35,6 +37,7 @@ class Run:
     start_ns: int | None
     labels: tuple[str, ...] = ()
     end_ns: int | None = None
+    simulated: tuple[tuple[int, int], ...] = ()
 
     @property
     def title(self) -> str:
@@ -47,8 +50,13 @@ def read_runs(connection: duckdb.DuckDBPyConnection) -> tuple[Run, ...]:
     rows = connection.execute(
         "SELECT run_id, name, start_ns, coalesce(labels, []), end_ns FROM main.run ORDER BY run_id"
     ).fetchall()
+    simulated: dict[int, dict[int, int]] = defaultdict(dict)
+    for run_id, at_ns, simulated_ns in connection.execute(
+        "SELECT run_id, at_ns, simulated_ns FROM main.simulated_time ORDER BY run_id, at_ns"
+    ).fetchall():
+        simulated[run_id][at_ns] = simulated_ns
     return tuple(
-        Run(run_id, name, start_ns, tuple(labels), end_ns)
+        Run(run_id, name, start_ns, tuple(labels), end_ns, tuple(simulated[run_id].items()))
         for run_id, name, start_ns, labels, end_ns in rows
     )
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
 from msgflow.run.choice import integer
+from msgflow.run.simulated import recorded_ns
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -57,8 +58,8 @@ WHOLE = Window()
 def time_point(text: str | int, runs: Sequence[Run], option: str) -> int:
     """Return a point in time in epoch ns.
 
-    `text` is an offset from the start of the only run ('2.5' seconds, '100ms'), an ISO time, or
-    epoch ns: an integer, or a text of 16 digits or more.
+    `text` is an offset from the start of the only run ('2.5' seconds, '100ms'), a time of its
+    simulation ('sim:2.5'), an ISO time, or epoch ns: an integer, or a text of 16 digits or more.
     """
     time_ns = _read(text, runs, option)
     if not MINIMUM_NS <= time_ns <= MAXIMUM_NS:
@@ -83,8 +84,11 @@ def _read(text: str | int, runs: Sequence[Run], option: str) -> int:
     text = text.strip()
     if (time_ns := integer(text)) is not None and abs(time_ns) >= LEAST_EPOCH_NS:
         return time_ns
-    if offset := _OFFSET.fullmatch(text):
-        return _run_start(runs, option) + _to_ns(offset["number"], offset["unit"] or "s")
+    if offset := _OFFSET.fullmatch(text.removeprefix("sim:")):
+        time_ns = _to_ns(offset["number"], offset["unit"] or "s")
+        if text.startswith("sim:"):
+            return recorded_ns(runs, time_ns)
+        return _run_start(runs, option) + time_ns
     try:
         return _iso_ns(text)
     except ValueError:

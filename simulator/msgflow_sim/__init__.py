@@ -46,6 +46,8 @@ transport — one row per take with its publication:
 subscription — one row per subscription, at whatever address:
     subscription_id, host, pid, node, topic_name, subscription_handle, rmw_subscription_handle,
     created_ns, ended_ns (NULL: not before the end of tracing), is_internal
+reader — one row per reader of DDS in a process without ROS, on a topic of ROS:
+    host, pid, topic_name, created_ns (dds:create_reader)
 undelivered — one row per publication and subscription of its topic where neither a callback nor a
 user got the message. It does not matter when the two existed: every publication and subscription of
 a topic has a take or a row here:

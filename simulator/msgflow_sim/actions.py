@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING
 
 from msgflow_sim import agnocast
 from msgflow_sim.callback_instance import CallbackInstance
-from msgflow_sim.entity import Answer, Call, Poll, Publish, Record, SendGoal, Spin, Transition
+from msgflow_sim.entity import (
+    Answer,
+    Call,
+    Poll,
+    Publish,
+    Record,
+    SendGoal,
+    Spin,
+    TellTime,
+    Transition,
+)
 from msgflow_sim.publication import publish
 from msgflow_sim.services import ClientObject, ServiceObject, answer, call
 from msgflow_sim.take import take
@@ -203,6 +213,20 @@ def _record(
     yield  # It takes no step, but is called as one that does.
 
 
+def _tell_time(
+    told: TellTime,
+    _: NodeObjects,
+    thread: ExecutorThread,
+    __: Middleware,
+    time: int,
+    ___: CallbackInstance | None,
+) -> Steps:
+    stamp = int(time * told.pace)
+    thread.emit(thread.machine.tracepoints.ros2_caret_sim_time, time, thread.context, stamp)
+    return time + 300
+    yield  # It takes no step, but is called as one that does.
+
+
 _DEEDS: Mapping[type, Callable[..., Steps]] = {
     Call: _call,
     SendGoal: _send_goal,
@@ -212,4 +236,5 @@ _DEEDS: Mapping[type, Callable[..., Steps]] = {
     Answer: _answer,
     Transition: _transition,
     Record: _record,
+    TellTime: _tell_time,
 }

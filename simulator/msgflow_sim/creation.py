@@ -98,6 +98,8 @@ class Creator:
         self._tracepoints = thread.machine.tracepoints
         # Since Jazzy generic publishers, serialised and loaned messages have events.
         self._is_every_kind_traced = thread.machine.layout.is_stamped_by_rmw
+        # CARET tells what is in callback groups.
+        self._names_groups = thread.machine.layout.declares("ros2_caret:add_callback_group")
         self._announcer = self._memory.allocate()
         self._announcement = self._memory.on_stack()
         # DDS has writers of its own, which tell others what there is.
@@ -224,6 +226,8 @@ class Creator:
         self._emit_of_rclcpp("rclcpp_subscription_init", handle, subscription)
         self._emit_of_rclcpp("rclcpp_subscription_callback_added", subscription, callback)
         self._emit_of_rclcpp("rclcpp_callback_register", callback, symbol)
+        if self._names_groups:
+            self.emit("ros2_caret_callback_group_add_subscription", group.handle, handle)
         # Nothing tells of a loan; of serialised messages nothing did in old releases.
         is_hidden = description.kind == "serialized" and not self._is_every_kind_traced
         created.is_silent = description.kind == "loaned" or is_hidden
@@ -391,6 +395,8 @@ class Creator:
             self._emit_of_rclcpp("rclcpp_timer_callback_added", handle, callback)
             self._emit_of_rclcpp("rclcpp_callback_register", callback, symbol)
             self._emit_of_rclcpp("rclcpp_timer_link_node", handle, node.handle)
+            if self._names_groups:
+                self.emit("ros2_caret_callback_group_add_timer", group.handle, handle)
         code = self._code(node, description, executor)
         name = node.description.full_name
         executor.timers.append(
@@ -477,6 +483,15 @@ class Creator:
         gid = self._process.gid(_READER)
         self._entity("create_reader", entity_of(rmw_handle), dds_topic, gid)
         self.emit("rmw_subscription_init", rmw_handle, gid)
+
+    def reader(self, topic: str) -> None:
+        """A reader of DDS alone, which messages of ROS reach."""
+        process = self._process
+        self.work(250 * MICROSECOND)
+        self._entity("create_reader", self._memory.allocate(), f"rt{topic}", process.gid(_READER))
+        self.thread.scheduler.truth.reader.add(
+            process.machine.hostname, process.pid, topic, self.time + process.machine.epoch
+        )
 
     def _entity(self, event: str, handle: int, dds_topic: str, gid: bytes) -> None:
         """DDS creates a writer or reader, and announces it with a writer of its own."""

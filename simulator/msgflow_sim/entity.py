@@ -109,7 +109,17 @@ class Record:
     """Record an event of a tracepoint of the user's own, `my_pkg:frame_done`."""
 
 
-Action = Call | SendGoal | Spin | Poll | Publish | Answer | Transition | Record
+@dataclass(frozen=True, slots=True)
+class TellTime:
+    """Record the time of a simulation, as CARET's clock recorder does.
+
+    `pace`: it runs so fast, from 0 at the begin of tracing.
+    """
+
+    pace: float = 1.0
+
+
+Action = Call | SendGoal | Spin | Poll | Publish | Answer | Transition | Record | TellTime
 
 
 @dataclass(frozen=True, slots=True)

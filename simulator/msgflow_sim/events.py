@@ -148,6 +148,17 @@ SIGNATURES: Mapping[str, tuple[EventField, ...]] = MappingProxyType(
             "agnocast:agnocast_callable_end": "callable pointer",
             "agnocast:agnocast_take": "subscription_handle pointer, message pointer, "
             "entry_id signed",
+            "ros2_caret:dds_write": "message pointer",
+            "ros2_caret:dds_bind_addr_to_stamp": "addr pointer, source_stamp signed",
+            "ros2_caret:on_data_available": "source_stamp signed",
+            "ros2_caret:sim_time": "stamp signed",
+            "ros2_caret:construct_executor": "executor_addr pointer, executor_type_name string",
+            "ros2_caret:add_callback_group": "executor_addr pointer, "
+            "callback_group_addr pointer, group_type_name string",
+            "ros2_caret:callback_group_add_timer": "callback_group_addr pointer, "
+            "timer_handle pointer",
+            "ros2_caret:callback_group_add_subscription": "callback_group_addr pointer, "
+            "subscription_handle pointer",
             "dds:create_writer": "writer pointer, topic_name string, gid_prefix bytes 12, "
             "gid_entity bytes 4, gid bytes 16",
             "dds:create_reader": "reader pointer, topic_name string, gid_prefix bytes 12, "

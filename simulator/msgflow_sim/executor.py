@@ -76,7 +76,7 @@ class Executor:
         has_events: it emits executor events.
         handle: its address, where an event names it.
         has_callbacks: it calls callbacks, which emit events.
-        is_in_order: it is an events executor.
+        is_in_order: it is an events executor; `is_agnocast`: one of Agnocast.
         owner: the thread that looks for something ready, or waits; others are blocked meanwhile.
         sleeper: the thread that waits.
         thread_count: threads that spin it.
@@ -92,6 +92,7 @@ class Executor:
         self.has_events = is_rclcpp and description.kind in _HAVING_EVENTS
         self.has_callbacks = is_rclcpp and description.kind not in _WITHOUT_CALLBACKS
         self.is_in_order = description.kind == "events"
+        self.is_agnocast = description.kind == "agnocast"
         self.handle = 0
         self.owner: Spinner | None = None
         self.sleeper: Spinner | None = None

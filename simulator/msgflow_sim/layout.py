@@ -6,6 +6,7 @@ implementation have its `dds:*` events as well, which only forks of Fast DDS and
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from functools import cache
 from types import MappingProxyType
@@ -279,6 +280,23 @@ def _with_early_cyclone_dds(layout: Layout) -> Layout:
     )
 
 
+_OF_CARET = (
+    "dds_write", "dds_bind_addr_to_stamp", "on_data_available", "sim_time", "construct_executor",
+    "add_callback_group", "callback_group_add_timer", "callback_group_add_subscription",
+)  # fmt: skip
+_NOT_OF_CARET = re.compile(r"ros2:(rcl_take|rclcpp_take|rmw_publish|rmw_.*_init|.*_executor_.*)")
+
+
+def _with_caret(layout: Layout) -> Layout:
+    """CARET's fork of ros2_tracing, which leaves out events, and the library that it preloads."""
+    events = layout.having(*_OF_CARET, provider="ros2_caret")
+    return replace(
+        layout,
+        name=f"{layout.name}-caret",
+        events=_events({n: e for n, e in events.items() if not _NOT_OF_CARET.fullmatch(n)}),
+    )
+
+
 _OF_AGNOCAST = (
     "init", "node_init", "construct_executor", "create_timer_callable", "callable_start",
     "callable_end", "take",
@@ -352,6 +370,7 @@ def layouts() -> Mapping[str, Layout]:
         _with_fast_dds(annotated, is_write_first=False),
         _with_fast_dds(annotated, suffix="fastdds-write-first", is_write_first=True),
         _with_early_agnocast(_HUMBLE),
+        _with_caret(_HUMBLE),
         _IRON,
         _JAZZY,
         _with_agnocast(_JAZZY),

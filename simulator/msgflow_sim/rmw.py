@@ -71,6 +71,7 @@ def write(thread: Thread, rmw_handle: int, message: int, time: int, size_bytes: 
     rmw = time + int((260 + int(random() * 700)) * pace)
     emit(tracepoints.rmw_publish, rmw, context, rmw_handle, message, 0)
     entered = rmw + int((150 + int(random() * 400)) * pace)
+    emit(tracepoints.ros2_caret_dds_write, entered, context, message)
     stamp = entered + int((200 + int(random() * 800)) * pace)
     if not layout.is_stamped_early:
         stamp += duration + int(thread.scheduler.tail(1_500) * pace)
@@ -88,6 +89,10 @@ def write(thread: Thread, rmw_handle: int, message: int, time: int, size_bytes: 
             end = end + int(150 * pace) if end > stamp else entered
             emit(tracepoints.dds_write_pre, end, context, writer, message)
         dds.append((name, end))
+    if tracepoints.ros2_caret_dds_bind_addr_to_stamp.pack is not None:
+        # Fast DDS does not know the message.
+        end += 200
+        emit(tracepoints.ros2_caret_dds_bind_addr_to_stamp, end, context, 0, stamp_ns)
     if layout.is_stamped_early:
         end += duration
     return Written(rmw, stamp_ns, end + int(size_bytes * _SENDING_NS_PER_BYTE), tuple(dds))

@@ -142,14 +142,20 @@ class Startup:
             self._discovery.join(self._listener)
         if any(node.is_agnocast for node in process.description.nodes):
             creator.emit("agnocast_agnocast_init", process.memory.allocate())
+        for topic in process.description.readers:
+            creator.reader(topic)
+        names_executors = process.machine.layout.declares("ros2_caret:construct_executor")
         for executor, described in zip(self._executors, process.description.executors, strict=True):
-            if described.kind == "agnocast":
+            if executor.is_agnocast or (names_executors and process.description.nodes):
                 executor.handle = process.memory.allocate()
-                kind = "single" if described.thread_count == 1 else "multi"
-                creator.emit(
-                    "agnocast_agnocast_construct_executor", executor.handle,
-                    f"agnocast_{kind}_threaded_executor",
-                )  # fmt: skip
+                threads = "single" if described.thread_count == 1 else "multi"
+                kind = f"{threads}_threaded_executor"
+                if executor.is_agnocast:
+                    creator.emit(
+                        "agnocast_agnocast_construct_executor", executor.handle, f"agnocast_{kind}"
+                    )
+                else:
+                    creator.emit("ros2_caret_construct_executor", executor.handle, kind)
         yield True
         for node in process.description.nodes:
             yield from self._create_node(node)
@@ -187,14 +193,19 @@ class Startup:
         yield True
 
     def _create_shared(self, node: NodeContext) -> Iterator[bool]:
-        """The objects of a node, and then its callback groups join executors of Agnocast."""
+        """The objects of a node, and then its callback groups join executors that are named."""
         yield from self._create_objects(node)
         for group, executor in node.groups.values():
-            if executor.handle:
+            kind = "reentrant" if group.is_reentrant else "mutually_exclusive"
+            if executor.is_agnocast:
                 self._creator.emit(
                     "agnocast_agnocast_add_callback_group", executor.handle, node.handle,
-                    group.handle, "reentrant" if group.is_reentrant else "mutually_exclusive",
+                    group.handle, kind,
                 )  # fmt: skip
+            elif executor.handle:
+                self._creator.emit(
+                    "ros2_caret_add_callback_group", executor.handle, group.handle, kind
+                )
 
     def _create_parameters(self, node: NodeContext) -> Iterator[bool]:
         """What every node has, but those that have said that they do without."""

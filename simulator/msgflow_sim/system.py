@@ -141,6 +141,7 @@ class Process:
         priority: of its threads, as the kernel has it: 0 to 99 real-time (less is more urgent), 100
             to 139 nice -20 to 19. It counts where the kernel is traced; likewise `cpus`.
         cpus: on which its threads may run; on all if there are none.
+        readers: topics of ROS that it reads with DDS alone, where it has no nodes.
     """
 
     name: str
@@ -157,6 +158,7 @@ class Process:
     container: str = ""
     priority: int = field(default=120, repr=False)
     cpus: tuple[int, ...] = field(default=(), repr=False)
+    readers: tuple[str, ...] = field(default=(), repr=False)
 
     def tid(self, number: int) -> int:
         """Id of a thread; number 0 is the main one."""

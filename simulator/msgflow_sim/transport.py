@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter, defaultdict, deque
 from typing import TYPE_CHECKING
 
+from msgflow_sim.caret import DataListener
 from msgflow_sim.latency import AGNOCAST, AT_ONCE, latency_between
 from msgflow_sim.objects import Match
 
@@ -43,6 +44,7 @@ class Middleware:
         self.failed_takes = 0
         self.undelivered: dict[str, int] = {}
         self._numbers: Counter[tuple[Machine, str]] = Counter()
+        self._listeners: dict[RunningProcess, DataListener] = {}
         self._publishers: dict[str, list[PublisherObject]] = defaultdict(list)
         self._subscriptions: dict[str, list[SubscriptionObject]] = defaultdict(list)
 
@@ -175,7 +177,10 @@ class Middleware:
 
     def finish(self) -> None:
         """Write down what was on its way or waiting at the end."""
-        for subscription, message in self._scheduler.left(self.arrive):
+        under_way = [*self._scheduler.left(self.arrive)]
+        for listener in self._listeners.values():
+            under_way += [*listener.heard, *self._scheduler.left(listener.hear)]
+        for subscription, message in under_way:
             self.drop(
                 message,
                 subscription,
@@ -233,7 +238,13 @@ class Middleware:
         if arrival <= match.last_arrival:
             arrival = match.last_arrival + 1
         match.last_arrival = arrival
-        self._scheduler.at(arrival, self.arrive, (match.subscription, message))
+        process = match.subscription.process
+        arrive = self.arrive
+        if process.machine.tracepoints.ros2_caret_on_data_available.pack is not None:
+            if process not in self._listeners:
+                self._listeners[process] = DataListener(process, self.arrive)
+            arrive = self._listeners[process].hear
+        self._scheduler.at(arrival, arrive, (match.subscription, message))
 
     def _match(self, publisher: PublisherObject, subscription: SubscriptionObject) -> None:
         latency = latency_between(publisher.process, subscription.process)

@@ -66,6 +66,7 @@ _SCHEMAS: Mapping[str, pa.Schema] = {
         subscription_handle=_HANDLE, rmw_subscription_handle=_HANDLE, created_ns=_TIME,
         ended_ns=_TIME, is_internal=_FLAG,
     ),
+    "reader": _schema(host=_TEXT, pid=_NUMBER, topic_name=_TEXT, created_ns=_TIME),
     "causal": _schema(
         callback_instance_id=_ID, publication_id=_ID, host=_TEXT, pid=_NUMBER, tid=_NUMBER,
         kind=_TEXT, callback_start_ns=_TIME, take_id=_ID, take_rmw_ns=_TIME, topic_name=_TEXT,

@@ -221,3 +221,20 @@ def test_when_a_message_arrived(system: RosSystem, analyse: Analyse) -> None:
         "SELECT t.source_timestamp_ns, t.taken_ns - a.waited_ns, a.is_ambiguous "
         "FROM data_arrival AS a JOIN take AS t USING (take_id) ORDER BY take_id"
     ) == [(1, 1_030, False), (2, 1_040, True)]
+
+
+def test_readers_that_belong_to_no_subscription(system: RosSystem, analyse: Analyse) -> None:
+    """Those of a process without ROS, of topics of ROS, and of a node that has no subscription."""
+    system.subscription(MAIN, 0x10, "/a")
+    for thread, topic in ((MAIN, "rt/a"), (MAIN, "rt/b"), (Thread(900), "rt/a")):
+        system.add("dds:create_reader", thread, reader=0xA, topic_name=topic)
+    for topic in ("rq/look_upRequest", "DCPSParticipant"):
+        system.add("dds:create_reader", Thread(900), reader=0xB, topic_name=topic)
+    assert analyse(system).rows(
+        "SELECT pid, topic_name FROM untraced_reader JOIN process USING (process_id) ORDER BY ALL"
+    ) == [(100, "/b"), (900, "/a")]
+
+
+def test_the_time_of_a_simulation(system: RosSystem, analyse: Analyse) -> None:
+    moments = [(system.add("ros2_caret:sim_time", MAIN, stamp=stamp), stamp) for stamp in (5, 7)]
+    assert analyse(system).rows("SELECT at_ns, simulated_ns FROM simulated_time") == moments

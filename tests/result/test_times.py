@@ -71,3 +71,17 @@ def test_what_cannot_be_converted_is_said() -> None:
         RESULT.with_times("minutes")
     with pytest.raises(UsageError, match="plain SQL"):
         QueryResult(TABLE).with_times("iso")
+
+
+def test_simulated_times_run_evenly_between_known_moments() -> None:
+    """And as fast as beside them before the first and after the last."""
+    moments = ((START, 10**9), (START + 2 * 10**9, 2 * 10**9), (START + 3 * 10**9, 5 * 10**9))
+    run = Run(1, "one", START, simulated=moments)
+    times = [START - 10**9, START + 10**9, START + 2_500_000_000, START + 4 * 10**9, None]
+    table = pa.table({"at_ns": pa.array(times, pa.int64())})
+    rows = QueryResult(table, HEADER, (run,)).with_times("sim").table.to_pydict()
+    assert rows == {"at_s": [0.5, 1.5, 3.5, 8.0, None]}
+    with pytest.raises(UsageError, match="nothing tells the simulated time"):
+        QueryResult(table, HEADER, RUNS[:1]).with_times("sim")
+    with pytest.raises(UsageError, match="that of one run"):
+        RESULT.with_times("sim")

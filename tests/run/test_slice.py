@@ -57,7 +57,26 @@ def test_skipping_the_warm_up() -> None:
     assert Slice(start="1.5").window([FIRST]) == Window(START + 1_500_000_000)
 
 
-@pytest.mark.parametrize("text", ["soon", "2,5", "3 s", "-1s", "2023-13-01"])
+@pytest.mark.parametrize(
+    ("text", "after_ms"),
+    [("sim:1.5", 1000), ("sim:3500ms", 3500), ("sim:2", 2000), ("sim:0s", -2000), ("sim:8", 5000)],
+)
+def test_times_of_a_simulation(text: str, after_ms: int) -> None:
+    """It stood still for a second, and then ran six times as fast as before."""
+    begin = 1_000_000_000_000_000_000
+    moments = ((0, 1000), (2000, 2000), (3000, 2000), (4000, 5000), (5000, 5000))
+    simulated = tuple((begin + at * 10**6, then * 10**6) for at, then in moments)
+    run = Run(1, "simulated", begin, simulated=simulated)
+    assert Slice(start=text).window([run]).start_ns == begin + after_ms * 10**6
+
+
+def test_a_simulation_that_stands_still_has_no_windows() -> None:
+    run = Run(1, "paused", 0, simulated=((0, 5), (10, 5)))
+    with pytest.raises(UsageError, match="nothing tells"):
+        Slice(start="sim:1").window([run])
+
+
+@pytest.mark.parametrize("text", ["soon", "2,5", "3 s", "-1s", "2023-13-01", "sim:soon"])
 def test_what_is_no_time_is_refused(text: str) -> None:
     with pytest.raises(UsageError, match="cannot read the time of --start"):
         Slice(start=text).window([FIRST])

@@ -108,6 +108,16 @@ table(
 )
 
 table(
+    "simulated_time",
+    process_id(),
+    moment("at_ns", "When it was recorded", clock="process_id", required=True),
+    number("simulated_ns", "Time of the simulation", unit="ns", required=True),
+    comment="One row per moment at which the time of a simulation is known",
+    view="What time it was in the simulation, as CARET's clock recorder tells about once a "
+    "second. Between two moments it runs evenly: query --times sim writes times in it.",
+)
+
+table(
     "thread_break",
     thread_id("Thread whose events may be missing"),
     moment(

@@ -62,6 +62,16 @@ table(
 )
 
 table(
+    "untraced_reader",
+    process_id(),
+    text("topic_name", "Topic of ROS that it reads", required=True),
+    moment("created_ns", "dds:create_reader", clock="process_id", required=True),
+    comment="One row per reader of DDS that belongs to no traced subscription",
+    view="Who else subscribes: readers that an instrumented DDS created for topics of ROS, "
+    "in processes without a traced subscription of the topic, such as programs without ROS.",
+)
+
+table(
     "timer",
     key("timer_id", "Identity of the timer"),
     process_id(),

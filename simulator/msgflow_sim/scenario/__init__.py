@@ -14,6 +14,7 @@ from msgflow_sim.scenario import (
     annotated,
     autoware,
     bursts,
+    caret,
     channels,
     containers,
     delivery,
@@ -96,5 +97,6 @@ def scenarios() -> Mapping[str, Scenario]:
         scheduling.shared_memory(),
         scheduling.kernel_losses(),
         agnocast.agnocast(),
+        caret.caret(),
     )
     return MappingProxyType({scenario.name: scenario for scenario in built_in})
