@@ -50,26 +50,31 @@ WHERE coalesce($from, $to, $via, $without) IS NOT NULL
 CREATE OR REPLACE TEMP TABLE function_flow AS
 SELECT
     flow_id, run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns,
-    is_ambiguous
+    is_ambiguous, row_number() OVER (ORDER BY latency_ns DESC, flow_id) AS place
 FROM main.chosen_flow('function_outcome', most_flows := $slowest);
 
 CREATE OR REPLACE TEMP TABLE function_trail AS
 SELECT flow_id, hop, take_id, publication_id, previous_take_id, next_take_id
 FROM main.end_to_end_trail('function_flow', $runs, chains := 'path_chain');
 
+-- The place counts from the slowest flow that it is on the way of, or the longest instance.
 CREATE OR REPLACE TEMP TABLE function_instance AS
-SELECT DISTINCT callback_instance_id
-FROM main.end_to_end_piece('function_flow', 'function_trail', $runs)
-WHERE part IN ('callback', 'service')
+SELECT p.callback_instance_id, min(f.place) AS place
+FROM main.end_to_end_piece('function_flow', 'function_trail', $runs) AS p
+JOIN function_flow AS f ON p.flow_id = f.flow_id
+WHERE p.part IN ('callback', 'service')
+GROUP BY p.callback_instance_id
 UNION ALL
-SELECT i.callback_instance_id
+SELECT
+    i.callback_instance_id,
+    row_number() OVER (
+        PARTITION BY k.alike_id ORDER BY i.end_ns - i.start_ns DESC NULLS LAST, i.start_ns
+    ) AS place
 FROM main.callback_instance AS i
 JOIN main.callback_alike AS k ON i.callback_id = k.callback_id
 WHERE coalesce($from, $to, $via, $without) IS NULL AND list_contains($runs, i.run_id)
     AND i.start_ns >= $start_ns AND i.start_ns < $end_ns
-QUALIFY $slowest IS NULL OR row_number() OVER (
-    PARTITION BY k.alike_id ORDER BY i.end_ns - i.start_ns DESC NULLS LAST, i.start_ns
-) <= $slowest;
+QUALIFY $slowest IS NULL OR place <= $slowest;
 
 WITH instance AS (
     SELECT i.callback_instance_id, k.alike_id AS callback_id

@@ -18,12 +18,12 @@ from msgflow.query.compare import compare, warm_up
 from msgflow.query.runner import run_query
 from msgflow.run.slice import Slice
 from msgflow.run.window import WHOLE, Window
-from msgflow.sql.statement import internal_sql
 from msgflow.text.shell import shell_joined
 from msgflow.view.critical_path import critical_path
 from msgflow.view.encoded import encoded_comparison, encoded_result, encoded_section
 from msgflow.view.page_query import Scratch, page_query, run_page_query
 from msgflow.view.sql_page import examples, words
+from msgflow.view.stacks import stacks, stacks_of_path
 from msgflow.view.summary import (
     MOST_PATHS,
     Part,
@@ -247,16 +247,31 @@ class Pages:
 
     def _stack(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
         extent = self.extent(connection, params)
-        window = {"run_id": extent.run.run_id, **self.window(extent, params).bindings}
-        table = internal_sql().run(connection, "folded_stack", window).to_arrow_table()
-        table = table.sort_by([("samples", "descending"), ("stack", "ascending")])
-        part = self._slice(extent, params)
-        words = ["msgflow", "export", "folded", "-o", "robot.folded", "--run", extent.run.name]
+        run, window = extent.run, self.window(extent, params)
+        parts: tuple[pa.Table, ...] = (stacks(connection, run, window),)
+        words = ["export", "folded", "-o", "robot.folded"]
+        # Without samples there is nothing to look for.
+        if "path" in params and parts[0].num_rows:
+            listed = run_page_query(connection, "path", {"run": run.run_id}).to_pylist()
+            paths = {row["path_id"]: row["path"] for row in listed}
+            number, slowest = _whole(params, "path"), _whole(params, "slowest")
+            if number not in paths:
+                raise UsageError(f"the run has no such path — {number}")
+            every = sorted(set(paths.values()))
+            parts = stacks_of_path(connection, run, window, paths[number], every, slowest)
+            number = every.index(paths[number]) + 1
+            words = ["query", "functions", "--path", str(number), "--slowest", str(slowest)]
+        shown = [part.slice(0, MOST_STACKS) for part in parts]
+        table = pa.concat_tables(
+            part.append_column("part", pa.array([at] * part.num_rows, pa.int64()))
+            for at, part in enumerate(shown)
+        )
+        options = _window_options(extent, self._slice(extent, params))
         meta = {
-            "left_out": max(table.num_rows - MOST_STACKS, 0),
-            "command": shell_joined(words + _window_options(extent, part)),
+            "left_out": sum(part.num_rows for part in parts) - table.num_rows,
+            "command": shell_joined(["msgflow", *words, "--run", run.name, *options]),
         }
-        return encode(table.slice(0, MOST_STACKS), meta=meta)
+        return encode(table, meta=meta)
 
     def _compare(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
         extent = self.extent(connection, params)

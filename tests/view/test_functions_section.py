@@ -11,7 +11,9 @@ import pytest
 from served import Page, Served
 from tables import decoded
 
+from msgflow import Database
 from msgflow.database import open_db
+from msgflow.errors import UsageError
 from msgflow.view import pages as pages_module
 from msgflow.view.pages import Pages
 
@@ -63,6 +65,37 @@ def test_stacks_are_those_that_are_exported(
     assert found.meta["left_out"] == 1
 
 
+def samples_on(database: Database, path: int, **choice: int) -> int:
+    """Return the samples of callbacks on the way of the flows of a path: each saw `main`."""
+    rows = database.query("functions", path=str(path), **choice).to_arrow().to_pylist()
+    return sum(row["samples"] for row in rows if row["function"] == "main")
+
+
+def test_stacks_of_the_slowest_flows_are_apart_from_those_of_the_others(sampled: Path) -> None:
+    with duckdb.connect(str(sampled)) as connection:
+        connection.execute(
+            "INSERT INTO store.stack_sample BY NAME SELECT 1 AS run_id, process_id, thread_id,"
+            " 1 AS tid, start_ns AS at_ns, 0 AS cpu, callback_instance_id, 2 AS stack_id"
+            " FROM store.callback_instance"
+        )
+    with open_db(sampled) as opened:
+        pages = Pages()
+        paths = decoded(pages.answer(opened.connection, "path", {})).rows
+        numbers = {text: at for at, text in enumerate(sorted({row["path"] for row in paths}), 1)}
+        path = max(paths, key=lambda row: len(row["path"]))
+        asked = {"path": path["path_id"], "slowest": 3}
+        found = decoded(pages.answer(opened.connection, "stack", asked))
+        slow, others = (
+            sum(row["samples"] for row in found.rows if row["part"] == part) for part in (0, 1)
+        )
+        number = numbers[path["path"]]
+        assert slow == samples_on(opened, number, slowest=3) > 0
+        assert slow + others == samples_on(opened, number) > slow
+        assert f"query functions --path {number} --slowest 3 " in found.meta["command"]
+        with pytest.raises(UsageError, match="the run has no such path — 999"):
+            pages.answer(opened.connection, "stack", asked | {"path": 999})
+
+
 @pytest.mark.thorough
 def test_a_flame_graph_says_what_samples_saw(
     sampled: Path, demo: Path, serve: Serve, page: Page
@@ -82,6 +115,12 @@ def test_a_flame_graph_says_what_samples_saw(
     assert page.page.evaluate("typeof hacked") == "undefined"
     page.page.get_by_role("button", name="all of it").click()
     page.page.wait_for_function(f"before => ({width})() === before", arg=before)
+    # On the page Paths the slowest flows stand beside the others.
+    page.go("#/paths")
+    page.page.get_by_label("how many flows are the slowest").select_option("1")
+    page.page.get_by_text("the slowest flow: no samples").or_(
+        page.page.locator("[aria-label='flame graph of functions: the slowest flow'] g.frame").first
+    ).first.wait_for()
     # Without samples there is no such section.
     page.open(serve(demo).address)
     page.go("#/nodes")

@@ -17,6 +17,7 @@ import { besides, dataTable } from "./table.js";
 import { command, doubt, doubtHelp, failed, notes, sqlText, waiting } from "./notice.js";
 import { chart, redrawCharts } from "./chart.js";
 import { doubted, pathNumbers } from "./overview.js";
+import { pathFunctions } from "./functions.js";
 
 const COLUMNS = [
   "path",
@@ -165,6 +166,9 @@ export class PathsPage {
       clear(parts, this.breakdown(breakdown, path, table.path[row]))
     )
       .catch((error) => clear(parts, failed(error)));
+    const sampled = h("div");
+    pathFunctions(app, path).then((found) => clear(sampled, found))
+      .catch((error) => error.name === "AbortError" || clear(sampled, failed(error)));
     const bins = this.bins = evenBins(histogram);
     const toFlow = (source, at) =>
       address({
@@ -271,6 +275,7 @@ export class PathsPage {
         )
         : h("p", {}, "No flow reached the end of this path."),
       h("section", {}, h("h2", {}, "What the latency consists of"), parts),
+      sampled,
     ];
   }
 

@@ -3,6 +3,7 @@
 -- description: Stacks that samples saw, below their node and callback, with how often: as tools for
 --     flame graphs read them, the outermost call first.
 -- grain: one row per node, callback and stack
+-- param: instances BIGINT[] = NULL  Only samples of these callback instances
 -- column: stack VARCHAR  Node, callback and functions, with semicolons between
 -- column: samples BIGINT  How many samples
 WITH sample AS (
@@ -11,7 +12,9 @@ WITH sample AS (
             AS process_id, count(*) AS samples
     FROM main.stack_sample AS s
     LEFT JOIN main.callback_instance AS i ON s.callback_instance_id = i.callback_instance_id
-    WHERE s.run_id = $run_id AND s.at_ns >= $start_ns AND s.at_ns < $end_ns
+    WHERE s.run_id = $run_id
+        AND CASE WHEN $instances IS NULL THEN s.at_ns >= $start_ns AND s.at_ns < $end_ns
+            ELSE s.callback_instance_id IN (SELECT unnest($instances::BIGINT[])) END
     GROUP BY ALL
 ),
 stack AS (
