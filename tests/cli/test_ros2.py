@@ -89,7 +89,12 @@ def test_words_reach_msgflow_as_they_are(ros2: Path, small_database: Path) -> No
 
 @pytest.mark.parametrize("option", few(["-h", "--help"], "-h"))
 def test_help_is_that_of_msgflow(ros2: Path, option: str) -> None:
-    assert "Usage: ros2 msgflow [OPTIONS] COMMAND" in run(ros2, option).stdout
+    own = [sys.executable, "-m", "msgflow", option]
+    words = subprocess.run(own, capture_output=True, text=True, check=True).stdout.split()
+    of_ros2 = run(ros2, option).stdout.split()
+    # The same commands and options, under another name.
+    assert " ".join(of_ros2) == " ".join(words).replace("python -m msgflow", "ros2 msgflow", 1)
+    assert "Usage: ros2 msgflow [OPTIONS] COMMAND" in " ".join(of_ros2)
     assert (
         "Usage: ros2 msgflow query e2e-latency" in run(ros2, "query", "e2e-latency", option).stdout
     )

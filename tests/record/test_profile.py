@@ -58,6 +58,14 @@ try:
 except (ExternalShutdownException, KeyboardInterrupt):
     pass
 """
+# Each computes in its own frame: without frame pointers only the innermost function has a name.
+HOG = """
+def {name}(seconds):
+    end = time.thread_time() + seconds * {share}
+    while time.thread_time() < end:
+        for number in range(500):
+            number * number
+"""
 SLOW_PERF = """#!{python}
 import os, pathlib, signal, sys, time
 (control,) = [word for word in sys.argv if word.startswith("--control=fd:")]
@@ -68,6 +76,7 @@ os.write(place, b"ack")
 signal.pause()
 """
 SHARES = {"hog<10>": 0.1, "hog<30>": 0.3, "hog<60>": 0.6}
+PYTHON_SHARES = {"hog_10": 0.1, "hog_30": 0.3, "hog_60": 0.6}
 
 
 def test_a_rate_may_say_how_callers_are_found() -> None:
@@ -165,3 +174,47 @@ def test_shares_of_known_functions(robot: list[str], tmp_path: Path) -> None:
         row = found["Subscription(/image)", function]
         assert abs(row["total_share"] - share) < (0.05 if samples >= 400 else 0.1), shares
     assert any("hog<60>" in note for note in why.notes)
+
+
+@pytest.mark.thorough
+def test_shares_of_known_functions_of_python(robot: list[str], tmp_path: Path) -> None:
+    """The same, from Python 3.12 on, of the samples whose stack leads to a function of Python."""
+    if reason := perf.why_not(["--event=cpu-clock"]):
+        pytest.skip(reason)
+    python = Path(robot[robot.index("-c") - 1])
+    names = "import sys; sys.exit(not hasattr(sys, 'activate_stack_trampoline'))"
+    if subprocess.run([python, "-c", names]).returncode:
+        pytest.skip(f"{python} is older than 3.12")
+    # The wheels start Python anew to set this: perf takes libraries of the first for the others.
+    folders = [python.parents[1] / "lib", *python.parents[1].glob("lib/python3*/*/ros_*.libs")]
+    libraries = os.pathsep.join(map(str, folders))
+    whole = [f"LD_LIBRARY_PATH={libraries}", "_ROS_WHEELS_BOOTSTRAP_COMPLETE=1", str(python)]
+    of_hogs = {**PYTHON_SHARES, "look": 1.0}
+    hogs = "".join(HOG.format(name=name, share=share) for name, share in of_hogs.items())
+    calls = ", ".join(f"{name}(0.06)" for name in PYTHON_SHARES)
+    nodes = (
+        NODES.replace("import ctypes, sys", f"import time\n{hogs}")
+        .replace("hogs.detect(0.06)", f"({calls})")
+        .replace("hogs.look", "look")
+    )
+    (tmp_path / "robot.py").write_text(
+        "".join(line for line in nodes.splitlines(keepends=True) if not line.startswith("hogs"))
+    )
+    command = [sys.executable, "-m", "msgflow", "record", "--profile", "99:dwarf"]
+    program = [*robot[: robot.index(str(python))], *whole, str(tmp_path / "robot.py")]
+    subprocess.run(
+        [*command, "--duration", "16", "-o", "trace", "--", *program],
+        cwd=tmp_path, check=True, capture_output=True, env=os.environ,
+    )  # fmt: skip
+    with Database(tmp_path / "msgflow.duckdb") as database:
+        rows = database.query("functions").to_arrow().to_pylist()
+    found = {(row["callback"], row["function"]): row for row in rows if row["function"] in of_hogs}
+    assert found.keys() == {
+        ("Timer(100 ms)", "look"), *(("Subscription(/image)", name) for name in PYTHON_SHARES)
+    }  # fmt: skip
+    assert {Path(row["file"]).name for row in found.values()} == {"robot.py"}
+    assert sum(found["Subscription(/image)", name]["total_share"] for name in PYTHON_SHARES) > 0.8
+    counts = {name: found["Subscription(/image)", name]["samples"] for name in PYTHON_SHARES}
+    samples = sum(counts.values())
+    for name, share in PYTHON_SHARES.items():
+        assert abs(counts[name] / samples - share) < (0.05 if samples >= 400 else 0.1), counts
