@@ -15,6 +15,7 @@ import duckdb
 import pytest
 from thorough import examples
 
+from msgflow import open_db
 from msgflow import trace as trace_package
 from msgflow.errors import TraceError
 from msgflow.ingest import IngestReport, ingest
@@ -75,6 +76,46 @@ def test_the_text_of_perf_beside_a_trace_is_read(
     count = text.count("cpu-clock")
     assert count
     assert inside(ingest([session], new_database), new_database) == (count, count)
+
+
+def test_shares_of_functions_of_a_simulated_system(
+    session: Path, database: Path, new_database: Path
+) -> None:
+    """Ten samples of each call: one in a function, three in another, six in a third."""
+    with trace_package.open([session]) as opened:
+        offset, hostname = opened.traces[0].clock_offset_ns, opened.traces[0].hostname
+    with duckdb.connect(str(database), read_only=True) as con:
+        rows = con.execute(
+            "SELECT p.pid, t.tid, i.start_ns + (i.end_ns - i.start_ns) * (2 * k + 1) // 20, k,"
+            " l.node || ' ' || l.label FROM callback_instance AS i JOIN thread AS t"
+            " USING (thread_id) JOIN process AS p ON i.process_id = p.process_id JOIN host AS h"
+            " USING (host_id) JOIN callback_label AS l USING (callback_id), range(10) AS r (k)"
+            " WHERE h.hostname = ?",
+            [hostname],
+        ).fetchall()
+    text = HEADER.format(hostname)
+    for pid, tid, ns, part, callback in rows:
+        second, rest = divmod(ns - offset, 10**9)
+        hog = 10 if part == 0 else 30 if part < 4 else 60
+        text += f"\n {pid}/{tid}  [000] {second}.{rest:09}:  7 cpu-clock: \n"
+        text += f"\t 11a8 hog_{hog} of {callback} (/lib/libhog.so)\n\t 279 main (/bin/robot)\n"
+    (session / TEXT).write_text(text)
+    ingest([session], new_database)
+    with open_db(new_database) as opened_database:
+        found = opened_database.query("functions", internal=True).to_arrow().to_pylist()
+    shares = {
+        (row["node"], row["callback"], row["function"]): row["self_share"]
+        for row in found
+        if row["function"] != "main"
+    }
+    callbacks = {(node, callback) for node, callback, _ in shares}
+    assert len(callbacks) > 3
+    assert shares == {
+        (node, callback, f"hog_{share} of {node} {callback}"): share / 100
+        for node, callback in callbacks
+        for share in (10, 30, 60)
+    }
+    assert len(rows) == sum(row["samples"] for row in found if row["function"] == "main")
 
 
 def test_samples_in_an_archive_are_read(session: Path, text: str, new_database: Path) -> None:
