@@ -42,7 +42,7 @@ def stacks_of_path(
 ) -> tuple[pa.Table, pa.Table]:
     """Return stacks on the way of so many slowest flows of a path, and of its other flows."""
     header = load_query("functions")
-    chosen = bind(header, only_path(path, every))
+    chosen = bind(header, {name: [*each] for name, each in only_path(path, every).items()})
     with Steps(connection) as steps:
         steps.make(header, {"runs": [run.run_id], **chosen, **window.bindings})
         found = connection.table("function_instance").fetchall()
