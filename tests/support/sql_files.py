@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 from msgflow.db import objects
@@ -62,6 +63,7 @@ def sql_paths() -> list[tuple[str, Path]]:
     return [(layer, path) for layer, folder in folders for path in sorted(folder.glob("**/*.sql"))]
 
 
+@cache
 def sql_files() -> list[SqlFile]:
     """Return every SQL file, parsed, with what its columns share with a table."""
     public = {header.path: header for header in objects.load("public")}
