@@ -63,6 +63,7 @@ def test_the_way_of_a_message_is_the_work_of_no_node(ask: Msgflow, name: str) ->
     )
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("name", "columns"),
     few(

@@ -82,6 +82,7 @@ def test_a_with_may_write_though_it_is_a_select() -> None:
         assert con.execute("FROM kept").fetchall() == []
 
 
+@pytest.mark.thorough
 def test_no_function_reads_or_changes_another_file(place: Path) -> None:
     before = content(place.parent)
     with duckdb.connect() as con:
