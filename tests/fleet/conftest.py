@@ -1,10 +1,12 @@
 from __future__ import annotations
 
+import pickle
 import shutil
 from pathlib import Path
 from typing import Any
 
 import pytest
+from ingested import made_once
 from lakes import copied
 
 from msgflow import Database
@@ -20,14 +22,16 @@ COPY = "c" * 20
 @pytest.fixture(scope="session")
 def databases(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     """Two databases with one run each, of the recordings r0 and r1 in a folder beside them."""
-    directory = tmp_path_factory.mktemp("databases")
-    paths = []
-    for name, scenario in (("first", "pipeline"), ("second", "two_hosts")):
-        recording = directory / "recordings" / f"r{len(paths)}"
-        simulate(scenario, recording, factor=_LENGTH, seed=len(paths))
-        paths.append(directory / f"{name}.duckdb")
-        ingest([recording], paths[-1], name=name)
-    return paths[0], paths[1]
+    names = "first", "second"
+
+    def make(path: Path) -> None:
+        for number, scenario in enumerate(("pipeline", "two_hosts")):
+            recording = path.parent / "recordings" / f"r{number}"
+            simulate(scenario, recording, factor=_LENGTH, seed=number)
+            ingest([recording], path.parent / f"{names[number]}.duckdb", name=names[number])
+
+    directory = made_once(tmp_path_factory, "fleet", make).parent
+    return directory / f"{names[0]}.duckdb", directory / f"{names[1]}.duckdb"
 
 
 @pytest.fixture(scope="session")
@@ -35,14 +39,20 @@ def written(
     databases: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[Path, dict[str, Any], dict[str, Any]]:
     """A lake with all files of both, and what `run` is to have of each, without a commit."""
-    folder = tmp_path_factory.mktemp("written")
-    lake = Lake.open_or_create(folder / "lake")
-    parts = []
-    for database in databases:
-        with Database(database) as opened:
-            content = Content(views=True)
-            parts.append(write_part(opened.connection, database, lake.store, folder, content))
-    return folder / "lake", parts[0], parts[1]
+
+    def make(path: Path) -> None:
+        lake = Lake.open_or_create(path.parent / "lake")
+        parts = []
+        for database in databases:
+            with Database(database) as opened:
+                content = Content(views=True)
+                folder = path.parent
+                parts.append(write_part(opened.connection, database, lake.store, folder, content))
+        (path.parent / "parts").write_bytes(pickle.dumps(parts))
+
+    folder = made_once(tmp_path_factory, "written", make).parent
+    first, second = pickle.loads((folder / "parts").read_bytes())
+    return folder / "lake", first, second
 
 
 @pytest.fixture(scope="session")

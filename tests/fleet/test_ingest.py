@@ -17,6 +17,7 @@ from typing import Any
 import duckdb
 import pyarrow as pa
 import pytest
+from ingested import made_once
 from typer.testing import CliRunner, Result
 
 from msgflow import Database
@@ -57,20 +58,24 @@ def run(*arguments: object) -> Result:
     return CliRunner().invoke(app, ["fleet", *map(str, arguments)])
 
 
-# Of the session, as it puts more beside the recordings: a worker may come back to this module.
+# Of the session, as a worker may come back to this module.
 @pytest.fixture(scope="session")
-def filled(databases: tuple[Path, Path]) -> Filled:
-    folder = databases[0].parent
-    recordings = folder / "recordings"
-    (recordings / "broken").mkdir()
-    (recordings / "broken" / "metadata").write_text("no metadata")
-    manifest = folder / "night.csv"
-    manifest.write_text(
-        "path,robot,software_version\n"
-        'recordings/r0,"the ""first"", or\nr0",1.1\n'
-        "recordings/broken,r2,1.1\n"
-        "recordings/missing,r3,1.1\n"
-    )
+def filled(databases: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) -> Filled:
+    recordings = databases[0].parent / "recordings"
+    manifest = recordings.parent / "night.csv"
+
+    def make(_: Path) -> None:
+        (recordings / "broken").mkdir()
+        (recordings / "broken" / "metadata").write_text("no metadata")
+        manifest.write_text(
+            "path,robot,software_version\n"
+            'recordings/r0,"the ""first"", or\nr0",1.1\n'
+            "recordings/broken,r2,1.1\n"
+            "recordings/missing,r3,1.1\n"
+        )
+
+    made_once(tmp_path_factory, "night", make)
+    folder = tmp_path_factory.mktemp("filled")
     scratch = folder / "scratch"
     result = run(
         "ingest", manifest, "--lake", folder / "lake", "--scratch", scratch, "--label", "site=x"
