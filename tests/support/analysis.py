@@ -10,19 +10,24 @@ from pathlib import Path
 from typing import Any
 
 import duckdb
+from parsed_once import parsing_once
 from staged_events import StagedEvents
 
 from msgflow.db import objects
 from msgflow.db.connection import attach
 from msgflow.db.derivation import derive, derive_table, derived_tables, learn_topics
+from msgflow.db.finding import kinds, kinds_of, short_name, statement, store_findings
 from msgflow.db.sandbox import open_memory
 from msgflow.db.store import store
 from msgflow.db.store_table import store_tables
 from msgflow.ingest import model, staging
 from msgflow.ingest.caret_initialisation import restore
 from msgflow.ingest.model import translate
+from msgflow.sql.header import Header
 
 _NAME = re.compile(r"(?:\b(staging|store|derive|main)\.)?\b([a-z_0-9]+)\b")
+_TEXT = re.compile(r"'(\w+)'")
+_FINDING = "staging.finding"
 # What is stored of links and of what is missing comes of whole derivations.
 _DERIVED = frozenset(f"store.{name}" for name in derived_tables())
 
@@ -33,13 +38,14 @@ class Analysis:
     One connection serves many tests, as opening and attaching takes as long as the rest: `build`
     replaces what was built before. A test mostly reads one view; only what that view needs, by the
     headers of the SQL files, is built: every statement of the model takes as long to plan as to run
-    on a few rows. A test that takes `connection` gets all of it.
+    on a few rows. Where it names kinds of findings, only these are found. A test that takes
+    `connection` gets all of it.
     """
 
     def __init__(self, empty_database: Path, directory: Path) -> None:
         path = directory / "analysis.duckdb"
         shutil.copyfile(empty_database, path)
-        self._connection = open_memory()
+        self._connection = parsing_once(open_memory())
         # Of a few rows, every order of joins is as good as the best: looking for it took a quarter.
         self._connection.execute("SET threads = 1")
         self._connection.execute("SET disabled_optimizers = 'join_order'")
@@ -48,7 +54,8 @@ class Analysis:
         self._tables = self._tables_of("raw"), self._tables_of("staging")
         self._views = self._views_of_staging()
         self._built: set[str] | None = None
-        self._empty: set[str] | None = None
+        self._empty: set[str] = set()
+        self._found: frozenset[str] = frozenset()
         self._derived: frozenset[str] = frozenset()
         # What is stored is never committed, unless somebody takes the database: to take it back
         # costs one statement, to delete it one for each table.
@@ -64,16 +71,19 @@ class Analysis:
     def build(self, events: StagedEvents) -> Analysis:
         """Take these events in place of those before."""
         self._clear()
-        events.write(self._connection)
-        for step in (restore, translate):
-            step(self._connection, staging.empty_tables(self._connection))
-        self._built, self._empty = set(), None
-        self._derived = frozenset()
+        con = self._connection
+        events.write(con)
+        empty = staging.empty_tables(con)
+        if any([restore(con, empty), translate(con, empty)]):
+            empty = staging.empty_tables(con)
+        staging.narrow(con, empty)
+        self._built, self._empty = set(), empty
+        self._derived = self._found = frozenset()
         return self
 
     def rows(self, sql: str) -> list[tuple[Any, ...]]:
         """Return the rows of a query."""
-        self._provide(_needed(sql))
+        self._provide(_needed(sql), _named(sql))
         return self._read(sql)
 
     def value(self, sql: str) -> Any:
@@ -86,33 +96,34 @@ class Analysis:
         return [value for (value,) in self.rows(sql)]
 
     def close(self) -> None:
-        self._provide(_everything())
-        self._keep()
         self._connection.close()
 
-    def _provide(self, needed: frozenset[str]) -> None:
-        """Build what is needed and not there yet."""
+    def _provide(self, needed: frozenset[str], found: frozenset[str] = frozenset()) -> None:
+        """Build what is needed and not there yet, and find these kinds of findings."""
         if self._built is None:
             return
-        self._model(needed)
-        tables = needed & _DERIVED
-        if "main.finding" in needed:
-            tables = _DERIVED  # those of a recording come of all that is derived
+        self._model(needed, found & _of("input"))
+        # Findings of the recording come of all that is derived.
+        is_all = "main.finding" in needed and not found
+        wanted = (_DERIVED if is_all else needed & _DERIVED) | found & _of("recording")
         if self._has_topics_to_learn():
             self._model(_closure(["derive.topic_learned"]))
             learn_topics(self._connection, 1)
-        if tables <= self._derived:
+        if wanted <= self._derived:
             return
-        self._model(_closure(tables))
-        if tables == _DERIVED:
+        self._model(_closure(wanted & _DERIVED))
+        if wanted >= _DERIVED:
             derive(self._connection, 1)
-        else:
-            for name in derived_tables():
-                if f"store.{name}" in tables:
-                    derive_table(self._connection, name, 1)
-        self._derived |= tables
+            self._derived = _DERIVED | _of("recording")
+            return
+        for name in derived_tables():
+            if f"store.{name}" in wanted:
+                derive_table(self._connection, name, 1)
+        self._derived |= wanted
+        if recorded := self._derived & _of("recording"):
+            store_findings(self._connection, 1, _headers(recorded))
 
-    def _model(self, needed: frozenset[str]) -> None:
+    def _model(self, needed: frozenset[str], found: frozenset[str] = frozenset()) -> None:
         """Build the objects of the model among these, and store all that there are."""
         assert self._built is not None
         missing = [
@@ -120,15 +131,17 @@ class Analysis:
             for header in objects.model()
             if header.name in needed and header.name not in self._built
         ]
-        if not missing:
+        is_found = found <= self._found or _FINDING in self._built
+        if not missing and is_found:
             return
         self._empty_store()
-        if self._empty is None:
-            self._empty = staging.empty_tables(self._connection)
-            staging.narrow(self._connection, self._empty)
         for header in missing:
             model.create(self._connection, header, self._empty)
             self._built.add(header.name)
+        if not is_found:
+            self._found |= found
+            rows = statement(_headers(self._found))
+            self._connection.execute(f"CREATE OR REPLACE TABLE {_FINDING} AS {rows}")
         self._connection.begin()
         self._is_stored = True
         store(self._connection, 1)
@@ -222,7 +235,31 @@ def _needs() -> dict[str, frozenset[str]]:
 @cache
 def _needed(sql: str) -> frozenset[str]:
     """Return all that a query needs; a name without its schema is that of a public view."""
-    return _closure(f"{schema or 'main'}.{name}" for schema, name in _NAME.findall(sql))
+    names = [f"{schema or 'main'}.{name}" for schema, name in _NAME.findall(sql)]
+    if not (found := _named(sql)):
+        return _closure(names)
+    words = _NAME.findall(statement(_headers(found)))
+    sources = [f"{schema}.{name}" for schema, name in words if schema]
+    return _closure([*names, *sources], without=_FINDING)
+
+
+@cache
+def _named(sql: str) -> frozenset[str]:
+    """Return the kinds of findings that a query of findings names, and those that these name."""
+    if not re.search(r"\bfinding\b", sql):
+        return frozenset()
+    every = _of("input") | _of("recording")
+    found = every.intersection(_TEXT.findall(sql))
+    return found | every.intersection(_TEXT.findall(statement(_headers(found))))
+
+
+@cache
+def _of(phase: str) -> frozenset[str]:
+    return frozenset(map(short_name, kinds_of(phase)))
+
+
+def _headers(found: frozenset[str]) -> list[Header]:
+    return [header for header in kinds() if short_name(header) in found]
 
 
 @cache
@@ -230,11 +267,11 @@ def _everything() -> frozenset[str]:
     return _closure([*(header.name for header in objects.model()), *_DERIVED])
 
 
-def _closure(names: Iterable[str]) -> frozenset[str]:
+def _closure(names: Iterable[str], *, without: str | None = None) -> frozenset[str]:
     waiting, found = list(names), set()
     while waiting:
         name = waiting.pop()
-        if name not in found:
+        if name not in found and name != without:
             found.add(name)
             waiting += _needs().get(name, ())
     return frozenset(found)
