@@ -109,6 +109,14 @@ class Store:
         real = os.path.join(self._real_root, os.path.normpath(path)) if path else self._real_root
         return os.path.realpath(real) != real
 
+    def require_no_link(self, path: str, suffix: str) -> None:
+        """Raise if a folder, or a file in it with this suffix, is a link: it would seem absent."""
+        self._require_here(path)
+        if self.is_local and os.path.isdir(self.full(path)):
+            for entry in os.scandir(self.full(path)):
+                if entry.is_symlink() and entry.name.endswith(suffix):
+                    self._require_here(f"{path}/{entry.name}")
+
     def _reading(self, path: str) -> Any:
         if self.is_local:
             return open_regular(Path(self.full(path)))

@@ -26,7 +26,7 @@ BOUNDS_S = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
 """Bounds of the buckets of latencies [s]."""
 
 MOST_LABELS = 1_000
-"""Paths, and subscriptions that lost messages, that metrics have at most."""
+"""Paths, subscriptions that lost messages, and violated targets that metrics have at most."""
 
 _SECOND_NS = 1_000_000_000
 _STATUSES = "SELECT path, status, count(*) FROM watched_flow GROUP BY ALL"
@@ -69,7 +69,7 @@ class Exporter:
         self._counts: Counter[str] = Counter()
         self._sums_ns: Counter[str] = Counter()
         self._losses: Counter[tuple[str, ...]] = Counter()
-        self._violations: Counter[tuple[str, str]] = Counter()
+        self._violations: Counter[tuple[str, ...]] = Counter()
         self._discarded = 0
         self._last: WindowReport | None = None
         self._shown_s = 0.0
@@ -134,15 +134,19 @@ class Exporter:
                 del self._statuses[status]
             for bound in BOUNDS_S:
                 del self._buckets[path, bound]
-        for labels in [*self._losses][: max(len(self._losses) - MOST_LABELS, 0)]:
-            del self._losses[labels]
+        for counter in (self._losses, self._violations):
+            for labels in [*counter][: max(len(counter) - MOST_LABELS, 0)]:
+                del counter[labels]
 
     def show(self, report: WindowReport) -> None:
         """Take over how it is now."""
         with self._lock:
             self._last = report
             self._shown_s = time.monotonic()
-            self._violations.update((each["subject"], each["metric"]) for each in report.violations)
+            for each in report.violations:
+                names = each["subject"], each["metric"]
+                self._violations[names] = self._violations.pop(names, 0) + 1
+            self._forget()
 
     def collect(self) -> Iterator[Metric]:
         """Yield all metrics, as a registry of prometheus-client asks for them."""

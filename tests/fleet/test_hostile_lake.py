@@ -289,6 +289,20 @@ def test_packing_loses_no_answers_that_are_elsewhere(lake: Lake, is_linked: bool
     assert len(lake.runs()) == 3
 
 
+@pytest.mark.parametrize("is_folder", [True, False])
+def test_packing_loses_no_runs_that_are_elsewhere(lake: Lake, is_folder: bool) -> None:
+    root = Path(lake.store.url)
+    key = lake.names()[0]
+    link = root / "run" if is_folder else root / "run" / f"{key}.parquet"
+    moved = link.replace(root.parent / "moved.parquet")
+    link.symlink_to(moved)
+    files = {path for path in root.rglob("*") if path.is_file()}
+    for use in (lambda: pack(lake), lake.runs, lambda: lake.remove([key])):
+        with pytest.raises(DatabaseError, match=rf"no symbolic link below a lake — {link}"):
+            use()
+    assert {path for path in root.rglob("*") if path.is_file()} == files
+
+
 def test_commands_are_quoted(lake: Lake) -> None:
     lake.commit([{"run": "x; touch PWN", "name": "$(touch PWN)"}])
     listed = CliRunner().invoke(app, ["fleet", "open", "no such", "--lake", f"{lake.store.url}/."])

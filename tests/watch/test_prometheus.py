@@ -209,11 +209,14 @@ def test_what_has_gone_is_dropped(monkeypatch: pytest.MonkeyPatch) -> None:
         exporter._statuses.update({(path, "reached"): 1, (path, "lost"): 1})
         exporter._counts[path] = exporter._counts.pop(path, 0) + 1
         exporter._losses[path, "[a 1]", "lost", "?"] = 1
-        exporter._forget()
+        exporter.show(shown({"subject": path, "metric": "latency"}))
     assert metrics(exporter, "msgflow_path_flows") == {
         ("/p0", "reached"): 1, ("/p0", "lost"): 1, ("/p3", "reached"): 1, ("/p3", "lost"): 1,
     }  # fmt: skip
     assert len(metrics(exporter, "msgflow_messages_undelivered")) == 2
+    assert metrics(exporter, "msgflow_violations") == {
+        ("/p0", "latency"): 1, ("/p3", "latency"): 1,
+    }  # fmt: skip
 
 
 def test_another_host_is_refused_and_open_connections_take_no_thread(
