@@ -259,7 +259,7 @@ def recorded_bytes(directory: Path) -> int:
 
 def _require_room(directory: Path, note: Callable[[str], None], seconds: float | None) -> None:
     try:
-        if directory.exists() and (not directory.is_dir() or any(directory.iterdir())):
+        if os.path.lexists(directory) and (not directory.is_dir() or any(directory.iterdir())):
             raise RecordingError(f"the directory is in use — {directory}", "another one: -o DIR")
         existing = next(
             path for path in (directory, *directory.absolute().parents) if path.exists()

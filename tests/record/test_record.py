@@ -321,9 +321,15 @@ class TestForeignDaemon:
         assert not list(tmp_path.glob("recording*"))
 
 
-def test_a_directory_in_use_is_refused(refused: Callable[..., Result], tmp_path: Path) -> None:
-    (tmp_path / "used").mkdir()
-    (tmp_path / "used" / "file").touch()
+@pytest.mark.parametrize("is_link", [False, True])
+def test_a_directory_in_use_is_refused(
+    refused: Callable[..., Result], tmp_path: Path, is_link: bool
+) -> None:
+    if is_link:
+        (tmp_path / "used").symlink_to("nowhere")
+    else:
+        (tmp_path / "used").mkdir()
+        (tmp_path / "used" / "file").touch()
     ended = refused("-o", "used", "--duration", "0.5")
     assert (ended.exit_code, "the directory is in use" in ended.stderr) == (1, True)
 
