@@ -151,6 +151,7 @@ piece AS (
             WHEN c.activity = 'network_or_idle'
                 AND coalesce(c.state, 'unknown') IN ('sleeping', 'unknown')
                 THEN 'between nodes'
+            WHEN c.request_id IS NOT NULL THEN coalesce(l.node, v.server, '?')
             ELSE coalesce(l.node, main.node_label(n.full_name, r.name, r.pid), o.node)
         END AS node,
         CASE
@@ -158,7 +159,9 @@ piece AS (
             WHEN c.activity IN (
                 'cache', 'take_to_callback', 'service', 'executor_busy',
                 'all_threads_busy', 'blocked', 'timer'
-            ) OR c.part = 'request_to_take' THEN l.label
+            ) OR c.part = 'request_to_take'
+                THEN coalesce(l.label, printf('Service(%s)', v.service_name))
+            WHEN c.request_id IS NOT NULL THEN printf('Service(%s)', v.service_name)
             ELSE coalesce(p.topic_name, s.topic_name, '?')
         END AS what,
         c.is_certain,
@@ -203,6 +206,8 @@ piece AS (
     LEFT JOIN main.other_thread AS bo ON c.by_other_thread_id = bo.other_thread_id
     LEFT JOIN main.callback_instance AS i ON c.callback_instance_id = i.callback_instance_id
     LEFT JOIN main.callback_label AS l ON i.callback_id = l.callback_id
+    LEFT JOIN main.waited_call AS v
+        ON c.request_id = v.request_id AND list_contains($runs, v.run_id)
     LEFT JOIN main.publication AS b ON c.message_id = b.publication_id
     LEFT JOIN main.publisher AS p ON b.publisher_id = p.publisher_id
     -- Who waits for a message is the node that takes it, with a traced callback or without.

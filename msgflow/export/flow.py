@@ -52,6 +52,7 @@ _NODE = (
     "until_ns",
     "user_events",
     "otherwise_published",
+    "calls",
 )
 _STATE = ("missing", "reason", "cut_count", "internal_count")
 _UNBOUNDED = 100_000
@@ -96,7 +97,9 @@ class Flow:
             when the thread of a publication went on at the latest (until_ns), and the user's events
             in a callback instance: name, event_count, first_ns (user_events), and what its node
             publishes for other reasons, if all its messages end there (otherwise_published), and
-            how long a message was stored until its subscription existed (stored_ns).
+            how long a message was stored until its subscription existed (stored_ns), and the
+            services that a callback instance waited for: service, server, waited_ns, queue_ns,
+            served_ns (calls).
         notes: what the rows do not say, a sentence each.
     """
 
@@ -361,6 +364,7 @@ class _Painter:
             details.append("ran NA: never seen to end")
         elif node["kind"] == "callback_instance":
             details.append(f"ran {format_duration(node['end_ns'] - node['start_ns'])}")
+            details += map(_call, node["calls"] or ())
         elif node["kind"] == "publication" and node["end_ns"] is not None:
             details.append(_publishing(node))
         details += map(self._event, node["user_events"] or ())
@@ -428,6 +432,18 @@ def _busy(node: Row) -> list[str]:
         return [f"executor busy {format_duration(most_ns)}"]
     least = f"{format_duration(least_ns)} to" if least_ns else "up to"
     return [f"executor busy {least} {format_duration(most_ns)}"]
+
+
+def _call(call: Row) -> str:
+    """Return for which service it waited, and what of that was the queue and the callback."""
+    server = "" if call["server"] is None else f" ({format_cell(call['server'])})"
+    parts = [
+        f"{name} {format_duration(call[column])}"
+        for name, column in (("queue", "queue_ns"), ("callback", "served_ns"))
+        if call[column] is not None
+    ]
+    text = f"service {format_cell(call['service'])}{server} {format_duration(call['waited_ns'])}"
+    return f"{text}: {', '.join(parts)}" if parts else text
 
 
 def _sending(node: Row) -> list[str]:

@@ -35,7 +35,7 @@ _IDENTITIES = (
 )
 _LARGEST_INTEGER = 2**63 - 1
 _SYMBOL = len(_IDENTITIES) + 1
-_CANDIDATES = _SYMBOL + 1
+_NUMBERS = ("candidate_count", "queue_ns", "served_ns")
 _CATEGORIES = ("callback", "publication", "take", *["service"] * 4, "executor")
 
 
@@ -137,7 +137,7 @@ class _Writer:
         packet = self.builder.create_packet()
         packet.trusted_packet_sequence_id = _SEQUENCE
         packet.sequence_flags = self.packets.TracePacket.SEQ_INCREMENTAL_STATE_CLEARED
-        for number, name in enumerate((*_IDENTITIES, "symbol", "candidate_count"), start=1):
+        for number, name in enumerate((*_IDENTITIES, "symbol", *_NUMBERS), start=1):
             packet.interned_data.debug_annotation_names.add(iid=number, name=name)
         for number, name in enumerate(_CATEGORIES, start=1):
             packet.interned_data.event_categories.add(iid=number, name=name)
@@ -175,10 +175,9 @@ class _Writer:
                 event.debug_annotations.add(name_iid=row["code"] + 1, int_value=row["id"])
                 if row["symbol_id"] is not None:
                     event.debug_annotations.add(name_iid=_SYMBOL, string_value_iid=row["symbol_id"])
-                if row["candidate_count"] is not None:
-                    event.debug_annotations.add(
-                        name_iid=_CANDIDATES, int_value=row["candidate_count"]
-                    )
+                for number, name in enumerate(_NUMBERS, start=_SYMBOL + 1):
+                    if row[name] is not None:
+                        event.debug_annotations.add(name_iid=number, int_value=row[name])
                 if row["outgoing"]:
                     event.flow_ids.extend(row["outgoing"])
                     arrows += len(row["outgoing"])

@@ -2,10 +2,11 @@
 -- kind: macro
 -- description: What one flow had to wait for, moment by moment: its parts (main.end_to_end_part),
 --     with waits replaced by what they waited for, as far as the trace shows. Before a callback:
---     what its executor was busy with, or what excludes the callback. In a cache: the timer until
---     it was due, or the message that completed the set, from the callback that published it. Where
---     the kernel was traced, what a thread did is divided into its states. The pieces add up to the
---     latency. A negative part is one piece.
+--     what its executor was busy with, or what excludes the callback. In a callback: the services
+--     that it called and waited for (main.waited_call). In a cache: the timer until it was due, or
+--     the message that completed the set, from the callback that published it. Where the kernel was
+--     traced, what a thread did is divided into its states. The pieces add up to the latency. A
+--     negative part is one piece.
 -- grain: one row per piece of the flow
 -- like: main.critical_piece, main.end_to_end_part
 -- param: runs BIGINT[]  Runs to look at
@@ -19,7 +20,7 @@
 -- column: run_id, path_id, root_kind, root_id, take_id, latency_ns, flow_rank, hop, position, part,
 --     activity, from_ns, to_ns, duration_ns, is_certain, callback_instance_id, publication_id,
 --     state, wakers, state_thread_id, priority, by_kind, by_thread_id, by_other_thread_id,
---     by_priority
+--     by_priority, request_id
 CREATE OR REPLACE MACRO main.critical_path(
     runs, from_topic := NULL, to_topic := NULL, from_event := 'callback_start',
     to_event := 'callback_end', window_start_ns := NULL, window_end_ns := NULL,
@@ -39,5 +40,6 @@ WITH flow_part AS MATERIALIZED (
 SELECT
     run_id, path_id, root_kind, root_id, take_id, latency_ns, flow_rank, hop, position, part,
     activity, from_ns, to_ns, duration_ns, is_certain, callback_instance_id, publication_id,
-    state, wakers, state_thread_id, priority, by_kind, by_thread_id, by_other_thread_id, by_priority
+    state, wakers, state_thread_id, priority, by_kind, by_thread_id, by_other_thread_id,
+    by_priority, request_id
 FROM main.critical_piece('flow_part', runs)

@@ -1,8 +1,9 @@
 -- name: main.critical_piece
 -- kind: macro
 -- description: What flows had to wait for, moment by moment: the last step of main.critical_path.
---     It replaces each wait of a flow by the parts of what the flow waited for. Where the kernel
---     was traced, what a thread did is divided into its states (main.schedule_piece).
+--     It replaces each wait of a flow by the parts of what the flow waited for, and the calls of
+--     services in a callback (main.waited_call) by what the service did. Where the kernel was
+--     traced, what a thread did is divided into its states (main.schedule_piece).
 -- grain: one row per piece of a flow
 -- param: parts VARCHAR  Name of the rows of main.end_to_end_part: a table, or a part of the query
 -- param: runs BIGINT[]  Runs that they are of
@@ -40,15 +41,80 @@
 -- column: by_thread_id BIGINT  That thread, of a ROS process
 -- column: by_other_thread_id BIGINT  That thread, of another process
 -- column: by_priority INTEGER  Its priority; known for what took the CPU
+-- column: request_id BIGINT  Request whose response the callback of the part waits for
 CREATE OR REPLACE MACRO main.critical_piece(parts, runs, waits := 'wait_here') AS TABLE
--- Here positions go on from flow to flow.
-WITH part AS MATERIALIZED (
+WITH RECURSIVE given AS MATERIALIZED (
     SELECT
-        run_id, path_id, root_kind, root_id, take_id, latency_ns, hop, part, from_ns,
-        to_ns, duration_ns, callback_instance_id, publication_id,
+        run_id, path_id, root_kind, root_id, take_id, latency_ns, hop, part, from_ns, to_ns,
+        callback_instance_id, publication_id,
         dense_rank() OVER (ORDER BY latency_ns DESC, flow_id) AS flow_rank,
+        -- Here positions go on from flow to flow.
         row_number() OVER (ORDER BY latency_ns DESC, flow_id, position) AS position
     FROM query_table(parts)
+),
+waited_call AS MATERIALIZED (
+    SELECT
+        callback_instance_id, request_id, server_instance_id, sent_ns, taken_ns, start_ns,
+        answered_ns, returned_ns
+    FROM main.waited_call
+    WHERE list_contains(runs, run_id)
+),
+-- Calls that callbacks of the flow waited for, and those that their services waited for in turn,
+-- each with what goes on when it returns.
+call AS (
+    SELECT
+        g.position, 1 AS level, g.part, g.callback_instance_id, NULL::BIGINT AS outer_id,
+        w.request_id, w.server_instance_id, w.sent_ns, w.taken_ns, w.start_ns, w.answered_ns,
+        w.returned_ns
+    FROM given AS g
+    JOIN waited_call AS w ON g.callback_instance_id = w.callback_instance_id
+    WHERE g.part IN ('callback', 'service')
+        AND w.sent_ns >= g.from_ns
+        AND w.returned_ns <= g.to_ns
+    UNION ALL
+    SELECT
+        c.position, c.level + 1, 'service', c.server_instance_id, c.request_id,
+        w.request_id, w.server_instance_id, w.sent_ns, w.taken_ns, w.start_ns, w.answered_ns,
+        w.returned_ns
+    FROM call AS c
+    JOIN waited_call AS w ON c.server_instance_id = w.callback_instance_id
+    WHERE c.level < 32 AND w.sent_ns >= c.start_ns AND w.returned_ns <= c.answered_ns
+),
+-- When parts begin. What of a call was not traced is a part of what comes before it.
+moment AS (
+    SELECT
+        position, from_ns AS at_ns, NULL::BIGINT AS sent_ns, part, callback_instance_id,
+        NULL::BIGINT AS request_id, 0 AS place
+    FROM given
+    UNION ALL
+    SELECT position, returned_ns, sent_ns, part, callback_instance_id, outer_id, 5
+    FROM call
+    UNION ALL
+    SELECT position, at_ns, sent_ns, part, server_instance_id, request_id, place
+    FROM (
+        SELECT
+            position, sent_ns, server_instance_id, request_id,
+            unnest([
+                {'place': 1, 'part': 'request_to_take',
+                    'at_ns': CASE WHEN start_ns IS NOT NULL THEN sent_ns END},
+                {'place': 2, 'part': 'take_to_callback',
+                    'at_ns': CASE WHEN server_instance_id IS NOT NULL THEN taken_ns END},
+                {'place': 3, 'part': 'service', 'at_ns': coalesce(start_ns, sent_ns)},
+                {'place': 4, 'part': 'response_to_take', 'at_ns': answered_ns}
+            ], recursive := true)
+        FROM call
+    )
+    WHERE at_ns IS NOT NULL
+),
+part AS MATERIALIZED (
+    SELECT
+        g.run_id, g.path_id, g.root_kind, g.root_id, g.take_id, g.latency_ns, g.flow_rank, g.hop,
+        g.publication_id, m.part, m.callback_instance_id, m.request_id, m.at_ns AS from_ns,
+        coalesce(lead(m.at_ns) OVER in_time, g.to_ns) AS to_ns,
+        row_number() OVER (ORDER BY m.position, m.at_ns, m.sent_ns NULLS FIRST, m.place) AS position
+    FROM moment AS m
+    JOIN given AS g ON m.position = g.position
+    WINDOW in_time AS (PARTITION BY m.position ORDER BY m.at_ns, m.sent_ns NULLS FIRST, m.place)
 ),
 waiting AS MATERIALIZED (
     SELECT position, part, from_ns, to_ns, callback_instance_id, publication_id
@@ -281,11 +347,11 @@ candidate AS (
 named AS (
     SELECT
         p.run_id, p.path_id, p.root_kind, p.root_id, p.take_id, p.latency_ns, p.flow_rank, p.hop,
-        p.part, p.position, c.from_ns, c.to_ns,
+        p.part, p.position, p.request_id, c.from_ns, c.to_ns,
         CASE
             WHEN c.activity IS NOT NULL THEN c.activity
             WHEN p.part NOT IN ('publish_to_take', 'request_to_take') THEN p.part
-            WHEN p.callback_instance_id IS NULL AND p.duration_ns > 0 THEN 'undecided'
+            WHEN p.callback_instance_id IS NULL AND p.to_ns > p.from_ns THEN 'undecided'
             ELSE 'network_or_idle'
         END AS activity,
         CASE WHEN c.priority <= 3 THEN coalesce(c.from_ns >= c.latest_ns, false) END AS is_certain,
@@ -300,7 +366,7 @@ named AS (
 numbered AS (
     SELECT
         run_id, path_id, root_kind, root_id, take_id, latency_ns, flow_rank, hop, part, position,
-        from_ns, to_ns, activity, is_certain, callback_instance_id, publication_id,
+        from_ns, to_ns, activity, is_certain, callback_instance_id, publication_id, request_id,
         row_number() OVER (PARTITION BY position ORDER BY from_ns)
         - row_number() OVER (
             PARTITION BY position, activity, is_certain, callback_instance_id, publication_id
@@ -311,7 +377,7 @@ numbered AS (
 whole AS MATERIALIZED (
     SELECT
         run_id, path_id, root_kind, root_id, take_id, latency_ns, flow_rank, hop, part, activity,
-        is_certain, callback_instance_id, publication_id,
+        is_certain, callback_instance_id, publication_id, request_id,
         row_number() OVER (ORDER BY position, min(from_ns)) AS interval_id,
         min(from_ns) AS from_ns,
         arg_max(to_ns, from_ns) AS to_ns,
@@ -319,11 +385,11 @@ whole AS MATERIALIZED (
     FROM numbered
     GROUP BY
         run_id, path_id, root_kind, root_id, take_id, latency_ns, flow_rank, hop, position, part,
-        activity, is_certain, callback_instance_id, publication_id, island
+        activity, is_certain, callback_instance_id, publication_id, request_id, island
 ),
 owned AS (
     SELECT
-        w.interval_id, w.flow_rank, w.take_id, w.part, w.activity, w.from_ns, w.to_ns,
+        w.interval_id, w.flow_rank, w.take_id, w.part, w.activity, w.request_id, w.from_ns, w.to_ns,
         CASE
             WHEN w.activity IN ('publish', 'intra', 'rclcpp', 'rcl', 'rmw', 'dds') THEN p.thread_id
             ELSE i.thread_id
@@ -349,6 +415,8 @@ interval AS MATERIALIZED (
     LEFT JOIN store.take AS t ON w.take_id = t.take_id
     QUALIFY w.activity NOT IN ('cache', 'timer', 'unpublished', 'stored', 'response_to_take')
         AND w.to_ns > w.from_ns
+        -- A thread of which nothing is known did the work of a call.
+        AND (w.request_id IS NULL OR w.thread_id IS NOT NULL)
 )
 SELECT
     w.run_id,
@@ -377,7 +445,8 @@ SELECT
     s.by_kind,
     s.by_thread_id,
     s.by_other_thread_id,
-    s.by_priority
+    s.by_priority,
+    w.request_id
 FROM whole AS w
 LEFT JOIN main.schedule_piece('interval', runs) AS s
     ON w.interval_id = s.interval_id AND s.state IS NOT NULL

@@ -192,6 +192,13 @@ def test_what_follows_from_a_request_without_a_callback_names_its_node(
     assert lines[3].endswith("  thread thread 1  ◀")
 
 
+def test_a_callback_that_waits_for_a_service_names_it(empty_database: Path, tmp_path: Path) -> None:
+    with database_of("../internal.flow_steps/message", empty_database, tmp_path) as database:
+        lines = str(database.flow(publication_id=1, direction="forward")).splitlines()
+    (line,) = [line for line in lines if "Filter::image" in line]
+    assert "  ran 200 ns  service /add (/server) 85 ns: queue 40 ns, callback 30 ns  " in line
+
+
 @pytest.mark.thorough
 def test_calls_of_services(empty_database: Path, tmp_path: Path) -> None:
     with database_of("services_forward", empty_database, tmp_path) as database:

@@ -5,7 +5,8 @@
 --     (until_ns): writing the message comes after the last event of the call, so that it took until
 --     then at most. And the events of the user's own tracepoints inside of callback instances. And
 --     what else made the node of a dead end publish (main.dead_end): there a link may be missing.
---     And how long a message was stored, until its subscription existed (stored_ns).
+--     And how long a message was stored, until its subscription existed (stored_ns). And the
+--     services that a callback instance called and waited for (calls).
 -- grain: one row per vertex and link that leads to it
 -- param: kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or 'response'
 -- param: id BIGINT  Its identity
@@ -100,12 +101,27 @@ otherwise AS (
     JOIN ended AS e ON c.subscription_id = e.subscription_id
     WHERE i.run_id = $run_id
         AND i.callback_instance_id IN (SELECT id FROM step WHERE kind = 'callback_instance')
+),
+called AS (
+    SELECT
+        callback_instance_id,
+        list(
+            {
+                'service': service_name, 'server': server, 'waited_ns': returned_ns - sent_ns,
+                'queue_ns': start_ns - sent_ns, 'served_ns': answered_ns - start_ns
+            }
+            ORDER BY sent_ns, request_id
+        ) AS calls
+    FROM main.waited_call
+    WHERE run_id = $run_id
+        AND callback_instance_id IN (SELECT id FROM step WHERE kind = 'callback_instance')
+    GROUP BY callback_instance_id
 )
 SELECT s.run_id, s.depth, s.from_kind, s.from_id, s.link_kind, s.wait_ns, s.candidate_count,
     s.is_loss_affected, s.kind, s.id, s.start_ns, s.end_ns, s.node, s.label, s.topic_name,
     s.symbol, s.thread, s.host, s.missing, s.reason, s.cut_count, s.internal_count,
     w.busy_min_ns, w.busy_max_ns, u.until_ns, v.user_events,
-    o.published AS otherwise_published, k.stored_ns
+    o.published AS otherwise_published, k.stored_ns, y.calls
 FROM step AS s
 LEFT JOIN (
     SELECT callback_instance_id, busy_min_ns, busy_max_ns
@@ -114,6 +130,7 @@ LEFT JOIN (
 ) AS w ON s.kind = 'callback_instance' AND s.id = w.callback_instance_id
 LEFT JOIN happened AS v ON s.kind = 'callback_instance' AND s.id = v.callback_instance_id
 LEFT JOIN otherwise AS o ON s.kind = 'callback_instance' AND s.id = o.callback_instance_id
+LEFT JOIN called AS y ON s.kind = 'callback_instance' AND s.id = y.callback_instance_id
 LEFT JOIN derive.stored_take AS k
     ON s.kind = 'take' AND s.id = k.take_id AND s.link_kind = 'transport' AND k.run_id = $run_id
 LEFT JOIN went_on AS u ON s.kind = 'publication' AND s.id = u.publication_id

@@ -1,7 +1,8 @@
 -- name: internal.perfetto_slice
 -- title: Slices in Perfetto
 -- description: Begins and ends of slices of threads and of executors, in the order of each track,
---     with the links between them. A link begins at the last and ends at the first moment of a
+--     with the links between them. A request whose response a callback waited for lasts until then.
+--     A link begins at the last and ends at the first moment of a
 --     request or response that was traced.
 -- grain: one row per begin and end of a slice, and per moment
 -- column: track BIGINT  Its track
@@ -12,9 +13,18 @@
 -- column: id BIGINT  What it is of
 -- column: symbol_id BIGINT  Callback whose symbol it has; NULL: none
 -- column: candidate_count BIGINT  How many causes of it are possible; NULL: one
+-- column: queue_ns BIGINT [ns]  Of a request that a callback waited for: until the service began
+-- column: served_ns BIGINT [ns]  Of the same: the service's callback, until it answered
 -- column: outgoing UBIGINT[]  Links that begin there
 -- column: incoming UBIGINT[]  Links that end there
-WITH slice AS MATERIALIZED (
+WITH waited AS MATERIALIZED (
+    SELECT
+        request_id, returned_ns, start_ns - sent_ns AS queue_ns,
+        answered_ns - start_ns AS served_ns
+    FROM main.waited_call
+    WHERE run_id = $run_id
+),
+slice AS MATERIALIZED (
     SELECT
         i.thread_id * 8 + 2 AS track, i.start_ns, coalesce(i.end_ns, i.start_ns) AS end_ns,
         0 AS code, i.callback_id AS object_id, i.callback_instance_id AS id,
@@ -33,10 +43,13 @@ WITH slice AS MATERIALIZED (
     WHERE run_id = $run_id AND taken_ns >= $start_ns AND taken_ns < $end_ns
         AND method <> 'callback_only'
     UNION ALL
-    SELECT sender_thread_id * 8 + 2, sent_ns, sent_ns, 3, coalesce(client_id, 0), request_id, NULL
-    FROM main.request
-    WHERE run_id = $run_id AND sent_ns >= $start_ns AND sent_ns < $end_ns
-        AND sender_thread_id IS NOT NULL
+    SELECT
+        q.sender_thread_id * 8 + 2, q.sent_ns, coalesce(w.returned_ns, q.sent_ns), 3,
+        2 * coalesce(q.client_id, 0) + (w.request_id IS NOT NULL)::INTEGER, q.request_id, NULL
+    FROM main.request AS q
+    LEFT JOIN waited AS w ON q.request_id = w.request_id
+    WHERE q.run_id = $run_id AND q.sent_ns >= $start_ns AND q.sent_ns < $end_ns
+        AND q.sender_thread_id IS NOT NULL
     UNION ALL
     SELECT receiver_thread_id * 8 + 2, taken_ns, taken_ns, 4, coalesce(service_id, 0), request_id,
         NULL
@@ -127,10 +140,12 @@ event AS (
 )
 SELECT
     e.track, e.at_ns, e.rank, e.object_id * 8 + e.code + 1 AS name, e.code, e.id,
-    e.symbol_id, a.candidate_count, o.arrows AS outgoing, i.arrows AS incoming
+    e.symbol_id, a.candidate_count, w.queue_ns, w.served_ns, o.arrows AS outgoing,
+    i.arrows AS incoming
 FROM event AS e
 LEFT JOIN outgoing AS o ON e.rank > 0 AND e.code = o.code AND e.id = o.id
 LEFT JOIN incoming AS i ON e.rank > 0 AND e.code = i.code AND e.id = i.id
+LEFT JOIN waited AS w ON e.rank > 0 AND e.code = 3 AND e.id = w.request_id
 LEFT JOIN derive.ambiguous_effect AS a
     ON e.rank > 0 AND e.id = a.id AND a.run_id = $run_id
     AND e.code = CASE a.kind WHEN 'take' THEN 2 ELSE 1 END

@@ -28,16 +28,13 @@ WITH chosen AS MATERIALIZED (
 ),
 call AS MATERIALIZED (
     SELECT
-        l.callback_instance_id, c.node, c.label, q.service_id,
-        sum(a.taken_ns - q.sent_ns)::BIGINT AS call_ns
-    FROM main.link_request AS l
-    JOIN main.request AS q ON l.request_id = q.request_id
-    JOIN main.response AS a ON q.request_id = a.request_id
-    JOIN main.callback_instance AS i ON l.callback_instance_id = i.callback_instance_id
+        w.callback_instance_id, c.node, c.label, w.service_id,
+        sum(w.returned_ns - w.sent_ns)::BIGINT AS call_ns
+    FROM main.waited_call AS w
+    JOIN main.callback_instance AS i ON w.callback_instance_id = i.callback_instance_id
     JOIN chosen AS c ON i.callback_id = c.callback_id
-    WHERE list_contains($runs, l.run_id)
-        AND a.taken_ns BETWEEN q.sent_ns AND i.end_ns
-    GROUP BY l.callback_instance_id, c.node, c.label, q.service_id
+    WHERE list_contains($runs, w.run_id)
+    GROUP BY w.callback_instance_id, c.node, c.label, w.service_id
 ),
 meanwhile AS (
     SELECT

@@ -1,0 +1,34 @@
+-- name: main.waited_call
+-- description: Calls of services that a callback waited for: it sent the request, and took the
+--     response before it ended. Between them it did nothing but wait, as far as the trace shows.
+-- grain: one row per such call
+-- column: run_id BIGINT  Run
+-- column: request_id BIGINT  The request
+-- column: callback_instance_id BIGINT  Callback instance that waited
+-- column: service_id BIGINT  The service; NULL: not in the trace
+-- column: service_name VARCHAR  Its name
+-- column: server VARCHAR  Node that offers it, or process in brackets; NULL: not in the trace
+-- column: server_instance_id BIGINT  Callback instance of the service; NULL: not traced
+-- column: sent_ns BIGINT [epoch ns]  The request is sent
+-- column: taken_ns BIGINT [epoch ns]  It is taken
+-- column: start_ns BIGINT [epoch ns]  The callback of the service begins; where none is traced, the
+--     take
+-- column: answered_ns BIGINT [epoch ns]  The response is sent
+-- column: returned_ns BIGINT [epoch ns]  It is taken
+SELECT
+    l.run_id, l.request_id, l.callback_instance_id, q.service_id,
+    coalesce(v.service_name, c.service_name, '?') AS service_name,
+    main.node_label(n.full_name, r.name, r.pid) AS server,
+    s.callback_instance_id AS server_instance_id,
+    q.sent_ns, q.taken_ns, coalesce(s.start_ns, q.taken_ns) AS start_ns, a.sent_ns AS answered_ns,
+    a.taken_ns AS returned_ns
+FROM main.link_request AS l
+JOIN main.request AS q ON l.request_id = q.request_id
+JOIN main.response AS a ON q.request_id = a.request_id
+JOIN main.callback_instance AS i ON l.callback_instance_id = i.callback_instance_id
+LEFT JOIN main.callback_instance AS s ON q.callback_instance_id = s.callback_instance_id
+LEFT JOIN main.client AS c ON q.client_id = c.client_id
+LEFT JOIN main.service AS v ON q.service_id = v.service_id
+LEFT JOIN main.node AS n ON v.node_id = n.node_id
+LEFT JOIN main.process AS r ON v.process_id = r.process_id
+WHERE a.taken_ns BETWEEN q.sent_ns AND i.end_ns
