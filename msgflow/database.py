@@ -657,8 +657,9 @@ class Database:
         only: it does not say how much the same system differs when it is started again.
 
         Args:
-            run_a: baseline run: name or id.
-            run_b: run to compare with it: name or id.
+            run_a: baseline run: name, id, or label KEY=VALUE; several runs, with commas between
+                them, count as one value each.
+            run_b: run to compare with it, likewise.
             run: in place of both, the one run whose windows are compared.
             window (START..END): what counts of each side, such as 0s..60s.
             what: latency of 'paths' or between their 'ends', duration of 'callbacks', time from

@@ -6,26 +6,21 @@ import re
 import shlex
 from collections import Counter
 from dataclasses import dataclass, replace
-from statistics import NormalDist
 from typing import TYPE_CHECKING, Any
 
 from msgflow.errors import UsageError
 from msgflow.fleet.lake_connection import Choice, Reading, choose
 from msgflow.query.compare import STATISTICS, Failure, failures, share_of
 from msgflow.query.selection import CASES, CUT_COLUMN
-from msgflow.result.query_result import QueryResult
-from msgflow.sql.statement import internal_sql
+from msgflow.query.several_runs import compared
 from msgflow.text.name_suggestions import meant_or, nearest
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
-    import duckdb
-
     from msgflow.fleet.lake import Lake
+    from msgflow.result.query_result import QueryResult
 
-# With fewer runs on one side and many on the other, intervals are too narrow: docs/fleet.md.
-LEAST_RUNS = 6
 _TABLES = ("flow", "e2e_latency")
 _SHOWN = ("B is longer", "B is shorter")
 _MOST_NAMED = 10
@@ -103,26 +98,6 @@ def compare(
     result.notes.extend(_one_sided(result, by))
     result.notes.extend(_doubts(result, confidence))
     return FleetComparison(result)
-
-
-def compared(
-    connection: duckdb.DuckDBPyConnection,
-    *,
-    case: str = "first",
-    confidence: float = 0.95,
-    at_least: float = 0.05,
-) -> QueryResult:
-    """Return the differences between two sides."""
-    measured = internal_sql().run(connection, "fleet_run_value", {"case": case}).to_arrow_table()
-    connection.register("measured", measured)
-    statement = "fleet_comparison"
-    values = {
-        "z": NormalDist().inv_cdf((1 + confidence) / 2),
-        "least_units": LEAST_RUNS,
-        "at_least": at_least,
-    }
-    rows = internal_sql().run(connection, statement, values).to_arrow_table()
-    return QueryResult(rows, replace(internal_sql().header(statement), name="fleet compare"))
 
 
 def _require_label(choice: Choice, key: str | None) -> None:

@@ -17,8 +17,9 @@ from msgflow.query.names import require_places
 from msgflow.query.runner import bind
 from msgflow.query.schedule_notes import function_notes, schedule_notes
 from msgflow.query.selection import CUT_COLUMN
+from msgflow.query.several_runs import LEAST_RUNS, compare_sides
 from msgflow.result.query_result import QueryResult
-from msgflow.run.choice import Run, choose_one, read_runs
+from msgflow.run.choice import Run, choose_one, choose_runs, read_runs
 from msgflow.run.slice import Slice
 from msgflow.run.window import MAXIMUM_NS
 from msgflow.sql.failure import query_errors
@@ -84,9 +85,10 @@ class Comparison:
     """Run B compared with run A.
 
     Attributes:
-        result: one row per path (callback, topic) and statistic, see `main.comparison`.
-        run_a: the baseline.
-        run_b: the run that is compared with it.
+        result: one row per path (callback, topic) and statistic, see `main.comparison`; of several
+            runs `internal.fleet_comparison`.
+        run_a: the baseline; of several runs the first.
+        run_b: the run that is compared with it, likewise.
         skipped: seconds that were left out at the start of each run.
         parts: what the differences of the means of paths consist of, see `internal.change_part`;
             None unless asked for.
@@ -241,7 +243,11 @@ def compare(
         )
     runs = read_runs(connection)
     wanted = (run, run) if run_a is None else (run_a, run_b)
-    first, second = (choose_one(runs, each, "each side of a comparison") for each in wanted)
+    sides = [
+        (choose_one(runs, each, "a comparison of windows"),) if window else _side(runs, each)
+        for each in wanted
+    ]
+    first, second = (side[0] for side in sides)
     both: dict[str, Value] = {"run_a": first.run_id, "run_b": second.run_id}
     both["at_least"] = share_of(at_least)
     both |= _windows(window, (first, second))
@@ -249,6 +255,8 @@ def compare(
     _require_sense(asked)
     if explain and asked["what"] != "paths":
         raise UsageError(f"only changes of paths have parts — {asked['what']}", "leave out --what")
+    if max(map(len, sides)) > 1:
+        return _several(connection, asked, sides, explain=explain)
     if explain and window and asked["skip_first"]:
         raise UsageError("a window leaves out the start itself", "leave out --skip-first")
     compared = _compared(connection, asked, first, second)
@@ -261,6 +269,47 @@ def compare(
     times = [*(window or ("..", ".."))]
     parts = change_parts(connection, compared.result, compared.skipped, asked, times)
     return replace(compared, parts=parts)
+
+
+def _side(runs: Sequence[Run], wanted: str | int | None) -> tuple[Run, ...]:
+    """Return the runs of a side: a name, id or label, or several of them."""
+    is_name = any(run.name == wanted for run in runs)
+    texts = [wanted] if is_name or wanted is None else str(wanted).split(",")
+    found = dict.fromkeys(run for text in texts for run in choose_runs(runs, text))
+    if not found:
+        raise UsageError("the database holds no run yet", "msgflow ingest TRACE")
+    return tuple(found)
+
+
+def _several(
+    connection: duckdb.DuckDBPyConnection,
+    asked: dict[str, Any],
+    sides: Sequence[tuple[Run, ...]],
+    *,
+    explain: bool,
+) -> Comparison:
+    """Compare sides of several runs; their paths alone."""
+    if explain or asked["what"] != "paths":
+        refused = "--explain" if explain else f"--what {asked['what']}"
+        raise UsageError(f"paths of several runs are compared — {refused}", "give one run each")
+    if both := set(sides[0]) & set(sides[1]):
+        raise UsageError(
+            f"a run is on one side — {next(iter(both)).title}", "give different runs or labels"
+        )
+    asked = asked | require_places(connection, [*sides[0], *sides[1]], asked)
+    with query_errors("the comparison", "the comparison failed: {}"):
+        result = compare_sides(connection, asked, sides)
+    first, second = (side[0] for side in sides)
+    result.notes.extend(_one_sided(result, "paths", first, second))
+    for name, side in zip("AB", sides, strict=True):
+        of = f"{len(side)} runs" if len(side) > 1 else "1 run"
+        result.notes.append(f"{name} is {of}: {', '.join(run.title for run in side)}")
+    if (least := min(map(len, sides))) < LEAST_RUNS:
+        result.notes.append(
+            f"{LEAST_RUNS} runs on either side tell a change from chance, one has {least}:"
+            " a_spread_percent and b_spread_percent of --wide say how much its runs differ"
+        )
+    return Comparison(result, first, second, skipped=asked["skip_first"])
 
 
 def share_of(text: str) -> float:

@@ -15,9 +15,10 @@ from typer.testing import CliRunner, Result
 
 from msgflow.cli.app import app
 from msgflow.errors import UsageError
-from msgflow.fleet.compare import LEAST_RUNS, compare, compared
+from msgflow.fleet.compare import compare
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.layout import part_path
+from msgflow.query.several_runs import LEAST_RUNS, compared
 from msgflow.sql.statement import internal_sql
 
 PATH = "/camera → /image → /control"

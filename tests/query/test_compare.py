@@ -8,10 +8,11 @@ from typing import Any
 
 import duckdb
 import pytest
-from golden import BASE, fill_case, insert
+from golden import BASE, FLOW, fill_case, insert
 from thorough import thorough
 
 import msgflow
+from msgflow.db.derivation import derive_table
 from msgflow.errors import UsageError
 from msgflow.query.compare import parse_conditions
 
@@ -575,3 +576,81 @@ def test_a_start_with_the_longest_values_is_named(fresh_database: Path) -> None:
     assert (mean["a_count"], mean["verdict"]) == (VALUES - 49, "no difference shown")
     assert later.failures(["p95>50%"]) == []
     assert len(comparison.failures(["p95>50%"])) == 1
+
+
+def _fill_runs(path: Path, latencies: list[int]) -> None:
+    """For each latency a run of 20 flows from a timer of /camera; the first six are old."""
+    tables: dict[str, list[dict[str, Any]]] = {}
+
+    def add(table: str, **values: str | int | None) -> None:
+        texts = {key: None if value is None else str(value) for key, value in values.items()}
+        tables.setdefault(table, []).append(texts)
+
+    for name in ("clock", "host", "trace", "process", "thread"):
+        tables[name] = [BASE[name]]
+    for run, latency in enumerate(latencies, start=1):
+        label = f"['version={'new' if run > 6 else 'old'}']"
+        add("run", run_id=run, name=f"start{run}", start_ns=0, labels=label)
+        add("node", node_id=2 * run, run_id=run, full_name="/camera")
+        add("node", node_id=2 * run + 1, run_id=run, full_name="/viewer")
+        add("timer", timer_id=run, run_id=run, node_id=2 * run, period_ns=1_000_000)
+        add("publisher", publisher_id=run, run_id=run, node_id=2 * run, topic_name="/image")
+        add(
+            "subscription",
+            subscription_id=run,
+            run_id=run,
+            node_id=2 * run + 1,
+            topic_name="/image",
+        )
+        add("callback", callback_id=2 * run, run_id=run, node_id=2 * run, kind="timer",
+            timer_id=run, subscription_id=None)  # fmt: skip
+        add("callback", callback_id=2 * run + 1, run_id=run, node_id=2 * run + 1,
+            kind="subscription", timer_id=None, subscription_id=run)  # fmt: skip
+        for flow in range(20):
+            one, start = 100 * run + flow, 10_000_000 * (flow + 1)
+            add("callback_instance", callback_instance_id=2 * one, run_id=run, callback_id=2 * run,
+                start_ns=start, end_ns=start + 20, take_id=None, depth=1)  # fmt: skip
+            add("publication", publication_id=one, run_id=run, publisher_id=run,
+                start_ns=start + 5, end_ns=start + 10)  # fmt: skip
+            add("link_causal", run_id=run, callback_instance_id=2 * one, publication_id=one,
+                publisher_id=run, kind="direct")  # fmt: skip
+            add("take", take_id=one, run_id=run, subscription_id=run, taken_ns=start + 30,
+                method="rmw")  # fmt: skip
+            add("link_transport", run_id=run, publication_id=one, take_id=one, publisher_id=run,
+                subscription_id=run, method="exact")  # fmt: skip
+            add("callback_instance", callback_instance_id=2 * one + 1, run_id=run,
+                callback_id=2 * run + 1, start_ns=start + 40, end_ns=start + latency + flow,
+                take_id=one, depth=1)  # fmt: skip
+    with duckdb.connect(str(path)) as connection:
+        for name, rows in tables.items():
+            insert(connection, name, list(rows[0]), [list(row.values()) for row in rows])
+        for run in range(1, len(latencies) + 1):
+            for name in FLOW:
+                derive_table(connection, name, run)
+
+
+def test_a_run_of_several_on_a_side_is_one_value(fresh_database: Path) -> None:
+    old, new = [1000, 1010, 1020, 1005, 1015, 1025], [1300, 1310, 1320, 1305, 1315, 1325]
+    _fill_runs(fresh_database, old + new)
+    with msgflow.open_db(fresh_database) as database:
+        found = database.compare("version=old", "version=new")
+        (path,) = found.changes().to_arrow().to_pylist()
+        few = database.compare("start1,2", "start7,start8")
+        with pytest.raises(UsageError, match="is on one side"):
+            database.compare("version=old", "start1")
+        for refused in ({"what": "topics"}, {"explain": True}):
+            with pytest.raises(UsageError, match="paths of several runs"):
+                database.compare("version=old", "version=new", **refused)
+        without = database.compare("version=old", "version=new", skip_first=0.155)
+    assert (path["change"], path["path"]) == ("longer", "/camera → /image → /viewer")
+    # The mean without the lowest and the highest run of the medians.
+    assert (path["a_median_ns"], path["b_median_ns"], path["a_count"]) == (1021, 1321, 6)
+    assert "A is 2 runs: start1 (1), start2 (2)" in few.result.notes
+    assert any("one has 2" in note for note in few.result.notes)
+    rows = few.result.to_arrow().to_pylist()
+    assert {row["verdict"] for row in rows} == {"too few runs", "not estimated"}
+    assert [row["a_ns"] for row in rows if row["statistic"] == "median"] == [1014]
+    assert few.failures(["median>20%"])[0].reason == (
+        "29.59 % more (0.001014 ms to 0.001314 ms); too few runs to exclude chance"
+    )
+    assert {row["a_flows"] for row in without.result.to_arrow().to_pylist()} == {6 * 5}
