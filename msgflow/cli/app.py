@@ -16,6 +16,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from msgflow.cli.completion import is_completing
 from msgflow.cli.errors import print_exception
+from msgflow.cli.options import plain, plain_help
 from msgflow.cli.output import discard_stdout, print_error
 from msgflow.cli.signals import HANDLER
 from msgflow.errors import ExitCode, UsageError, require_utf8
@@ -73,6 +74,10 @@ class RootGroup(TyperGroup):
         super().__init__(**options)
         self.commands = {name: _listed(name, summary) for name, summary in COMMANDS.items()}
 
+    def get_help_option(self, ctx: Any) -> Any:
+        """Return --help, which takes nothing."""
+        return plain(super().get_help_option(ctx))
+
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of all commands, those of other distributions last."""
         for point in _added():
@@ -94,7 +99,9 @@ class RootGroup(TyperGroup):
                 hint = " or ".join(header.command for header in meant)
                 raise UsageError(f"there is no such command — {args[0]}", hint)
         name, summary, rest = super().resolve_command(ctx, args)
-        return name, summary and _imported(str(name), rest), rest
+        command = summary and _imported(str(name), rest)
+        plain_help(command or self, ctx)
+        return name, command, rest
 
     def main(self, *args: Any, **options: Any) -> None:
         """Run a command line; an exception becomes a message and an exit code."""

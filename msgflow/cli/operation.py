@@ -9,7 +9,7 @@ and `output`, stands in `msgflow/cli/options.py`, by its name; a docstring may s
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterator, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from copy import copy
 from inspect import Parameter, Signature, signature
 from pathlib import Path
@@ -18,7 +18,7 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import docstring_parser
 import typer
-from typer.models import OptionInfo
+from typer.models import ArgumentInfo, OptionInfo
 
 from msgflow.cli.options import ADVANCED, ADVANCED_NAMES, SHARED, one_text, path_of
 from msgflow.files.default_files import DEFAULT_DATABASE
@@ -31,8 +31,9 @@ _METAVARS = {bool: "", int: "NUMBER", float: "NUMBER", str: "TEXT"}
 
 def operation(function: Command) -> Command:
     """Make a function a command: Typer finds its parameters and its help where it looks."""
-    set_parameters(function, list(parameters_of(function)))
-    function.__doc__ = _help(function)
+    parameters = list(parameters_of(function))
+    set_parameters(function, parameters)
+    function.__doc__ = "\n\n".join([_help(function), *_arguments(parameters)])
     return function
 
 
@@ -64,7 +65,8 @@ def asks(method: Callable[..., Any]) -> Callable[[Command], Command]:
             show(found, **{each.name: given[each.name] for each in shown})
 
         set_parameters(command, list(parameters.values()))
-        command.__doc__ = f"{_help(method)}\n\n{_help(show)}"
+        arguments = _arguments(parameters.values())
+        command.__doc__ = "\n\n".join([_help(method), _help(show), *arguments])
         return command
 
     return decorate
@@ -102,6 +104,16 @@ def parameters_of(
             if get_args(annotation)[0] is Path and isinstance(default, str):
                 default = Path(default)
             yield parameter.replace(default=default, annotation=annotation)
+
+
+def _arguments(parameters: Iterable[Parameter]) -> Iterator[str]:
+    """Yield what arguments are. Typer would show their types as Python writes them."""
+    for parameter in parameters:
+        _, info = get_args(parameter.annotation)
+        if isinstance(info, ArgumentInfo):
+            info.hidden = True
+            name = (info.metavar or parameter.name.upper()).strip("[].")
+            yield f"{escape(name)}: {info.help}"
 
 
 def escape(text: str) -> str:

@@ -14,7 +14,7 @@ from typer.core import TyperCommand, TyperOption
 
 from msgflow.cli.header_options import given_of, header_parameter
 from msgflow.cli.operation import escape, parameters_of, set_parameters
-from msgflow.cli.options import DefaultGroup, one_text
+from msgflow.cli.options import DefaultGroup, one_text, plain
 from msgflow.cli.output import print_lines, print_result
 from msgflow.database import Database
 from msgflow.errors import UsageError
@@ -207,6 +207,9 @@ def _command_class(header: Header, own: Set[str]) -> type[TyperCommand]:
     """Return the class of a command; `own` options are not those of every query."""
 
     class QueryCommand(TyperCommand):
+        def get_help_option(self, ctx: Any) -> Any:
+            return plain(super().get_help_option(ctx))
+
         def format_help(self, ctx: Any, formatter: Any) -> None:
             # Completion still offers the options: they are hidden only here.
             common = [

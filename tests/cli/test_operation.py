@@ -67,7 +67,8 @@ def test_a_docstring_becomes_the_help(monkeypatch: pytest.MonkeyPatch) -> None:
     text = " ".join(asked(said, "--help").replace("│", " ").split())
     for part in (
         "Say what was given. All of [it].",
-        "WHO <str> The one who says it [required]",
+        "{WHO} [sizes]...",
+        "WHO: The one who says it SIZES: As texts",
         "--file FILE Where [default: a]",
         "--once Only once",
         "--really --no-really Is it so [default: really]",
