@@ -337,7 +337,7 @@ def _without_callbacks(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run
     what = "process records" if len(rows) == 1 else "processes record"
     return [
         f"{len(rows)} {what} no callbacks, without rclcpp (as those of rclpy): {names};"
-        " path-breakdown has their times from take to publication"
+        " msgflow query path-breakdown has their times from take to publication"
     ]
 
 

@@ -356,7 +356,7 @@ def test_processes_that_record_no_callbacks_are_named(
         "(3, 'started_late', 'c 9 on vm')) AS t (run_id, name, subject)"
     )
     noted = header(QUERY.replace("-- param", "-- note: callbacks\n-- param"))
-    rest = "path-breakdown has their times from take to publication"
+    rest = "msgflow query path-breakdown has their times from take to publication"
 
     def notes(run: str) -> list[str]:
         return list(run_query(connection, noted, {}, Slice(run=run)).notes[-1:])

@@ -224,13 +224,15 @@ def test_nodes(way: str, demo: Path, serve: Serve, report: Report, page: Page) -
 def test_processes_without_callbacks_are_named(
     real: Callable[[str], Path], serve: Serve, page: Page
 ) -> None:
-    """In the words of the command line, and their nodes are said to have no callback."""
+    """In the words of the command line without its hint; their nodes are said to have none."""
     database = real("real_py_mixed")
     with open_db(database) as opened:
         (note,) = (one for one in opened.query("callbacks").notes if "rclpy" in one)
     page.open(serve(database).address)
     page.go("#/nodes")
-    assert note in page.page.locator("main").inner_text()
+    said, hint = note.split("; ")
+    assert said in page.page.locator("main").inner_text()
+    assert hint not in page.page.locator("main").inner_text()
     page.page.get_by_text("No callback of /filter_image was recorded.").wait_for()
 
 

@@ -82,6 +82,7 @@ export class ComparePage {
           },
         },
       },
+      !this.other && h("option", { selected: true }, "choose a run"),
       others.map((run) =>
         h("option", { value: String(run.run_id), selected: run === this.other }, run.name)
       ),
@@ -135,18 +136,23 @@ export class ComparePage {
     await this.show();
   }
 
-  // The run before, of the same system; else the one before it in the list.
+  // The run before, of the same system, if there is one.
   async before(others) {
-    if (others.length > 1) {
-      const { run_id: found } = await this.app.fetch("run_before");
-      const before = others.find((run) => run.run_id === found[0]);
-      if (before) return before;
-    }
-    return others[Math.max(this.app.runs.indexOf(this.app.run) - 1, 0)];
+    // A report has one other run.
+    if (!this.app.source.isServed) return others[0];
+    const { run_id: found } = await this.app.fetch("run_before");
+    return others.find((run) => run.run_id === found[0]);
   }
 
   // What was measured first; intervals, and with them verdicts, take longer.
   async show() {
+    if (!this.other) {
+      clear(
+        this.body,
+        h("p", {}, "No earlier run is of the same system: choose the one to compare with."),
+      );
+      return;
+    }
     replace({ page: "compare", other: this.other.run_id, what: this.what });
     this.app.linksMoved();
     this.abort?.abort();
@@ -195,7 +201,7 @@ export class ComparePage {
           {},
           `${
             count(changed.size, ONE_OF[this.what])
-          } of ${subjects.size} differ between ${table.meta.a} (A) and ${table.meta.b} (B): the 95 % confidence interval of B − A does not contain 0. Separation says how rarely values of one run are found among those of the other, not how far apart they are.`,
+          } of ${subjects.size} differ between ${table.meta.a} (A) and ${table.meta.b} (B): the 95 % confidence interval of B − A does not contain 0.`,
         ),
       dataTable(table, {
         label: isQuick ? "measured" : "comparison",
