@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 HERE = Path(__file__).parent
 # How many views have a column that is described once for all of them.
 _OFTEN = 5
+_SAID = "said once of all"
 MODEL = HERE.parent / "schema" / "model.sql"
 
 _MODEL = """\
@@ -72,7 +73,7 @@ These views and macros are the schema `main` of a database: what queries, export
 [SQLAlchemy](cookbook.md#sqlalchemy). The tables behind them are in `schema/store.sql`; any version
 may change those.
 
-- A column without a type is a `BIGINT`.
+- A column without a type is a `BIGINT`. `run_id`, the run that a row belongs to, is not listed.
 - `*_ns` are nanoseconds: since the epoch on the common time axis [epoch ns], or of a duration.
 - An identity (`*_id`) is unique in the database. `take_id` refers to the view `take`, and so on.
 - A handle is the address of an object: it means something only in its process, until the object
@@ -238,6 +239,8 @@ def data_model() -> str:
     columns = _often(_column(column) for header in public for column in header.columns)
     params = _often(_param(param, header.kind) for header in public for param in header.params)
     known = dict.fromkeys([*columns, *params], "as above")
+    every = [column for header in public for column in header.columns]
+    known |= {_column(column): _SAID for column in every if column.name == "run_id"}
     parts = [_DATA_MODEL, *columns, "\nParameters of many macros:\n\n", *params]
     for title, kind in (("Views", "view"), ("Macros", "macro")):
         parts.append(f"\n## {title}\n")
@@ -346,11 +349,13 @@ def _lines(described: dict[str, str], known: dict[str, str]) -> list[str]:
     there = {
         where: names
         for where, names in same.items()
-        if where == "as above" or (where and len(names) > 1)
+        if where in ("as above", _SAID) or (where and len(names) > 1)
     }
     named = {name for names in there.values() for name in names}
     lists = [
-        f"- {', '.join(f'`{name}`' for name in names)}: {where}\n" for where, names in there.items()
+        f"- {', '.join(f'`{name}`' for name in names)}: {where}\n"
+        for where, names in there.items()
+        if where != _SAID
     ]
     return [*lists, *(line for name, line in described.items() if name not in named)]
 
