@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 from msgflow.query.catalogue import load_query
 from msgflow.query.path_numbers import only_path
-from msgflow.query.runner import bind
-from msgflow.query.steps import Steps
+from msgflow.query.runner import Steps, bind
 from msgflow.sql.statement import internal_sql
 
 if TYPE_CHECKING:
