@@ -37,8 +37,10 @@ def write_empty(path: Path) -> None:
         return
     with contextlib.closing(open_file(path, read_only=False)) as con:
         with transaction(con):
-            for statement in _statements():
-                con.execute(statement)
+            for script in _scripts():
+                # One by one: what looks at a statement before it runs, such as EXPLAIN, sees it.
+                for statement in con.extract_statements(script):
+                    con.execute(statement)
             objects.apply(con)
         con.execute("CHECKPOINT")  # closing would fail silently, and leave a log behind
     _cache(path.read_bytes())
@@ -77,7 +79,7 @@ def _cache_file() -> Path:
     return root / "msgflow" / f"database-{duckdb.__version__}-{key}"
 
 
-def _statements() -> Iterator[str]:
+def _scripts() -> Iterator[str]:
     yield store_file().read_text(encoding="utf-8")
     # As Alembic makes it.
     yield (
