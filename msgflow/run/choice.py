@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
@@ -37,7 +37,7 @@ class Run:
     start_ns: int | None
     labels: tuple[str, ...] = ()
     end_ns: int | None = None
-    simulated: tuple[tuple[int, int], ...] = ()
+    simulated: tuple[tuple[int, int], ...] = field(default=(), repr=False, compare=False)
 
     @property
     def title(self) -> str:

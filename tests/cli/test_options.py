@@ -17,7 +17,7 @@ HOME = "/home/robot"
 
 def commands(group: Any, names: list[str]) -> Iterator[Any]:
     for name in names:
-        _, command, _ = group.resolve_command(None, [name])
+        _, command, _ = group.resolve_command(group.context_class(group), [name])
         yield command
         if hasattr(command, "commands"):
             # The queries are alike: one stands for all.

@@ -527,7 +527,7 @@ def test_runs_without_anything_in_common_are_refused(alike: Path) -> None:
             database.compare("before", "after")
         with pytest.raises(UsageError, match="there is no such run — never"):
             database.compare("before", "never")
-        with pytest.raises(UsageError, match="each side of a comparison is of one run"):
+        with pytest.raises(UsageError, match="a run is on one side — before"):
             database.compare("before", "all")
         with pytest.raises(UsageError, match="--what has no such value — nodes"):
             database.compare("before", "after", what="nodes")

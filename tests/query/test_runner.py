@@ -52,6 +52,7 @@ def connection() -> duckdb.DuckDBPyConnection:
         "(1, '/c', 400, NULL), (2, '/a', 1000000000, false), (2, '/a', 2500000000, false)"
         ") AS t (run_id, topic, start_ns, is_internal)"
     )
+    con.execute("CREATE TABLE simulated_time (run_id BIGINT, at_ns BIGINT, simulated_ns BIGINT)")
     con.execute("CREATE SCHEMA derive")
     (together,) = (each for each in objects.views() if each.name == "derive.clock_group_id")
     con.execute(together.body)

@@ -96,6 +96,8 @@ class Analysis:
         return [value for (value,) in self.rows(sql)]
 
     def close(self) -> None:
+        self._provide(_everything())
+        self._keep()
         self._connection.close()
 
     def _provide(self, needed: frozenset[str], found: frozenset[str] = frozenset()) -> None:

@@ -23,7 +23,11 @@ class _ParsingOnce:
     def __getattr__(self, name: str) -> Any:
         return getattr(self._connection, name)
 
-    def execute(self, query: str, parameters: object = None) -> duckdb.DuckDBPyConnection:
+    def execute(
+        self, query: str | duckdb.Statement, parameters: object = None
+    ) -> duckdb.DuckDBPyConnection:
+        if not isinstance(query, str):
+            return self._connection.execute(query, parameters)
         if query not in self._known:
             statements = self._connection.extract_statements(query)
             if len(statements) != 1:

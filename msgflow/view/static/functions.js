@@ -13,7 +13,7 @@ const HELP =
 // Of all nodes and callbacks. Only a server has the library: a report goes without it.
 export async function functions(app) {
   const table = await sampled(app);
-  return table && section(HELP, await graphs(table, ["all samples"]));
+  return table && framed(HELP, await graphs(table, ["all samples"]));
 }
 
 // Of the callbacks on the way of a path's flows: the slowest of these beside the others.
@@ -45,7 +45,7 @@ export async function pathFunctions(app, path) {
     CHOICES.map((number) => h("option", { value: number }, `${names(number)[0]}, and the others`)),
   );
   choice.value = String(CHOICES[1]);
-  return section(
+  return framed(
     `${HELP} A function that is wider for the slowest flows than for the others took more of their CPU time. All that callbacks on the way did counts, also behind what they published.`,
     h("div", { className: "tools" }, choice),
     place,
@@ -57,7 +57,7 @@ async function sampled(app, params = {}) {
   return table?.rows ? table : null;
 }
 
-function section(help, ...content) {
+function framed(help, ...content) {
   return h(
     "section",
     {},
