@@ -11,7 +11,12 @@ from msgflow.cli.operation import operation
 from msgflow.cli.options import SELECTION
 from msgflow.cli.output import is_screen, print_note
 from msgflow.cli.query_command import build_command, choice_of, chosen_by
-from msgflow.cli.sections import SectionsFormat, print_sections, screen_sections
+from msgflow.cli.sections import (
+    SectionsFormat,
+    chosen_format,
+    print_sections,
+    screen_sections,
+)
 from msgflow.database import Database
 from msgflow.files.default_files import DEFAULT_DATABASE
 from msgflow.query.catalogue import load_query
@@ -43,6 +48,7 @@ def command(
     Args:
         form (table|json|markdown): By default by the suffix of FILE, else table.
     """
+    form = chosen_format(form, output)
     with Database(database) as opened:
         # Its topics are a query of their own.
         results = {

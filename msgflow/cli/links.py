@@ -15,7 +15,6 @@ from msgflow.files.default_files import DEFAULT_DATABASE
 from msgflow.text.values import count
 
 if TYPE_CHECKING:
-    from msgflow.database import Database
     from msgflow.links import AppliedLinks
 
 

@@ -110,7 +110,7 @@ def _arguments(parameters: Iterable[Parameter]) -> Iterator[str]:
     """Yield what arguments are. Typer would show their types as Python writes them."""
     for parameter in parameters:
         _, info = get_args(parameter.annotation)
-        if isinstance(info, ArgumentInfo):
+        if isinstance(info, ArgumentInfo) and info.help:
             info.hidden = True
             name = (info.metavar or parameter.name.upper()).strip("[].")
             yield f"{escape(name)}: {info.help}"

@@ -110,8 +110,8 @@ SHARED: dict[str, Any] = {
         show_default="the latest",
     ),
     "start": _selecting(
-        "Start of the time window: seconds from the start of the run, 100ms, ISO time, or epoch ns"
-        " (16 digits or more)",
+        "Start of the time window: seconds from the start of the run, 100ms, ISO time, epoch ns"
+        " (16 digits or more), or sim:12.5 (seconds of a simulation)",
         "TIME",
     ),
     "end": _selecting("End of the time window, in the same formats as --start", "TIME"),

@@ -33,6 +33,13 @@ _SUFFIXES = {
 }
 
 
+def chosen_format(form: SectionsFormat | None, output: Path | None) -> SectionsFormat:
+    """Return the format that is asked for, else that of the suffix."""
+    if form is not None:
+        return form
+    return SectionsFormat.TABLE if output is None else by_suffix(output, _SUFFIXES)
+
+
 def print_sections(
     results: Mapping[str, QueryResult],
     form: SectionsFormat | None,
@@ -40,8 +47,7 @@ def print_sections(
     brief: Callable[[int], Iterator[str]] | None,
 ) -> None:
     """Print results; `brief` returns the lines of a table of a width, where people read it."""
-    if form is None:
-        form = SectionsFormat.TABLE if output is None else by_suffix(output, _SUFFIXES)
+    form = chosen_format(form, output)
     if form is SectionsFormat.JSON:
         lines = _json_lines(results)
     elif form is SectionsFormat.TABLE and brief is not None:

@@ -10,7 +10,12 @@ from typing import TYPE_CHECKING, Unpack
 
 from msgflow.cli.operation import asks
 from msgflow.cli.output import database_option, print_note, print_runs, print_status
-from msgflow.cli.sections import SectionsFormat, print_sections, screen_sections
+from msgflow.cli.sections import (
+    SectionsFormat,
+    chosen_format,
+    print_sections,
+    screen_sections,
+)
 from msgflow.database import Database
 from msgflow.files.default_files import DEFAULT_DATABASE
 from msgflow.run.slice import SliceWords
@@ -76,6 +81,7 @@ def command(
     Args:
         form (table|json|markdown): By default by the suffix of FILE, else table.
     """
+    form = chosen_format(form, output)
     print_runs([found.run])
     print_sections(found.sections, form, output, None if wide else partial(_brief, found))
     for note in [*_more(found, part, database), *found.notes]:

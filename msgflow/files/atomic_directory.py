@@ -109,7 +109,10 @@ def _is_exported(path: Path) -> bool:
         partition.is_dir()
         and not partition.is_symlink()
         and partition.name.startswith(_PARTITION)
-        and all(file.name == PARTITION_FILE and file.is_file() for file in partition.iterdir())
+        and all(
+            file.name == PARTITION_FILE and file.is_file() and not file.is_symlink()
+            for file in partition.iterdir()
+        )
         for partition in path.iterdir()
     )
 

@@ -109,13 +109,22 @@ class Store:
         real = os.path.join(self._real_root, os.path.normpath(path)) if path else self._real_root
         return os.path.realpath(real) != real
 
-    def require_no_link(self, path: str, suffix: str) -> None:
-        """Raise if a folder, or a file in it with this suffix, is a link: it would seem absent."""
+    def require_files(self, path: str, suffix: str) -> None:
+        """Raise if a folder is a link, or what has this suffix in it is no file.
+
+        It would seem absent.
+        """
         self._require_here(path)
-        if self.is_local and os.path.isdir(self.full(path)):
-            for entry in os.scandir(self.full(path)):
-                if entry.is_symlink() and entry.name.endswith(suffix):
+        if not self.is_local or not os.path.isdir(self.full(path)):
+            return
+        with _reaching(self.url), os.scandir(self.full(path)) as found:
+            for entry in found:
+                if entry.name.endswith(suffix) and not entry.is_file(follow_symlinks=False):
                     self._require_here(f"{path}/{entry.name}")
+                    raise DatabaseError(
+                        f"this is no file — {self.url_of(f'{path}/{entry.name}')}",
+                        "move it away: msgflow did not put it there",
+                    )
 
     def _reading(self, path: str) -> Any:
         if self.is_local:

@@ -113,7 +113,7 @@ class Lake:
     def names(self) -> list[str]:
         """Return the names of the files of the table `run`: keys of runs, and `PACKED`."""
         # `pack` would delete the files of runs that are not listed.
-        self.store.require_no_link(RUN, ".parquet")
+        self.store.require_files(RUN, ".parquet")
         return [
             entry.path.removeprefix(f"{RUN}/").removesuffix(".parquet")
             for entry in self.store.entries(RUN, recursive=False)

@@ -41,6 +41,10 @@ _CONDITION = re.compile(
     rf"\s*(?P<unit>%|ns|us|µs|ms|s)|{SHARE}\s*<\s*-\s*(?P<points>\d+(?:\.\d+)?)\s*%)\s*"
 )
 _UNIT_NS = {"ns": 1, "us": 1_000, "µs": 1_000, "ms": 1_000_000, "s": 1_000_000_000}
+_CUT = (
+    "paths beyond the limits are left out; --max-paths and --max-depth raise them, --from and --to"
+    " choose"
+)
 _UNITS = {"paths": "flows", "ends": "flows", "callbacks": "callback instances", "topics": "takes"}
 # What a verdict adds to a failure: the measured values decide, and these may be chance.
 _CHANCE = {
@@ -304,6 +308,12 @@ def _several(
     for name, side in zip("AB", sides, strict=True):
         of = f"{len(side)} runs" if len(side) > 1 else "1 run"
         result.notes.append(f"{name} is {of}: {', '.join(run.title for run in side)}")
+        doubted = result.table.select(["subject", f"{name.lower()}_{AMBIGUOUS}"])
+        doubted = doubted.rename_columns(["subject", AMBIGUOUS])
+        result.notes.extend(f"{name}: {note}" for note in doubt_notes(connection, side, doubted))
+    if any(row[CUT_COLUMN] for row in result.to_arrow().to_pylist()):
+        result.notes.append(_CUT)
+    result.notes.extend(clock_notes(connection, [*sides[0], *sides[1]]))
     if (least := min(map(len, sides))) < LEAST_RUNS:
         result.notes.append(
             f"{LEAST_RUNS} runs on either side tell a change from chance, one has {least}:"
@@ -444,10 +454,7 @@ def _doubts(
     """Yield notes on limits, losses and verdicts: the numbers do not show these."""
     rows = result.to_arrow().to_pylist()
     if any(row[CUT_COLUMN] for row in rows):
-        yield (
-            "paths beyond the limits are left out; --max-paths and --max-depth raise them, --from"
-            " and --to choose"
-        )
+        yield _CUT
     own = [row for row in rows if row["statistic"] == STATISTICS[0]]
     lost = dict(connection.execute(_LOST, {"runs": [first.run_id, second.run_id]}).fetchall())
     for side, run in (("a", first), ("b", second)):

@@ -349,7 +349,7 @@ def _into(pieces: Sequence[dict[str, Any]], since: tuple[str, ...]) -> Iterator[
         yield ("query", "scheduling", "--measure", of_state, *since)
     # What the trace has no name for cannot be asked for.
     elif (
-        longest["node"] is not None
+        longest["node"] not in _NO_NAMES
         and (of_node := _BY_NODE.get(longest["activity"]))
         and (longest["callback_instance_id"] is not None or of_node[0] not in _OF_CALLBACKS)
     ):

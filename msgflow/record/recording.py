@@ -166,7 +166,7 @@ def _written(log: Path) -> Iterator[IO[bytes]]:
             yield stream
         finally:
             # The program may have moved it, and put something else there.
-            with suppress(FileNotFoundError):
+            with suppress(OSError):
                 found = log.lstat()
                 is_ours = os.path.samestat(found, os.fstat(stream.fileno()))
                 if is_ours and not found.st_size:

@@ -81,7 +81,7 @@ def _simulated(column: Any, moments: Sequence[tuple[int, int]]) -> Any:
     origin = moments[0][0]
     recorded = numpy.array([at - origin for at, _ in moments], dtype=numpy.float64)
     simulated = numpy.array([then for _, then in moments], dtype=numpy.float64)
-    times = compute.subtract(column, origin).cast(pyarrow.float64()).to_numpy()
+    times = compute.subtract(column, origin).cast(pyarrow.float64(), safe=False).to_numpy()
     piece = numpy.clip(numpy.searchsorted(recorded, times, "right") - 1, 0, len(moments) - 2)
     pace = numpy.diff(simulated) / numpy.diff(recorded)
     found = simulated[piece] + (times - recorded[piece]) * pace[piece]

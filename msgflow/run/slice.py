@@ -36,9 +36,9 @@ class SliceWords(RunWords, TimeWords, total=False):
 class Slice:
     """Which runs are read, and between which times, as a user says it.
 
-    Times are an offset from the start of the run ('2.5' in seconds, '100ms'), an ISO time, or
-    nanoseconds since the epoch (an integer, or a text of 16 digits or more). Offsets need exactly
-    one run.
+    Times are an offset from the start of the run ('2.5' in seconds, '100ms'), an ISO time,
+    nanoseconds since the epoch (an integer, or a text of 16 digits or more), or seconds of a
+    simulation ('sim:12.5'). Offsets need exactly one run.
 
     Attributes:
         run: a name, an id, a label KEY=VALUE of several runs, or 'all'; the latest run when None.

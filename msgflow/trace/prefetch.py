@@ -2,42 +2,77 @@
 
 from __future__ import annotations
 
-from collections import deque
-from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+import threading
+from queue import Empty, Full, Queue
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
-    from concurrent.futures import Future
 
 Item = TypeVar("Item")
 
-_END = object()
+_WAIT_SECONDS = 0.1
 
 
 class Prefetch(Generic[Item]):
     """Items of an iterator, made while the consumer works on those before.
 
-    An error of the iterator is raised where the item would have been.
+    An error of the iterator is raised where the item would have been. The thread ends when the
+    items do, or with `close`.
     """
 
     def __init__(self, make: Callable[[], Iterator[Item]], most: int) -> None:
-        """Start; at most so many items wait, and one more is being made."""
-        self._thread = ThreadPoolExecutor(1, "msgflow-reader")
-        self._iterator = make()
-        self._waiting = deque(self._following() for _ in range(most + 1))
+        """Start; at most so many items wait."""
+        self._queue: Queue[Item | BaseException | None] = Queue(most)
+        self._stopped = threading.Event()
+        self._make = make
+        self._thread = threading.Thread(target=self._run, name="msgflow-reader", daemon=True)
+        self._thread.start()
 
     def items(self) -> Iterator[Item]:
         """Yield the items."""
-        while (item := self._waiting.popleft().result()) is not _END:
-            self._waiting.append(self._following())
+        while True:
+            item = self._next()
+            if item is None:
+                return
+            if isinstance(item, BaseException):
+                raise item
             yield item
 
     def close(self) -> None:
         """End the thread; the iterator is closed when this returns."""
-        self._thread.shutdown(cancel_futures=True)
-        if hasattr(self._iterator, "close"):
-            self._iterator.close()
+        self._stopped.set()
+        self._thread.join()
 
-    def _following(self) -> Future[Any]:
-        return self._thread.submit(next, self._iterator, _END)
+    def _next(self) -> Item | BaseException | None:
+        # With a limit, so that a signal is not kept waiting.
+        while True:
+            try:
+                return self._queue.get(timeout=_WAIT_SECONDS)
+            except Empty:
+                continue
+
+    def _run(self) -> None:
+        end: BaseException | None = None
+        try:
+            iterator = self._make()
+            try:
+                for item in iterator:
+                    if not self._put(item):
+                        break
+            finally:
+                close = getattr(iterator, "close", None)
+                if close is not None:
+                    close()
+        except BaseException as error:
+            end = error
+        self._put(end)
+
+    def _put(self, item: Item | BaseException | None) -> bool:
+        while not self._stopped.is_set():
+            try:
+                self._queue.put(item, timeout=_WAIT_SECONDS)
+            except Full:
+                continue
+            return True
+        return False

@@ -34,6 +34,11 @@ def open(
     end at the first damage), or 'auto', which is 'msgflow'. `strict` ends at the first damage.
     `after` has the parts of the same recordings that were read before; it takes in these, which can
     be read only once then. Only msgflow's own decoder can go on like this.
+
+    Raises:
+        TraceError: there is no readable trace below a path, an archive cannot be unpacked, or
+            the reader is not installed.
+        UsageError: there is no reader of that name.
     """
     if reader not in READERS:
         raise UsageError(f"there is no reader {reader!r}", hint=f"use one of {', '.join(READERS)}")

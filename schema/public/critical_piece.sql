@@ -52,18 +52,34 @@ WITH RECURSIVE given AS MATERIALIZED (
         row_number() OVER (ORDER BY latency_ns DESC, flow_id, position) AS position
     FROM query_table(parts)
 ),
+-- What a server did lies within its call, though its clock or a late event may say otherwise. Of
+-- two calls at once the second counts from when the first returned.
 waited_call AS MATERIALIZED (
     SELECT
-        callback_instance_id, request_id, server_instance_id, sent_ns, taken_ns, start_ns,
-        answered_ns, returned_ns
-    FROM main.waited_call
-    WHERE list_contains(runs, run_id)
+        callback_instance_id, request_id, server_instance_id, from_ns AS sent_ns, returned_ns,
+        CASE WHEN taken_ns IS NOT NULL THEN least(greatest(taken_ns, from_ns), returned_ns) END
+            AS taken_ns,
+        CASE WHEN start_ns IS NOT NULL
+            THEN least(greatest(start_ns, taken_ns, from_ns), returned_ns) END AS start_ns,
+        CASE WHEN answered_ns IS NOT NULL
+            THEN least(greatest(answered_ns, start_ns, taken_ns, from_ns), returned_ns) END
+            AS answered_ns
+    FROM (
+        SELECT *, greatest(sent_ns, max(returned_ns) OVER earlier) AS from_ns
+        FROM main.waited_call
+        WHERE list_contains(runs, run_id)
+        WINDOW earlier AS (
+            PARTITION BY callback_instance_id ORDER BY sent_ns, request_id
+            ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING
+        )
+    ) AS w
+    WHERE returned_ns > from_ns
 ),
 -- Calls that callbacks of the flow waited for, and those that their services waited for in turn,
 -- each with what goes on when it returns.
 call AS (
     SELECT
-        g.position, 1 AS level, g.part, g.callback_instance_id, NULL::BIGINT AS outer_id,
+        g.position, g.part, g.callback_instance_id, NULL::BIGINT AS outer_id,
         w.request_id, w.server_instance_id, w.sent_ns, w.taken_ns, w.start_ns, w.answered_ns,
         w.returned_ns
     FROM given AS g
@@ -73,12 +89,12 @@ call AS (
         AND w.returned_ns <= g.to_ns
     UNION ALL
     SELECT
-        c.position, c.level + 1, 'service', c.server_instance_id, c.request_id,
+        c.position, 'service', c.server_instance_id, c.request_id,
         w.request_id, w.server_instance_id, w.sent_ns, w.taken_ns, w.start_ns, w.answered_ns,
         w.returned_ns
     FROM call AS c
     JOIN waited_call AS w ON c.server_instance_id = w.callback_instance_id
-    WHERE c.level < 32 AND w.sent_ns >= c.start_ns AND w.returned_ns <= c.answered_ns
+    WHERE w.sent_ns >= c.start_ns AND w.returned_ns <= c.answered_ns
 ),
 -- When parts begin. What of a call was not traced is a part of what comes before it.
 moment AS (

@@ -96,6 +96,18 @@ def test_packing_deletes_nothing_behind_a_link(lake: Lake, tmp_path: Path) -> No
     assert linked.is_symlink()
 
 
+@pytest.mark.parametrize("kind", ["folder", "pipe"])
+def test_what_is_no_file_among_the_runs_is_an_error(lake: Lake, kind: str) -> None:
+    """It would look like a run that is gone, and `pack` would delete what belongs to it."""
+    place = Path(lake.store.url) / "run" / "stranger.parquet"
+    if kind == "folder":
+        place.mkdir()
+    else:
+        os.mkfifo(place)
+    with pytest.raises(DatabaseError, match=r"no file — .*run/stranger\.parquet"):
+        pack(lake)
+
+
 def test_files_behind_links_are_errors(lake: Lake, tmp_path: Path) -> None:
     (tmp_path / "secret").write_text("secret")
     link = Path(lake.store.url) / "run" / "linked"

@@ -108,7 +108,8 @@ called AS (
         list(
             {
                 'service': service_name, 'server': server, 'waited_ns': returned_ns - sent_ns,
-                'queue_ns': start_ns - sent_ns, 'served_ns': answered_ns - start_ns
+                'queue_ns': CASE WHEN start_ns >= sent_ns THEN start_ns - sent_ns END,
+                'served_ns': CASE WHEN answered_ns >= start_ns THEN answered_ns - start_ns END
             }
             ORDER BY sent_ns, request_id
         ) AS calls

@@ -19,8 +19,9 @@
 -- column: incoming UBIGINT[]  Links that end there
 WITH waited AS MATERIALIZED (
     SELECT
-        request_id, returned_ns, start_ns - sent_ns AS queue_ns,
-        answered_ns - start_ns AS served_ns
+        request_id, returned_ns,
+        CASE WHEN start_ns >= sent_ns THEN start_ns - sent_ns END AS queue_ns,
+        CASE WHEN answered_ns >= start_ns THEN answered_ns - start_ns END AS served_ns
     FROM main.waited_call
     WHERE run_id = $run_id
 ),
