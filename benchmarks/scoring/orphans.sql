@@ -58,7 +58,7 @@ SELECT
     CASE
         WHEN m.is_missing THEN 'its link is missing'
         -- Taken from a ring buffer, with a hole in between.
-        WHEN m.truth = 'recorded' AND m.reason = 'publisher_gap' AND m.is_in_hole
+        WHEN m.truth IN ('recorded', 'kept') AND m.reason = 'publisher_gap' AND m.is_in_hole
             THEN 'events are missing'
         WHEN m.is_undecided AND m.reason = 'publisher_gap' AND m.is_beside_hole
             THEN 'events are missing'
