@@ -68,7 +68,8 @@ UNION ALL
 SELECT
     i.callback_instance_id,
     row_number() OVER (
-        PARTITION BY k.alike_id ORDER BY i.end_ns - i.start_ns DESC NULLS LAST, i.start_ns
+        PARTITION BY k.alike_id
+        ORDER BY i.end_ns - i.start_ns DESC NULLS LAST, i.start_ns, i.callback_instance_id
     ) AS place
 FROM main.callback_instance AS i
 JOIN main.callback_alike AS k ON i.callback_id = k.callback_id

@@ -30,9 +30,17 @@ def known_moments(runs: Sequence[Run]) -> tuple[tuple[int, int], ...]:
 
 def recorded_ns(runs: Sequence[Run], simulated_ns: int) -> int:
     """Return when it was so late in the simulation for the first time, epoch ns."""
-    pieces = [(a, b) for a, b in pairwise(known_moments(runs)) if b[1] != a[1]]
-    begin, end = next(
-        ((a, b) for a, b in pieces if a[1] <= simulated_ns <= b[1]),
-        pieces[0] if simulated_ns < pieces[0][0][1] else pieces[-1],
-    )
+    moments = known_moments(runs)
+    times = [then for _, then in moments]
+    around = [(a, b) for a, b in pairwise(moments) if a[1] <= simulated_ns <= b[1]]
+    if not min(times) <= simulated_ns <= max(times):
+        around = [moments[:2] if simulated_ns < min(times) else moments[-2:]]
+    # It may have stood still, or begun anew.
+    running = [(a, b) for a, b in around if a[1] < b[1]]
+    if not running:
+        raise UsageError(
+            f"the simulation never had this time — {simulated_ns / 1e9:g} s",
+            f"its time is known from {min(times) / 1e9:g} s to {max(times) / 1e9:g} s",
+        )
+    ((begin, end), *_) = running
     return begin[0] + (simulated_ns - begin[1]) * (end[0] - begin[0]) // (end[1] - begin[1])

@@ -15,20 +15,31 @@
 --     take
 -- column: answered_ns BIGINT [epoch ns]  The response is sent
 -- column: returned_ns BIGINT [epoch ns]  It is taken
+-- column: queue_ns BIGINT [ns]  From request to start_ns; NULL: not known, or clocks are apart
+-- column: served_ns BIGINT [ns]  From start_ns to the response; NULL: the same
+WITH call AS (
+    SELECT
+        l.run_id, l.request_id, l.callback_instance_id, q.service_id,
+        coalesce(v.service_name, c.service_name, '?') AS service_name,
+        main.node_label(n.full_name, r.name, r.pid) AS server,
+        s.callback_instance_id AS server_instance_id,
+        q.sent_ns, q.taken_ns, coalesce(s.start_ns, q.taken_ns) AS start_ns, a.sent_ns AS answered_ns,
+        a.taken_ns AS returned_ns
+    FROM main.link_request AS l
+    JOIN main.request AS q ON l.request_id = q.request_id
+    JOIN main.response AS a ON q.request_id = a.request_id
+    JOIN main.callback_instance AS i ON l.callback_instance_id = i.callback_instance_id
+    LEFT JOIN main.callback_instance AS s ON q.callback_instance_id = s.callback_instance_id
+    LEFT JOIN main.client AS c ON q.client_id = c.client_id
+    LEFT JOIN main.service AS v ON q.service_id = v.service_id
+    LEFT JOIN main.node AS n ON v.node_id = n.node_id
+    LEFT JOIN main.process AS r ON v.process_id = r.process_id
+    WHERE a.taken_ns BETWEEN q.sent_ns AND i.end_ns
+)
 SELECT
-    l.run_id, l.request_id, l.callback_instance_id, q.service_id,
-    coalesce(v.service_name, c.service_name, '?') AS service_name,
-    main.node_label(n.full_name, r.name, r.pid) AS server,
-    s.callback_instance_id AS server_instance_id,
-    q.sent_ns, q.taken_ns, coalesce(s.start_ns, q.taken_ns) AS start_ns, a.sent_ns AS answered_ns,
-    a.taken_ns AS returned_ns
-FROM main.link_request AS l
-JOIN main.request AS q ON l.request_id = q.request_id
-JOIN main.response AS a ON q.request_id = a.request_id
-JOIN main.callback_instance AS i ON l.callback_instance_id = i.callback_instance_id
-LEFT JOIN main.callback_instance AS s ON q.callback_instance_id = s.callback_instance_id
-LEFT JOIN main.client AS c ON q.client_id = c.client_id
-LEFT JOIN main.service AS v ON q.service_id = v.service_id
-LEFT JOIN main.node AS n ON v.node_id = n.node_id
-LEFT JOIN main.process AS r ON v.process_id = r.process_id
-WHERE a.taken_ns BETWEEN q.sent_ns AND i.end_ns
+    run_id, request_id, callback_instance_id, service_id, service_name, server, server_instance_id,
+    sent_ns, taken_ns, start_ns, answered_ns, returned_ns,
+    CASE WHEN start_ns BETWEEN sent_ns AND returned_ns THEN start_ns - sent_ns END AS queue_ns,
+    CASE WHEN answered_ns BETWEEN start_ns AND returned_ns THEN answered_ns - start_ns END
+        AS served_ns
+FROM call

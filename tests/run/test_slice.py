@@ -59,7 +59,7 @@ def test_skipping_the_warm_up() -> None:
 
 @pytest.mark.parametrize(
     ("text", "after_ms"),
-    [("sim:1.5", 1000), ("sim:3500ms", 3500), ("sim:2", 2000), ("sim:0s", -2000), ("sim:8", 5000)],
+    [("sim:1.5", 1000), ("sim:3500ms", 3500), ("sim:2", 2000), ("sim:0s", -2000), ("sim:5", 4000)],
 )
 def test_times_of_a_simulation(text: str, after_ms: int) -> None:
     """It stood still for a second, and then ran six times as fast as before."""
@@ -74,6 +74,21 @@ def test_a_simulation_that_stands_still_has_no_windows() -> None:
     run = Run(1, "paused", 0, simulated=((0, 5), (10, 5)))
     with pytest.raises(UsageError, match="nothing tells"):
         Slice(start="sim:1").window([run])
+
+
+@pytest.mark.parametrize(
+    "known",
+    [
+        # It stands still at the end; and it begins anew.
+        ((0, 0), (1, 10), (2, 10)),
+        ((0, 20), (1, 21), (2, 0), (3, 1)),
+    ],
+)
+def test_a_time_that_a_simulation_never_had(known: tuple[tuple[int, int], ...]) -> None:
+    moments = tuple((at * 10**9, then * 10**9) for at, then in known)
+    run = Run(1, "simulated", 0, simulated=moments)
+    with pytest.raises(UsageError, match="never had this time — 12 s"):
+        Slice(start="sim:12").window([run])
 
 
 @pytest.mark.parametrize("text", ["soon", "2,5", "3 s", "-1s", "2023-13-01", "sim:soon"])

@@ -11,9 +11,10 @@
 -- severity: info
 -- when: store.undelivered WHERE reason IN ('not_delivered', 'lost_in_transport')
 WITH pair AS (
-    SELECT run_id, subject, sum(number)::BIGINT AS missing, flatten(list(pairs)) AS pairs
+    SELECT
+        run_id, subject, sum(number)::BIGINT AS untaken, flatten(list(pairs)) AS pairs,
+        sum(number) FILTER (reason IN ('not_delivered', 'lost_in_transport'))::BIGINT AS missing
     FROM untaken_pair
-    WHERE reason IN ('not_delivered', 'lost_in_transport')
     GROUP BY run_id, subject
 ),
 taken AS (
@@ -22,16 +23,16 @@ taken AS (
     GROUP BY publisher_id, subscription_id
 ),
 counted AS (
-    SELECT p.run_id, p.subject, p.missing, sum(t.number)::BIGINT AS taken
+    SELECT p.run_id, p.subject, p.missing, p.untaken, sum(t.number)::BIGINT AS taken
     FROM pair AS p
     JOIN taken AS t ON list_contains(p.pairs, (t.publisher_id, t.subscription_id))
-    GROUP BY p.run_id, p.subject, p.missing
+    GROUP BY p.run_id, p.subject, p.missing, p.untaken
 )
 SELECT
     run_id, subject, missing AS count,
     printf(
         '%d of %d messages reached it (%.0f %%)',
-        taken, taken + missing, 100 * taken / (taken + missing)
+        taken, taken + untaken, 100 * taken / (taken + untaken)
     ) AS detail
 FROM counted
 -- A few may get lost at any time.

@@ -108,8 +108,7 @@ called AS (
         list(
             {
                 'service': service_name, 'server': server, 'waited_ns': returned_ns - sent_ns,
-                'queue_ns': CASE WHEN start_ns >= sent_ns THEN start_ns - sent_ns END,
-                'served_ns': CASE WHEN answered_ns >= start_ns THEN answered_ns - start_ns END
+                'queue_ns': queue_ns, 'served_ns': served_ns
             }
             ORDER BY sent_ns, request_id
         ) AS calls

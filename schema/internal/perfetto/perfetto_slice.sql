@@ -18,10 +18,7 @@
 -- column: outgoing UBIGINT[]  Links that begin there
 -- column: incoming UBIGINT[]  Links that end there
 WITH waited AS MATERIALIZED (
-    SELECT
-        request_id, returned_ns,
-        CASE WHEN start_ns >= sent_ns THEN start_ns - sent_ns END AS queue_ns,
-        CASE WHEN answered_ns >= start_ns THEN answered_ns - start_ns END AS served_ns
+    SELECT request_id, returned_ns, queue_ns, served_ns
     FROM main.waited_call
     WHERE run_id = $run_id
 ),
