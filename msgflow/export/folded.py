@@ -20,12 +20,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class FoldedStacks:
-    """A file that was written."""
+    """A file that was written.
+
+    Attributes:
+        path: the file.
+        run: what it is of.
+        stacks: different ones, each a line.
+        samples: of all of them.
+    """
 
     path: Path
-    run: Run  # what it is of
-    stacks: int  # different ones, each a line
-    samples: int  # of all of them
+    run: Run
+    stacks: int
+    samples: int
 
 
 def write_folded(connection: duckdb.DuckDBPyConnection, path: Path, part: Slice) -> FoldedStacks:

@@ -133,11 +133,17 @@ def _brief(duration_ns: int) -> str:
 
 @dataclass(frozen=True, repr=False)
 class Graph:
-    """Nodes, topics, services and actions of a run, and the messages between them."""
+    """Nodes, topics, services and actions of a run, and the messages between them.
+
+    Attributes:
+        run: the run.
+        result: the rows of the query `graph`.
+        notes: what the rows do not say, a sentence each.
+    """
 
     run: Run
-    result: QueryResult  # the rows of the query `graph`
-    notes: list[str] = field(default_factory=list)  # what the rows do not say, a sentence each
+    result: QueryResult
+    notes: list[str] = field(default_factory=list)
 
     @cached_property
     def rows(self) -> list[Row]:

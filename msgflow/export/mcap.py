@@ -48,14 +48,23 @@ _ERROR = 40
 
 @dataclass(frozen=True)
 class ExportedMcap:
-    """An MCAP file that was written."""
+    """An MCAP file that was written.
+
+    Attributes:
+        path: the file.
+        run: what it is of.
+        topics: topics with values.
+        values: measured values, a message each.
+        losses: messages about messages that were dropped or lost.
+        violations: messages about requirements that are not met.
+    """
 
     path: Path
-    run: Run  # what it is of
-    topics: int  # topics with values
-    values: int  # measured values, a message each
-    losses: int  # messages about messages that were dropped or lost
-    violations: int  # messages about requirements that are not met
+    run: Run
+    topics: int
+    values: int
+    losses: int
+    violations: int
 
 
 def write_mcap(

@@ -120,12 +120,19 @@ SELECT json_object('resourceSpans', list(json ORDER BY json))::VARCHAR FROM reso
 
 @dataclass(frozen=True)
 class ExportedTraces:
-    """Traces that were written."""
+    """Traces that were written.
 
-    run: Run  # what they are of
+    Attributes:
+        run: what they are of.
+        traces: number of traces.
+        spans: number of spans.
+        links: number of links from a span to a further cause.
+    """
+
+    run: Run
     traces: int
     spans: int
-    links: int  # number of links from a span to a further cause
+    links: int
 
 
 def write_otlp(

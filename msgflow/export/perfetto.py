@@ -41,17 +41,29 @@ _CATEGORIES = ("callback", "publication", "take", *["service"] * 4, "executor")
 
 @dataclass(frozen=True)
 class PerfettoTrace:
-    """A trace that was written."""
+    """A trace that was written.
+
+    Attributes:
+        path: the file.
+        run: what it is of.
+        slices: callbacks, publications, takes, requests, responses and activities of executors.
+        arrows: links between them.
+        values: values of counters.
+        gaps: stretches of a host in which something was not recorded.
+        events: events of the user's own tracepoints.
+        states: states of threads to the kernel, and stretches in which a core ran one of them.
+        samples: samples of stacks.
+    """
 
     path: Path
-    run: Run  # what it is of
-    slices: int  # callbacks, publications, takes, requests, responses and activities of executors
-    arrows: int  # links between them
-    values: int  # values of counters
-    gaps: int  # stretches of a host in which something was not recorded
-    events: int  # events of the user's own tracepoints
-    states: int  # states of threads to the kernel, and stretches in which a core ran one of them
-    samples: int  # samples of stacks
+    run: Run
+    slices: int
+    arrows: int
+    values: int
+    gaps: int
+    events: int
+    states: int
+    samples: int
 
 
 def write_perfetto(connection: duckdb.DuckDBPyConnection, path: Path, part: Slice) -> PerfettoTrace:

@@ -51,11 +51,17 @@ _WHOLE = ("run", "trace")
 
 @dataclass(frozen=True)
 class ExportedView:
-    """One view that was written."""
+    """One view that was written.
+
+    Attributes:
+        view: its name.
+        path: the file, or the directory with one file per run.
+        row_count: rows written.
+    """
 
     view: str
-    path: Path  # the file, or the directory with one file per run
-    row_count: int  # rows written
+    path: Path
+    row_count: int
 
 
 @dataclass(frozen=True)

@@ -24,15 +24,25 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class AppliedLinks:
-    """The links that a file declared for a run."""
+    """The links that a file declared for a run.
+
+    Attributes:
+        run: the run.
+        annotation_count: declared links, one per node that an entry matches.
+        known_count: those that the trace declares, too; they are not stored again.
+        topic_count: topics that the file names.
+        link_count: indirect links of messages that come from the file only.
+        traced_link_count: indirect links of messages that come from the trace.
+        without_effect: a sentence for each declared link that no message took.
+    """
 
     run: Run
-    annotation_count: int  # declared links, one per node that an entry matches
-    known_count: int  # those that the trace declares, too; they are not stored again
-    topic_count: int  # topics that the file names
-    link_count: int  # indirect links of messages that come from the file only
-    traced_link_count: int  # indirect links of messages that come from the trace
-    without_effect: tuple[str, ...]  # a sentence for each declared link that no message took
+    annotation_count: int
+    known_count: int
+    topic_count: int
+    link_count: int
+    traced_link_count: int
+    without_effect: tuple[str, ...]
 
 
 def apply_links(

@@ -27,12 +27,18 @@ _WIDTH = 76
 
 @dataclass(frozen=True)
 class LinkSuggestions:
-    """What a run suggests."""
+    """What a run suggests.
 
-    runs: Sequence[Run]  # the run; none if the database holds none
-    candidates: Sequence[Mapping[str, Any]]  # rows of the query `links --suggested`
-    declared: Sequence[Mapping[str, Any]] = ()  # links that a file declared before; they stay
-    # topics that it named, which stay, and those without a name
+    Attributes:
+        runs: the run; none if the database holds none.
+        candidates: rows of the query `links --suggested`.
+        declared: links that a file declared before; they stay.
+        topics: topics that it named, which stay, and those without a name.
+    """
+
+    runs: Sequence[Run]
+    candidates: Sequence[Mapping[str, Any]]
+    declared: Sequence[Mapping[str, Any]] = ()
     topics: Sequence[Mapping[str, Any]] = ()
 
     @property

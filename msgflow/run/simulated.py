@@ -32,9 +32,11 @@ def recorded_ns(runs: Sequence[Run], simulated_ns: int) -> int:
     """Return when it was so late in the simulation for the first time, epoch ns."""
     moments = known_moments(runs)
     times = [then for _, then in moments]
-    around = [(a, b) for a, b in pairwise(moments) if a[1] <= simulated_ns <= b[1]]
-    if not min(times) <= simulated_ns <= max(times):
-        around = [moments[:2] if simulated_ns < min(times) else moments[-2:]]
+    pieces = list(pairwise(moments))
+    if min(times) <= simulated_ns <= max(times):
+        around = [(a, b) for a, b in pieces if a[1] <= simulated_ns <= b[1]]
+    else:
+        around = [pieces[0 if simulated_ns < min(times) else -1]]
     # It may have stood still, or begun anew.
     running = [(a, b) for a, b in around if a[1] < b[1]]
     if not running:

@@ -382,6 +382,9 @@ def _columns(fields: Sequence[_Field], like: Sequence[Header], path: Path) -> It
             continue
         if _NAMES.fullmatch(field.value):
             # Of a public view its table may declare them.
+            unknown = [name for name in _names(field.value) if name not in known]
+            if unknown and path.parent.name != "public":
+                raise _error(path, field.line, f"nothing declares this column — {unknown[0]}")
             yield from (known.get(name, Column(name, "", None, "")) for name in _names(field.value))
         else:
             yield _column(field, path)

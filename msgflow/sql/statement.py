@@ -90,7 +90,7 @@ def may_have_rows(
     sources: Iterable[tuple[str, str]],
     values: Mapping[str, Any],
 ) -> bool:
-    """Return whether any of the sources of a header or step has a row; true where there is none."""
+    """Tell whether a source of a header or step has a row. Without sources the answer is yes."""
     found = [f"EXISTS (FROM {name} WHERE {condition or 'true'})" for name, condition in sources]
     if not found:
         return True

@@ -46,8 +46,8 @@ class FlightRecorder:
     ) -> None:
         """Keep nothing yet.
 
-        The directory gets one per violation, of which the `most` last ones stay. `clock_sync` is as
-        `ingest` takes it. `note` gets a sentence about what was kept, or why not.
+        The directory gets a copy per violation, and keeps the last `most` of them. `ingest` has the
+        meaning of `clock_sync`. `note` gets a sentence about what was kept, or why not.
         """
         self._directory = directory
         self._most = most

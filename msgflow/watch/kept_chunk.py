@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 class KeptChunk:
     """The content of a chunk."""
 
-    source: Path  # of which recording it is a part
+    source: Path  # the recording that it is a part of
     path: Path  # its directory, which need not exist any more
     traces: tuple[TraceInfo, ...]  # what its traces declare
     # By name, in order of `event_id`, which counts those that are kept from 0.

@@ -10,6 +10,7 @@ import subprocess
 import time
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import duckdb
 import pytest
@@ -37,17 +38,25 @@ def text(session: Path, database: Path) -> str:
     return text_of(session, database)
 
 
-def text_of(session: Path, database: Path) -> str:
-    """Return what `perf script` says of it: a sample in the middle of each callback."""
+def calls(
+    session: Path, database: Path, columns: str, joined: str = ""
+) -> tuple[int, str, list[Any]]:
+    """Return the offset of the trace's clock, its host, and of each callback pid, tid and more."""
     with trace_package.open([session]) as opened:
         offset, hostname = opened.traces[0].clock_offset_ns, opened.traces[0].hostname
     with duckdb.connect(str(database), read_only=True) as con:
         rows = con.execute(
-            "SELECT p.pid, t.tid, (i.start_ns + i.end_ns) // 2 FROM callback_instance AS i "
+            f"SELECT p.pid, t.tid, {columns} FROM callback_instance AS i "
             "JOIN thread AS t USING (thread_id) JOIN process AS p ON i.process_id = p.process_id "
-            "JOIN host AS h USING (host_id) WHERE h.hostname = ?",
+            f"JOIN host AS h USING (host_id) {joined} WHERE h.hostname = ?",
             [hostname],
-        ).fetchall()
+        )
+        return offset, hostname, rows.fetchall()
+
+
+def text_of(session: Path, database: Path) -> str:
+    """Return what `perf script` says of it: a sample in the middle of each callback."""
+    offset, hostname, rows = calls(session, database, "(i.start_ns + i.end_ns) // 2")
     moments = [(pid, tid, *divmod(ns - offset, 10**9)) for pid, tid, ns in rows]
     heads = [
         f"  {pid}/{tid}  [000] {second}.{rest:09}:  7 cpu-clock: \n"
@@ -82,17 +91,12 @@ def test_shares_of_functions_of_a_simulated_system(
     session: Path, database: Path, new_database: Path
 ) -> None:
     """Ten samples of each call: one in a function, three in another, six in a third."""
-    with trace_package.open([session]) as opened:
-        offset, hostname = opened.traces[0].clock_offset_ns, opened.traces[0].hostname
-    with duckdb.connect(str(database), read_only=True) as con:
-        rows = con.execute(
-            "SELECT p.pid, t.tid, i.start_ns + (i.end_ns - i.start_ns) * (2 * k + 1) // 20, k,"
-            " l.node || ' ' || l.label FROM callback_instance AS i JOIN thread AS t"
-            " USING (thread_id) JOIN process AS p ON i.process_id = p.process_id JOIN host AS h"
-            " USING (host_id) JOIN callback_label AS l USING (callback_id), range(10) AS r (k)"
-            " WHERE h.hostname = ?",
-            [hostname],
-        ).fetchall()
+    offset, hostname, rows = calls(
+        session,
+        database,
+        "i.start_ns + (i.end_ns - i.start_ns) * (2 * k + 1) // 20, k, l.node || ' ' || l.label",
+        "JOIN callback_label AS l USING (callback_id) CROSS JOIN range(10) AS r (k)",
+    )
     text = HEADER.format(hostname)
     for pid, tid, ns, part, callback in rows:
         second, rest = divmod(ns - offset, 10**9)

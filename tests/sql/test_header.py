@@ -153,7 +153,12 @@ def test_names_alone_are_declared_by_the_first_file_that_has_them(tmp_path: Path
         text = f"{head}-- param: depth BIGINT = 1  Of {name}\n-- column: {name} BIGINT  Of {name}\n"
         (tmp_path / f"{name}.sql").write_text(f"{text}SELECT 1\n")
     text = f"{head}-- like: b, a\n-- param: depth\n-- column: a, b,\n--     c\nSELECT 1\n"
-    header = parse(text, tmp_path / "x.sql")
+    with pytest.raises(HeaderError, match="nothing declares this column — c"):
+        parse(text, tmp_path / "x.sql")
+    (place := tmp_path / "public").mkdir()
+    for name in ("a", "b"):
+        (tmp_path / f"{name}.sql").rename(place / f"{name}.sql")
+    header = parse(text, place / "x.sql")
     assert header.params == (Param("depth", "BIGINT", 1, True, "Of b"),)
     assert [column.description for column in header.columns] == ["Of a", "Of b", ""]
 

@@ -16,6 +16,22 @@ def _fails(*words: object, **options: object) -> None:
     raise RuntimeError("can't start new thread")
 
 
+def recording(directory: Path) -> tuple[FlightRecorder, Path, list[str]]:
+    """Return a recorder into `kept`, an empty chunk, and what the recorder notes."""
+    chunk = directory / "drive" / "archives" / "0"
+    chunk.mkdir(parents=True)
+    notes: list[str] = []
+    recorder = FlightRecorder(
+        directory / "kept",
+        most=5,
+        window_ns=_SECOND_NS,
+        earlier_ns=0,
+        clock_sync="none",
+        note=notes.append,
+    )
+    return recorder, chunk, notes
+
+
 @pytest.mark.parametrize("place", ["a thread", "the database"])
 def test_what_nobody_foresaw_is_a_note(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: str
@@ -24,17 +40,7 @@ def test_what_nobody_foresaw_is_a_note(
         monkeypatch.setattr(ThreadPoolExecutor, "submit", _fails)
     else:
         monkeypatch.setattr(flight_recorder, "ingest", _fails)
-    chunk = tmp_path / "drive" / "archives" / "0"
-    chunk.mkdir(parents=True)
-    notes: list[str] = []
-    recorder = FlightRecorder(
-        tmp_path / "kept",
-        most=5,
-        window_ns=_SECOND_NS,
-        earlier_ns=0,
-        clock_sync="none",
-        note=notes.append,
-    )
+    recorder, chunk, notes = recording(tmp_path)
     for second in (0, 2):
         recorder.keep(second * _SECOND_NS, None, [chunk], None, None)  # type: ignore[arg-type]
     recorder.close()
@@ -45,17 +51,7 @@ def test_what_nobody_foresaw_is_a_note(
 
 def test_a_link_that_leads_nowhere_is_a_note(tmp_path: Path) -> None:
     (tmp_path / "kept").symlink_to(tmp_path / "gone")
-    chunk = tmp_path / "drive" / "archives" / "0"
-    chunk.mkdir(parents=True)
-    notes: list[str] = []
-    recorder = FlightRecorder(
-        tmp_path / "kept",
-        most=5,
-        window_ns=_SECOND_NS,
-        earlier_ns=0,
-        clock_sync="none",
-        note=notes.append,
-    )
+    recorder, chunk, notes = recording(tmp_path)
     recorder.keep(0, None, [chunk], None, None)  # type: ignore[arg-type]
     recorder.close()
     assert [note.partition(": ")[2].partition(";")[0] for note in notes] == ["file exists"]

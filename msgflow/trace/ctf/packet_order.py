@@ -141,7 +141,7 @@ _CHUNK = 1 << 20
 class Repetition(Enum):
     """What a packet is to an earlier one of its trace."""
 
-    NONE = auto()  # there is none like it
+    NONE = auto()  # no packet is like it
     SAME = auto()  # it is the same once more
     OTHER = auto()  # another one with the same identity; one of them is damaged
 
