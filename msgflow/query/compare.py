@@ -77,11 +77,17 @@ class Condition:
 
 @dataclass(frozen=True)
 class Failure:
-    """A path, callback or topic that is worse than it may be."""
+    """A path, callback or topic that is worse than it may be.
 
-    condition: str  # as the user wrote it
-    subject: str  # the path, callback or topic
-    reason: str  # the measured difference
+    Attributes:
+        condition: as the user wrote it.
+        subject: the path, callback or topic.
+        reason: the measured difference.
+    """
+
+    condition: str
+    subject: str
+    reason: str
 
 
 @dataclass(frozen=True)
@@ -304,7 +310,7 @@ def _several(
     with query_errors("the comparison", "the comparison failed: {}"):
         result = compare_sides(connection, asked, sides)
     first, second = (side[0] for side in sides)
-    result.notes.extend(_one_sided(result, "paths", first, second))
+    result.notes.extend(_one_sided(result, "paths", *sides))
     for name, side in zip("AB", sides, strict=True):
         of = f"{len(side)} runs" if len(side) > 1 else "1 run"
         result.notes.append(f"{name} is {of}: {', '.join(run.title for run in side)}")
@@ -378,7 +384,7 @@ def _compared(
         table = internal_sql().run(connection, "comparison", asked).to_arrow_table()
     result = QueryResult(table, _header(), (first, second))
     if is_strict:
-        result.notes.extend(_one_sided(result, what, first, second))
+        result.notes.extend(_one_sided(result, what, [first], [second]))
         result.notes.extend(function_notes(connection, asked))
     if what == "callbacks":
         result.notes.extend(schedule_notes(connection, asked, result))
@@ -480,20 +486,22 @@ def _doubts(
         )
 
 
-def _one_sided(result: QueryResult, what: str, first: Run, second: Run) -> Iterable[str]:
-    """Yield notes on subjects of one run only; raise if the runs have no subject in common."""
+def _one_sided(
+    result: QueryResult, what: str, first: Sequence[Run], second: Sequence[Run]
+) -> Iterable[str]:
+    """Yield notes on subjects of one side only; raise if the sides have no subject in common."""
+    titles = [", ".join(run.title for run in side) for side in (first, second)]
     rows = [row for row in result.to_arrow().to_pylist() if row["statistic"] == STATISTICS[0]]
     if not any(row["a_count"] and row["b_count"] for row in rows):
         only = {row["subject"] for row in rows}
         example = f"; one of them has {min(only)}" if only else ""
         raise UsageError(
-            f"the runs have no {what} with values in common — {first.title} and"
-            f" {second.title}{example}",
-            f"msgflow query e2e-latency --run {first.run_id}, and likewise"
-            f" --run {second.run_id}, tell what each has",
+            f"the runs have no {what} with values in common — {' and '.join(titles)}{example}",
+            f"msgflow query e2e-latency --run {first[0].run_id}, and likewise"
+            f" --run {second[0].run_id}, tell what each has",
         )
-    for side, run in (("A", first), ("B", second)):
+    for side, runs, title in zip("AB", (first, second), titles, strict=True):
         number = sum(row["verdict"] == f"only in {side}" for row in rows)
         if number:
             thing = what[:-1] if number == 1 else what
-            yield f"{number} {thing} with values only in run {side}, {run.title}"
+            yield f"{number} {thing} with values only in {'run ' * (len(runs) == 1)}{side}, {title}"

@@ -67,8 +67,10 @@ class TraceSet(ABC):
         then, at the least for every 16 MB, and once at the end. `batch_rows` are held before they
         are handed over.
 
-        Where a trace is damaged, and the reader does not go on after that (it is strict, or bt2),
-        what came before has been delivered.
+        Raises:
+            TraceError: a trace is damaged, and the reader does not go on after that (it is
+                strict, or bt2); what came before has been delivered.
+            UsageError: the set is closed, or an earlier iteration has not ended.
         """
 
     @abstractmethod
