@@ -220,7 +220,7 @@ CREATE TABLE staging.schedule_candidate (candidate_number BIGINT, trace_index IN
     clock_key VARCHAR, shift_ns BIGINT, has_cpus BOOLEAN);
 CREATE TABLE staging.schedule_interval (thread_id BIGINT, tid INTEGER, start_ns BIGINT,
     end_ns BIGINT, state VARCHAR, trace_index INTEGER, cpu INTEGER, next_cpu INTEGER,
-    left_ns BIGINT, priority INTEGER, waking_event_id BIGINT);
+    priority INTEGER, waking_event_id BIGINT);
 CREATE TABLE staging.schedule_moment (candidate_number BIGINT, event_id BIGINT,
     thread_index INTEGER, at_ns BIGINT, tid INTEGER, contradiction_id BIGINT);
 CREATE TABLE staging.sender_run (event_id BIGINT, callback_instance_id BIGINT);
@@ -283,7 +283,7 @@ CREATE TABLE staging.thread_switch (thread_id BIGINT, tid INTEGER, trace_index I
 CREATE TABLE staging.thread_tid (thread_id BIGINT, clock_key VARCHAR, tid INTEGER, source VARCHAR,
     from_ns BIGINT, until_ns BIGINT);
 CREATE TABLE staging.thread_waking (thread_id BIGINT, tid INTEGER, event_id BIGINT, at_ns BIGINT,
-    kind VARCHAR, clock_key VARCHAR, waker_tid INTEGER, waker_name VARCHAR);
+    kind VARCHAR, clock_key VARCHAR, target_cpu INTEGER, waker_tid INTEGER, waker_name VARCHAR);
 CREATE TABLE staging.timer (timer_id BIGINT, process_id BIGINT, node_id BIGINT, period_ns BIGINT,
     timer_handle UBIGINT, created_ns BIGINT, event_id BIGINT);
 CREATE TABLE staging.timer_use (event_id BIGINT, process_id BIGINT, timer_handle UBIGINT,

@@ -117,6 +117,43 @@ def test_a_woken_thread_waits_where_it_goes_on(system: RosSystem, analyse: Analy
     assert waits(analyse(system)) == [(OTHER, "runnable", 1, 1300, 1350, 119, 120)]
 
 
+@pytest.mark.parametrize(
+    ("target", "moved", "expected"),
+    [
+        (0, None, [(HOG, "runnable", 0, 1300, 1350, 119, 120)]),
+        # Where it left its CPU, or was moved to before, is not asked: events may be lost since.
+        (1, None, [(OTHER, "runnable", 1, 1300, 1350, 119, 120)]),
+        (
+            0,
+            1320,
+            [
+                (HOG, "runnable", 0, 1300, 1320, 119, 120),
+                (OTHER, "runnable", 1, 1320, 1350, 119, 120),
+            ],
+        ),
+        (0, 1300, [(OTHER, "runnable", 1, 1300, 1350, 119, 120)]),
+    ],
+)
+def test_a_woken_thread_waits_where_its_waking_says_until_it_is_moved(
+    system: RosSystem,
+    analyse: Analyse,
+    target: int,
+    moved: int | None,
+    expected: list[tuple[Any, ...]],
+) -> None:
+    kernel = Kernel(system)
+    kernel.switch(800, 0, OTHER, cpu=1)
+    kernel.add("sched_migrate_task", 850, tid=41, dest_cpu=0)
+    kernel.switch(900, 0, 41)
+    kernel.switch(1200, 41, HOG, BLOCKED)
+    kernel.wake(1300, 41, target_cpu=target)
+    if moved is not None:
+        kernel.add("sched_migrate_task", moved, tid=41, dest_cpu=1)
+    kernel.switch(1350, OTHER, 41, cpu=1)
+    call(system, 1000, 1150)
+    assert waits(analyse(system)) == expected
+
+
 def test_interrupts_are_part_of_the_time_on_a_cpu(system: RosSystem, analyse: Analyse) -> None:
     kernel = Kernel(system)
     kernel.switch(900, 0, 41)

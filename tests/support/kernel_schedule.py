@@ -53,8 +53,8 @@ class Kernel:
             next_tid=after, next_prio=19, next_comm=f"thread {after}",
         )  # fmt: skip
 
-    def wake(self, ts: int, tid: int, cpu: int = 0) -> int:
-        return self.add("sched_waking", ts, cpu, tid=tid)
+    def wake(self, ts: int, tid: int, cpu: int = 0, target_cpu: int = 0) -> int:
+        return self.add("sched_waking", ts, cpu, tid=tid, target_cpu=target_cpu)
 
 
 def call(system: RosSystem, begin: int, end: int, thread: Thread = MAIN) -> None:

@@ -1,7 +1,7 @@
 -- name: staging.cpu_wait
 -- description: Waits of threads for a CPU: preempted, or woken. A wait is cut where the thread goes
 --     to another CPU. Where the kernel trace does not say that, a thread that was woken waits for
---     the CPU on which it goes on.
+--     the CPU on which it goes on; else for the one that its waking names.
 -- grain: one row per wait and CPU
 -- when: staging.schedule_interval
 WITH migration AS (
@@ -27,13 +27,14 @@ begin AS (
         w.start_ns AS state_start_ns,
         w.start_ns,
         CASE
-            WHEN m.at_ns >= coalesce(w.left_ns, m.at_ns) THEN m.cpu
-            WHEN w.state = 'runnable'
-                AND w.trace_index NOT IN (SELECT trace_index FROM raw.sched_migrate_task)
+            WHEN m.at_ns = w.start_ns THEN m.cpu
+            WHEN w.state = 'preempted' THEN w.cpu
+            WHEN w.trace_index NOT IN (SELECT trace_index FROM raw.sched_migrate_task)
                 THEN coalesce(w.next_cpu, w.cpu)
-            ELSE w.cpu
+            ELSE k.target_cpu
         END AS cpu
     FROM wait AS w
+    LEFT JOIN staging.thread_waking AS k ON w.waking_event_id = k.event_id
     ASOF LEFT JOIN migration AS m
         ON w.thread_id = m.thread_id AND w.tid = m.tid AND w.start_ns >= m.at_ns
 ),

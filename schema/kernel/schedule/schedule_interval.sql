@@ -81,7 +81,7 @@ placed AS (
 ),
 interval AS (
     SELECT
-        thread_id, tid, trace_index, at_ns AS start_ns, at_ns AS left_ns,
+        thread_id, tid, trace_index, at_ns AS start_ns,
         CASE WHEN state IN ('sleeping', 'uninterruptible')
             THEN coalesce(slept_until_ns, end_ns) ELSE end_ns END AS end_ns,
         state, cpu, next_cpu, priority,
@@ -91,7 +91,7 @@ interval AS (
     WHERE state IS NOT NULL
     UNION ALL
     SELECT
-        thread_id, tid, trace_index, slept_until_ns, at_ns, end_ns,
+        thread_id, tid, trace_index, slept_until_ns, end_ns,
         CASE WHEN next_unseen_since_ns IS NULL THEN 'runnable' ELSE 'unknown' END,
         cpu, next_cpu, priority, waking_event_id
     FROM placed
@@ -106,7 +106,6 @@ interval AS (
             WHEN s.is_on OR s.unseen_since_ns IS NOT NULL THEN coalesce(k.at_ns, s.unseen_since_ns)
             ELSE f.start_ns
         END,
-        NULL,
         s.at_ns,
         CASE
             WHEN s.unseen_since_ns IS NOT NULL THEN 'unknown'
@@ -121,7 +120,6 @@ interval AS (
     WHERE s.number = 1
 )
 SELECT
-    thread_id, tid, start_ns, end_ns, state, trace_index, cpu, next_cpu, left_ns, priority,
-    waking_event_id
+    thread_id, tid, start_ns, end_ns, state, trace_index, cpu, next_cpu, priority, waking_event_id
 FROM interval
 WHERE end_ns > start_ns

@@ -3,22 +3,24 @@
 --     was handling, else the thread that ran there. A switch ends every interrupt. Where the kernel
 --     trace contradicts itself about what ran, only a thread that is seen there is known. `kind` is
 --     'thread', 'timer', 'interrupt' or 'softirq'; NULL: not known. `waker_tid` is the thread that
---     woke it, or that was interrupted.
+--     woke it, or that was interrupted; `target_cpu` the CPU on which it waits until it is moved.
 -- grain: one row per waking of such a thread
 -- when: staging.thread_tid
 WITH waking AS (
-    SELECT trace_index, event_id, ts_ns, tid, switch_event_id, interrupt FROM raw.sched_waking
+    SELECT trace_index, event_id, ts_ns, tid, target_cpu, switch_event_id, interrupt
+    FROM raw.sched_waking
     UNION ALL
-    SELECT trace_index, event_id, ts_ns, tid, switch_event_id, interrupt FROM raw.sched_wakeup_new
+    SELECT trace_index, event_id, ts_ns, tid, target_cpu, switch_event_id, interrupt
+    FROM raw.sched_wakeup_new
     UNION ALL
-    SELECT trace_index, event_id, ts_ns, tid, switch_event_id, interrupt
+    SELECT trace_index, event_id, ts_ns, tid, target_cpu, switch_event_id, interrupt
     FROM raw.sched_wakeup
     WHERE trace_index NOT IN (SELECT trace_index FROM raw.sched_waking)
 ),
 woken AS (
     SELECT
         t.thread_id, t.tid, k.event_id, k.ts_ns + s.shift_ns AS at_ns, s.clock_key, s.shift_ns,
-        k.switch_event_id, k.interrupt
+        k.target_cpu, k.switch_event_id, k.interrupt
     FROM waking AS k
     JOIN staging.schedule AS s ON k.trace_index = s.trace_index
     JOIN staging.thread_tid AS t
@@ -61,6 +63,7 @@ SELECT
     at_ns,
     coalesce(interrupt, CASE WHEN waker_tid IS NOT NULL THEN 'thread' END) AS kind,
     clock_key,
+    target_cpu,
     waker_tid,
     CASE WHEN NOT is_contradicted THEN next_comm END AS waker_name
 FROM found
