@@ -19,10 +19,10 @@ from msgflow.ingest.sequences import Placed, Sequences
 from msgflow.ingest.user_events import is_match, matches, names_of, user_rows
 from msgflow.trace import PACKET, EventBatch, Progress, TraceInfo, TraceSet
 from msgflow.trace.numpy_arrow import is_valid, text_lengths, to_numpy, without
-from msgflow.trace.prefetch import Prefetch
+from msgflow.trace.prefetch import prefetched
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 
     import duckdb
 
@@ -90,11 +90,9 @@ def load_traces(
         sequences, cpus = Sequences(catalogue, _hosts(sources)), Cpus(catalogue)
         with transaction(con), con.cursor() as beside:
             # A thread reads the next round while DuckDB inserts this one.
-            placed = Prefetch(
-                lambda: _placed(batches, sequences, cpus, corrections, implausible, beside), 1
-            )
-            with contextlib.closing(placed):
-                for item in placed.items():
+            placed = _placed(batches, sequences, cpus, corrections, implausible, beside)
+            with contextlib.closing(prefetched(placed, 1)) as ahead:
+                for item in ahead:
                     interrupts.check()
                     tables.add_all(item)
             tables.flush()
@@ -150,7 +148,7 @@ def _placed(
     corrections: Corrections | None,
     implausible: ImplausibleValues,
     beside: duckdb.DuckDBPyConnection,
-) -> Iterator[Placed | tuple[str, pa.RecordBatch]]:
+) -> Generator[Placed | tuple[str, pa.RecordBatch], None, None]:
     """Yield the events of all batches, round by round, and (table, rows) of packets and kernel.
 
     Nothing else uses the connection `beside` meanwhile.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from contextlib import closing
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,7 +17,7 @@ from msgflow.trace.ctf.field_types import BYTE
 from msgflow.trace.ctf.packet_rows import PacketRows
 from msgflow.trace.ctf.record_batch import ClassPlan, ThreadNames, build_batch, make_plan
 from msgflow.trace.model import EventBatch, Progress
-from msgflow.trace.prefetch import Prefetch
+from msgflow.trace.prefetch import prefetched
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -75,14 +76,10 @@ class Iteration:
         latest_ns = 0
         packets = PacketRows(self._report_damage)
         # A thread finds the events of the next batch while the columns of this one are made.
-        batches = Prefetch(
-            lambda: ordered_batches(
-                self._entries, size, self._report_damage, self._field_by_field()
-            ),
-            _AHEAD,
-        )
-        try:
-            for number, batch in enumerate(batches.items()):
+        whole = self._field_by_field()
+        batches = ordered_batches(self._entries, size, self._report_damage, whole)
+        with closing(prefetched(batches, _AHEAD)) as ahead:
+            for number, batch in enumerate(ahead):
                 packets.add(batch.packets)
                 if batch.ts_ns.size:
                     latest_ns = int(batch.ts_ns[-1])
@@ -91,8 +88,6 @@ class Iteration:
                 done += sum(packet.entry.size for packet in batch.packets)
                 if done < total:
                     self._report_progress(done / total, latest_ns)
-        finally:
-            batches.close()
         self._report_progress(1.0, latest_ns)
 
     def _field_by_field(self) -> set[StreamLayout]:

@@ -15,7 +15,7 @@ from msgflow.trace.ctf.packet_memory import Loader
 from msgflow.trace.ctf.packet_order import PacketEvents
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterator, Sequence
+    from collections.abc import Callable, Collection, Generator, Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -68,7 +68,7 @@ def ordered_batches(
     size: int,
     report: Callable[[Entry, int, str], None],
     whole: Collection[StreamLayout] = (),
-) -> Iterator[Batch]:
+) -> Generator[Batch, None, None]:
     """Read packets, about `size` bytes at once, and yield their events in order of time.
 
     An event at or after the begin of the next unread packet may have to wait for events of that
