@@ -42,7 +42,7 @@ class FieldReader:
         """Read from `data`, which begins with the packet, up to the bit `end`."""
         self.position = 0  # of the next field, in bits from the begin of the packet
         self.found: dict[str, Any] = {}  # role to the value found last, for fields that have a role
-        self.time_bits = 64  # size of the clock value found last
+        self.bits: dict[str, int] = {}  # role to the size of that value, if it is an integer
         self._data = data
         self._end = min(end, len(data) * BYTE)
         self._scopes: dict[Scope, dict[str, Any]] = {}
@@ -98,9 +98,7 @@ class FieldReader:
         if field_type.signed and value >> (size - 1):
             value -= 1 << size
         for role in field_type.roles:
-            self.found[role] = value
-            if role == Role.TIME:
-                self.time_bits = size
+            self.found[role], self.bits[role] = value, size
         return bool(value) if field_type.arrow == "bool" else value
 
     def _variable_integer(self, field_type: VariableInteger) -> int:
@@ -115,9 +113,7 @@ class FieldReader:
         if field_type.signed and byte & 0x40:
             value -= 1 << (7 * (number + 1))
         for role in field_type.roles:
-            self.found[role] = value
-            if role == Role.TIME:
-                self.time_bits = 64
+            self.found[role], self.bits[role] = value, 64
         return value
 
     def _real(self, field_type: Real) -> float:
@@ -162,15 +158,16 @@ class FieldReader:
             self._empty_elements += length
         if length > room:
             raise FieldError(f"{length} elements do not fit into the packet")
+        roles = field_type.roles if isinstance(field_type, Array) else ()
+        if not roles and not field_type.is_text:
+            return [self._read(element) for _ in range(length)]
+        self.position = begin + length * BYTE
+        content = bytes(self._data[begin // BYTE : self.position // BYTE])
         if field_type.is_text:
-            self.position = begin + length * BYTE
-            content = bytes(self._data[begin // BYTE : self.position // BYTE])
             return content.partition(b"\0")[0].decode("utf-8", "replace")
-        elements = [self._read(element) for _ in range(length)]
-        if isinstance(field_type, Array):
-            for role in field_type.roles:
-                self.found[role] = bytes(element & 0xFF for element in elements)
-        return elements
+        # Only a uuid: bytes.
+        self.found |= dict.fromkeys(roles, content)
+        return list(content)
 
     def _structure(self, field_type: Structure) -> dict[str, Any]:
         values: dict[str, Any] = {}
@@ -294,7 +291,7 @@ class EventReader:
         event = self._stream.events.get(reader.found[Role.EVENT_CLASS])
         if event is None:
             raise FieldError(f"there is no event class {reader.found[Role.EVENT_CLASS]}")
-        return HeaderValues(event, reader.found.get(Role.TIME), reader.time_bits)
+        return HeaderValues(event, reader.found.get(Role.TIME), reader.bits.get(Role.TIME, 64))
 
     def event(self, position: int) -> dict[Scope, dict[str, Any]]:
         """Read the contexts and payload of the event that begins at this bit."""
