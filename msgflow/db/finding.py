@@ -241,12 +241,6 @@ def _object(name: str, description: str, grain: str, body: str) -> Header:
         description=description,
         grain=grain,
         kind="view",
-        params=(),
-        columns=(),
-        severity=None,
-        cause=None,
-        cure=None,
-        note=None,
         body=body,
         path=_statements().directory,
     )

@@ -50,19 +50,21 @@ def labels_of(field: pa.Field) -> dict[str, list[tuple[int, int]]]:
     return {label: [(first, last) for first, last in ranges] for label, ranges in found.items()}
 
 
-def can_hold(wanted: pa.DataType, declared: pa.DataType) -> bool:
+def _can_hold(wanted: pa.DataType, declared: pa.DataType | None) -> bool:
     """Tell whether values of a declared type can be delivered as the wanted type."""
     types = pa.types
+    if declared is None:
+        return False
     if types.is_integer(wanted):
         return bool(types.is_integer(declared))
     if types.is_floating(wanted):
         return bool(types.is_floating(declared) or types.is_integer(declared))
     if types.is_list(wanted):
-        return bool(types.is_list(declared)) and can_hold(wanted.value_type, declared.value_type)
+        return bool(types.is_list(declared)) and _can_hold(wanted.value_type, declared.value_type)
     return bool(wanted.equals(declared))
 
 
-def union_type(first: pa.DataType, second: pa.DataType) -> pa.DataType | None:
+def _union_type(first: pa.DataType, second: pa.DataType) -> pa.DataType | None:
     """Return the type that holds values of both, None if no type does."""
     if first.equals(second):
         return first
@@ -94,58 +96,31 @@ def merged_schemas(declared: Iterable[tuple[str, pa.Schema]]) -> dict[str, pa.Sc
         merged = events.setdefault(event, {})
         for field in schema:
             known = merged.setdefault(field.name, field)
-            joint = union_type(known.type, field.type) or known.type
+            joint = _union_type(known.type, field.type) or known.type
             merged[field.name] = pa.field(field.name, joint, metadata=_joined(known, field))
     return {event: pa.schema(list(merged.values())) for event, merged in events.items()}
 
 
-def matching(columns: Iterable[pa.Field], fields: Iterable[pa.Field]) -> dict[str, pa.Field]:
-    """Return column to the field that fills it, for those columns that a field can fill."""
-    by_name = {field.name: field for field in fields}
-    found = {}
-    for column in columns:
-        for name in names_of(column):
-            field = by_name.get(name)
-            if field is not None and can_hold(_plain(column.type), field.type):
-                found[column.name] = field
-                break
-    return found
-
-
-def inner_matching(
-    columns: Iterable[pa.Field], fields: Iterable[pa.Field]
-) -> dict[str, tuple[tuple[str, ...], ...]]:
-    """Return column to the paths of the fields inside others that fill it.
-
-    A path is the names from the outermost structure, variant or option to the field itself; the
-    name of such a column has dots between them. Options of one variant may fill the same column,
-    each in the events that have it.
-    """
-    by_name = {field.name: field.type for field in fields}
-    found = {}
-    for column in columns:
-        paths = []
-        for name in names_of(column):
-            path = tuple(name.split("."))
-            declared = by_name.get(path[0]) if len(path) > 1 else None
-            for member in path[1:]:
-                declared = _member_type(declared, member)
-            if declared is not None and can_hold(column.type, declared):
-                paths.append(path)
-        if paths:
-            found[column.name] = tuple(paths)
-    return found
-
-
 def paths_of(
     columns: Iterable[pa.Field], fields: Iterable[pa.Field]
-) -> list[list[tuple[str, ...]]]:
-    """Return for each column the paths of names of the fields that fill it; none: no field does."""
-    plain, inner = matching(columns, fields), inner_matching(columns, fields)
-    return [
-        [(plain[column.name].name,)] if column.name in plain else list(inner.get(column.name, ()))
-        for column in columns
-    ]
+) -> list[tuple[tuple[str, ...], ...]]:
+    """Return for each column the paths of the fields that fill it; none: no field does.
+
+    A path is the names from the outermost structure, variant or option to the field itself. The
+    first name of a column that a field has fills it alone. Else its names have dots between those
+    of a path. Options of one variant may fill the same column, each in the events that have it.
+    """
+    types = {field.name: field.type for field in fields}
+    found: list[tuple[tuple[str, ...], ...]] = []
+    for column in columns:
+        wanted, names = _plain(column.type), names_of(column)
+        paths: list[tuple[str, ...]]
+        paths = [(name,) for name in names if _can_hold(wanted, types.get(name))][:1]
+        if not paths:
+            inner = (tuple(name.split(".")) for name in names if "." in name)
+            paths = [path for path in inner if _can_hold(wanted, _type_at(types, path))]
+        found.append(tuple(paths))
+    return found
 
 
 def first_inner_value(fields: Any, paths: Iterable[Sequence[str]]) -> Any:
@@ -166,11 +141,14 @@ def _joined(known: pa.Field, field: pa.Field) -> dict[bytes, bytes]:
     return {**(field.metadata or {}), **(known.metadata or {}), **field_metadata(None, labels)}
 
 
-def _member_type(declared: pa.DataType | None, name: str) -> pa.DataType | None:
-    if declared is None or not pa.types.is_struct(declared):
-        return None
-    index = declared.get_field_index(name)
-    return None if index < 0 else declared.field(index).type
+def _type_at(types: Mapping[str, pa.DataType], path: Sequence[str]) -> pa.DataType | None:
+    found = types.get(path[0])
+    for name in path[1:]:
+        if found is None or not pa.types.is_struct(found):
+            return None
+        index = found.get_field_index(name)
+        found = None if index < 0 else found.field(index).type
+    return found
 
 
 def to_array(values: Sequence[Any], data_type: pa.DataType) -> pa.Array:

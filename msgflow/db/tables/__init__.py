@@ -3,9 +3,9 @@
 `STORE.tables` has them by name. `python docs/generate.py` renders them into `schema/store.sql`.
 What runs reads that file (`store_table.py`), since SQLAlchemy takes long to import. It makes new
 databases of it, stores rows by it, and makes of it the public views that show a table as it is,
-with their comments and their page of the documentation (`table_view.py`). Other public views over a
-table are files of `schema/public`; what their columns share with the table stands only here. For
-users the module `msgflow.schema` has the tables and the public views.
+with their comments and their page of the documentation. Other public views over a table are files
+of `schema/public`; what their columns share with the table stands only here. For users the module
+`msgflow.schema` has the tables and the public views.
 
 The comment of a table states its grain, the comment of a column its meaning. `column.py` documents
 what their `info` holds. Each `ForeignKey` declares a relation. Databases do not have it: DuckDB's

@@ -14,7 +14,7 @@ from msgflow.trace.ctf.arrow import declared_schema
 from msgflow.trace.ctf.event_order import ordered_batches
 from msgflow.trace.ctf.events import event_reader_of
 from msgflow.trace.ctf.field_types import BYTE
-from msgflow.trace.ctf.packet_rows import PacketRows
+from msgflow.trace.ctf.packet_rows import packet_batches
 from msgflow.trace.ctf.record_batch import ClassPlan, ThreadNames, build_batch, make_plan
 from msgflow.trace.model import EventBatch, Progress
 from msgflow.trace.prefetch import prefetched
@@ -74,17 +74,17 @@ class Iteration:
         total = sum(entry.size for entry in self._entries) or 1
         done = 0
         latest_ns = 0
-        packets = PacketRows(self._report_damage)
         # A thread finds the events of the next batch while the columns of this one are made.
         whole = self._field_by_field()
         batches = ordered_batches(self._entries, size, self._report_damage, whole)
         with closing(prefetched(batches, _AHEAD)) as ahead:
             for number, batch in enumerate(ahead):
-                packets.add(batch.packets)
+                yield from packet_batches(
+                    batch.packets, self._batch_rows, number, self._report_damage
+                )
                 if batch.ts_ns.size:
                     latest_ns = int(batch.ts_ns[-1])
                 yield from self.events(batch, number)
-                yield from packets.take(self._batch_rows, number)
                 done += sum(packet.entry.size for packet in batch.packets)
                 if done < total:
                     self._report_progress(done / total, latest_ns)

@@ -20,8 +20,15 @@ from msgflow.trace.ctf.field_types import (
     Type,
     Variant,
 )
-from msgflow.trace.ctf.fixed_layout import DynamicError, is_dense, lay_out
-from msgflow.trace.ctf.variant_layout import VariantLayout, dtype_of, is_selector, lay_out_variant
+from msgflow.trace.ctf.layout import (
+    DynamicError,
+    VariantLayout,
+    dtype_of,
+    is_dense,
+    is_selector,
+    lay_out,
+    lay_out_variant,
+)
 
 if TYPE_CHECKING:
     from msgflow.trace.ctf.declarations import EventClass, StreamClass

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from msgflow.trace.ctf.event_header import read_headers
 from msgflow.trace.ctf.event_positions import find_positions
 from msgflow.trace.ctf.field_types import BYTE, FieldError
-from msgflow.trace.ctf.header_columns import read_headers
 from msgflow.trace.numpy_arrow import distinct
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from msgflow.trace.ctf.field_types import (
     Scope,
     Structure,
 )
-from msgflow.trace.ctf.fixed_layout import DynamicError, Leaf, lay_out
+from msgflow.trace.ctf.layout import DynamicError, Leaf, lay_out
 
 if TYPE_CHECKING:
     from msgflow.trace.ctf.declarations import StreamClass, TraceClass

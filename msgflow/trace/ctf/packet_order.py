@@ -13,8 +13,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from msgflow.trace.ctf.losses import LossCounter
-    from msgflow.trace.ctf.packets import Packet
-    from msgflow.trace.ctf.streams import Stream
+    from msgflow.trace.ctf.packets import Packet, Stream
     from msgflow.trace.model import TraceInfo
 
 

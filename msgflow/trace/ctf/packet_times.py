@@ -14,8 +14,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from msgflow.trace.ctf.packets import Packet
-    from msgflow.trace.ctf.streams import Stream
+    from msgflow.trace.ctf.packets import Packet, Stream
 
 
 def numbers_of(streams: Iterable[Stream]) -> dict[Packet, tuple[int, int]]:

@@ -15,15 +15,15 @@ from msgflow.trace.ctf.packet_header import HeaderReader
 from msgflow.trace.ctf.packet_index import orphans
 from msgflow.trace.ctf.packet_order import entries_of
 from msgflow.trace.ctf.packet_times import begins_of, numbers_of
+from msgflow.trace.ctf.packets import streams_of
 from msgflow.trace.ctf.stream_layout import StreamLayout
-from msgflow.trace.ctf.streams import streams_of
 from msgflow.trace.ctf.trace_info import corrected, describe
 from msgflow.trace.discovery import irregular_files, stream_files
 from msgflow.trace.metadata_frame import FILE_NAME
 from msgflow.trace.model import Damage, TraceInfo
 from msgflow.trace.regular_file import unreadable_error
 from msgflow.trace.time_base import on_one_base
-from msgflow.trace.trace_set import ExclusiveTraceSet
+from msgflow.trace.trace_set import TraceSet
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -31,13 +31,12 @@ if TYPE_CHECKING:
 
     from msgflow.trace.ctf.losses import Continuation
     from msgflow.trace.ctf.packet_order import Entry
-    from msgflow.trace.ctf.packets import Packet
-    from msgflow.trace.ctf.streams import Stream
+    from msgflow.trace.ctf.packets import Packet, Stream
     from msgflow.trace.model import TraceLocation
     from msgflow.trace.trace_set import Batches, Report, Wanted
 
 
-class CtfTraceSet(ExclusiveTraceSet):
+class CtfTraceSet(TraceSet):
     """Traces read by msgflow itself."""
 
     def __init__(
@@ -59,7 +58,6 @@ class CtfTraceSet(ExclusiveTraceSet):
         self._begins: dict[Packet, tuple[int, int]] | None = None
         self._found_early: list[Damage] = []
         self._losses = None if after is None else after.losses
-        self.damages: list[Damage] = []
         self.traces: tuple[TraceInfo, ...] = on_one_base(
             [self._open(location, index) for index, location in enumerate(locations)],
             {} if after is None else after.clock_offsets,

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from msgflow.trace.ctf.clock import Clock
     from msgflow.trace.ctf.declarations import TraceClass
     from msgflow.trace.ctf.field_types import Structure
-    from msgflow.trace.ctf.streams import Stream
+    from msgflow.trace.ctf.packets import Stream
 
 
 _PROCESS_CONTEXT = {"vpid", "vtid"}

@@ -1,23 +1,102 @@
-"""Layout of a variant at the end of an event, whose options are structures of fixed size.
+"""Layout of types: places of their fields, where they do not depend on values.
 
-Kernel traces have the headers of network packets in such variants. An option may itself end in
-such a variant. With this layout the variants of many events are read at once.
+Kernel traces have the headers of network packets in a variant at the end of an event, whose options
+are structures of fixed size; an option may itself end in such a variant. With its layout the
+variants of many events are read at once.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeGuard
 
-from msgflow.trace.ctf.field_types import BYTE, Array, FieldError, Integer, Real, Structure, Variant
-from msgflow.trace.ctf.fixed_layout import DynamicError, Leaf, is_dense, lay_out
+from msgflow.trace.ctf.field_types import (
+    BYTE,
+    Array,
+    FieldError,
+    Integer,
+    Real,
+    Structure,
+    Type,
+    Variant,
+    aligned,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from msgflow.trace.ctf.field_types import Choice, Type
+    from msgflow.trace.ctf.field_types import Choice
 
+_MOST_STEPS = 100_000
 _WIDTHS = {8, 16, 32, 64}
+
+
+class DynamicError(Exception):
+    """The layout of a type is not fixed."""
+
+
+@dataclass(frozen=True)
+class Leaf:
+    """A number, or an array of numbers that follow each other without gaps."""
+
+    path: tuple[str, ...]  # names of the members from the outermost to this one
+    type: Integer | Real | Array
+    position: int  # in bits
+
+
+def lay_out(
+    declared: Type,
+    position: int,
+    leaves: list[Leaf] | None = None,
+    path: tuple[str, ...] = (),
+) -> int:
+    """Return the bit at which a field ends that begins at `position` or, aligned, behind it.
+
+    Positions are bits from the begin of the packet. The numbers in the field are added to `leaves`,
+    if given. `path` names the structures around it.
+
+    A DynamicError says that the layout depends on values, or has too many parts to go through.
+    """
+    return _Layout(leaves).end(declared, position, path)
+
+
+class _Layout:
+    def __init__(self, leaves: list[Leaf] | None) -> None:
+        self._leaves = leaves
+        # Arrays inside arrays may have more elements than a loop can count.
+        self._steps = 0
+
+    def end(self, declared: Type, position: int, path: tuple[str, ...]) -> int:
+        self._steps += 1
+        if self._steps > _MOST_STEPS:
+            raise DynamicError
+        position = aligned(position, declared.align)
+        match declared:
+            case Integer() | Real():
+                if self._leaves is not None:
+                    self._leaves.append(Leaf(path, declared, position))
+                return position + declared.size
+            case Array() if is_dense(declared.element):
+                if self._leaves is not None:
+                    self._leaves.append(Leaf(path, declared, position))
+                return position + declared.length * declared.element.size
+            case Array():
+                if declared.length > _MOST_STEPS:
+                    raise DynamicError
+                for number in range(declared.length):
+                    position = self.end(declared.element, position, (*path, str(number)))
+                return position
+            case Structure():
+                for member in declared.members:
+                    position = self.end(member.type, position, (*path, member.name))
+                return position
+            case _:
+                raise DynamicError
+
+
+def is_dense(element: Type) -> TypeGuard[Integer | Real]:
+    """Tell whether elements of this type follow each other without gaps."""
+    return isinstance(element, Integer | Real) and element.size % element.align == 0
 
 
 @dataclass(frozen=True)
