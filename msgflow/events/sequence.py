@@ -10,8 +10,8 @@ import pyarrow as pa
 
 from msgflow.sql.json_fields import MOST_LAMBDAS, column_name, json_fields, label_of, member
 from msgflow.sql.quoting import literal
-from msgflow.trace import COMMON_SCHEMA
 from msgflow.trace.columns import BASE
+from msgflow.trace.schemas import COMMON_SCHEMA
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

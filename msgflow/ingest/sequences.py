@@ -15,8 +15,8 @@ import pyarrow as pa
 
 from msgflow.ingest.catalogue import Origin
 from msgflow.ingest.groups import NONE, Groups, Latest, Numbers, gathered, present
-from msgflow.trace import COMMON_SCHEMA
 from msgflow.trace.numpy_arrow import empty_batch, is_valid, texts_to_arrow, to_arrow, to_numpy
+from msgflow.trace.schemas import COMMON_SCHEMA
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -114,12 +114,12 @@ def paths_of(
     found: list[tuple[tuple[str, ...], ...]] = []
     for column in columns:
         wanted, names = _plain(column.type), names_of(column)
-        paths: list[tuple[str, ...]]
-        paths = [(name,) for name in names if _can_hold(wanted, types.get(name))][:1]
-        if not paths:
-            inner = (tuple(name.split(".")) for name in names if "." in name)
-            paths = [path for path in inner if _can_hold(wanted, _type_at(types, path))]
-        found.append(tuple(paths))
+        plain = next((name for name in names if _can_hold(wanted, types.get(name))), None)
+        if plain is not None:
+            found.append(((plain,),))
+            continue
+        inner = (tuple(name.split(".")) for name in names if "." in name)
+        found.append(tuple(path for path in inner if _can_hold(wanted, _type_at(types, path))))
     return found
 
 

@@ -6,9 +6,6 @@ from typing import Final
 
 import pyarrow as pa
 
-PACKET: Final = "packet"
-"""Name of the batches that hold packets instead of events."""
-
 COMMON_SCHEMA: Final = pa.schema(
     [
         pa.field("event_id", pa.int64(), nullable=False),

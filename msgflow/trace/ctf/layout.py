@@ -7,6 +7,7 @@ variants of many events are read at once.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeGuard
 
@@ -57,41 +58,36 @@ def lay_out(
 
     A DynamicError says that the layout depends on values, or has too many parts to go through.
     """
-    return _Layout(leaves).end(declared, position, path)
+    # Arrays inside arrays may have more elements than a loop can count.
+    steps = itertools.count(1)
 
-
-class _Layout:
-    def __init__(self, leaves: list[Leaf] | None) -> None:
-        self._leaves = leaves
-        # Arrays inside arrays may have more elements than a loop can count.
-        self._steps = 0
-
-    def end(self, declared: Type, position: int, path: tuple[str, ...]) -> int:
-        self._steps += 1
-        if self._steps > _MOST_STEPS:
+    def end(declared: Type, position: int, path: tuple[str, ...]) -> int:
+        if next(steps) > _MOST_STEPS:
             raise DynamicError
         position = aligned(position, declared.align)
         match declared:
             case Integer() | Real():
-                if self._leaves is not None:
-                    self._leaves.append(Leaf(path, declared, position))
+                if leaves is not None:
+                    leaves.append(Leaf(path, declared, position))
                 return position + declared.size
             case Array() if is_dense(declared.element):
-                if self._leaves is not None:
-                    self._leaves.append(Leaf(path, declared, position))
+                if leaves is not None:
+                    leaves.append(Leaf(path, declared, position))
                 return position + declared.length * declared.element.size
             case Array():
                 if declared.length > _MOST_STEPS:
                     raise DynamicError
                 for number in range(declared.length):
-                    position = self.end(declared.element, position, (*path, str(number)))
+                    position = end(declared.element, position, (*path, str(number)))
                 return position
             case Structure():
                 for member in declared.members:
-                    position = self.end(member.type, position, (*path, member.name))
+                    position = end(member.type, position, (*path, member.name))
                 return position
             case _:
                 raise DynamicError
+
+    return end(declared, position, path)
 
 
 def is_dense(element: Type) -> TypeGuard[Integer | Real]:

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
 
-from msgflow.trace.model import EventBatch
+from msgflow.trace.model import PACKET, EventBatch
 from msgflow.trace.numpy_arrow import integers_to_arrow
-from msgflow.trace.schemas import PACKET, PACKET_SCHEMA
+from msgflow.trace.schemas import PACKET_SCHEMA
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence

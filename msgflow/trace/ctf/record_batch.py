@@ -180,7 +180,7 @@ class _FieldByField:
 def _sources(
     layout: ClassLayout, scope: Scope, structure: Structure, columns: Iterable[pa.Field]
 ) -> list[Source | None]:
-    numbers = {
+    numbers: dict[tuple[str, ...], int] = {
         (field.name,): number
         for number, field in enumerate(layout.body.fields or ())
         if field.scope is scope

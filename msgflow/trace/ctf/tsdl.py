@@ -14,16 +14,17 @@ from msgflow.trace.ctf.field_types import (
     Integer,
     Member,
     MetadataError,
+    Reference,
     Role,
     Scope,
+    Sequence,
     Structure,
     Type,
     Variant,
     may_have,
 )
 from msgflow.trace.ctf.tsdl_tokens import Token, TokenStream, tokens_of
-from msgflow.trace.ctf.tsdl_types import TypeParser, Value
-from msgflow.trace.ctf.tsdl_variants import resolved
+from msgflow.trace.ctf.tsdl_types import TypeParser, Value, without_prefix
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -53,6 +54,8 @@ _SCOPES = {
     "context": Scope.SPECIFIC_CONTEXT,
     "fields": Scope.PAYLOAD,
 }
+_MOST_FIELDS = 100_000
+Frames = list[dict[str, Type]]
 
 
 @dataclass
@@ -195,33 +198,15 @@ def _trace_class(blocks: _Blocks) -> TraceClass:
 
 
 def _add(scopes: dict[Scope, Structure], block: _Block, scope: Scope) -> None:
-    structure = resolved(block.structures.get(scope, Structure()), scope, scopes)
-    scopes[scope] = _with_roles(structure, _ROLES[scope]) if scope in _ROLES else structure
-
-
-def _with_roles(structure: Structure, roles: Mapping[str, str]) -> Structure:
-    """Give the fields of these names their role, in nested structures and variants too."""
-    members = tuple(
-        Member(member.name, _with_role(member.name, member.type, roles))
-        for member in structure.members
-    )
-    return Structure(members, structure.minimum_align)
-
-
-def _with_role(name: str, declared: Type, roles: Mapping[str, str]) -> Type:
-    match declared:
-        case Structure():
-            return _with_roles(declared, roles)
-        case Variant():
-            choices = tuple(
-                Choice(choice.name, _with_role("", choice.type, roles), choice.ranges)
-                for choice in declared.choices
-            )
-            return replace(declared, choices=choices)
-        case Integer() | Array() if name in roles and may_have(declared, roles[name]):
-            return replace(declared, roles=declared.roles | {roles[name]})
-        case _:
-            return declared
+    """Add the structure of a scope, after those that it may refer to."""
+    frames: dict[Scope, dict[str, Type]] = {
+        known: {member.name: member.type for member in of_scope.members}
+        for known, of_scope in scopes.items()
+        if known < scope
+    }
+    declared = block.structures.get(scope, Structure())
+    outer = [frames[known] for known in sorted(frames)]
+    scopes[scope] = _Resolver(scope, frames).structure(declared, outer)
 
 
 def _clock_of(scopes: Mapping[Scope, Structure], clocks: Mapping[str, Clock]) -> Clock | None:
@@ -265,3 +250,88 @@ def _uuid(block: _Block) -> str | None:
         return str(UUID(str(value)))
     except ValueError as error:
         raise MetadataError(f"{value!r} is no uuid") from error
+
+
+class _Resolver:
+    """Gives fields their roles, and options of variants the values that choose them.
+
+    The selector is an enumeration declared before, and its labels are the names of the options.
+    """
+
+    def __init__(self, scope: Scope, scopes: dict[Scope, dict[str, Type]]) -> None:
+        self._scope = scope
+        self._scopes = scopes
+        self._roles = _ROLES.get(scope, {})
+        self._count = 0
+
+    def structure(self, declared: Structure, frames: Frames) -> Structure:
+        frame: dict[str, Type] = {}
+        self._scopes.setdefault(self._scope, frame)
+        members = []
+        for member in declared.members:
+            field = self._with_role(member.name, self._type(member.type, [*frames, frame]))
+            frame[member.name] = field
+            members.append(Member(member.name, field))
+        return Structure(tuple(members), declared.minimum_align)
+
+    def _with_role(self, name: str, declared: Type) -> Type:
+        role = self._roles.get(name)
+        if role and isinstance(declared, Integer | Array) and may_have(declared, role):
+            return replace(declared, roles=declared.roles | {role})
+        return declared
+
+    def _type(self, declared: Type, frames: Frames) -> Type:
+        self._count += 1
+        if self._count > _MOST_FIELDS:
+            # Structures that contain others by name can grow without limit.
+            raise MetadataError(f"a structure has more than {_MOST_FIELDS} fields")
+        match declared:
+            case Structure():
+                return self.structure(declared, frames)
+            case Array() | Sequence():
+                return replace(declared, element=self._type(declared.element, frames))
+            case Variant():
+                return self._variant(declared, frames)
+            case _:
+                return declared
+
+    def _variant(self, declared: Variant, frames: Frames) -> Variant:
+        selector = self._find(declared.selector, frames)
+        if not isinstance(selector, Integer) or selector.labels is None:
+            path = ".".join(map(str, declared.selector.path))
+            raise MetadataError(f"the selector {path!r} of a variant is no enumeration before it")
+        choices = []
+        for choice in declared.choices:
+            name = without_prefix(choice.name)
+            ranges = selector.labels.get(choice.name) or selector.labels.get(name) or ()
+            choices.append(Choice(name, self._type(choice.type, frames), ranges))
+        return replace(declared, choices=tuple(choices))
+
+    def _find(self, reference: Reference, frames: Frames) -> Type | None:
+        if reference.scope is not None:
+            return _follow(self._scopes.get(reference.scope), reference.path)
+        for frame in reversed(frames):
+            if reference.path[0] in frame:
+                return _follow(frame, reference.path)
+        return None
+
+
+def _follow(frame: dict[str, Type] | None, path: tuple[str | None, ...]) -> Type | None:
+    found: Type | None = None
+    for name in path:
+        if frame is None or name is None:
+            return None
+        found = frame.get(name)
+        match found:
+            case Structure(members=members):
+                frame = {member.name: member.type for member in members}
+            case Variant(choices=choices):
+                frame = {
+                    member.name: member.type
+                    for choice in choices
+                    if isinstance(choice.type, Structure)
+                    for member in choice.type.members
+                }
+            case _:
+                frame = None
+    return found

@@ -20,7 +20,6 @@ from msgflow.trace.ctf.field_types import (
     Type,
     Variant,
 )
-from msgflow.trace.ctf.tsdl_variants import without_prefix
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -365,3 +364,8 @@ def reference_of(text: str) -> Reference:
         if names[: len(prefix)] == prefix and len(names) > len(prefix):
             return Reference(scope, tuple(map(without_prefix, names[len(prefix) :])))
     return Reference(None, tuple(map(without_prefix, names)))
+
+
+def without_prefix(name: str) -> str:
+    """Remove the underscore that keeps names of fields apart from words of the language."""
+    return name.removeprefix("_")
