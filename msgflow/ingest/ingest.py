@@ -17,12 +17,7 @@ from msgflow.db import migration
 from msgflow.db.connection import attach
 from msgflow.db.derivation import derive
 from msgflow.db.finding import read_findings
-from msgflow.db.memory import (
-    default_limit,
-    ingest_memory_errors,
-    limit_threads,
-    set_memory_limit,
-)
+from msgflow.db.memory import default_limit, ingest_memory_errors, limit_threads, set_memory_limit
 from msgflow.db.sandbox import open_memory, shut_in
 from msgflow.db.transaction import transaction
 from msgflow.db.workspace import creating, workspace

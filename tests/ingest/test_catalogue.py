@@ -13,7 +13,7 @@ import pytest
 
 import msgflow.trace
 from msgflow.files.resources import resource_directory
-from msgflow.ingest import catalogue
+from msgflow.ingest import catalogue, staging
 from msgflow.ingest.cpus import Cpus
 from msgflow.ingest.load import without_thread
 from msgflow.ingest.sequences import Sequences
@@ -182,3 +182,13 @@ def test_everything_that_is_staged_is_read() -> None:
     )
     words = set(re.findall(r"\w+", re.sub(r"--.*", "", text)))
     assert {t.table for t in known.staged.values()} - words <= again
+
+
+def test_interrupts_have_the_kinds_of_the_catalogue() -> None:
+    with duckdb.connect() as con:
+        staging.attach(con, None)
+        ((kind,),) = con.execute(
+            "SELECT data_type FROM duckdb_columns() WHERE table_name = 'interrupt' "
+            "AND column_name = 'kind'"
+        ).fetchall()
+    assert kind == catalogue.enum_type(catalogue.load().interrupts)
