@@ -12,21 +12,7 @@ what their `info` holds. Each `ForeignKey` declares a relation. Databases do not
 foreign keys would forbid replacing a run in one transaction. `relation_check.py` proves it instead.
 """
 
-from msgflow.db.tables import (  # noqa: F401
-    bag,
-    call,
-    callback,
-    clock,
-    executor,
-    flow,
-    identity,
-    link,
-    profile,
-    recording,
-    ros_object,
-    schedule,
-    user_event,
-)
+from msgflow.db.tables import call, callback, identity, link, recording, ros_object, schedule
 from msgflow.db.tables.column import STORE
 
-__all__ = ["STORE"]
+__all__ = ["STORE", "call", "callback", "identity", "link", "recording", "ros_object", "schedule"]
