@@ -79,12 +79,12 @@ class Iteration:
         batches = ordered_batches(self._entries, size, self._report_damage, whole)
         with closing(prefetched(batches, _AHEAD)) as ahead:
             for number, batch in enumerate(ahead):
-                yield from packet_batches(
-                    batch.packets, self._batch_rows, number, self._report_damage
-                )
                 if batch.ts_ns.size:
                     latest_ns = int(batch.ts_ns[-1])
                 yield from self.events(batch, number)
+                yield from packet_batches(
+                    batch.packets, self._batch_rows, number, self._report_damage
+                )
                 done += sum(packet.entry.size for packet in batch.packets)
                 if done < total:
                     self._report_progress(done / total, latest_ns)

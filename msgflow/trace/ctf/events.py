@@ -159,14 +159,8 @@ def _read_field_by_field(
         reader = event_reader_of(layout, memory, entry, entry.base)
         clock = entry.clock_before
         for position in _begins(entry).tolist():
-            header = reader.header(position)
-            if header.time is not None:
-                size = 1 << header.time_bits
-                if header.time_bits < 64:
-                    clock += (header.time - clock) % size
-                else:
-                    clock = header.time
-            classes.append(layout.classes[header.event.id].number)
+            event, clock = reader.header(position, clock)
+            classes.append(layout.classes[event.id].number)
             values.append(clock % (1 << 64))
     positions = np.concatenate([_begins(entry) for entry in entries])
     return Events(

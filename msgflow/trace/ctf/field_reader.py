@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from msgflow.trace.ctf.field_types import (
@@ -253,15 +252,6 @@ def _smallest_size(field_type: Type) -> int:
             return 0
 
 
-@dataclass(frozen=True, slots=True)
-class HeaderValues:
-    """Header of an event: its class, its time stamp and the size of the time stamp in bits."""
-
-    event: EventClass
-    time: int | None
-    time_bits: int
-
-
 class EventReader:
     """Reader of the events of one packet, which may begin at any bit."""
 
@@ -281,8 +271,11 @@ class EventReader:
         begin = aligned(position, self._stream.event_header.align)
         return min(begin, self._end) if position < self._end else self._end
 
-    def header(self, position: int) -> HeaderValues:
-        """Read the header of the event that begins at this bit."""
+    def header(self, position: int, clock: int = 0) -> tuple[EventClass, int]:
+        """Return the class of the event that begins at this bit, and the clock's value there.
+
+        `clock` is its value before: a time stamp may be only the low bits.
+        """
         reader = self._reader
         reader.position = position
         reader.found.pop(Role.TIME, None)
@@ -291,11 +284,12 @@ class EventReader:
         event = self._stream.events.get(reader.found[Role.EVENT_CLASS])
         if event is None:
             raise FieldError(f"there is no event class {reader.found[Role.EVENT_CLASS]}")
-        return HeaderValues(event, reader.found.get(Role.TIME), reader.bits.get(Role.TIME, 64))
+        time, bits = reader.found.get(Role.TIME, clock), reader.bits.get(Role.TIME, 64)
+        return event, time if bits == 64 else clock + (time - clock) % (1 << bits)
 
     def event(self, position: int) -> dict[Scope, dict[str, Any]]:
         """Read the contexts and payload of the event that begins at this bit."""
-        event = self.header(position).event
+        event, _ = self.header(position)
         read = self._reader.read_scope
         return {
             Scope.EVENT_CONTEXT: read(Scope.EVENT_CONTEXT, self._stream.event_context),
