@@ -23,7 +23,7 @@ from msgflow.trace.ctf.field_types import (
     Variant,
     may_have,
 )
-from msgflow.trace.ctf.tsdl_tokens import Token, TokenStream, tokens_of
+from msgflow.trace.ctf.tsdl_tokens import Token, tokens_of
 from msgflow.trace.ctf.tsdl_types import TypeParser, Value, without_prefix
 
 if TYPE_CHECKING:
@@ -74,33 +74,30 @@ class _Block:
 
 def parse(text: str) -> TraceClass:
     """Parse metadata."""
-    tokens = tokens_of(text)
-    blocks = _Blocks(tokens)
+    blocks = _Blocks(tokens_of(text))
     blocks.parse()
     return _trace_class(blocks)
 
 
-class _Blocks:
+class _Blocks(TypeParser):
     """The blocks of a text, in the order of their appearance."""
 
     def __init__(self, tokens: list[Token]) -> None:
+        super().__init__(tokens, _is_big_endian(tokens))
         self.trace: _Block | None = None
         self.environment: dict[str, Value] = {}
         self.clocks: list[_Block] = []
         self.streams: list[_Block] = []
         self.events: list[_Block] = []
-        self._tokens = TokenStream(tokens)
-        self._types = TypeParser(self._tokens, _is_big_endian(tokens))
 
     def parse(self) -> None:
-        tokens = self._tokens
-        while tokens.token.kind != "end":
-            if self._types.at_declaration():
-                self._types.declaration()
+        while self.token.kind != "end":
+            if self.at_declaration():
+                self.declaration()
                 continue
-            kind = tokens.name()
+            kind = self.name()
             block = self._block()
-            tokens.expect(";")
+            self.expect(";")
             if kind == "trace":
                 self.trace = block
             elif kind == "env":
@@ -112,26 +109,25 @@ class _Blocks:
             elif kind == "event":
                 self.events.append(block)
             elif kind != "callsite":
-                raise tokens.error(f"there is no block {kind!r}")
+                raise self.error(f"there is no block {kind!r}")
 
     def _block(self) -> _Block:
-        tokens = self._tokens
         block = _Block()
-        self._types.open_block()
-        while tokens.token.value != "}":
-            if self._types.at_declaration():
-                self._types.declaration()
+        self.open_block()
+        while self.token.value != "}":
+            if self.at_declaration():
+                self.declaration()
                 continue
-            name = str(self._types.value())
-            if tokens.take_if(":="):
+            name = str(self.value())
+            if self.take_if(":="):
                 if name not in _SCOPES:
-                    raise tokens.error(f"there is no structure {name!r}")
-                block.structures[_SCOPES[name]] = self._types.structure()
+                    raise self.error(f"there is no structure {name!r}")
+                block.structures[_SCOPES[name]] = self.structure()
             else:
-                tokens.expect("=")
-                block.values[name] = self._types.value()
-            tokens.expect(";")
-        self._types.close_block()
+                self.expect("=")
+                block.values[name] = self.value()
+            self.expect(";")
+        self.close_block()
         return block
 
 
