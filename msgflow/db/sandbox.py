@@ -20,7 +20,7 @@ from msgflow.db.lock_holder import lock_holder
 from msgflow.db.memory import limit_threads, set_memory_limit
 from msgflow.db.workspace import remove_abandoned_workspaces
 from msgflow.errors import DatabaseError, DatabaseInUseError, require_utf8
-from msgflow.files.temporary_owner import is_abandoned, mark
+from msgflow.files.temporary_owner import left_behind, mark
 from msgflow.sql.failure import in_words
 
 if TYPE_CHECKING:
@@ -105,16 +105,9 @@ def remove_abandoned_spills(database: Path, *, is_ours_alone: bool) -> None:
     `is_ours_alone` says that the database is open for writing. No other process can have it open
     then, so that every other spill directory is abandoned.
     """
-    prefix = _prefix(database)
-    try:
-        entries = [entry.name for entry in os.scandir(_place(database))]
-    except OSError:
-        return
-    for name in entries:
-        if name.startswith(prefix) and name.endswith(_SPILL):
-            owner = name[len(prefix) : -len(_SPILL)]
-            if owner != mark() and (is_ours_alone or is_abandoned(owner)):
-                shutil.rmtree(_place(database) / name, ignore_errors=True)
+    others = left_behind(_place(database), _prefix(database), _SPILL, by_others=is_ours_alone)
+    for directory in others:
+        shutil.rmtree(directory, ignore_errors=True)
 
 
 def _place(database: Path) -> Path:

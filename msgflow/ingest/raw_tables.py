@@ -30,18 +30,10 @@ class RawTables:
     """
 
     def __init__(
-        self,
-        con: duckdb.DuckDBPyConnection,
-        *,
-        may_hold: bool,
-        may_replace: bool,
-        rows_per_insert: int = ROWS_PER_INSERT,
-        most_waiting: int = MOST_WAITING,
+        self, con: duckdb.DuckDBPyConnection, *, may_hold: bool, may_replace: bool
     ) -> None:
         """Start with nothing waiting, inside an open transaction."""
         self._con = con
-        self._rows_per_insert = rows_per_insert
-        self._most_waiting = most_waiting
         self._may_hold = may_hold
         self._may_replace = may_replace
         self._waiting: dict[str, list[pa.RecordBatch]] = {}
@@ -68,9 +60,9 @@ class RawTables:
             self.replaced |= self._same_packets(rows)
         self._waiting.setdefault(table, []).append(rows)
         self._counts[table] = self._counts.get(table, 0) + rows.num_rows
-        if self._counts[table] >= self._rows_per_insert:
+        if self._counts[table] >= ROWS_PER_INSERT:
             self._insert(table)
-        elif sum(self._counts.values()) > self._most_waiting:
+        elif sum(self._counts.values()) > MOST_WAITING:
             self._insert(max(self._counts, key=self._counts.__getitem__))
 
     def flush(self) -> None:

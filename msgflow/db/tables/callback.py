@@ -24,9 +24,9 @@ from msgflow.db.tables.column import (
 
 _IS_END_INFERRED = column(
     "is_end_inferred",
-    BOOLEAN,
     "No callback_end: a service callback that answers later (before Kilted), which was over at "
     "the next executor event of its thread at the latest",
+    BOOLEAN,
     sql="self.end_ns IS NOT NULL AND self.end_event_id IS NULL",
 )
 

@@ -29,7 +29,7 @@ table(
     "run",
     key("run_id", "Identity of the run"),
     text("name", "Name given by the user, or the name of the first trace directory", required=True),
-    column("created_at", TIMESTAMP, "When the run was ingested, UTC", required=True),
+    column("created_at", "When the run was ingested, UTC", TIMESTAMP, required=True),
     text("msgflow_version", "Version of msgflow that ingested the run", required=True),
     text("derivation_hash", "SHA-256 of the SQL that derived the links", required=True),
     moment("start_ns", "First event of any trace"),
@@ -37,8 +37,8 @@ table(
     number("event_count", "Events read"),
     column(
         "labels",
-        ARRAY(VARCHAR),
         "Labels that users gave to the run, KEY=VALUE each, sorted; NULL: no label",
+        ARRAY(VARCHAR),
     ),
     text("clock_sync", "How clocks were to be brought together: 'none', 'messages' or 'file'"),
     comment="One row per ingest of traces that belong together",
@@ -59,8 +59,8 @@ table(
     number("discarded_event_count", "Events that the tracer counted as discarded"),
     column(
         "has_request_events",
-        BOOLEAN,
         "Requests would have events in it, if there were any (Kilted and later)",
+        BOOLEAN,
     ),
     comment="One row per CTF trace read",
     view="CTF traces that were read.",
@@ -169,6 +169,6 @@ table(
     number("drift_ppb", "Change of the difference in the stretch", unit="ppb"),
     number("message_count", "Messages that agree with it"),
     number("segment", "Number of jumps of the clock before it"),
-    column("is_sharp", BOOLEAN, "Publications microseconds apart can be distinguished; NULL: yes"),
+    column("is_sharp", "Publications microseconds apart can be distinguished; NULL: yes", BOOLEAN),
     comment="One row per stretch of time in which stamps run along a clock of the traces",
 )

@@ -22,8 +22,8 @@ from msgflow.db.tables.column import (
 
 _POLICY = column(
     "policy",
-    VARCHAR,
     "How it is scheduled, as its priority tells: 'deadline', 'real_time' or 'normal'",
+    VARCHAR,
     sql="CASE WHEN self.priority < 0 THEN 'deadline' WHEN self.priority < 100 THEN 'real_time' "
     "WHEN self.priority IS NOT NULL THEN 'normal' END",
 )
