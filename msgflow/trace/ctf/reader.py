@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
@@ -13,8 +14,7 @@ from msgflow.trace.ctf.field_types import MetadataError
 from msgflow.trace.ctf.losses import LossCounter
 from msgflow.trace.ctf.packet_header import HeaderReader
 from msgflow.trace.ctf.packet_index import orphans
-from msgflow.trace.ctf.packet_order import entries_of
-from msgflow.trace.ctf.packet_times import begins_of, numbers_of
+from msgflow.trace.ctf.packet_order import begins_of, entries_of
 from msgflow.trace.ctf.packets import streams_of
 from msgflow.trace.ctf.stream_layout import StreamLayout
 from msgflow.trace.ctf.trace_info import corrected, describe
@@ -112,7 +112,10 @@ class CtfTraceSet(TraceSet):
     def _batches(self, wanted: Wanted, progress: Report | None, batch_rows: int) -> Batches:
         self.damages = list(self._found_early)
         if self._begins is None:
-            self._begins = numbers_of(s for s in self._streams if not s.has_time)
+            # Packets without times have a number in place of the clock's value, and of the time.
+            timeless = (s.packets for s in self._streams if not s.has_time)
+            numbered = enumerate(itertools.chain.from_iterable(timeless))
+            self._begins = {packet: (number, number) for number, packet in numbered}
             for stream in self._streams:
                 if stream.has_time:
                     self._begins |= begins_of(stream)
