@@ -41,6 +41,9 @@ _NO_ROW = (
     "NULL::BIGINT AS count, NULL::VARCHAR AS detail WHERE false"
 )
 
+# What the header of a kind says of each of its findings.
+_OF_KIND = "name, phase, severity, title, description, cause, cure"
+
 # By the name of a finding: what shows more of it, or cures it.
 _AFTER = {
     "dead_end": "msgflow suggest links",
@@ -115,13 +118,12 @@ def composed(layer: str) -> tuple[Header, ...]:
         return (_object("staging.finding", description, "one row per place", rows),)
     if layer == "stat":
         rows = "VALUES\n" + ",\n".join(map(_row, (*kinds_of("input"), *kinds_of("recording"))))
-        columns = "name, phase, severity, title, description, cause, cure"
         return (
             _object(
                 "derive.finding_kind",
                 "What an ingest can find, and what the headers in `schema/health` say about it.",
                 "one row per kind of finding",
-                f"SELECT {columns}\nFROM (\n{rows}\n) AS kind ({columns})\n",
+                f"SELECT {_OF_KIND}\nFROM (\n{rows}\n) AS kind ({_OF_KIND})\n",
             ),
         )
     return ()
@@ -200,24 +202,15 @@ def _broken(
     values: dict[str, object] = {"run_id": run_id}
     if header.params:
         values["broken"] = broken_relations(con, run_id)
+    fields = ", ".join(Finding.__dataclass_fields__)
     rows = con.execute(
-        f"FROM (\n{statement([header])}\n) WHERE run_id = coalesce($run_id, run_id)", values
+        f"SELECT {fields} FROM (SELECT * REPLACE (coalesce(subject, 'the database') AS subject) "
+        f"FROM (\n{statement([header])}\n)) "
+        f"JOIN (VALUES\n{_row(header)}\n) AS kind ({_OF_KIND}) USING (name) "
+        "WHERE run_id = coalesce($run_id, run_id)",
+        values,
     ).fetchall()
-    for found_id, trace_id, name, subject, count, detail in rows:
-        yield Finding(
-            run_id=found_id,
-            trace_id=trace_id,
-            name=name,
-            phase="database",
-            severity=header.severity or "",
-            subject=subject or "the database",
-            count=count,
-            detail=detail,
-            cause=header.cause or "",
-            cure=header.cure or "",
-            title=header.title,
-            description=header.description,
-        )
+    yield from (Finding(*row) for row in rows)
 
 
 def _order(finding: Finding) -> tuple[int, str, int, str, int, str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import time
+from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -235,7 +236,7 @@ class ImplausibleValues:
     """
 
     def __init__(self) -> None:
-        self._counts: dict[tuple[str, str, str], int] = {}
+        self._counts: Counter[tuple[str, str, str]] = Counter()
 
     def without(self, name: str, batch: pa.RecordBatch) -> pa.RecordBatch:
         """Return events of this name with NULL in place of implausible values."""
@@ -252,12 +253,9 @@ class ImplausibleValues:
                 continue
             bad = is_valid(values) & ~((least <= numbers) & (numbers <= most))
             if bad.any():
-                self._count(name, field.name, what, int(bad.sum()))
+                self._counts[name, field.name, what] += int(bad.sum())
                 batch = batch.set_column(place, field, without(values, bad))
         return batch
-
-    def _count(self, name: str, column: str, what: str, bad: int) -> None:
-        self._counts[name, column, what] = self._counts.get((name, column, what), 0) + bad
 
     def rows(self) -> Iterator[tuple[str, str, str, int]]:
         """Yield (event, field, what its values cannot be, how many were left out)."""

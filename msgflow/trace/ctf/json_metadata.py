@@ -47,7 +47,10 @@ _ORIGINS = {
     "event-record-specific-context": Scope.SPECIFIC_CONTEXT,
     "event-record-payload": Scope.PAYLOAD,
 }
-_ARROW = {
+# Integers of CTF 2, and what they are to Arrow.
+_INTEGERS = {
+    "fixed-length-unsigned-integer": "integer",
+    "fixed-length-signed-integer": "integer",
     "fixed-length-boolean": "bool",
     "fixed-length-bit-array": "bits",
     "fixed-length-bit-map": "bits",
@@ -209,13 +212,7 @@ class TypeReader:
         # Before the final specification integers with mappings had types of their own.
         kind = str(declared.get("type")).replace("signed-enumeration", "signed-integer")
         match kind:
-            case (
-                "fixed-length-unsigned-integer"
-                | "fixed-length-signed-integer"
-                | "fixed-length-boolean"
-                | "fixed-length-bit-array"
-                | "fixed-length-bit-map"
-            ):
+            case _ if kind in _INTEGERS:
                 return _integer(declared, kind)
             case "variable-length-unsigned-integer" | "variable-length-signed-integer":
                 integer = VariableInteger("unsigned" not in kind, _labels(declared))
@@ -303,7 +300,7 @@ def _integer(declared: dict[str, Any], kind: str) -> Integer:
         big_endian=_is_big_endian(declared),
         signed=kind == "fixed-length-signed-integer",
         labels=_labels(declared),
-        arrow=_ARROW.get(kind, "integer"),
+        arrow=_INTEGERS[kind],
         base=integer_of(declared, "preferred-display-base", 10),
     )
     return replace(integer, roles=_roles(declared, integer))
