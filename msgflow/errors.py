@@ -45,8 +45,6 @@ class MsgflowError(Exception):
 class QueryError(MsgflowError):
     """The database could not run a query or other SQL."""
 
-    exit_code = ExitCode.FAILED
-
 
 class UsageError(MsgflowError):
     """The command or call itself is wrong: a name, parameter or value that does not exist."""
@@ -66,8 +64,6 @@ class TraceError(MsgflowError):
 
 class RecordingError(MsgflowError):
     """A recording cannot begin or go on: LTTng, its daemon, the disk, or a program is missing."""
-
-    exit_code: ExitCode = ExitCode.FAILED
 
 
 class DatabaseError(MsgflowError):

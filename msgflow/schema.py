@@ -25,20 +25,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import sqlalchemy
 from duckdb_engine.datatypes import UBigInteger
-from sqlalchemy import (
-    ARRAY,
-    BIGINT,
-    BLOB,
-    BOOLEAN,
-    DOUBLE,
-    INTEGER,
-    VARCHAR,
-    Column,
-    ForeignKey,
-    MetaData,
-    Table,
-)
+from sqlalchemy import ARRAY, Column, ForeignKey, MetaData, Table
 
 from msgflow.db import objects
 from msgflow.db.tables import STORE
@@ -51,16 +40,6 @@ if TYPE_CHECKING:
     from msgflow.sql.header import Column as HeaderColumn
 
 __all__ = ["public", "store"]
-
-_TYPES: dict[str, type[TypeEngine[Any]]] = {
-    "BIGINT": BIGINT,
-    "BLOB": BLOB,
-    "BOOLEAN": BOOLEAN,
-    "DOUBLE": DOUBLE,
-    "INTEGER": INTEGER,
-    "UBIGINT": UBigInteger,
-    "VARCHAR": VARCHAR,
-}
 
 
 def _public() -> MetaData:
@@ -109,9 +88,9 @@ def _relation(
 
 
 def _type(name: str) -> TypeEngine[Any]:
-    base = name.rstrip("[]")
-    dimensions = name.count("[]")
-    return ARRAY(_TYPES[base](), dimensions=dimensions) if dimensions else _TYPES[base]()
+    base, dimensions = name.rstrip("[]"), name.count("[]")
+    declared = UBigInteger() if base == "UBIGINT" else getattr(sqlalchemy, base)()
+    return ARRAY(declared, dimensions=dimensions) if dimensions else declared
 
 
 store = STORE

@@ -13,20 +13,6 @@
 
 CREATE SCHEMA store;
 
--- One row per message of a bag whose publication is known (msgflow bag)
--- view: Messages of a bag that was recorded in the same run: size, stamp and frame.
-CREATE TABLE store.bag_message (
-    run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
-    publication_id BIGINT NOT NULL,  -- The publication that it is the message of {to publication}
-    topic_name VARCHAR NOT NULL,  -- Name of the topic
-    type_name VARCHAR NOT NULL,  -- Type of the message, such as sensor_msgs/msg/Image
-    received_ns BIGINT NOT NULL,  -- When the recorder of the bag received it, clock of ROS [epoch
-        -- ns]
-    size_bytes BIGINT NOT NULL,  -- Size as it was sent (CDR) [bytes]
-    stamp_ns BIGINT,  -- header.stamp, clock of ROS; NULL: its type has no header [epoch ns]
-    frame_id VARCHAR  -- header.frame_id; NULL: its type has no header
-);
-
 -- One row per publish() call
 -- view: Messages at the moment they were published, with the time of each layer seen.
 CREATE TABLE store.publication (
@@ -153,6 +139,38 @@ CREATE TABLE store.response (
     request_id BIGINT  -- Request that it answers {to request}
 );
 
+-- One row per message of a bag whose publication is known (msgflow bag)
+-- view: Messages of a bag that was recorded in the same run: size, stamp and frame.
+CREATE TABLE store.bag_message (
+    run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
+    publication_id BIGINT NOT NULL,  -- The publication that it is the message of {to publication}
+    topic_name VARCHAR NOT NULL,  -- Name of the topic
+    type_name VARCHAR NOT NULL,  -- Type of the message, such as sensor_msgs/msg/Image
+    received_ns BIGINT NOT NULL,  -- When the recorder of the bag received it, clock of ROS [epoch
+        -- ns]
+    size_bytes BIGINT NOT NULL,  -- Size as it was sent (CDR) [bytes]
+    stamp_ns BIGINT,  -- header.stamp, clock of ROS; NULL: its type has no header [epoch ns]
+    frame_id VARCHAR  -- header.frame_id; NULL: its type has no header
+);
+
+-- One row per event whose name a pattern of msgflow ingest --events matches
+-- view: Events of the user's own tracepoints.
+CREATE TABLE store.user_event (
+    user_event_id BIGINT NOT NULL,  -- Identity of the event
+    run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
+    trace_id BIGINT NOT NULL,  -- Trace it was recorded in {to trace}
+    process_id BIGINT NOT NULL,  -- Process it lives in {to process}
+    thread_id BIGINT NOT NULL,  -- Thread it happened on {to thread}
+    cpu INTEGER,  -- CPU that it happened on
+    at_ns BIGINT NOT NULL,  -- When it happened [epoch ns] {clock process_id}
+    name VARCHAR NOT NULL,  -- Provider and event, such as my_pkg:frame_done
+    callback_instance_id BIGINT,  -- Innermost callback instance inside which it happened, on its
+        -- thread; NULL: none {to callback_instance}
+    fields VARCHAR NOT NULL,  -- Its fields, a JSON object: fields->>'$.name' is one of them
+    is_loss_affected BOOLEAN DEFAULT false NOT NULL  -- A gap may hide that the callback instance
+        -- was over
+);
+
 -- One row per callback object
 -- view: Callback objects and what they belong to.
 CREATE TABLE store.callback (
@@ -221,49 +239,6 @@ CREATE TABLE store.callback_instance (
         -- self.end_ns IS NOT NULL AND self.end_event_id IS NULL}
 );
 
--- One row per clock: hosts of one clock need no synchronisation
--- view: Clocks and how their times are corrected. Times in the other views are corrected already.
-CREATE TABLE store.clock (
-    clock_id BIGINT PRIMARY KEY,  -- Identity of the clock
-    run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
-    uuid VARCHAR,  -- UUID of the clock (LTTng: boot identity)
-    offset_ns BIGINT NOT NULL,  -- Added to a time of this clock to correct it [ns]
-    drift_ppb BIGINT NOT NULL,  -- Added per unit of time since reference_ns [1e-9]
-    reference_ns BIGINT NOT NULL,  -- Moment at which the correction is offset_ns alone [epoch ns]
-    uncertainty_ns BIGINT,  -- Bound of the error of the correction at reference_ns [ns]
-    method VARCHAR NOT NULL,  -- 'none', 'messages', 'packets' or 'file'
-    drift_uncertainty_ppb BIGINT,  -- Growth of the error bound per unit of time from reference_ns;
-        -- NULL: the bound holds throughout, or is not known [1e-9]
-    reference_clock_id BIGINT  -- Clock that this one is corrected to: times of clocks with the same
-        -- one can be compared; NULL: as recorded {to clock}
-);
-
--- One row per clock and moment
--- view: Bounds of the error of each clock's correction: at the moments listed here, uncertainty_ns;
--- between two of them, on the straight line. Times of two clocks with the same reference can be
--- compared to within the sum of both bounds. The reference itself has no error and no rows.
-CREATE TABLE store.clock_uncertainty (
-    run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
-    clock_id BIGINT NOT NULL,  -- The clock {to clock}
-    at_ns BIGINT NOT NULL,  -- Moment, as the clock showed it [epoch ns]
-    uncertainty_ns BIGINT NOT NULL  -- Bound of the error of the correction at that moment [ns]
-);
-
--- One row per stretch of time in which stamps run along a clock of the traces
-CREATE TABLE store.stamp_clock (
-    run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
-    clock_id BIGINT NOT NULL,  -- Clock of the traces {to clock}
-    at_ns BIGINT NOT NULL,  -- Middle of the stretch, time of the traces [epoch ns]
-    start_ns BIGINT NOT NULL,  -- Begin of the stretch [epoch ns]
-    end_ns BIGINT NOT NULL,  -- End of the stretch, exclusive [epoch ns]
-    difference_ns BIGINT NOT NULL,  -- Clock of ROS less clock of the traces, with the shortest
-        -- delay of a stamp [ns]
-    drift_ppb BIGINT,  -- Change of the difference in the stretch [ppb]
-    message_count BIGINT,  -- Messages that agree with it
-    segment BIGINT,  -- Number of jumps of the clock before it
-    is_sharp BOOLEAN  -- Publications microseconds apart can be distinguished; NULL: yes
-);
-
 -- One row per executor
 -- view: Executors.
 CREATE TABLE store.executor (
@@ -294,49 +269,6 @@ CREATE TABLE store.executor_state (
         -- one before and this one
     callback_instance_id BIGINT,  -- First callback instance in it {to callback_instance}
     start_event_id BIGINT  -- Executor event that began it [event order] {hidden}
-);
-
--- One row per publication caused by a call, callback instance that called, and services in between
-CREATE TABLE store.flow_call (
-    run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
-    publication_id BIGINT NOT NULL,  -- What was published {to publication}
-    publisher_id BIGINT,  -- Its publisher {to publisher}
-    kind VARCHAR NOT NULL,  -- Kind of the causal link to the publication
-    callback_instance_id BIGINT,  -- Callback instance of the service; NULL: what was taken led to
-        -- it without one {to callback_instance}
-    caller_id BIGINT NOT NULL,  -- Callback instance that called {to callback_instance}
-    route BIGINT[] NOT NULL,  -- Node (or, negative, process) that called, then services; empty: by
-        -- no service
-    take_id BIGINT,  -- Message that the caller processed; NULL: none {to take}
-    subscription_id BIGINT,  -- Subscription of that message {to subscription}
-    taken_request_id BIGINT,  -- Request that the service took {to request}
-    taken_response_id BIGINT  -- Response that the caller took {to response}
-);
-
--- One row per publication on a topic of the application, and per take from (not traced)
-CREATE TABLE store.flow_root (
-    run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
-    publication_id BIGINT NOT NULL,  -- The message; below 0: its publisher is not traced
-    publisher_id BIGINT NOT NULL,  -- Its publisher; below 0: not traced
-    is_source BOOLEAN DEFAULT false NOT NULL,  -- Not caused by a taken message
-    root_kind VARCHAR NOT NULL,  -- 'callback_instance', 'publication' or 'take'
-    root_id BIGINT NOT NULL,  -- Row of that kind where its flow begins
-    route BIGINT[] NOT NULL,  -- Node (or, negative, process) that called, then services; empty: by
-        -- no service
-    before_take_ns BIGINT  -- Of a take: how long before it the flow begins [ns]
-);
-
--- One row per step of the graph: subscription before, route, publisher and subscription
-CREATE TABLE store.flow_hop (
-    run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
-    from_subscription_id BIGINT,  -- Subscription whose message led on; NULL: none {to subscription}
-    route BIGINT[] NOT NULL,  -- Node (or, negative, process) that called, then services; empty: by
-        -- no service
-    publisher_id BIGINT NOT NULL,  -- Publisher; below 0: not traced
-    subscription_id BIGINT NOT NULL,  -- Subscription that took from it {to subscription}
-    is_source BOOLEAN DEFAULT false NOT NULL,  -- At least one of its publications was not caused by
-        -- a taken message
-    is_cached BOOLEAN DEFAULT false NOT NULL  -- The message may wait in the node for others
 );
 
 -- One row per machine or container
@@ -565,46 +497,47 @@ CREATE TABLE store.orphan_take (
     reason VARCHAR NOT NULL  -- Why; a closed vocabulary
 );
 
--- One row per function and file
--- view: Functions that samples of stacks saw.
-CREATE TABLE store.stack_frame (
-    stack_frame_id BIGINT PRIMARY KEY,  -- Identity of the function
+-- One row per publication caused by a call, callback instance that called, and services in between
+CREATE TABLE store.flow_call (
     run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
-    function VARCHAR NOT NULL,  -- Its name; '[unknown]': the file has no symbol for it
-    file VARCHAR NOT NULL  -- Library or program that has it, of Python the source file
+    publication_id BIGINT NOT NULL,  -- What was published {to publication}
+    publisher_id BIGINT,  -- Its publisher {to publisher}
+    kind VARCHAR NOT NULL,  -- Kind of the causal link to the publication
+    callback_instance_id BIGINT,  -- Callback instance of the service; NULL: what was taken led to
+        -- it without one {to callback_instance}
+    caller_id BIGINT NOT NULL,  -- Callback instance that called {to callback_instance}
+    route BIGINT[] NOT NULL,  -- Node (or, negative, process) that called, then services; empty: by
+        -- no service
+    take_id BIGINT,  -- Message that the caller processed; NULL: none {to take}
+    subscription_id BIGINT,  -- Subscription of that message {to subscription}
+    taken_request_id BIGINT,  -- Request that the service took {to request}
+    taken_response_id BIGINT  -- Response that the caller took {to response}
 );
 
--- One row per different stack
--- view: Stacks of calls that samples saw, each once, with the function that ran.
-CREATE TABLE store.stack (
-    stack_id BIGINT PRIMARY KEY,  -- Identity of the stack
+-- One row per publication on a topic of the application, and per take from (not traced)
+CREATE TABLE store.flow_root (
     run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
-    stack_frame_id BIGINT NOT NULL,  -- The function that ran: the innermost one {to stack_frame}
-    depth INTEGER NOT NULL  -- How many calls it has
+    publication_id BIGINT NOT NULL,  -- The message; below 0: its publisher is not traced
+    publisher_id BIGINT NOT NULL,  -- Its publisher; below 0: not traced
+    is_source BOOLEAN DEFAULT false NOT NULL,  -- Not caused by a taken message
+    root_kind VARCHAR NOT NULL,  -- 'callback_instance', 'publication' or 'take'
+    root_id BIGINT NOT NULL,  -- Row of that kind where its flow begins
+    route BIGINT[] NOT NULL,  -- Node (or, negative, process) that called, then services; empty: by
+        -- no service
+    before_take_ns BIGINT  -- Of a take: how long before it the flow begins [ns]
 );
 
--- One row per stack and call in it
--- view: The calls of each stack.
-CREATE TABLE store.stack_call (
+-- One row per step of the graph: subscription before, route, publisher and subscription
+CREATE TABLE store.flow_hop (
     run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
-    stack_id BIGINT NOT NULL,  -- The stack {to stack}
-    position INTEGER NOT NULL,  -- Place of the call, 1: the outermost
-    stack_frame_id BIGINT NOT NULL  -- The function that was called {to stack_frame}
-);
-
--- One row per sample of a process with ROS events
--- view: Samples of what threads of ROS processes ran, by perf.
-CREATE TABLE store.stack_sample (
-    run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
-    process_id BIGINT NOT NULL,  -- Process it lives in {to process}
-    thread_id BIGINT,  -- Thread that ran; NULL: one that recorded no event {to thread}
-    tid INTEGER NOT NULL,  -- Thread that ran, as perf numbers it
-    at_ns BIGINT NOT NULL,  -- When [epoch ns] {clock process_id}
-    cpu INTEGER,  -- CPU it ran on
-    callback_instance_id BIGINT,  -- Innermost callback instance that ran on its thread; NULL:
-        -- outside of callbacks {to callback_instance}
-    stack_id BIGINT NOT NULL,  -- The stack {to stack}
-    cpu_ns BIGINT  -- CPU time that it stands for; NULL: perf counted cycles [ns]
+    from_subscription_id BIGINT,  -- Subscription whose message led on; NULL: none {to subscription}
+    route BIGINT[] NOT NULL,  -- Node (or, negative, process) that called, then services; empty: by
+        -- no service
+    publisher_id BIGINT NOT NULL,  -- Publisher; below 0: not traced
+    subscription_id BIGINT NOT NULL,  -- Subscription that took from it {to subscription}
+    is_source BOOLEAN DEFAULT false NOT NULL,  -- At least one of its publications was not caused by
+        -- a taken message
+    is_cached BOOLEAN DEFAULT false NOT NULL  -- The message may wait in the node for others
 );
 
 -- One row per part of the schema that is re-applied rather than migrated
@@ -684,6 +617,49 @@ CREATE TABLE store.finding (
     subject VARCHAR,  -- Where: a trace, process, host, topic; NULL: the trace, or all of the phase
     count BIGINT,  -- How often
     detail VARCHAR  -- Numbers, and what they mean
+);
+
+-- One row per clock: hosts of one clock need no synchronisation
+-- view: Clocks and how their times are corrected. Times in the other views are corrected already.
+CREATE TABLE store.clock (
+    clock_id BIGINT PRIMARY KEY,  -- Identity of the clock
+    run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
+    uuid VARCHAR,  -- UUID of the clock (LTTng: boot identity)
+    offset_ns BIGINT NOT NULL,  -- Added to a time of this clock to correct it [ns]
+    drift_ppb BIGINT NOT NULL,  -- Added per unit of time since reference_ns [1e-9]
+    reference_ns BIGINT NOT NULL,  -- Moment at which the correction is offset_ns alone [epoch ns]
+    uncertainty_ns BIGINT,  -- Bound of the error of the correction at reference_ns [ns]
+    method VARCHAR NOT NULL,  -- 'none', 'messages', 'packets' or 'file'
+    drift_uncertainty_ppb BIGINT,  -- Growth of the error bound per unit of time from reference_ns;
+        -- NULL: the bound holds throughout, or is not known [1e-9]
+    reference_clock_id BIGINT  -- Clock that this one is corrected to: times of clocks with the same
+        -- one can be compared; NULL: as recorded {to clock}
+);
+
+-- One row per clock and moment
+-- view: Bounds of the error of each clock's correction: at the moments listed here, uncertainty_ns;
+-- between two of them, on the straight line. Times of two clocks with the same reference can be
+-- compared to within the sum of both bounds. The reference itself has no error and no rows.
+CREATE TABLE store.clock_uncertainty (
+    run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
+    clock_id BIGINT NOT NULL,  -- The clock {to clock}
+    at_ns BIGINT NOT NULL,  -- Moment, as the clock showed it [epoch ns]
+    uncertainty_ns BIGINT NOT NULL  -- Bound of the error of the correction at that moment [ns]
+);
+
+-- One row per stretch of time in which stamps run along a clock of the traces
+CREATE TABLE store.stamp_clock (
+    run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
+    clock_id BIGINT NOT NULL,  -- Clock of the traces {to clock}
+    at_ns BIGINT NOT NULL,  -- Middle of the stretch, time of the traces [epoch ns]
+    start_ns BIGINT NOT NULL,  -- Begin of the stretch [epoch ns]
+    end_ns BIGINT NOT NULL,  -- End of the stretch, exclusive [epoch ns]
+    difference_ns BIGINT NOT NULL,  -- Clock of ROS less clock of the traces, with the shortest
+        -- delay of a stamp [ns]
+    drift_ppb BIGINT,  -- Change of the difference in the stretch [ppb]
+    message_count BIGINT,  -- Messages that agree with it
+    segment BIGINT,  -- Number of jumps of the clock before it
+    is_sharp BOOLEAN  -- Publications microseconds apart can be distinguished; NULL: yes
 );
 
 -- One row per publisher
@@ -889,20 +865,44 @@ CREATE TABLE store.cpu_usage (
         -- not recorded [Hz]
 );
 
--- One row per event whose name a pattern of msgflow ingest --events matches
--- view: Events of the user's own tracepoints.
-CREATE TABLE store.user_event (
-    user_event_id BIGINT NOT NULL,  -- Identity of the event
+-- One row per function and file
+-- view: Functions that samples of stacks saw.
+CREATE TABLE store.stack_frame (
+    stack_frame_id BIGINT PRIMARY KEY,  -- Identity of the function
     run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
-    trace_id BIGINT NOT NULL,  -- Trace it was recorded in {to trace}
+    function VARCHAR NOT NULL,  -- Its name; '[unknown]': the file has no symbol for it
+    file VARCHAR NOT NULL  -- Library or program that has it, of Python the source file
+);
+
+-- One row per different stack
+-- view: Stacks of calls that samples saw, each once, with the function that ran.
+CREATE TABLE store.stack (
+    stack_id BIGINT PRIMARY KEY,  -- Identity of the stack
+    run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
+    stack_frame_id BIGINT NOT NULL,  -- The function that ran: the innermost one {to stack_frame}
+    depth INTEGER NOT NULL  -- How many calls it has
+);
+
+-- One row per stack and call in it
+-- view: The calls of each stack.
+CREATE TABLE store.stack_call (
+    run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
+    stack_id BIGINT NOT NULL,  -- The stack {to stack}
+    position INTEGER NOT NULL,  -- Place of the call, 1: the outermost
+    stack_frame_id BIGINT NOT NULL  -- The function that was called {to stack_frame}
+);
+
+-- One row per sample of a process with ROS events
+-- view: Samples of what threads of ROS processes ran, by perf.
+CREATE TABLE store.stack_sample (
+    run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
     process_id BIGINT NOT NULL,  -- Process it lives in {to process}
-    thread_id BIGINT NOT NULL,  -- Thread it happened on {to thread}
-    cpu INTEGER,  -- CPU that it happened on
-    at_ns BIGINT NOT NULL,  -- When it happened [epoch ns] {clock process_id}
-    name VARCHAR NOT NULL,  -- Provider and event, such as my_pkg:frame_done
-    callback_instance_id BIGINT,  -- Innermost callback instance inside which it happened, on its
-        -- thread; NULL: none {to callback_instance}
-    fields VARCHAR NOT NULL,  -- Its fields, a JSON object: fields->>'$.name' is one of them
-    is_loss_affected BOOLEAN DEFAULT false NOT NULL  -- A gap may hide that the callback instance
-        -- was over
+    thread_id BIGINT,  -- Thread that ran; NULL: one that recorded no event {to thread}
+    tid INTEGER NOT NULL,  -- Thread that ran, as perf numbers it
+    at_ns BIGINT NOT NULL,  -- When [epoch ns] {clock process_id}
+    cpu INTEGER,  -- CPU it ran on
+    callback_instance_id BIGINT,  -- Innermost callback instance that ran on its thread; NULL:
+        -- outside of callbacks {to callback_instance}
+    stack_id BIGINT NOT NULL,  -- The stack {to stack}
+    cpu_ns BIGINT  -- CPU time that it stands for; NULL: perf counted cycles [ns]
 );

@@ -72,7 +72,7 @@ def _cache(content: bytes) -> None:
 
 
 def _cache_file() -> Path:
-    given = os.environ.get("LOCALAPPDATA" if os.name == "nt" else "XDG_CACHE_HOME")
+    given = os.environ.get("XDG_CACHE_HOME")
     root = Path(given) if given and os.path.isabs(given) else Path("~/.cache").expanduser()
     made_by = (__version__, objects.head_revision(), objects.definition_hash(), STORAGE_VERSION)
     key = hashlib.sha256("\0".join(made_by).encode()).hexdigest()[:32]

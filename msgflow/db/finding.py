@@ -41,6 +41,9 @@ _NO_ROW = (
     "NULL::BIGINT AS count, NULL::VARCHAR AS detail WHERE false"
 )
 
+# What the header of a kind says of each of its findings.
+_OF_KIND = "name, phase, severity, title, description, cause, cure"
+
 # By the name of a finding: what shows more of it, or cures it.
 _AFTER = {
     "dead_end": "msgflow suggest links",
@@ -110,21 +113,20 @@ def short_name(header: Header) -> str:
 def composed(layer: str) -> tuple[Header, ...]:
     """Return the objects of a layer of `schema/` that are made of all kinds of findings."""
     if layer == "model":
+        name, grain = "staging.finding", "one row per place"
         description = "What was found in the input while it was read and the model was built."
-        rows = statement(kinds_of("input"))
-        return (_object("staging.finding", description, "one row per place", rows),)
-    if layer == "stat":
-        rows = "VALUES\n" + ",\n".join(map(_row, (*kinds_of("input"), *kinds_of("recording"))))
-        columns = "name, phase, severity, title, description, cause, cure"
-        return (
-            _object(
-                "derive.finding_kind",
-                "What an ingest can find, and what the headers in `schema/health` say about it.",
-                "one row per kind of finding",
-                f"SELECT {columns}\nFROM (\n{rows}\n) AS kind ({columns})\n",
-            ),
+        body = statement(kinds_of("input"))
+    elif layer == "stat":
+        name, grain = "derive.finding_kind", "one row per kind of finding"
+        description = (
+            "What an ingest can find, and what the headers in `schema/health` say about it."
         )
-    return ()
+        rows = ",\n".join(map(_row, (*kinds_of("input"), *kinds_of("recording"))))
+        body = f"SELECT {_OF_KIND}\nFROM (\nVALUES\n{rows}\n) AS kind ({_OF_KIND})\n"
+    else:
+        return ()
+    path = _statements().directory
+    return (Header(name, name, description, grain, "view", body, path),)
 
 
 def statement(headers: Sequence[Header]) -> str:
@@ -200,24 +202,15 @@ def _broken(
     values: dict[str, object] = {"run_id": run_id}
     if header.params:
         values["broken"] = broken_relations(con, run_id)
+    fields = ", ".join(Finding.__dataclass_fields__)
     rows = con.execute(
-        f"FROM (\n{statement([header])}\n) WHERE run_id = coalesce($run_id, run_id)", values
+        f"SELECT {fields} FROM (SELECT * REPLACE (coalesce(subject, 'the database') AS subject) "
+        f"FROM (\n{statement([header])}\n)) "
+        f"JOIN (VALUES\n{_row(header)}\n) AS kind ({_OF_KIND}) USING (name) "
+        "WHERE run_id = coalesce($run_id, run_id)",
+        values,
     ).fetchall()
-    for found_id, trace_id, name, subject, count, detail in rows:
-        yield Finding(
-            run_id=found_id,
-            trace_id=trace_id,
-            name=name,
-            phase="database",
-            severity=header.severity or "",
-            subject=subject or "the database",
-            count=count,
-            detail=detail,
-            cause=header.cause or "",
-            cure=header.cure or "",
-            title=header.title,
-            description=header.description,
-        )
+    yield from (Finding(*row) for row in rows)
 
 
 def _order(finding: Finding) -> tuple[int, str, int, str, int, str]:
@@ -232,24 +225,6 @@ def _row(header: Header) -> str:
         header.cause, header.cure,
     )  # fmt: skip
     return f"    ({', '.join(literal(text or '') for text in texts)})"
-
-
-def _object(name: str, description: str, grain: str, body: str) -> Header:
-    return Header(
-        name=name,
-        title=name,
-        description=description,
-        grain=grain,
-        kind="view",
-        params=(),
-        columns=(),
-        severity=None,
-        cause=None,
-        cure=None,
-        note=None,
-        body=body,
-        path=_statements().directory,
-    )
 
 
 @cache

@@ -13,8 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.db.finding import composed
-from msgflow.db.store_table import store_file, store_tables
-from msgflow.db.table_view import table_views
+from msgflow.db.store_table import store_file, store_tables, table_views
 from msgflow.files.resources import resource_directory
 from msgflow.sql.header import Header, HeaderError, read
 from msgflow.sql.quoting import identifier, literal
@@ -37,7 +36,7 @@ MODEL_LAYERS = ("alignment", "model", "kernel")
 VIEW_LAYERS = ("link", "clock", "delivery", "flow", "stat", PUBLIC)
 
 # Modules that make tables and views besides `schema/`; the hash reads them as text.
-_MODULES = ("store_table.py", "table_view.py", "empty_database.py", "finding.py")
+_MODULES = ("store_table.py", "empty_database.py", "finding.py")
 
 
 @cache

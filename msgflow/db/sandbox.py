@@ -20,7 +20,7 @@ from msgflow.db.lock_holder import lock_holder
 from msgflow.db.memory import limit_threads, set_memory_limit
 from msgflow.db.workspace import remove_abandoned_workspaces
 from msgflow.errors import DatabaseError, DatabaseInUseError, require_utf8
-from msgflow.files.temporary_owner import is_abandoned, mark
+from msgflow.files.temporary_owner import left_behind, mark
 from msgflow.sql.failure import in_words
 
 if TYPE_CHECKING:
@@ -47,7 +47,8 @@ def open_file(
     with opening(path):
         con = duckdb.connect(str(path), read_only=read_only, config=config)
         # A file that this process has open already is the same database, with its settings.
-        if not _is_shut_in(con):
+        setting = "SELECT current_setting('enable_external_access')"
+        if con.execute(setting).fetchall() != [(False,)]:
             try:
                 if memory_limit is not None:
                     set_memory_limit(con, memory_limit)
@@ -89,11 +90,6 @@ def shut_in(
         con.execute("SET lock_configuration = true")
 
 
-def _is_shut_in(con: duckdb.DuckDBPyConnection) -> bool:
-    found = con.execute("SELECT current_setting('enable_external_access')").fetchall()
-    return found == [(False,)]
-
-
 def spill_directory(database: Path) -> Path:
     """Return the directory that connections of this process to `database` spill to."""
     return _place(database) / f"{_prefix(database)}{mark()}{_SPILL}"
@@ -105,16 +101,9 @@ def remove_abandoned_spills(database: Path, *, is_ours_alone: bool) -> None:
     `is_ours_alone` says that the database is open for writing. No other process can have it open
     then, so that every other spill directory is abandoned.
     """
-    prefix = _prefix(database)
-    try:
-        entries = [entry.name for entry in os.scandir(_place(database))]
-    except OSError:
-        return
-    for name in entries:
-        if name.startswith(prefix) and name.endswith(_SPILL):
-            owner = name[len(prefix) : -len(_SPILL)]
-            if owner != mark() and (is_ours_alone or is_abandoned(owner)):
-                shutil.rmtree(_place(database) / name, ignore_errors=True)
+    others = left_behind(_place(database), _prefix(database), _SPILL, by_others=is_ours_alone)
+    for directory in others:
+        shutil.rmtree(directory, ignore_errors=True)
 
 
 def _place(database: Path) -> Path:

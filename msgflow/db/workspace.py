@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import os
 import shutil
 import uuid
@@ -10,11 +11,6 @@ from typing import TYPE_CHECKING
 
 from msgflow.db.lock_holder import lock_holder
 from msgflow.errors import DatabaseError, require_utf8
-
-try:
-    import fcntl
-except ImportError:  # Windows has no such locks
-    fcntl = None  # type: ignore[assignment]
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -28,8 +24,7 @@ _LOCK = ".lock"
 def workspace(beside: Path) -> Iterator[Path]:
     """Yield an empty directory in the directory of `beside`; it is gone afterwards.
 
-    It first removes workspaces of killed commands, whose lock files no process holds. On a system
-    without such locks these stay.
+    It first removes workspaces of killed commands, whose lock files no process holds.
     """
     parent = beside.absolute().parent
     require_utf8(parent, DatabaseError)
@@ -37,8 +32,7 @@ def workspace(beside: Path) -> Iterator[Path]:
     directory = parent / f"{_PREFIX}{uuid.uuid4().hex}"
     with contextlib.ExitStack() as stack:
         try:
-            if fcntl:
-                stack.enter_context(_locked(directory.with_suffix(_LOCK), wait=True))
+            stack.enter_context(_locked(directory.with_suffix(_LOCK), wait=True))
             directory.mkdir()
         except OSError as error:
             raise _cannot_write(parent, error) from error
@@ -49,17 +43,14 @@ def workspace(beside: Path) -> Iterator[Path]:
 def remove_abandoned_workspaces(parent: Path) -> None:
     """Remove the workspaces of killed commands from a directory."""
     # Only names that we give: directories of users may begin so, too.
-    for abandoned in parent.glob(f"{_PREFIX}{'[0-9a-f]' * 32}{_LOCK}") if fcntl else ():
+    for abandoned in parent.glob(f"{_PREFIX}{'[0-9a-f]' * 32}{_LOCK}"):
         with contextlib.suppress(OSError), _locked(abandoned, wait=False):
             shutil.rmtree(abandoned.with_suffix(""), ignore_errors=True)
 
 
 @contextlib.contextmanager
 def creating(database: Path) -> Iterator[None]:
-    """Keep other processes from creating `database`, if the system has file locks."""
-    if not fcntl:
-        yield
-        return
+    """Keep other processes from creating `database`."""
     path = database.absolute().with_name(f"{_PREFIX}{database.name}{_LOCK}")
     with contextlib.ExitStack() as stack:
         try:

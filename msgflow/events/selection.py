@@ -15,7 +15,8 @@ from msgflow.errors import UsageError
 from msgflow.run.choice import Run
 from msgflow.run.slice import Slice
 from msgflow.run.window import WHOLE
-from msgflow.trace import COMMON_SCHEMA, PACKET, EventBatch
+from msgflow.trace import PACKET, EventBatch
+from msgflow.trace.columns import COMMON_SCHEMA
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

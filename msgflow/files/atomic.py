@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
-from msgflow.files.temporary_owner import is_abandoned, mark
+from msgflow.files.temporary_owner import left_behind, mark
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -45,7 +45,9 @@ def replacing(path: Path) -> Iterator[Path]:
 @contextmanager
 def _in_place_of(path: Path) -> Iterator[Path]:
     target = Path(os.path.realpath(path))
-    _remove_abandoned(target)
+    for entry in left_behind(target.parent, f".{target.name}.", _SUFFIX):
+        with suppress(OSError):
+            entry.unlink()
     temporary = target.with_name(f".{target.name}.{mark()}{_SUFFIX}")
     try:
         yield temporary
@@ -83,14 +85,3 @@ def _is_stdout(path: Path) -> bool:
     with suppress(OSError):  # a closed stdout
         return os.path.samestat(path.stat(), os.fstat(_STDOUT))
     return False
-
-
-def _remove_abandoned(path: Path) -> None:
-    """Remove what killed processes have left of `path`."""
-    prefix = f".{path.name}."
-    with suppress(OSError):
-        for entry in os.scandir(path.parent):
-            name = entry.name
-            is_ours = name.startswith(prefix) and name.endswith(_SUFFIX)
-            if is_ours and is_abandoned(name[len(prefix) : -len(_SUFFIX)]):
-                os.unlink(entry.path)

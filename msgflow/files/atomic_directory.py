@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
-from msgflow.files.temporary_owner import is_abandoned, mark
+from msgflow.files.temporary_owner import left_behind, mark
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -73,16 +73,15 @@ def _publish(directory: Path, aside: Path, names: Sequence[str]) -> None:
 
 def _clean_up(directory: Path) -> None:
     """Remove remains of killed exports; entries that they were replacing go back."""
-    for aside in directory.glob(f"{_ASIDE}*{_SUFFIX}"):
-        if is_abandoned(aside.name.removeprefix(_ASIDE).removesuffix(_SUFFIX)):
-            moved = aside / "old"
-            # What a link leads to was never here.
-            if aside.is_symlink() or moved.is_symlink():
-                continue
-            for old in moved.glob("*"):
-                if not os.path.lexists(directory / old.name):
-                    old.rename(directory / old.name)
-            shutil.rmtree(aside, ignore_errors=True)
+    for aside in left_behind(directory, _ASIDE, _SUFFIX):
+        moved = aside / "old"
+        # What a link leads to was never here.
+        if aside.is_symlink() or moved.is_symlink():
+            continue
+        for old in moved.glob("*"):
+            if not os.path.lexists(directory / old.name):
+                old.rename(directory / old.name)
+        shutil.rmtree(aside, ignore_errors=True)
 
 
 def _refuse_existing(directory: Path, names: Sequence[str], force: bool) -> None:

@@ -31,6 +31,21 @@ def is_abandoned(text: str) -> bool:
     return _start(int(found[2])) != int(found[3])
 
 
+def left_behind(folder: Path, prefix: str, suffix: str, *, by_others: bool = False) -> list[Path]:
+    """Return what processes that ended left in a folder, named by prefix, mark and suffix.
+
+    `by_others` says that no other process is at work there: what is not of this one was left.
+    """
+    found = []
+    with contextlib.suppress(OSError):
+        for entry in folder.iterdir():
+            if entry.name.startswith(prefix) and entry.name.endswith(suffix):
+                owner = entry.name[len(prefix) : -len(suffix)]
+                if is_abandoned(owner) or (by_others and owner != mark()):
+                    found.append(entry)
+    return found
+
+
 @cache
 def _place() -> str:
     try:

@@ -18,7 +18,7 @@ MOST_BYTES = 1_000_000
 def read_text(path: Path, what: str, hint: str) -> str:
     """Return the text of a file."""
     try:
-        with open(path, "rb", opener=_without_waiting) as file:
+        with os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb") as file:
             if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
                 raise UsageError(f"{what}: not a regular file — {path}", hint)
             content = file.read(MOST_BYTES + 1)
@@ -33,7 +33,3 @@ def read_text(path: Path, what: str, hint: str) -> str:
         return content.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
     except UnicodeDecodeError as error:
         raise UsageError(f"not a text file in UTF-8 — {path}", hint) from error
-
-
-def _without_waiting(path: str, flags: int) -> int:
-    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))

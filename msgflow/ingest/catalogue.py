@@ -105,11 +105,6 @@ class Tracepoint:
     interrupt: str | None = None  # the kind of interrupt that begins or ends
 
     @property
-    def provider(self) -> str:
-        """The part before the colon, empty for events of the kernel."""
-        return self.name.rpartition(":")[0]
-
-    @property
     def event(self) -> str:
         """The part after the colon."""
         return self.name.rpartition(":")[2]
@@ -242,16 +237,12 @@ def _tracepoint(entry: dict[str, Any]) -> Tracepoint:
     fields = tuple(
         Field(**{**field, "aliases": tuple(field.get("aliases", ()))}) for field in entry["fields"]
     )
-    predecessors = tuple(_predecessor(text) for text in entry.get("predecessors", ()))
+    pairs = (text.split(".") for text in entry.get("predecessors", ()))
+    predecessors = tuple(Predecessor(sequence, Origin(origin)) for sequence, origin in pairs)
     tuples = {name: tuple(entry.get(name, ())) for name in ("aliases", "sequences")}
     role = CpuRole(entry["role"]) if "role" in entry else None
     given = {"fields": fields, "predecessors": predecessors, "role": role}
     return Tracepoint(**{**entry, **tuples, **given})
-
-
-def _predecessor(text: str) -> Predecessor:
-    sequence, _, origin = text.partition(".")
-    return Predecessor(sequence, Origin(origin))
 
 
 def _arrow_type(sql_type: str) -> pa.DataType:

@@ -74,7 +74,9 @@ class Cpus:
         self, batches: Sequence[tuple[Tracepoint, pa.RecordBatch]]
     ) -> list[tuple[str, pa.RecordBatch]]:
         """Return (table, rows) of the events of one round that have a role on their CPU."""
-        groups = Groups(gathered(batches, "event_id"), self._cpus_of(batches))
+        traces = gathered(batches, "trace_index").astype(np.int64)
+        cpus = self._cpus.of(traces << 32 | gathered(batches, "cpu_id"))
+        groups = Groups(gathered(batches, "event_id"), cpus)
         events = self._events(batches, groups)
         for latest in (self._switches, *self._handlings):
             latest.grow(self._cpus.count)
@@ -84,9 +86,11 @@ class Cpus:
             latest.before(groups, _repeated(batches, groups, is_of), events)
             for is_of, latest in zip(of_kinds, self._handlings, strict=True)
         ]
+        # An interrupt is being handled if it has begun behind the latest switch, and not ended.
         is_open = np.array(
             [(one["is_open"] == 1) & (one["event_id"] > switch["event_id"]) for one in handlings]
         ).reshape(len(handlings), -1)
+        # Of several, the one that began last.
         innermost = np.where(is_open, [one["event_id"] for one in handlings], NONE)
         interrupt = np.where(is_open.any(axis=0), innermost.argmax(axis=0), NONE).astype(np.int32)
         ends = np.cumsum([0, *(batch.num_rows for _, batch in batches)])
@@ -116,10 +120,6 @@ class Cpus:
                     rows = self._interrupts(batch, kind, start_ns, switch["tid"][at], is_whole)
                     placed.append((INTERRUPT, rows))
         return placed
-
-    def _cpus_of(self, batches: Sequence[tuple[Any, pa.RecordBatch]]) -> NDArray[np.int32]:
-        traces = gathered(batches, "trace_index").astype(np.int64)
-        return self._cpus.of(traces << 32 | gathered(batches, "cpu_id"))
 
     def _events(
         self, batches: Sequence[tuple[Tracepoint, pa.RecordBatch]], groups: Groups

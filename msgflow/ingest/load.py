@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import time
-from dataclasses import dataclass
+from collections import Counter
 from typing import TYPE_CHECKING
 
 import pyarrow as pa
@@ -14,15 +14,15 @@ from msgflow.db.transaction import transaction
 from msgflow.ingest import overlapping_traces, staging
 from msgflow.ingest.catalogue import USER_EVENT, load
 from msgflow.ingest.cpus import Cpus
-from msgflow.ingest.raw_tables import RawTables
 from msgflow.ingest.sequences import Placed, Sequences
+from msgflow.ingest.staging import RawTables
 from msgflow.ingest.user_events import is_match, matches, names_of, user_rows
 from msgflow.trace import PACKET, EventBatch, Progress, TraceInfo, TraceSet
 from msgflow.trace.numpy_arrow import is_valid, text_lengths, to_numpy, without
-from msgflow.trace.prefetch import Prefetch
+from msgflow.trace.prefetch import prefetched
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 
     import duckdb
 
@@ -39,15 +39,6 @@ _LONGEST_NAME = 1 << 10
 _LONGEST_SYMBOL = 1 << 16
 
 
-@dataclass(frozen=True)
-class Loaded:
-    """What was loaded."""
-
-    # (trace index, event name) -> events read, wanted or not.
-    event_counts: Mapping[tuple[int, str], int]
-    replaced_runs: frozenset[int]  # ids of the runs that hold some of these packets already
-
-
 def load_traces(
     con: duckdb.DuckDBPyConnection,
     traces: TraceSet,
@@ -59,8 +50,8 @@ def load_traces(
     replace: bool,
     interrupts: Interrupts,
     progress: Callable[[Progress, float], None] | None,
-) -> Loaded:
-    """Load all wanted events and all packets of `traces`.
+) -> frozenset[int]:
+    """Load all wanted events and packets; return the runs that hold some of these packets already.
 
     `may_hold` says that the current database may hold some of these packets already; `replace`,
     that this is no error. `interrupts` is asked at every batch. `progress` gets the progress of the
@@ -90,11 +81,9 @@ def load_traces(
         sequences, cpus = Sequences(catalogue, _hosts(sources)), Cpus(catalogue)
         with transaction(con), con.cursor() as beside:
             # A thread reads the next round while DuckDB inserts this one.
-            placed = Prefetch(
-                lambda: _placed(batches, sequences, cpus, corrections, implausible, beside), 1
-            )
-            with contextlib.closing(placed):
-                for item in placed.items():
+            placed = _placed(batches, sequences, cpus, corrections, implausible, beside)
+            with contextlib.closing(prefetched(placed, 1)) as ahead:
+                for item in ahead:
                     interrupts.check()
                     tables.add_all(item)
             tables.flush()
@@ -125,7 +114,7 @@ def load_traces(
     if traces.duplicate_packet_count:
         _insert(con, "packet_read_once", [(None, traces.duplicate_packet_count)])
     _insert(con, "packet_read_once", traces.repeated_packet_counts.items())
-    return Loaded(dict(traces.event_counts), frozenset(tables.replaced))
+    return frozenset(tables.replaced)
 
 
 def _insert(con: duckdb.DuckDBPyConnection, table: str, rows: Iterable[Sequence[object]]) -> None:
@@ -150,7 +139,7 @@ def _placed(
     corrections: Corrections | None,
     implausible: ImplausibleValues,
     beside: duckdb.DuckDBPyConnection,
-) -> Iterator[Placed | tuple[str, pa.RecordBatch]]:
+) -> Generator[Placed | tuple[str, pa.RecordBatch], None, None]:
     """Yield the events of all batches, round by round, and (table, rows) of packets and kernel.
 
     Nothing else uses the connection `beside` meanwhile.
@@ -237,7 +226,7 @@ class ImplausibleValues:
     """
 
     def __init__(self) -> None:
-        self._counts: dict[tuple[str, str, str], int] = {}
+        self._counts: Counter[tuple[str, str, str]] = Counter()
 
     def without(self, name: str, batch: pa.RecordBatch) -> pa.RecordBatch:
         """Return events of this name with NULL in place of implausible values."""
@@ -254,12 +243,9 @@ class ImplausibleValues:
                 continue
             bad = is_valid(values) & ~((least <= numbers) & (numbers <= most))
             if bad.any():
-                self._count(name, field.name, what, int(bad.sum()))
+                self._counts[name, field.name, what] += int(bad.sum())
                 batch = batch.set_column(place, field, without(values, bad))
         return batch
-
-    def _count(self, name: str, column: str, what: str, bad: int) -> None:
-        self._counts[name, column, what] = self._counts.get((name, column, what), 0) + bad
 
     def rows(self) -> Iterator[tuple[str, str, str, int]]:
         """Yield (event, field, what its values cannot be, how many were left out)."""

@@ -56,14 +56,11 @@ class Corrections:
     def applied(self, batch: pa.RecordBatch) -> pa.RecordBatch:
         """Return the corrected events of a batch, perhaps none."""
         if self.duplicates.size:
-            batch = self._without_copies(batch)
+            is_copy = _are_among(to_numpy(batch["event_id"]), self.duplicates)[0]
+            batch = batch.filter(to_arrow(~is_copy)) if is_copy.any() else batch
         if self.processes.size and batch["pid_ns"].null_count:
             batch = self._with_namespaces(batch)
         return batch
-
-    def _without_copies(self, batch: pa.RecordBatch) -> pa.RecordBatch:
-        is_copy = _are_among(to_numpy(batch["event_id"]), self.duplicates)[0]
-        return batch.filter(to_arrow(~is_copy)) if is_copy.any() else batch
 
     def _with_namespaces(self, batch: pa.RecordBatch) -> pa.RecordBatch:
         names = batch["procname"]
@@ -94,7 +91,10 @@ def corrections_of(con: duckdb.DuckDBPyConnection) -> Corrections:
             _create(con, made, f"VIEW session_event AS {statements().header('session_event').body}")
             for table in ("session_pair", "session_container", "duplicate_event"):
                 _make(con, made, table)
-            duplicates = _duplicates(con)
+            counts = statements().header("duplicate_count").body
+            con.execute(f"INSERT INTO staging.left_out\n{counts}")
+            found = con.execute("SELECT event_id FROM duplicate_event ORDER BY ALL").fetchnumpy()
+            duplicates = np.asarray(found["event_id"], np.int64)
         else:
             _create(con, made, "TABLE session_container (session BIGINT, container BIGINT)")
         # A thread that gets its name back has had three.
@@ -125,16 +125,6 @@ def corrections_of(con: duckdb.DuckDBPyConnection) -> Corrections:
         sessions,
         names,
     )
-
-
-def _duplicates(con: duckdb.DuckDBPyConnection) -> NDArray[np.int64]:
-    """Return the ids of events that another trace holds as well, in order.
-
-    Their counts go to `staging.left_out`.
-    """
-    con.execute("INSERT INTO staging.left_out\n" + statements().header("duplicate_count").body)
-    found = con.execute("SELECT event_id FROM duplicate_event ORDER BY ALL").fetchnumpy()
-    return np.asarray(found["event_id"], np.int64)
 
 
 def _make(con: duckdb.DuckDBPyConnection, made: ExitStack, table: str) -> None:

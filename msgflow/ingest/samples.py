@@ -10,6 +10,7 @@ import pyarrow as pa
 
 from msgflow.db.transaction import transaction
 from msgflow.errors import TraceError
+from msgflow.trace import archive
 from msgflow.trace.perf_script import DATA, TEXT, read_script, sample_files, write_script
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ def load_samples(
     """
     warnings = []
     for file in sample_files([*paths, *traces.unpacked]):
-        shown = _shown(file, traces)
+        shown = archive.shown(file, traces.unpacked) or Path(os.path.realpath(file))
         hostname = _given_name(shown, traces, hostnames)
         text = file
         try:
@@ -61,14 +62,6 @@ def load_samples(
             message = error.message.replace(str(file), str(shown))
             warnings.append(f"{message}{f'; {error.hint}' if error.hint else ''}")
     return tuple(warnings)
-
-
-def _shown(file: Path, traces: TraceSet) -> Path:
-    """Return the path of a file as traces have theirs: below that of the archive."""
-    for directory, archive in traces.unpacked.items():
-        if file.is_relative_to(directory):
-            return archive / file.relative_to(directory)
-    return Path(os.path.realpath(file))
 
 
 def _given_name(file: Path, traces: TraceSet, hostnames: Mapping[int, str]) -> str | None:

@@ -2,20 +2,9 @@
 
 `raw` and `staging` are temporary database files. A database in memory would have to compress what
 it spills, and keep the beginning of each column of each row group. `raw` has one table per
-tracepoint, the packets, and the threads, all as read (`raw.cpu_return`: events of threads that
-changed their CPU twice faster than a thread can; `raw.interrupt`: interrupts, each with the thread
-that it interrupted; `raw.kernel_thread`: ids of threads to the kernel and in their PID namespace,
-as contexts of switches have them; `raw.user_event`: the user's events of all names;
-`raw.stack_sample`: lines of `perf script`).
-`staging` has `staging.source` (one row per trace), `staging.event_count`, `staging.declared`
-(tracepoints that were enabled in a trace, also if they never occurred), `staging.left_out` (events
-that another trace holds as well),
-`staging.ignored` (patterns of events to leave out, with the events that match, NULL if none does),
-`staging.asked` (patterns of the user's events to load, with the events that match, likewise),
-`staging.packet_read_once` (packets that a trace holds twice, or where it is NULL several traces),
-`staging.implausible` (values that were left out), `staging.damage`, `staging.event` (all events of
-the user and of known tracepoints, but those of the kernel, without payload), `staging.predecessor`
-(the pointers from event to event), and the objects of `schema/alignment`, `model` and `kernel`.
+tracepoint, and with `staging` what `schema/staging.sql` has. Views of `staging` are `event` (all
+events of the user and of known tracepoints, but those of the kernel, without payload) and
+`predecessor` (the pointers from event to event).
 """
 
 from __future__ import annotations
@@ -23,71 +12,29 @@ from __future__ import annotations
 import contextlib
 from typing import TYPE_CHECKING
 
+from msgflow.errors import UsageError
 from msgflow.files.atomic_directory import replacing_entries
-from msgflow.ingest.catalogue import (
-    COMMON_COLUMNS,
-    Origin,
-    Predecessor,
-    Tracepoint,
-    enum_type,
-    load,
-)
+from msgflow.files.resources import resource_directory
+from msgflow.ingest.catalogue import COMMON_COLUMNS, Origin, Predecessor, Tracepoint, load
 from msgflow.sql.quoting import literal
+from msgflow.sql.statement import internal_sql
+from msgflow.trace import PACKET
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence
     from pathlib import Path
 
     import duckdb
+    import pyarrow as pa
 
-_TABLES = """
-CREATE TABLE raw.packet (
-    trace_index INTEGER, stream_index INTEGER, stream_class_id BIGINT, stream_instance_id BIGINT,
-    cpu_id INTEGER, position BIGINT, begin_ns BIGINT, end_ns BIGINT, last_event_ns BIGINT,
-    event_count BIGINT, discarded_event_count BIGINT, lost_packet_count BIGINT,
-    is_numbered BOOLEAN
-);
-CREATE TABLE raw.thread (
-    thread_index INTEGER, trace_index INTEGER, pid_ns BIGINT, vpid INTEGER, vtid INTEGER
-);
-CREATE TABLE raw.thread_name (
-    thread_index INTEGER, procname VARCHAR, first_event_id BIGINT, last_event_id BIGINT,
-    first_seen_ns BIGINT, last_seen_ns BIGINT
-);
-CREATE TABLE raw.cpu_return (thread_index INTEGER, event_id BIGINT);
-CREATE TABLE raw.interrupt (
-    trace_index INTEGER, kind {kind}, start_ns BIGINT, end_ns BIGINT, tid INTEGER
-);
-CREATE TABLE raw.kernel_thread (
-    trace_index INTEGER, tid INTEGER, vpid INTEGER, vtid INTEGER, pid_ns BIGINT, first_ns BIGINT,
-    last_ns BIGINT
-);
-CREATE TABLE raw.stack_sample (
-    hostname VARCHAR, is_monotonic BOOLEAN, head VARCHAR, stack VARCHAR
-);
-CREATE TABLE staging.source (
-    trace_index INTEGER, path VARCHAR, uuid VARCHAR, domain VARCHAR, hostname VARCHAR,
-    tracer VARCHAR, clock_uuid VARCHAR, clock_key VARCHAR, begin_ns BIGINT, end_ns BIGINT,
-    clock_correction_ns BIGINT, clock_origin_ns BIGINT
-);
-CREATE TABLE staging.event_count (
-    trace_index INTEGER, name VARCHAR, is_known BOOLEAN, event_count BIGINT
-);
-CREATE TABLE staging.declared (trace_index INTEGER, name VARCHAR);
-CREATE TABLE staging.left_out (
-    trace_index INTEGER, used_index INTEGER, event_count BIGINT, thread_count BIGINT,
-    length_ns BIGINT
-);
-CREATE TABLE staging.ignored (place INTEGER, pattern VARCHAR, event VARCHAR);
-CREATE TABLE staging.asked (place INTEGER, pattern VARCHAR, event VARCHAR);
-CREATE TABLE staging.packet_read_once (trace_index INTEGER, packet_count BIGINT);
-CREATE TABLE staging.implausible (
-    event VARCHAR, field VARCHAR, what VARCHAR, value_count BIGINT
-);
-CREATE TABLE staging.damage (
-    trace_index INTEGER, file VARCHAR, position BIGINT, byte_offset BIGINT, message VARCHAR
-)
-"""
+    from msgflow.ingest.sequences import Placed
+
+# Rows that wait for a commit take memory that nothing limits.
+_ROWS_PER_TRANSACTION = 2_000_000
+# A row group of DuckDB: fewer rows at once cost more each.
+ROWS_PER_INSERT = 122_880
+# Rows of all tables that wait for an insert.
+MOST_WAITING = 500_000
 
 OF_ALL_EVENTS = {"staging.event", "staging.predecessor"}
 """Views of all events, which unite the tables of all tracepoints."""
@@ -102,7 +49,7 @@ def attach(con: duckdb.DuckDBPyConnection, directory: Path | None) -> None:
     catalogue = load()
     for each in catalogue.staged.values():
         con.execute(each.create_table_sql("raw", catalogue.labels, catalogue.interrupts))
-    con.execute(_TABLES.format(kind=enum_type(catalogue.interrupts)))
+    con.execute((resource_directory("schema") / "staging.sql").read_text(encoding="utf-8"))
 
 
 def empty_tables(con: duckdb.DuckDBPyConnection) -> set[str]:
@@ -194,3 +141,74 @@ def export(con: duckdb.DuckDBPyConnection, directory: Path) -> None:
     with replacing_entries(directory, list(files), force=True) as aside:
         for file, name in files.items():
             con.execute(f"COPY {name} TO {literal(str(aside / file))} (FORMAT parquet)")
+
+
+class RawTables:
+    """The tables of `raw`, filled inside a transaction that is committed now and then.
+
+    Rows wait until there are enough of them, or `flush` is called.
+    """
+
+    def __init__(
+        self, con: duckdb.DuckDBPyConnection, *, may_hold: bool, may_replace: bool
+    ) -> None:
+        self._con = con
+        self._may_hold = may_hold
+        self._may_replace = may_replace
+        self._waiting: dict[str, list[pa.RecordBatch]] = {}
+        self._counts: dict[str, int] = {}
+        self._uncommitted = 0
+        # Ids of the runs that hold some of the packets added already.
+        self.replaced: set[int] = set()
+
+    def add_all(self, item: Placed | tuple[str, pa.RecordBatch]) -> None:
+        """Add the events of a round, or (table, rows)."""
+        if isinstance(item, tuple):
+            self.add(*item)
+            return
+        self.add("thread", item.threads)
+        self.add("thread_name", item.thread_names)
+        self.add("cpu_return", item.cpu_returns)
+        staged = load().staged
+        for name, rows in item.batches:
+            self.add(staged[name].table, rows)
+
+    def add(self, table: str, rows: pa.RecordBatch) -> None:
+        """Add rows to a table."""
+        if table == PACKET and self._may_hold:
+            self.replaced |= self._same_packets(rows)
+        self._waiting.setdefault(table, []).append(rows)
+        self._counts[table] = self._counts.get(table, 0) + rows.num_rows
+        if self._counts[table] >= ROWS_PER_INSERT:
+            self._insert(table)
+        elif sum(self._counts.values()) > MOST_WAITING:
+            self._insert(max(self._counts, key=self._counts.__getitem__))
+
+    def flush(self) -> None:
+        """Insert what waits."""
+        for table in list(self._waiting):
+            self._insert(table)
+
+    def _insert(self, table: str) -> None:
+        import pyarrow as pa
+
+        rows = pa.Table.from_batches(self._waiting.pop(table))
+        self._con.from_arrow(rows).insert_into(f"raw.main.{table}")
+        self._uncommitted += self._counts.pop(table)
+        if self._uncommitted >= _ROWS_PER_TRANSACTION:
+            self._con.commit()
+            self._con.begin()
+            self._uncommitted = 0
+
+    def _same_packets(self, rows: pa.RecordBatch) -> set[int]:
+        self._con.register("packet_batch", rows)
+        try:
+            runs = self._con.execute(internal_sql().text("known_packet")).fetchall()
+        finally:
+            self._con.unregister("packet_batch")
+        if runs and not self._may_replace:
+            raise UsageError(
+                f"these packets are in the database already — run {runs[0][1]} ({runs[0][0]})",
+                "give --replace to read them again in place of that run",
+            )
+        return {run_id for run_id, _ in runs}

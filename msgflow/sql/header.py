@@ -159,14 +159,14 @@ class Header:
     # 'view' (the body is a SELECT; in the model a table is made of it), 'inline' (the same, but
     # never made a table) or 'macro' (the body is the whole statement)
     kind: str
-    params: tuple[Param, ...]  # parameters in the order of the file
-    columns: tuple[Column, ...]  # output columns in the order of the file
-    severity: str | None  # severity of a finding, else None
-    cause: str | None  # cause of a finding, else None
-    cure: str | None  # remedy for a finding, else None
-    note: str | None
     body: str  # the SQL below the header; of a query in steps, the statement that returns its rows
     path: Path
+    params: tuple[Param, ...] = ()  # parameters in the order of the file
+    columns: tuple[Column, ...] = ()  # output columns in the order of the file
+    severity: str | None = None  # severity of a finding, else None
+    cause: str | None = None  # cause of a finding, else None
+    cure: str | None = None  # remedy for a finding, else None
+    note: str | None = None
     brief: tuple[str, ...] = ()
     answer: tuple[str, ...] = ()
     heading: tuple[str, ...] = ()

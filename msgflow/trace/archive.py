@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from pathlib import Path
 
 SUFFIXES = (".tar", ".tar.gz", ".tgz", ".tar.zst", ".tzst", ".tar.xz", ".txz", ".zip")
@@ -22,3 +23,11 @@ def stem(path: Path) -> str:
         return path.name
     suffix = max((end for end in SUFFIXES if path.name.lower().endswith(end)), key=len)
     return path.name[: -len(suffix)]
+
+
+def shown(path: Path, unpacked: Mapping[Path, Path]) -> Path | None:
+    """Return a path as it is in its archive, given where archives were unpacked; None: in none."""
+    for directory, archive in unpacked.items():
+        if path.is_relative_to(directory):
+            return archive / path.relative_to(directory)
+    return None

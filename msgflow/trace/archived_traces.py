@@ -9,17 +9,17 @@ import shutil
 import tempfile
 import weakref
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
-from msgflow.trace.archive import is_archive
+from msgflow.trace.archive import is_archive, shown
 from msgflow.trace.extraction import unpack
 from msgflow.trace.trace_set import TraceSet
 
 if TYPE_CHECKING:
-    from collections.abc import Generator, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
-    from msgflow.trace.model import EventBatch
+    from msgflow.trace.trace_set import Batches, Report, Wanted
 
 _PREFIX = "msgflow-"
 
@@ -50,10 +50,7 @@ class Unpacked:
 
     def shown(self, path: Path) -> Path:
         """Return the path that a user knows: that of the archive, then that inside."""
-        for directory, archive in self.archives.items():
-            if path.is_relative_to(directory):
-                return archive / path.relative_to(directory)
-        return path
+        return shown(path, self.archives) or path
 
     @contextlib.contextmanager
     def explained(self) -> Iterator[None]:
@@ -88,6 +85,7 @@ class UnpackedTraceSet(TraceSet):
 
     def __init__(self, traces: TraceSet, unpacked: Unpacked) -> None:
         """Take over both; closing this set closes the other one and removes what was unpacked."""
+        super().__init__()
         self._traces = traces
         self._unpacked = unpacked
         self.unpacked = unpacked.archives
@@ -96,19 +94,16 @@ class UnpackedTraceSet(TraceSet):
         )
         self._take_over()
 
-    def batches(self, *given: Any, **named: Any) -> Iterator[EventBatch]:
-        """Read everything once; see `TraceSet.batches`."""
-        return self._explained(self._traces.batches(*given, **named))
-
     def close(self) -> None:
         """Close the set and remove what was unpacked."""
+        super().close()
         self._traces.close()
         self._unpacked.remove()
 
-    def _explained(self, batches: Iterator[EventBatch]) -> Generator[EventBatch, None, None]:
+    def _batches(self, wanted: Wanted, progress: Report | None, batch_rows: int) -> Batches:
         try:
             with self._unpacked.explained():
-                yield from batches
+                yield from self._traces.batches(wanted, progress=progress, batch_rows=batch_rows)
         finally:
             self._take_over()
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import shlex
 from collections import Counter
 from dataclasses import dataclass, field
 from operator import itemgetter
@@ -11,28 +13,31 @@ import pyarrow as pa
 
 from msgflow.errors import TraceError
 from msgflow.trace import bt2_library, columns
-from msgflow.trace.bt2_description import clock_of, context_of, describe
 from msgflow.trace.bt2_fields import schema_of, value_of
-from msgflow.trace.bt2_messages import messages
+from msgflow.trace.columns import COMMON_SCHEMA, PACKET_SCHEMA
 from msgflow.trace.ctf.clock import GIGA, Clock
 from msgflow.trace.ctf.packet_index import DiscardCounters
-from msgflow.trace.model import EventBatch, Progress
-from msgflow.trace.schemas import COMMON_SCHEMA, PACKET, PACKET_SCHEMA
+from msgflow.trace.ctf.trace_info import description
+from msgflow.trace.metadata_frame import MetadataKind, kind_of
+from msgflow.trace.model import PACKET, EventBatch, Progress, TraceInfo
 from msgflow.trace.time_base import on_one_base
-from msgflow.trace.trace_set import ExclusiveTraceSet, Report
+from msgflow.trace.trace_set import Report, TraceSet
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
+    from pathlib import Path
 
-    from msgflow.trace.model import TraceInfo, TraceLocation
+    from msgflow.trace.model import TraceLocation
     from msgflow.trace.trace_set import Batches, Wanted
 
 # Babeltrace orders by times that it rounds, where a clock does not count nanoseconds.
 _ROUNDING_NS = 1000
 _CONTEXT = [COMMON_SCHEMA.field(name) for name in ("vpid", "vtid", "procname", "pid_ns")]
+_QUOTED_PATH = re.compile(r"[`'](/[^`']+)[`']")
+_ADDRESS = re.compile(r"[\w-]*addr=0x[0-9a-f]+,?")
 
 
-class Bt2TraceSet(ExclusiveTraceSet):
+class Bt2TraceSet(TraceSet):
     """Traces read through Babeltrace 2."""
 
     def __init__(self, locations: Sequence[TraceLocation]) -> None:
@@ -220,3 +225,94 @@ class _Reading:
         if progress is not None:
             fraction = (self._time_ns - self._begin_ns) / ((self._end_ns - self._begin_ns) or 1)
             progress(Progress(self._event_count, min(max(fraction, 0.0), 1.0), self._time_ns))
+
+
+def messages(bt2: Any, traces: Sequence[tuple[Path, int]]) -> Iterator[Any]:
+    """Yield the messages of traces; each is a directory and a correction of its clock [ns].
+
+    A directory has a source of its own: one source would merge directories of one trace uuid.
+    The name of a trace object ends with the place of the trace in `traces`.
+    """
+    source = bt2.ComponentSpec.from_named_plugin_and_component_class
+    parameters = [parameters_of(path, place, ns) for place, (path, ns) in enumerate(traces)]
+    try:
+        yield from bt2.TraceCollectionMessageIterator([source("ctf", "fs", p) for p in parameters])
+    except bt2._Error as error:
+        # Babeltrace turns an exception that Python raised in between into text.
+        if "KeyboardInterrupt" in str(error):
+            raise KeyboardInterrupt from None
+        # The components are named fs, fs-1, fs-2 and so on.
+        names = [getattr(cause, "component_name", None) or "" for cause in error]
+        places = [int(name[3:] or 0) for name in names if re.fullmatch(r"fs(-\d+)?", name)]
+        path = traces[places[0]][0] if places else "TRACE"
+        cause = " ".join(_ADDRESS.sub("", error[0].message).split()).rstrip(".,: ")
+        named = [match[1] for each in error for match in _QUOTED_PATH.finditer(each.message)]
+        raise TraceError(
+            f"the trace is damaged or incomplete: {cause} — {named[0] if named else path}",
+            hint="copy it again from where it was recorded;"
+            f" babeltrace2 {shlex.quote(str(path))} says more",
+        ) from error
+
+
+def parameters_of(path: Path, place: int = 0, correction_ns: int = 0) -> dict[str, Any]:
+    """Return the parameters with which `source.ctf.fs` reads a trace; see `messages`.
+
+    The clocks are said to count from the epoch, which LTTng's do: Babeltrace orders traces of
+    several clocks only then.
+    """
+    return {
+        "inputs": [str(path)],
+        "trace-name": f"{place:09}",
+        "clock-class-offset-ns": correction_ns,
+        "force-clock-class-origin-unix-epoch": True,
+    }
+
+
+def describe(bt2: Any, path: Path, index: int) -> tuple[TraceInfo, list[Any]]:
+    """Describe one trace, with names and payload schemas of its events."""
+    if kind_of(path) is MetadataKind.JSON and bt2.__version__ < "2.1":
+        raise TraceError(
+            "the trace is CTF 2, which needs babeltrace2 2.1 or newer, here is "
+            f"{bt2.__version__} — {path}",
+            hint="record with `lttng create --trace-format=ctf-1.8`, or install a newer "
+            "python3-bt2",
+        )
+    first = next(messages(bt2, [(path, 0)]), None)
+    if first is None:
+        return TraceInfo(index, path), []
+    trace = first.stream.trace
+    streams = list(trace.cls.values())
+    events = [event for stream in streams for event in stream.values()]
+    if any(stream.default_clock_class is None for stream in streams):
+        raise TraceError(
+            f"the events have no time stamps — {path}", hint="record with LTTng or ros2_tracing"
+        )
+    # On a damaged trace this query ends the process: it comes after the trace could be opened.
+    source = bt2.find_plugin("ctf").source_component_classes["fs"]
+    query = bt2.QueryExecutor(source, "babeltrace.trace-infos", parameters_of(path))
+    found = [stream for each in query.query() for stream in each["stream-infos"]]
+    ranges = [stream["range-ns"] for stream in found if "range-ns" in stream]
+    info = description(
+        path,
+        index,
+        uuid=None if trace.uuid is None else str(trace.uuid),
+        environment={str(name): str(value) for name, value in trace.environment.items()},
+        clock=clock_of(streams[0].default_clock_class),
+        begins=[int(span["begin"]) for span in ranges],
+        ends=[int(span["end"]) for span in ranges],
+        events=[(event.name or "", {*context_of(bt2, event).names}) for event in events],
+    )
+    return info, [(event.name or "", schema_of(bt2, event.payload_field_class)) for event in events]
+
+
+def context_of(bt2: Any, event_class: Any) -> pa.Schema:
+    """Return the contexts of an event class; what all events of the stream have comes last."""
+    specific = schema_of(bt2, event_class.specific_context_field_class)
+    common = schema_of(bt2, event_class.stream_class.event_common_context_field_class)
+    return pa.schema([*specific, *common])
+
+
+def clock_of(clock: Any) -> Clock:
+    """Return a clock class of Babeltrace, which itself rounds times, as one of ours."""
+    uuid = None if clock.uuid is None else str(clock.uuid)
+    return Clock(clock.frequency, clock.offset.seconds, clock.offset.cycles, clock.name, uuid)

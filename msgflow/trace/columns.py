@@ -1,15 +1,60 @@
-"""Columns of events: which field fills which column, and Arrow batches from Python values."""
+"""Columns of batches: those of every reader, which field fills which, and their Python values."""
 
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import pyarrow as pa
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
+COMMON_SCHEMA: Final = pa.schema(
+    [
+        pa.field("event_id", pa.int64(), nullable=False),
+        pa.field("ts_ns", pa.int64(), nullable=False),
+        pa.field("trace_index", pa.int32(), nullable=False),
+        pa.field("cpu_id", pa.int32()),
+        pa.field("vpid", pa.int32(), nullable=False),
+        pa.field("vtid", pa.int32(), nullable=False),
+        pa.field("procname", pa.dictionary(pa.int32(), pa.string())),
+        pa.field("pid_ns", pa.int64()),
+    ]
+)
+"""First columns of every batch of events.
+
+`event_id` counts all events of the set from 0 in the order (time, trace, stream, position in
+stream), wanted or not. `vpid` and `vtid` are -1 where the trace has no such context, the nullable
+columns are NULL there.
+"""
+
+PACKET_SCHEMA: Final = pa.schema(
+    [
+        pa.field("trace_index", pa.int32(), nullable=False),
+        pa.field("stream_index", pa.int32(), nullable=False),
+        pa.field("stream_class_id", pa.int64(), nullable=False),
+        pa.field("stream_instance_id", pa.int64(), nullable=False),
+        pa.field("cpu_id", pa.int32()),
+        pa.field("position", pa.int64(), nullable=False),
+        pa.field("begin_ns", pa.int64()),
+        pa.field("end_ns", pa.int64()),
+        pa.field("last_event_ns", pa.int64()),
+        pa.field("event_count", pa.int64(), nullable=False),
+        pa.field("discarded_event_count", pa.int64()),
+        pa.field("lost_packet_count", pa.int64()),
+        pa.field("is_numbered", pa.bool_(), nullable=False),
+    ]
+)
+"""Columns of the batches of packets, one row per packet.
+
+`stream_index` is dense within the trace, in the order (stream class, stream instance); `position`
+is the place of the packet in its stream. `discarded_event_count` events were lost after
+`last_event_ns` and before `end_ns`; `lost_packet_count` packets are missing right before this
+one. Both are NULL where something was lost but the trace does not say how much. Where
+`is_numbered`, packets have numbers that go on from one directory of a recording to the next. Else
+nothing says how many packets are missing before the first one of a directory.
+"""
 
 ALIASES = b"aliases"
 """Key of a field's metadata: other names under which traces have it, comma separated."""
@@ -19,13 +64,6 @@ BASE = b"base"
 
 LABELS = b"labels"
 """Key of a field's metadata: of an enumeration, each label with its ranges of values, as JSON."""
-
-
-def names_of(field: pa.Field) -> tuple[str, ...]:
-    """Return the names under which a trace may have this field, the preferred one first."""
-    metadata = field.metadata or {}
-    aliases = metadata.get(ALIASES, b"").decode()
-    return (field.name, *(alias for alias in aliases.split(",") if alias))
 
 
 def field_metadata(
@@ -50,19 +88,21 @@ def labels_of(field: pa.Field) -> dict[str, list[tuple[int, int]]]:
     return {label: [(first, last) for first, last in ranges] for label, ranges in found.items()}
 
 
-def can_hold(wanted: pa.DataType, declared: pa.DataType) -> bool:
+def _can_hold(wanted: pa.DataType, declared: pa.DataType | None) -> bool:
     """Tell whether values of a declared type can be delivered as the wanted type."""
     types = pa.types
+    if declared is None:
+        return False
     if types.is_integer(wanted):
         return bool(types.is_integer(declared))
     if types.is_floating(wanted):
         return bool(types.is_floating(declared) or types.is_integer(declared))
     if types.is_list(wanted):
-        return bool(types.is_list(declared)) and can_hold(wanted.value_type, declared.value_type)
+        return bool(types.is_list(declared)) and _can_hold(wanted.value_type, declared.value_type)
     return bool(wanted.equals(declared))
 
 
-def union_type(first: pa.DataType, second: pa.DataType) -> pa.DataType | None:
+def _union_type(first: pa.DataType, second: pa.DataType) -> pa.DataType | None:
     """Return the type that holds values of both, None if no type does."""
     if first.equals(second):
         return first
@@ -94,58 +134,33 @@ def merged_schemas(declared: Iterable[tuple[str, pa.Schema]]) -> dict[str, pa.Sc
         merged = events.setdefault(event, {})
         for field in schema:
             known = merged.setdefault(field.name, field)
-            joint = union_type(known.type, field.type) or known.type
+            joint = _union_type(known.type, field.type) or known.type
             merged[field.name] = pa.field(field.name, joint, metadata=_joined(known, field))
     return {event: pa.schema(list(merged.values())) for event, merged in events.items()}
 
 
-def matching(columns: Iterable[pa.Field], fields: Iterable[pa.Field]) -> dict[str, pa.Field]:
-    """Return column to the field that fills it, for those columns that a field can fill."""
-    by_name = {field.name: field for field in fields}
-    found = {}
-    for column in columns:
-        for name in names_of(column):
-            field = by_name.get(name)
-            if field is not None and can_hold(_plain(column.type), field.type):
-                found[column.name] = field
-                break
-    return found
-
-
-def inner_matching(
-    columns: Iterable[pa.Field], fields: Iterable[pa.Field]
-) -> dict[str, tuple[tuple[str, ...], ...]]:
-    """Return column to the paths of the fields inside others that fill it.
-
-    A path is the names from the outermost structure, variant or option to the field itself; the
-    name of such a column has dots between them. Options of one variant may fill the same column,
-    each in the events that have it.
-    """
-    by_name = {field.name: field.type for field in fields}
-    found = {}
-    for column in columns:
-        paths = []
-        for name in names_of(column):
-            path = tuple(name.split("."))
-            declared = by_name.get(path[0]) if len(path) > 1 else None
-            for member in path[1:]:
-                declared = _member_type(declared, member)
-            if declared is not None and can_hold(column.type, declared):
-                paths.append(path)
-        if paths:
-            found[column.name] = tuple(paths)
-    return found
-
-
 def paths_of(
     columns: Iterable[pa.Field], fields: Iterable[pa.Field]
-) -> list[list[tuple[str, ...]]]:
-    """Return for each column the paths of names of the fields that fill it; none: no field does."""
-    plain, inner = matching(columns, fields), inner_matching(columns, fields)
-    return [
-        [(plain[column.name].name,)] if column.name in plain else list(inner.get(column.name, ()))
-        for column in columns
-    ]
+) -> list[tuple[tuple[str, ...], ...]]:
+    """Return for each column the paths of the fields that fill it; none: no field does.
+
+    A path has the names from the outermost structure, variant or option to the field itself. A
+    field that has one of the names of a column fills it alone. Otherwise each of these names is a
+    path, with dots in it. Options of one variant may fill the same column, each in its events.
+    """
+    types = {field.name: field.type for field in fields}
+    found: list[tuple[tuple[str, ...], ...]] = []
+    for column in columns:
+        wanted = column.type.value_type if pa.types.is_dictionary(column.type) else column.type
+        aliases = (column.metadata or {}).get(ALIASES, b"").decode()
+        names = (column.name, *filter(None, aliases.split(",")))
+        plain = next((name for name in names if _can_hold(wanted, types.get(name))), None)
+        if plain is not None:
+            found.append(((plain,),))
+            continue
+        inner = (tuple(name.split(".")) for name in names if "." in name)
+        found.append(tuple(path for path in inner if _can_hold(wanted, _type_at(types, path))))
+    return found
 
 
 def first_inner_value(fields: Any, paths: Iterable[Sequence[str]]) -> Any:
@@ -166,11 +181,14 @@ def _joined(known: pa.Field, field: pa.Field) -> dict[bytes, bytes]:
     return {**(field.metadata or {}), **(known.metadata or {}), **field_metadata(None, labels)}
 
 
-def _member_type(declared: pa.DataType | None, name: str) -> pa.DataType | None:
-    if declared is None or not pa.types.is_struct(declared):
-        return None
-    index = declared.get_field_index(name)
-    return None if index < 0 else declared.field(index).type
+def _type_at(types: Mapping[str, pa.DataType], path: Sequence[str]) -> pa.DataType | None:
+    found = types.get(path[0])
+    for name in path[1:]:
+        if found is None or not pa.types.is_struct(found):
+            return None
+        index = found.get_field_index(name)
+        found = None if index < 0 else found.field(index).type
+    return found
 
 
 def to_array(values: Sequence[Any], data_type: pa.DataType) -> pa.Array:
@@ -192,10 +210,6 @@ def batch_of(rows: Sequence[Sequence[Any]], schema: pa.Schema) -> pa.RecordBatch
     filled = zip(zip(*rows, strict=True), schema.types, strict=True)
     arrays = [to_array(values, data_type) for values, data_type in filled]
     return pa.RecordBatch.from_arrays(arrays, schema=schema)
-
-
-def _plain(data_type: pa.DataType) -> pa.DataType:
-    return data_type.value_type if pa.types.is_dictionary(data_type) else data_type
 
 
 def _valid_text(value: Any) -> Any:

@@ -17,24 +17,23 @@ from msgflow.trace.regular_file import irregular, read_regular, unreadable_error
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+_RECORD_HINT = "ros2 trace"
+_RECORDING_HINT = f"messages are not traces, record one: {_RECORD_HINT}"
+# What files with these suffixes are, and what to do; {} is the path. See also `is_archive`.
 _FOREIGN = {
-    ".mcap": "a rosbag2 recording",
-    ".db3": "a rosbag2 recording",
-    ".bag": "a ROS 1 recording",
-    ".pickle": "a converted file of tracetools_analysis",
-    ".tar": "an archive",
-    ".gz": "a compressed file",
-    ".tgz": "an archive",
-    ".zst": "a compressed file",
-    ".xz": "a compressed file",
-    ".bz2": "a compressed file",
-    ".zip": "an archive",
-    ".7z": "an archive",
+    ".mcap": ("a rosbag2 recording", _RECORDING_HINT),
+    ".db3": ("a rosbag2 recording", _RECORDING_HINT),
+    ".bag": ("a ROS 1 recording", _RECORDING_HINT),
+    ".pickle": (
+        "a converted file of tracetools_analysis",
+        "give the directory of the trace that it was converted from",
+    ),
+    **dict.fromkeys((".tar", ".tgz", ".zip", ".7z"), ("an archive", "tar xf {}")),
+    **dict.fromkeys((".gz", ".zst", ".xz", ".bz2"), ("a compressed file", "tar xf {}")),
 }
 _STREAM_MAGICS = {b"\xc1\x1f\xfc\xc1", b"\xc1\xfc\x1f\xc1"}
 _MAGIC_SIZE = 4
 _MOST_LOOKED_AT = 20
-_RECORD_HINT = "ros2 trace"
 
 
 def discover(paths: Sequence[str | Path]) -> list[TraceLocation]:
@@ -46,18 +45,27 @@ def discover(paths: Sequence[str | Path]) -> list[TraceLocation]:
     found: dict[Path, TraceLocation] = {}
     for path in map(Path, paths):
         _check_exists(path)
+        below: list[TraceLocation] = []
         strays: list[Path] = []
-        below = [_locate(directory) for directory in _directories_with_metadata(path, strays)]
-        if strays:
-            below[:1] = [replace(first, strays=tuple(strays)) for first in below[:1]]
+        for directory, files in directories(path):
+            if metadata_frame.FILE_NAME in files:
+                below.append(_locate(directory))
+            else:
+                strays += _first_stream(directory, files)
         if not below:
             raise _no_trace_error(path, strays)
+        below[0] = replace(below[0], strays=tuple(strays))
         found.update((location.path, location) for location in below)
     locations = [found[path] for path in sorted(found)]
     if not locations:
         raise TraceError("no trace given", hint="msgflow ingest TRACE")
     if not any(location.size_bytes for location in locations):
-        raise _nothing_recorded_error(locations)
+        raise TraceError(
+            "the trace has metadata but no events, nothing was recorded — "
+            + ", ".join(str(location.path) for location in locations),
+            hint="start the trace before the application, check that tracetools was built with "
+            "LTTng: ros2 run tracetools status",
+        )
     return locations
 
 
@@ -116,19 +124,8 @@ def _check_exists(path: Path) -> None:
                 f"this is a file inside a trace, give the directory — {path}",
                 hint=f"msgflow ingest {shlex.quote(str(path.parent))}",
             )
-        raise TraceError(
-            f"not a trace but {_describe(path)} — {path}",
-            hint=_hint_for(path),
-        )
-
-
-def _directories_with_metadata(root: Path, strays: list[Path]) -> Iterator[Path]:
-    """Yield the traces below a directory; add streams that have no metadata to `strays`."""
-    for directory, files in directories(root):
-        if metadata_frame.FILE_NAME in files:
-            yield directory
-        else:
-            strays += _first_stream(directory, files)
+        what, hint = _foreign(path)
+        raise TraceError(f"not a trace but {what} — {path}", hint=hint)
 
 
 def directories(root: Path) -> Iterator[tuple[Path, list[str]]]:
@@ -194,9 +191,9 @@ def _no_trace_error(path: Path, strays: Sequence[Path]) -> TraceError:
         return TraceError(f"empty directory — {path}", hint=_RECORD_HINT)
     for entry in entries:
         if entry.suffix in _FOREIGN:
+            what, hint = _foreign(entry)
             return TraceError(
-                f"no CTF trace in this directory, it holds {_describe(entry)} — {entry}",
-                hint=_hint_for(entry),
+                f"no CTF trace in this directory, it holds {what} — {entry}", hint=hint
             )
     return TraceError(
         f"no CTF trace (no file `metadata`) in this directory or below — {path}",
@@ -204,27 +201,10 @@ def _no_trace_error(path: Path, strays: Sequence[Path]) -> TraceError:
     )
 
 
-def _nothing_recorded_error(locations: Sequence[TraceLocation]) -> TraceError:
-    return TraceError(
-        "the trace has metadata but no events, nothing was recorded — "
-        + ", ".join(str(location.path) for location in locations),
-        hint="start the trace before the application, check that tracetools was built with "
-        "LTTng: ros2 run tracetools status",
+def _foreign(path: Path) -> tuple[str, str]:
+    """Return what a file is that is no trace, and what to do."""
+    kind, hint = _FOREIGN.get(
+        path.suffix, ("a file of another kind", metadata_frame.DIRECTORY_HINT)
     )
-
-
-def _describe(path: Path) -> str:
-    return _FOREIGN.get(path.suffix, "a file of another kind")
-
-
-def _hint_for(path: Path) -> str:
-    kind = _describe(path)
-    if is_archive(path):
-        return f"msgflow ingest {shlex.quote(str(path))}"
-    if "archive" in kind or "compressed" in kind:
-        return f"tar xf {shlex.quote(str(path))}"
-    if "tracetools_analysis" in kind:
-        return "give the directory of the trace that it was converted from"
-    if "recording" in kind:
-        return f"messages are not traces, record one: {_RECORD_HINT}"
-    return metadata_frame.DIRECTORY_HINT
+    quoted = shlex.quote(str(path))
+    return kind, f"msgflow ingest {quoted}" if is_archive(path) else hint.replace("{}", quoted)

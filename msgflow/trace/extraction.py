@@ -6,19 +6,27 @@ there, and removed again if they lead nowhere. Owners, modes and times are not r
 
 from __future__ import annotations
 
+import contextlib
+import gzip
+import io
+import lzma
 import os
 import re
 import shutil
 import stat
+import struct
 import tarfile
 import tempfile
 import zipfile
+import zlib
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
-from typing import IO, Any
+from typing import IO, TYPE_CHECKING, Any
 
 from msgflow.errors import TraceError, UsageError
-from msgflow.trace.compression import CORRUPT, UNPACKABLE, open_plain
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 _CHUNK = 1 << 20
 _MOST_HEADER_BYTES = 1 << 20
@@ -46,6 +54,33 @@ _LONG_HEADERS = {
     tarfile.GNUTYPE_LONGLINK,
 }
 
+_MAGIC_SIZE = 6
+_GZIP = b"\x1f\x8b"
+_XZ = b"\xfd7zXZ\x00"
+# What Arrow unpacks: the standard library learned Zstandard only in Python 3.14, and LZ4 never.
+_OF_ARROW = {b"\x28\xb5\x2f\xfd": "zstd", b"\x04\x22\x4d\x18": "lz4"}
+
+
+class _ArrowError(Exception):
+    """Data that Arrow unpacks are damaged."""
+
+
+# What reading a damaged archive raises.
+_CORRUPT = (
+    tarfile.TarError,
+    zipfile.BadZipFile,
+    gzip.BadGzipFile,
+    lzma.LZMAError,
+    zlib.error,
+    struct.error,
+    _ArrowError,
+    EOFError,
+    UnicodeError,
+    ValueError,
+)
+# What reading an encrypted archive, or one of an unknown compression, raises.
+_UNPACKABLE = (RuntimeError, NotImplementedError)
+
 
 def unpack(archive: Path, directory: Path) -> None:
     """Unpack an archive into an empty directory."""
@@ -57,12 +92,12 @@ def unpack(archive: Path, directory: Path) -> None:
             else:
                 _unpack_tar(file, target)
         target.make_links()
-    except UNPACKABLE as error:
+    except _UNPACKABLE as error:
         raise TraceError(
             f"the archive cannot be unpacked ({_reason(error)}) — {archive}",
             hint="unpack it by hand and give the directory",
         ) from error
-    except CORRUPT as error:
+    except _CORRUPT as error:
         raise TraceError(
             f"the archive is damaged or cut off ({_reason(error)}) — {archive}",
             hint="copy or pack it again from where the trace was recorded",
@@ -138,19 +173,15 @@ class Target:
 
     def make_directory(self, member: str) -> None:
         """Make a directory."""
-        try:
+        with _of_one_kind(member):
             self.place(member).mkdir(parents=True, exist_ok=True)
-        except (FileExistsError, NotADirectoryError) as error:
-            raise self._two_kinds(member) from error
 
     def write(self, member: str, content: IO[bytes]) -> None:
         """Write a regular file."""
         place = self.place(member)
-        try:
+        with _of_one_kind(member):
             place.parent.mkdir(parents=True, exist_ok=True)
             file = place.open("wb")
-        except (FileExistsError, IsADirectoryError, NotADirectoryError) as error:
-            raise self._two_kinds(member) from error
         with file:
             while chunk := content.read(_CHUNK):
                 self.take(len(chunk))
@@ -161,11 +192,9 @@ class Target:
         place, source = self.place(member), self.place(earlier)
         if not source.is_file():
             raise tarfile.ReadError(f"{member} is a link to {earlier}, which is missing")
-        try:
+        with _of_one_kind(member):
             place.parent.mkdir(parents=True, exist_ok=True)
             place.unlink(missing_ok=True)
-        except (FileExistsError, IsADirectoryError, NotADirectoryError) as error:
-            raise self._two_kinds(member) from error
         os.link(source, place)
 
     def add_symbolic_link(self, member: str, to: str) -> None:
@@ -178,18 +207,14 @@ class Target:
 
     def make_links(self) -> None:
         """Make the symbolic links; where they lead is only certain when all are made."""
-        member = ""
-        try:
-            for link in self.links:
-                member, place, _ = link
+        for member, place, _ in self.links:
+            with _of_one_kind(member):
                 place.parent.mkdir(parents=True, exist_ok=True)
-            # Every parent is a directory now, and stays one: no link takes a directory's place.
-            for link in self.links:
-                member, place, to = link
+        # Every parent is a directory now, and stays one: no link takes a directory's place.
+        for member, place, to in self.links:
+            with _of_one_kind(member):
                 place.unlink(missing_ok=True)
                 place.symlink_to(to)
-        except (FileExistsError, IsADirectoryError, NotADirectoryError) as error:
-            raise self._two_kinds(member) from error
         dangling = {place for member, place, _ in self.links if not self._leads_inside(member)}
         for place in dangling:
             place.unlink()
@@ -205,14 +230,21 @@ class Target:
             raise self._refusal(member, "is a link that leads outside of it")
         return is_there
 
-    def _two_kinds(self, member: str) -> tarfile.ReadError:
-        return tarfile.ReadError(f"{member!r} is both a directory and something else in it")
-
     def _refusal(self, member: str, why: str) -> TraceError:
         return TraceError(
             f"a member of the archive {why}: {member!r} — {self.archive}",
             hint="ask who made it; msgflow reads no such archive",
         )
+
+
+@contextlib.contextmanager
+def _of_one_kind(member: str) -> Iterator[None]:
+    """Say so if a name in the archive is that of a directory and of something else."""
+    try:
+        yield
+    except (FileExistsError, IsADirectoryError, NotADirectoryError) as error:
+        what = f"{member!r} is both a directory and something else in it"
+        raise tarfile.ReadError(what) from error
 
 
 class _Member(tarfile.TarInfo):
@@ -237,7 +269,7 @@ class _Member(tarfile.TarInfo):
 
 def _unpack_tar(file: IO[bytes], target: Target) -> None:
     with (
-        open_plain(file) as content,
+        _open_plain(file) as content,
         tarfile.open(fileobj=content, mode="r|", tarinfo=_Member) as tar,
     ):
         for member in tar:
@@ -275,3 +307,40 @@ def _unpack_zip(file: IO[bytes], target: Target) -> None:
                     target.write(member.filename, content)
             else:
                 raise target.refuse_special(member.filename)
+
+
+def _open_plain(file: IO[bytes]) -> Any:
+    """Return the content of a file, decompressed as its first bytes say.
+
+    It has a method `read`, which raises one of `_CORRUPT` where the file is damaged.
+    """
+    magic = file.read(_MAGIC_SIZE)
+    file.seek(0)
+    if magic.startswith(_GZIP):
+        return gzip.open(file)
+    if magic.startswith(_XZ):
+        return lzma.LZMAFile(file)
+    for first, name in _OF_ARROW.items():
+        if magic.startswith(first):
+            return io.BufferedReader(_Unpacked(file, name))
+    return file
+
+
+class _Unpacked(io.RawIOBase):
+    """What Arrow unpacks."""
+
+    def __init__(self, file: IO[bytes], compression: str) -> None:
+        import pyarrow
+
+        self._content = pyarrow.CompressedInputStream(pyarrow.PythonFile(file, "r"), compression)
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        try:
+            chunk = self._content.read(len(buffer))
+        except OSError as error:
+            raise _ArrowError(str(error)) from error
+        buffer[: len(chunk)] = chunk
+        return len(chunk)

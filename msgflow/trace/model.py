@@ -10,6 +10,9 @@ if TYPE_CHECKING:
 
     import pyarrow as pa
 
+PACKET = "packet"
+"""Name of the batches that hold packets instead of events."""
+
 
 @dataclass(frozen=True)
 class TraceLocation:

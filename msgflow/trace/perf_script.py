@@ -30,6 +30,7 @@ _MOST_BYTES = 1 << 32
 _MOST_MEMORY = 1 << 32
 _LONGEST_LINE = 1 << 16
 _MOST_LINES = 1 << 10
+_MOST_SAMPLES = 10_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,8 +106,8 @@ def _why_not_written(data: Path, text: Path, fields: str) -> str | None:
     return said[-1].strip() if said else f"perf ends with {run.returncode}"
 
 
-def read_script(text: Path, at_once: int = 10_000) -> Iterator[Samples]:
-    """Yield the samples of a text of perf, so many at a time."""
+def read_script(text: Path) -> Iterator[Samples]:
+    """Yield the samples of a text of perf, some thousand at a time."""
     hostname: str | None = None
     is_monotonic = False
     heads: list[str] = []
@@ -133,7 +134,7 @@ def read_script(text: Path, at_once: int = 10_000) -> Iterator[Samples]:
                 elif line.startswith("# clockid: monotonic ("):
                     is_monotonic = True
                 elif not line.startswith("#"):
-                    if len(heads) == at_once:
+                    if len(heads) == _MOST_SAMPLES:
                         yield taken()
                         heads, stacks = [], []
                     heads.append(line)

@@ -2,77 +2,28 @@
 
 from __future__ import annotations
 
-import threading
-from queue import Empty, Full, Queue
-from typing import TYPE_CHECKING, Generic, TypeVar
+from collections import deque
+from concurrent.futures import ThreadPoolExecutor
+from typing import TYPE_CHECKING, TypeVar
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Generator
 
 Item = TypeVar("Item")
 
-_WAIT_SECONDS = 0.1
 
+def prefetched(items: Generator[Item, None, None], most: int) -> Generator[Item, None, None]:
+    """Yield items that are made while the consumer works on those before; at most so many wait.
 
-class Prefetch(Generic[Item]):
-    """Items of an iterator, made while the consumer works on those before.
-
-    An error of the iterator is raised where the item would have been. The thread ends when the
-    items do, or with `close`.
+    An error is raised where its item would have been. Once this generator is closed, or ends,
+    `items` is closed and the thread has ended.
     """
-
-    def __init__(self, make: Callable[[], Iterator[Item]], most: int) -> None:
-        """Start; at most so many items wait."""
-        self._queue: Queue[Item | BaseException | None] = Queue(most)
-        self._stopped = threading.Event()
-        self._make = make
-        self._thread = threading.Thread(target=self._run, name="msgflow-reader", daemon=True)
-        self._thread.start()
-
-    def items(self) -> Iterator[Item]:
-        """Yield the items."""
-        while True:
-            item = self._next()
-            if item is None:
-                return
-            if isinstance(item, BaseException):
-                raise item
-            yield item
-
-    def close(self) -> None:
-        """End the thread; the iterator is closed when this returns."""
-        self._stopped.set()
-        self._thread.join()
-
-    def _next(self) -> Item | BaseException | None:
-        # With a limit, so that a signal is not kept waiting.
-        while True:
-            try:
-                return self._queue.get(timeout=_WAIT_SECONDS)
-            except Empty:
-                continue
-
-    def _run(self) -> None:
-        end: BaseException | None = None
+    with ThreadPoolExecutor(1, thread_name_prefix="msgflow-reader") as thread:
+        futures = deque(thread.submit(next, items, None) for _ in range(most + 1))
         try:
-            iterator = self._make()
-            try:
-                for item in iterator:
-                    if not self._put(item):
-                        break
-            finally:
-                close = getattr(iterator, "close", None)
-                if close is not None:
-                    close()
-        except BaseException as error:
-            end = error
-        self._put(end)
-
-    def _put(self, item: Item | BaseException | None) -> bool:
-        while not self._stopped.is_set():
-            try:
-                self._queue.put(item, timeout=_WAIT_SECONDS)
-            except Full:
-                continue
-            return True
-        return False
+            while (item := futures.popleft().result()) is not None:
+                futures.append(thread.submit(next, items, None))
+                yield item
+        finally:
+            thread.shutdown(cancel_futures=True)
+            items.close()

@@ -1,18 +1,17 @@
-"""Sets of traces: the interface that every reader fulfils, and what the readers share."""
+"""Sets of traces: what every reader of them does, one iteration at a time."""
 
 from __future__ import annotations
 
 import weakref
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
 from msgflow.trace.model import Progress
 
 if TYPE_CHECKING:
-    from collections.abc import Generator, Iterator, Mapping, Sequence
+    from collections.abc import Generator, Iterator, Mapping
     from pathlib import Path
 
     import pyarrow as pa
@@ -35,20 +34,25 @@ class TraceSet(ABC):
     """
 
     traces: tuple[TraceInfo, ...]  # what each trace declares, in order of path
-    # (trace index, event name) to the number of events read, wanted or not; only events that occur.
-    # Complete after `batches` has ended.
-    event_counts: Mapping[tuple[int, str], int]
-    duplicate_packet_count: int  # packets skipped because another trace of the set holds them
-    # Trace index to the packets skipped because that trace holds them twice, such as those of a
-    # stream file copied beside itself.
-    repeated_packet_counts: Mapping[int, int] = MappingProxyType({})
-    # What is damaged and was left out or read as far as possible. Complete after `batches` has
-    # ended.
-    damages: Sequence[Damage] = ()
-    # Directories where archives were unpacked to until the set is closed, each with its archive.
-    unpacked: Mapping[Path, Path] = MappingProxyType({})
 
-    @abstractmethod
+    def __init__(self) -> None:
+        # (trace index, event name) to the number of events read, wanted or not; only events that
+        # occur. Complete after `batches` has ended.
+        self.event_counts: Mapping[tuple[int, str], int] = {}
+        # Packets skipped because another trace of the set holds them.
+        self.duplicate_packet_count = 0
+        # Trace index to the packets skipped because that trace holds them twice, such as those of a
+        # stream file copied beside itself.
+        self.repeated_packet_counts: Mapping[int, int] = {}
+        # What is damaged and was left out or read as far as possible. Complete after `batches` has
+        # ended.
+        self.damages: list[Damage] = []
+        # Directories with what archives had, until the set is closed, and the archive of each.
+        self.unpacked: Mapping[Path, Path] = {}
+        # Weak, so that an iteration which its consumer has dropped is over.
+        self._running: weakref.ref[Batches] | None = None
+        self._closed = False
+
     def batches(
         self,
         wanted: Wanted = None,
@@ -72,41 +76,6 @@ class TraceSet(ABC):
                 strict, or bt2); what came before has been delivered.
             UsageError: the set is closed, or an earlier iteration has not ended.
         """
-
-    @abstractmethod
-    def close(self) -> None:
-        """Give everything back. May be called more than once."""
-
-    def __enter__(self) -> TraceSet:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-
-class ExclusiveTraceSet(TraceSet):
-    """A set that allows one iteration at a time."""
-
-    def __init__(self) -> None:
-        self.event_counts: Mapping[tuple[int, str], int] = {}
-        self.duplicate_packet_count = 0
-        self.repeated_packet_counts: Mapping[int, int] = {}
-        # Weak, so that an iteration which its consumer has dropped is over.
-        self._running: weakref.ref[Batches] | None = None
-        self._closed = False
-
-    @abstractmethod
-    def _batches(self, wanted: Wanted, progress: Report | None, batch_rows: int) -> Batches:
-        """Read everything; sets `event_counts` and `duplicate_packet_count` at its end."""
-
-    def batches(
-        self,
-        wanted: Wanted = None,
-        *,
-        progress: Report | None = None,
-        batch_rows: int = DEFAULT_BATCH_ROWS,
-    ) -> Iterator[EventBatch]:
-        """Read everything once; see `TraceSet.batches`."""
         if self._closed:
             raise UsageError("the traces have been closed", hint="msgflow.trace.open(paths)")
         if self._under_way() is not None:
@@ -118,12 +87,22 @@ class ExclusiveTraceSet(TraceSet):
         return iteration
 
     def close(self) -> None:
-        """End an iteration under way."""
+        """End an iteration under way, and give everything back. May be called more than once."""
         self._closed = True
         iteration = self._under_way()
         if iteration is not None:
             iteration.close()
         self._running = None
+
+    def __enter__(self) -> TraceSet:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    @abstractmethod
+    def _batches(self, wanted: Wanted, progress: Report | None, batch_rows: int) -> Batches:
+        """Read everything; sets `event_counts` and `duplicate_packet_count` at its end."""
 
     def _under_way(self) -> Batches | None:
         return None if self._running is None else self._running()

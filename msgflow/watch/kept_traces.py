@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,12 +13,12 @@ from msgflow.trace.numpy_arrow import to_numpy
 from msgflow.watch.kept_chunk import joined, placed, with_column
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
 
     import pyarrow as pa
 
     from msgflow.trace import TraceInfo
-    from msgflow.trace.trace_set import Wanted
+    from msgflow.trace.trace_set import Batches, Report, Wanted
     from msgflow.watch.kept_chunk import KeptChunk
 
 
@@ -27,7 +27,7 @@ class KeptTraces(TraceSet):
 
     def __init__(self, lasting: Sequence[KeptChunk], chunks: Sequence[KeptChunk]) -> None:
         """Join them."""
-        self.duplicate_packet_count = 0
+        super().__init__()
         self._parts = (*lasting, *chunks)
         traces: list[TraceInfo] = []
         # Of each part: its trace index -> that in the set.
@@ -60,8 +60,8 @@ class KeptTraces(TraceSet):
             for damage in part.damages
         ]
 
-    def batches(self, wanted: Wanted = None, **_: Any) -> Iterator[EventBatch]:
-        """Deliver everything in one round; what is wanted was decided when the chunks were read."""
+    def _batches(self, wanted: Wanted, progress: Report | None, batch_rows: int) -> Batches:
+        # In one round. What is wanted was decided when the chunks were read.
         firsts = np.cumsum([0, *(part.times_ns.size for part in self._parts)])
         # Chunks overlap: the buffers of one CPU are exchanged after those of another.
         order = np.argsort(np.concatenate([part.times_ns for part in self._parts]), kind="stable")
@@ -79,6 +79,3 @@ class KeptTraces(TraceSet):
             by_id = np.argsort(to_numpy(batch["event_id"]), kind="stable")
             is_ordered = bool((by_id == np.arange(by_id.size)).all())
             yield EventBatch(name, batch if is_ordered else batch.take(by_id), 0)
-
-    def close(self) -> None:
-        """Do nothing: the chunks stay in memory."""

@@ -338,7 +338,7 @@ for path in map(Path, sys.argv[1:]):
     print(definition_hash())
 """
     files = [
-        "msgflow/db/store_table.py", "msgflow/db/table_view.py", "msgflow/db/finding.py",
+        "msgflow/db/store_table.py", "msgflow/db/empty_database.py", "msgflow/db/finding.py",
         "schema/store.sql", "schema/public/run.sql", "schema/health/recording/lost_packets.sql",
     ]  # fmt: skip
     done = subprocess.run(

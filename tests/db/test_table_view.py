@@ -9,8 +9,7 @@ import duckdb
 import pytest
 
 from msgflow.db import objects
-from msgflow.db.store_table import store_tables
-from msgflow.db.table_view import table_views
+from msgflow.db.store_table import store_tables, table_views
 from msgflow.db.tables import STORE
 
 VIEWS = table_views()

@@ -9,7 +9,7 @@ import pyarrow as pa
 import pytest
 
 from msgflow.ingest import staging
-from msgflow.ingest.raw_tables import RawTables
+from msgflow.ingest.staging import RawTables
 
 
 @pytest.fixture
@@ -32,9 +32,15 @@ def rows(count: int) -> pa.RecordBatch:
     return pa.record_batch({"n": pa.array(range(count))})
 
 
+@pytest.fixture(autouse=True)
+def few_rows(monkeypatch: pytest.MonkeyPatch) -> None:
+    """100 rows are enough, and 150 are too many."""
+    monkeypatch.setattr("msgflow.ingest.staging.ROWS_PER_INSERT", 100)
+    monkeypatch.setattr("msgflow.ingest.staging.MOST_WAITING", 150)
+
+
 def raw_tables(con: duckdb.DuckDBPyConnection) -> RawTables:
-    """Return tables for which 100 rows are enough, and 150 are too many."""
-    return RawTables(con, may_hold=False, may_replace=False, rows_per_insert=100, most_waiting=150)
+    return RawTables(con, may_hold=False, may_replace=False)
 
 
 def test_rows_wait_for_more(con: duckdb.DuckDBPyConnection) -> None:

@@ -16,7 +16,7 @@ from thorough import few
 from msgflow.db.workspace import workspace
 from msgflow.ingest import ingest
 from msgflow.ingest import ingest as ingest_function
-from msgflow.ingest.raw_tables import RawTables
+from msgflow.ingest.staging import RawTables
 
 
 class Interruption(BaseException):
@@ -150,26 +150,6 @@ def test_the_workspace_of_a_running_ingest_is_left_alone(database: Path, other_t
         assert (running / "raw.duckdb").read_bytes() == b"half"
         assert not abandoned.exists()
     assert os.listdir(database.parent) == [database.name]
-
-
-@pytest.mark.thorough
-def test_without_file_locks_everything_works_but_cleaning(
-    new_database: Path, trace: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """As on Windows: nobody can tell whether a workspace is still in use, so it stays."""
-    monkeypatch.setattr("msgflow.db.workspace.fcntl", None)
-    other = new_database.with_name(".msgflow-ingest-other")
-    other.mkdir()
-    other.with_suffix(".lock").touch()
-    ingest([trace], new_database)
-    assert sorted(os.listdir(new_database.parent)) == sorted(
-        [new_database.name, other.name, f"{other.name}.lock"]
-    )
-
-
-def test_file_locks_are_not_needed_to_import_it() -> None:
-    program = "import sys; sys.modules['fcntl'] = None; import msgflow.ingest"
-    subprocess.run([sys.executable, "-c", program], check=True)
 
 
 def test_errors_of_the_ingest_itself_are_not_those_of_its_workspace(new_database: Path) -> None:

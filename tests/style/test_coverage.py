@@ -9,7 +9,7 @@ from each import each
 from golden import SYSTEMS, read_case
 from sql_files import SqlFile, sql_files
 
-from msgflow.db.table_view import table_views
+from msgflow.db.store_table import table_views
 from msgflow.view.page_query import DIRECTORY, page_query
 
 TESTS = Path(__file__).resolve().parents[1]

@@ -7,4 +7,4 @@ import threading
 
 def reading_threads() -> int:
     """Return how many are running."""
-    return sum(thread.name == "msgflow-reader" for thread in threading.enumerate())
+    return sum(thread.name.startswith("msgflow-reader") for thread in threading.enumerate())

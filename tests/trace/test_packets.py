@@ -11,7 +11,8 @@ from uuid import uuid4
 import pytest
 from ctf_writer import Event, Packet, TraceContent, write_index, write_trace
 
-from msgflow.trace import PACKET, PACKET_SCHEMA, TraceSet
+from msgflow.trace import PACKET, TraceSet
+from msgflow.trace.columns import PACKET_SCHEMA
 
 Rows = dict[str, list[dict[str, Any]]]
 Open = Callable[..., TraceSet]

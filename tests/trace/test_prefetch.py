@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,59 +14,56 @@ from reading_threads import reading_threads
 
 import msgflow.trace
 from msgflow.trace.ctf import batches, event_order
-from msgflow.trace.prefetch import Prefetch
+from msgflow.trace.prefetch import prefetched
 
 
 def test_all_items_in_order() -> None:
-    prefetch = Prefetch(lambda: iter(range(1000)), 3)
-    assert list(prefetch.items()) == list(range(1000))
-    prefetch.close()
+    items = prefetched((number for number in range(1000)), 3)
+    assert list(items) == list(range(1000))
     assert reading_threads() == 0
 
 
 def test_error_comes_after_the_items_before_it() -> None:
-    def make() -> Iterator[int]:
+    def make() -> Generator[int, None, None]:
         yield 1
         raise KeyError("gone")
 
-    prefetch = Prefetch(make, 1)
-    items = prefetch.items()
+    items = prefetched(make(), 1)
     assert next(items) == 1
     with pytest.raises(KeyError, match="gone"):
         next(items)
-    prefetch.close()
+    assert reading_threads() == 0
 
 
 def test_no_more_than_allowed_are_made_ahead() -> None:
     made = []
 
-    def make() -> Iterator[int]:
+    def make() -> Generator[int, None, None]:
         for n in range(100):
             made.append(n)
             yield n
 
-    prefetch = Prefetch(make, 2)
-    items = prefetch.items()
+    items = prefetched(make(), 2)
     next(items)
     time.sleep(0.3)
     # One taken, two waiting, one in hand.
     assert len(made) == 4
-    prefetch.close()
+    items.close()
 
 
 def test_closing_ends_the_iterator() -> None:
     closed = threading.Event()
 
-    def make() -> Iterator[int]:
+    def make() -> Generator[int, None, None]:
         try:
             while True:
                 yield 0
         finally:
             closed.set()
 
-    prefetch = Prefetch(make, 1)
-    next(prefetch.items())
-    prefetch.close()
+    items = prefetched(make(), 1)
+    next(items)
+    items.close()
     assert closed.is_set()
     assert reading_threads() == 0
 

@@ -1,4 +1,4 @@
-"""Tables of calls: publications, takes, requests, responses."""
+"""Tables of what programs did: publications, takes, requests, responses, events of their own."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from msgflow.db.tables.column import (
     flag,
     handle,
     identity,
+    integer,
     moment,
     number,
     process_id,
@@ -144,4 +145,36 @@ table(
     reference("request_id", "Request that it answers"),
     comment="One row per service response",
     view="Service responses.",
+)
+
+table(
+    "bag_message",
+    reference("publication_id", "The publication that it is the message of", required=True),
+    text("topic_name", "Name of the topic", required=True),
+    text("type_name", "Type of the message, such as sensor_msgs/msg/Image", required=True),
+    moment("received_ns", "When the recorder of the bag received it, clock of ROS", required=True),
+    number("size_bytes", "Size as it was sent (CDR)", unit="bytes", required=True),
+    moment("stamp_ns", "header.stamp, clock of ROS; NULL: its type has no header"),
+    text("frame_id", "header.frame_id; NULL: its type has no header"),
+    comment="One row per message of a bag whose publication is known (msgflow bag)",
+    view="Messages of a bag that was recorded in the same run: size, stamp and frame.",
+)
+
+table(
+    "user_event",
+    identity("user_event_id", "Identity of the event"),
+    trace_id(),
+    process_id(),
+    thread_id(),
+    integer("cpu", "CPU that it happened on"),
+    moment("at_ns", "When it happened", required=True, clock="process_id"),
+    text("name", "Provider and event, such as my_pkg:frame_done", required=True),
+    reference(
+        "callback_instance_id",
+        "Innermost callback instance inside which it happened, on its thread; NULL: none",
+    ),
+    text("fields", "Its fields, a JSON object: fields->>'$.name' is one of them", required=True),
+    flag("is_loss_affected", "A gap may hide that the callback instance was over"),
+    comment="One row per event whose name a pattern of msgflow ingest --events matches",
+    view="Events of the user's own tracepoints.",
 )

@@ -15,6 +15,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from duckdb_engine.datatypes import UBigInteger
@@ -46,8 +47,8 @@ def table(
 
 def column(
     name: str,
-    type_: type[TypeEngine[Any]] | TypeEngine[Any],
     comment: str,
+    type_: type[TypeEngine[Any]] | TypeEngine[Any],
     *,
     unit: str | None = None,
     required: bool = False,
@@ -65,14 +66,16 @@ def column(
     )
 
 
+text = partial(column, type_=VARCHAR)
+number = partial(column, type_=BIGINT)
+integer = partial(column, type_=INTEGER)  # of 32 bits
+# The key of a table of instances: unique, but not worth an index.
+identity = partial(number, required=True)
+
+
 def key(name: str, comment: str) -> Column[Any]:
     """Return the primary key of a table of entities."""
     return Column(name, BIGINT, primary_key=True, autoincrement=False, comment=comment)
-
-
-def identity(name: str, comment: str) -> Column[Any]:
-    """Return the key of a table of instances: unique, but not worth an index."""
-    return column(name, BIGINT, comment, required=True)
 
 
 def reference(
@@ -80,7 +83,7 @@ def reference(
 ) -> Column[Any]:
     """Return a column with identities of another table: `to`, or the one that its name says."""
     key = name if to is None else f"{to}_id"
-    return column(name, BIGINT, comment, to=f"{key.removesuffix('_id')}.{key}", required=required)
+    return number(name, comment, to=f"{key.removesuffix('_id')}.{key}", required=required)
 
 
 def trace_id(comment: str = "Trace it was recorded in", required: bool = True) -> Column[Any]:
@@ -120,29 +123,12 @@ def moment(
     more: dict[str, Any] = {} if clock is None else {"clock": clock}
     if hidden:
         more["is_hidden"] = True
-    return column(name, BIGINT, comment, unit="epoch ns", required=required, **more)
+    return number(name, comment, unit="epoch ns", required=required, **more)
 
 
 def event_order(name: str, comment: str) -> Column[Any]:
     """Return a place in the total order of events, which public views do not show."""
-    return column(name, BIGINT, comment, unit="event order", is_hidden=True)
-
-
-def text(name: str, comment: str, *, required: bool = False) -> Column[Any]:
-    """Return a text."""
-    return column(name, VARCHAR, comment, required=required)
-
-
-def number(
-    name: str, comment: str, *, unit: str | None = None, required: bool = False
-) -> Column[Any]:
-    """Return a number."""
-    return column(name, BIGINT, comment, unit=unit, required=required)
-
-
-def integer(name: str, comment: str, *, required: bool = False) -> Column[Any]:
-    """Return a number of 32 bits."""
-    return column(name, INTEGER, comment, required=required)
+    return number(name, comment, unit="event order", is_hidden=True)
 
 
 def flag(name: str, comment: str, *, hidden: bool = False) -> Column[Any]:
@@ -159,14 +145,15 @@ def flag(name: str, comment: str, *, hidden: bool = False) -> Column[Any]:
 
 def handle(name: str, comment: str) -> Column[Any]:
     """Return an address in a process."""
-    return column(name, UBigInteger, f"{comment}; an address, valid in its process until reused")
+    meaning = f"{comment}; an address, valid in its process until reused"
+    return column(name, meaning, UBigInteger)
 
 
 def route() -> Column[Any]:
     """Return the services that a flow took on its way."""
     return column(
         "route",
-        ARRAY(BIGINT),
         "Node (or, negative, process) that called, then services; empty: by no service",
+        ARRAY(BIGINT),
         required=True,
     )

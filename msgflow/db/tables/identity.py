@@ -54,8 +54,8 @@ table(
     integer("life", "Number of this life among those of the pid, from 1", required=True),
     column(
         "is_ambiguous",
-        BOOLEAN,
         "Several processes with equal ids are one here: nothing tells them apart",
+        BOOLEAN,
     ),
     comment="One row per process life",
     view="Process lives: a pid that is used again is another process.",

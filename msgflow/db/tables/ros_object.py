@@ -18,7 +18,7 @@ from msgflow.db.tables.column import (
 )
 
 _IS_INFERRED = column(
-    "is_inferred", BOOLEAN, "Its initialisation was not traced", sql="self.created_ns IS NULL"
+    "is_inferred", "Its initialisation was not traced", BOOLEAN, sql="self.created_ns IS NULL"
 )
 
 table(
@@ -29,7 +29,7 @@ table(
     text("topic_name", "Fully expanded topic name"),
     handle("publisher_handle", "rcl publisher handle"),
     handle("rmw_handle", "rmw publisher handle"),
-    column("gid", BLOB, "Global identifier, 16 bytes; NULL: none"),
+    column("gid", "Global identifier, 16 bytes; NULL: none", BLOB),
     number("queue_depth", "History depth asked for"),
     moment("created_ns", "First initialisation event", clock="process_id"),
     flag("is_internal", "Infrastructure of ROS (/rosout, /parameter_events, ...)"),
@@ -49,7 +49,7 @@ table(
     text("topic_name", "Fully expanded topic name"),
     handle("subscription_handle", "rcl subscription handle"),
     handle("rmw_handle", "rmw subscription handle"),
-    column("gid", BLOB, "Global identifier, 16 bytes; NULL: none"),
+    column("gid", "Global identifier, 16 bytes; NULL: none", BLOB),
     number("queue_depth", "History depth asked for"),
     moment("created_ns", "First initialisation event", clock="process_id"),
     flag("is_internal", "Infrastructure of ROS (/parameter_events, /clock, ...)"),
@@ -92,7 +92,7 @@ table(
     text("service_name", "Fully expanded service name"),
     handle("service_handle", "rcl service handle"),
     handle("rmw_handle", "rmw service handle"),
-    column("gid", BLOB, "Global identifier, 16 bytes; NULL: none"),
+    column("gid", "Global identifier, 16 bytes; NULL: none", BLOB),
     moment("created_ns", "rcl_service_init", clock="process_id"),
     flag("is_internal", "Infrastructure of ROS (parameter and lifecycle services)"),
     comment="One row per service",
@@ -108,7 +108,7 @@ table(
     text("service_name", "Fully expanded service name"),
     handle("client_handle", "rcl client handle"),
     handle("rmw_handle", "rmw client handle"),
-    column("gid", BLOB, "Identifier that servers see, 16 bytes; NULL: none"),
+    column("gid", "Identifier that servers see, 16 bytes; NULL: none", BLOB),
     moment("created_ns", "rcl_client_init", clock="process_id"),
     flag("is_internal", "Infrastructure of ROS (parameter and lifecycle services)"),
     comment="One row per service client",

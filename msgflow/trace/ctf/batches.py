@@ -3,27 +3,28 @@
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING
+from contextlib import closing
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
 
-from msgflow.trace.columns import complete_schemas, merged_schemas
+from msgflow.trace.columns import PACKET_SCHEMA, complete_schemas, merged_schemas
 from msgflow.trace.ctf.arrow import declared_schema
 from msgflow.trace.ctf.event_order import ordered_batches
 from msgflow.trace.ctf.events import event_reader_of
 from msgflow.trace.ctf.field_types import BYTE
-from msgflow.trace.ctf.packet_rows import PacketRows
 from msgflow.trace.ctf.record_batch import ClassPlan, ThreadNames, build_batch, make_plan
-from msgflow.trace.model import EventBatch, Progress
-from msgflow.trace.prefetch import Prefetch
+from msgflow.trace.model import PACKET, EventBatch, Progress
+from msgflow.trace.numpy_arrow import integers_to_arrow
+from msgflow.trace.prefetch import prefetched
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from msgflow.trace.ctf.event_order import Batch
     from msgflow.trace.ctf.field_reader import EventReader
-    from msgflow.trace.ctf.packet_order import Entry
+    from msgflow.trace.ctf.packet_order import Entry, PacketEvents
     from msgflow.trace.ctf.stream_layout import StreamLayout
 
 LARGEST_BATCH = 8 << 20
@@ -73,26 +74,20 @@ class Iteration:
         total = sum(entry.size for entry in self._entries) or 1
         done = 0
         latest_ns = 0
-        packets = PacketRows(self._report_damage)
         # A thread finds the events of the next batch while the columns of this one are made.
-        batches = Prefetch(
-            lambda: ordered_batches(
-                self._entries, size, self._report_damage, self._field_by_field()
-            ),
-            _AHEAD,
-        )
-        try:
-            for number, batch in enumerate(batches.items()):
-                packets.add(batch.packets)
+        whole = self._field_by_field()
+        batches = ordered_batches(self._entries, size, self._report_damage, whole)
+        with closing(prefetched(batches, _AHEAD)) as ahead:
+            for number, batch in enumerate(ahead):
                 if batch.ts_ns.size:
                     latest_ns = int(batch.ts_ns[-1])
                 yield from self.events(batch, number)
-                yield from packets.take(self._batch_rows, number)
+                yield from packet_batches(
+                    batch.packets, self._batch_rows, number, self._report_damage
+                )
                 done += sum(packet.entry.size for packet in batch.packets)
                 if done < total:
                     self._report_progress(done / total, latest_ns)
-        finally:
-            batches.close()
         self._report_progress(1.0, latest_ns)
 
     def _field_by_field(self) -> set[StreamLayout]:
@@ -148,3 +143,75 @@ class Iteration:
 def _in_order(parts: list[pa.RecordBatch]) -> pa.RecordBatch:
     table = pa.Table.from_batches(parts).unify_dictionaries().sort_by("event_id")
     return table.combine_chunks().to_batches()[0]
+
+
+def packet_batches(
+    packets: Sequence[PacketEvents],
+    most: int,
+    number: int,
+    report: Callable[[Entry, int, str], None],
+) -> Iterator[EventBatch]:
+    """Yield the rows of packets that were read in a round, at most `most` in a batch.
+
+    `report` is called for packets whose times contradict those of their events.
+    """
+    rows = [_row(packet, report) for packet in packets]
+    for begin in range(0, len(rows), most):
+        columns = [
+            integers_to_arrow(values, field.type)
+            for field, values in zip(
+                PACKET_SCHEMA, zip(*rows[begin : begin + most], strict=True), strict=True
+            )
+        ]
+        batch = pa.RecordBatch.from_arrays(columns, schema=PACKET_SCHEMA)
+        yield EventBatch(PACKET, batch, number)
+
+
+def _row(packet: PacketEvents, report: Callable[[Entry, int, str], None]) -> tuple[Any, ...]:
+    entry, stream = packet.entry, packet.entry.stream
+    header, last = entry.packet.header, packet.last
+    if packet.falls_back:
+        report(entry, 0, "time runs backward in the packet")
+    if packet.first is not None and packet.first < entry.begin:
+        report(entry, 0, "an event is earlier than the begin of its packet")
+    clock = stream.layout.clock
+    end_ns = None
+    if header.end is not None:
+        # A crash leaves packets without an end; old tracers give one before the last event.
+        end_ns = clock.to_ns(max(header.end, entry.begin if last is None else last))
+        is_late = bool(header.end) and last is not None and last > header.end
+        if is_late and not _events_may_follow_end(stream.layout.trace.environment):
+            report(entry, 0, "an event is later than the end of its packet")
+    return (
+        stream.trace_index,
+        stream.index,
+        stream.class_id,
+        stream.instance,
+        header.cpu,
+        entry.position,
+        None if header.begin is None else clock.to_ns(header.begin),
+        end_ns,
+        packet.last_ns if stream.has_time else None,
+        packet.count,
+        entry.discarded,
+        entry.lost,
+        header.sequence is not None,
+    )
+
+
+def _events_may_follow_end(environment: Mapping[str, int | str]) -> bool:
+    """Tell whether events may be later than the end of their packet.
+
+    True of LTTng-UST before 2.11 and LTTng-modules before 2.9.13, 2.10.10 and 2.11.
+    """
+    version = tuple(
+        value if isinstance(value := environment.get(f"tracer_{part}", 0), int) else 0
+        for part in ("major", "minor", "patchlevel")
+    )
+    match environment.get("tracer_name"):
+        case "lttng-ust":
+            return version < (2, 11, 0)
+        case "lttng-modules":
+            return version < (2, 9, 13) or (2, 10, 0) <= version < (2, 10, 10)
+        case _:
+            return False

@@ -1,21 +1,26 @@
-"""Order of events: packets of all streams, merged into batches of events in order of time."""
+"""Order of events: packets of all streams, merged into batches of events in order of time.
+
+A packet of each CPU must be in memory at the same time, and packets may have many megabytes. So
+large ones are cut into pieces that are read like packets.
+"""
 
 from __future__ import annotations
 
 import heapq
-from dataclasses import dataclass
-from itertools import groupby
+from dataclasses import dataclass, replace
+from itertools import groupby, pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from msgflow.trace.ctf.events import Events, find_events, read_events, without_absurd
-from msgflow.trace.ctf.large_packets import cut
+from msgflow.trace.ctf.events import Events, find_events, read_events, say_nothing, without_absurd
 from msgflow.trace.ctf.packet_memory import Loader
 from msgflow.trace.ctf.packet_order import PacketEvents
+from msgflow.trace.ctf.stream_layout import GAP
+from msgflow.trace.numpy_arrow import distinct
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterator, Sequence
+    from collections.abc import Callable, Collection, Generator, Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -25,6 +30,9 @@ if TYPE_CHECKING:
 
 _NEVER_NS = 1 << 64
 MOST_EVENTS = 1 << 18
+# Bytes of a piece. Pieces begin at multiples of `GAP`, as this one is: no two at the same.
+PIECE = 1 << 19
+LARGEST_WHOLE = 2 * PIECE
 
 
 @dataclass(frozen=True)
@@ -68,7 +76,7 @@ def ordered_batches(
     size: int,
     report: Callable[[Entry, int, str], None],
     whole: Collection[StreamLayout] = (),
-) -> Iterator[Batch]:
+) -> Generator[Batch, None, None]:
     """Read packets, about `size` bytes at once, and yield their events in order of time.
 
     An event at or after the begin of the next unread packet may have to wait for events of that
@@ -134,9 +142,7 @@ def _load(
         events = read_events(layout, memory, of_layout)
         events = without_absurd(layout, of_layout, events, report_once)
         parts.append(events)
-        clock = layout.stream.clock
-        assert clock is not None
-        times.append(clock.to_ns_array(events.clock))
+        times.append(layout.clock.to_ns_array(events.clock))
     counts = np.concatenate([part.counts for part in parts])
     ts_ns = _joined(times)
     return _Loaded(
@@ -274,3 +280,50 @@ def _forget(entries: Sequence[Entry], held: Sequence[Entry]) -> None:
     for entry in entries:
         if id(entry) not in kept:
             entry.events = None
+
+
+def cut(
+    loader: Loader, entry: Entry, report: Callable[[Entry, int, str], None]
+) -> tuple[PacketEvents, list[Entry]] | None:
+    """Return a packet's times and counts, and its pieces in order of time.
+
+    Its events are found once, for all pieces; `report` is called for damage. None says that the
+    packet is better read as a whole: it is small, a piece already, empty, or its times make no
+    sense.
+    """
+    if entry.size <= LARGEST_WHOLE or entry.until is not None:
+        return None
+    memory = loader.alone(entry)
+    if memory is None:
+        return None
+    layout = entry.stream.layout
+    entry.base = 0
+    find_events(layout, memory, [entry], report)
+    events = read_events(layout, memory, [entry])
+    is_sound = without_absurd(layout, [entry], events, say_nothing) is events
+    entry.base = -1
+    ts_ns = layout.clock.to_ns_array(events.clock)
+    begins = events.positions
+    if not (is_sound and begins.size and (ts_ns[1:] >= ts_ns[:-1]).all()):
+        return None
+    entry.events = None
+    first = distinct(np.searchsorted(begins, np.arange(0, begins[-1] + 1, PIECE)))
+    pieces = []
+    for at, end in pairwise([*first.tolist(), begins.size]):
+        # Events have the same layout at positions that differ by a multiple of `GAP`.
+        skipped = int(begins[at]) // GAP * GAP
+        piece = replace(
+            entry,
+            order_ns=max(entry.order_ns, int(ts_ns[at])),
+            skipped=skipped,
+            until=int(begins[end]) if end < begins.size else entry.size,
+            events=(begins[at:end] - skipped).astype(np.int32),
+        )
+        if at:
+            piece.clock_before = int(events.clock[at - 1])
+        pieces.append(piece)
+    clock = events.clock
+    summary = PacketEvents(
+        entry, begins.size, int(clock[0]), int(clock[-1]), int(ts_ns[-1]), falls_back=False
+    )
+    return summary, pieces

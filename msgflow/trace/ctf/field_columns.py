@@ -10,12 +10,12 @@ from msgflow.trace.ctf.event_body import EventBody, Kind
 from msgflow.trace.numpy_arrow import distinct
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
+    from msgflow.trace.ctf.layout import OptionLayout, Part, VariantLayout
     from msgflow.trace.ctf.packet_memory import Memory
-    from msgflow.trace.ctf.variant_layout import OptionLayout, Part, VariantLayout
 
 _WIDEST_ROW = 256
 _WORD = 8
@@ -112,16 +112,15 @@ class FieldRows:
         cut, at = _flat(offsets[:-1], lengths, 1)
         return cut, content[at]
 
-    def in_variant(self, name: str) -> tuple[NDArray[np.int64], NDArray[Any]] | None:
+    def in_variant(self, path: Sequence[str]) -> tuple[NDArray[np.int64], NDArray[Any]] | None:
         """Return the rows that have a field of the variant, and its values; None if no row has it.
 
-        The values of an array have a column for each element. The name has dots between the names
-        of the variants, their options and the structures around the field.
+        The values of an array have a column for each element. The path is the names of the
+        variants, their options and the structures around the field, and its own.
         """
-        words = name.split(".")
-        for depth in range(len(words) - 1, 0, -1):
-            rows, at, option = self._options.get(".".join(words[:depth]), (None, None, None))
-            part = None if option is None else option.parts.get(".".join(words[depth:]))
+        for depth in range(len(path) - 1, 0, -1):
+            rows, at, option = self._options.get(".".join(path[:depth]), (None, None, None))
+            part = None if option is None else option.parts.get(".".join(path[depth:]))
             if rows is not None and at is not None and part is not None:
                 return rows, _values(self._memory, at, part)
         return None

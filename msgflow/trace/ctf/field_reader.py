@@ -3,30 +3,13 @@
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from msgflow.trace.ctf.field_types import (
-    BYTE,
-    Array,
-    FieldError,
-    Integer,
-    Optional,
-    Real,
-    Reference,
-    Role,
-    Scope,
-    Sequence,
-    String,
-    Structure,
-    Type,
-    VariableInteger,
-    Variant,
-    aligned,
-)
+from msgflow.trace.ctf import field_types as ctf
+from msgflow.trace.ctf.field_types import BYTE, FieldError, Reference, Role, Scope, aligned
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Iterable
 
     from msgflow.trace.ctf.declarations import EventClass, StreamClass, TraceClass
 
@@ -42,25 +25,14 @@ class FieldReader:
         """Read from `data`, which begins with the packet, up to the bit `end`."""
         self.position = 0  # of the next field, in bits from the begin of the packet
         self.found: dict[str, Any] = {}  # role to the value found last, for fields that have a role
-        self.time_bits = 64  # size of the clock value found last
+        self.bits: dict[str, int] = {}  # role to the size of that value, if it is an integer
         self._data = data
         self._end = min(end, len(data) * BYTE)
         self._scopes: dict[Scope, dict[str, Any]] = {}
         self._frames: list[dict[str, Any]] = []
         self._empty_elements = 0
-        self._readers: dict[type, Callable[[Any], Any]] = {
-            Integer: self._integer,
-            VariableInteger: self._variable_integer,
-            Real: self._real,
-            String: self._string,
-            Array: self._array,
-            Sequence: self._sequence,
-            Structure: self._structure,
-            Variant: self._variant,
-            Optional: self._optional,
-        }
 
-    def read_scope(self, scope: Scope, structure: Structure) -> dict[str, Any]:
+    def read_scope(self, scope: Scope, structure: ctf.Structure) -> dict[str, Any]:
         """Read one of the structures of a packet or event."""
         if scope is Scope.EVENT_HEADER:
             self._empty_elements = 0
@@ -72,8 +44,39 @@ class FieldReader:
         self._fill(structure, values)
         return values
 
-    def _read(self, field_type: Type) -> Any:
-        return self._readers[type(field_type)](field_type)
+    def _read(self, field_type: ctf.Type) -> Any:
+        match field_type:
+            case ctf.Integer():
+                return self._integer(field_type)
+            case ctf.VariableInteger():
+                return self._variable_integer(field_type)
+            case ctf.Real():
+                bits = self._bits(field_type.size, field_type.align, field_type.big_endian)
+                codes = ("<I", "<f") if field_type.size == 32 else ("<Q", "<d")
+                return float(struct.unpack(codes[1], struct.pack(codes[0], bits))[0])
+            case ctf.String():
+                return self._string(field_type)
+            case ctf.Array():
+                return self._elements(field_type, field_type.length)
+            case ctf.Sequence():
+                length = self._look_up(field_type.length)
+                if length < 0:
+                    raise FieldError("the length of a sequence is no length")
+                return self._elements(field_type, length)
+            case ctf.Structure():
+                values: dict[str, Any] = {}
+                self._fill(field_type, values)
+                return values
+            case ctf.Variant():
+                value = self._look_up(field_type.selector)
+                for choice in field_type.choices:
+                    if choice.holds(value):
+                        return {choice.name: self._read(choice.type)}
+                raise FieldError(f"a variant has no option for the value {value}")
+            case ctf.Optional():
+                value = self._look_up(field_type.selector)
+                is_there = any(first <= value <= last for first, last in field_type.ranges)
+                return self._read(field_type.content) if is_there else None
 
     def _take(self, size: int, align: int = 1) -> int:
         """Return the position of so many bits and go on behind them."""
@@ -92,18 +95,16 @@ class FieldReader:
             return int.from_bytes(content, "big") >> shift & ((1 << size) - 1)
         return int.from_bytes(content, "little") >> (begin - first * BYTE) & ((1 << size) - 1)
 
-    def _integer(self, field_type: Integer) -> int | bool:
+    def _integer(self, field_type: ctf.Integer) -> int | bool:
         size = field_type.size
         value = self._bits(size, field_type.align, field_type.big_endian)
         if field_type.signed and value >> (size - 1):
             value -= 1 << size
         for role in field_type.roles:
-            self.found[role] = value
-            if role == Role.TIME:
-                self.time_bits = size
+            self.found[role], self.bits[role] = value, size
         return bool(value) if field_type.arrow == "bool" else value
 
-    def _variable_integer(self, field_type: VariableInteger) -> int:
+    def _variable_integer(self, field_type: ctf.VariableInteger) -> int:
         value = 0
         for number in range(_MOST_VARIABLE_BYTES):
             byte = self._bits(BYTE, BYTE, False)
@@ -115,17 +116,10 @@ class FieldReader:
         if field_type.signed and byte & 0x40:
             value -= 1 << (7 * (number + 1))
         for role in field_type.roles:
-            self.found[role] = value
-            if role == Role.TIME:
-                self.time_bits = 64
+            self.found[role], self.bits[role] = value, 64
         return value
 
-    def _real(self, field_type: Real) -> float:
-        bits = self._bits(field_type.size, field_type.align, field_type.big_endian)
-        codes = ("<I", "<f") if field_type.size == 32 else ("<Q", "<d")
-        return float(struct.unpack(codes[1], struct.pack(codes[0], bits))[0])
-
-    def _string(self, field_type: String) -> str:
+    def _string(self, field_type: ctf.String) -> str:
         begin = self._take(0, field_type.align) // BYTE
         end = self._end // BYTE
         size = _USUAL_TEXT
@@ -141,16 +135,7 @@ class FieldReader:
         self.position = (begin + length + 1) * BYTE
         return content[:length].decode("utf-8", "replace")
 
-    def _array(self, field_type: Array) -> Any:
-        return self._elements(field_type, field_type.length)
-
-    def _sequence(self, field_type: Sequence) -> Any:
-        length = self._look_up(field_type.length)
-        if not isinstance(length, int) or length < 0:
-            raise FieldError("the length of a sequence is no length")
-        return self._elements(field_type, length)
-
-    def _elements(self, field_type: Array | Sequence, length: int) -> Any:
+    def _elements(self, field_type: ctf.Array | ctf.Sequence, length: int) -> Any:
         element = field_type.element
         begin = self._take(0, field_type.align)
         smallest = _smallest_size(element)
@@ -162,46 +147,29 @@ class FieldReader:
             self._empty_elements += length
         if length > room:
             raise FieldError(f"{length} elements do not fit into the packet")
+        roles = field_type.roles if isinstance(field_type, ctf.Array) else ()
+        if not roles and not field_type.is_text:
+            return [self._read(element) for _ in range(length)]
+        self.position = begin + length * BYTE
+        content = bytes(self._data[begin // BYTE : self.position // BYTE])
         if field_type.is_text:
-            self.position = begin + length * BYTE
-            content = bytes(self._data[begin // BYTE : self.position // BYTE])
             return content.partition(b"\0")[0].decode("utf-8", "replace")
-        elements = [self._read(element) for _ in range(length)]
-        if isinstance(field_type, Array):
-            for role in field_type.roles:
-                self.found[role] = bytes(element & 0xFF for element in elements)
-        return elements
+        # Only a uuid: bytes.
+        self.found |= dict.fromkeys(roles, content)
+        return list(content)
 
-    def _structure(self, field_type: Structure) -> dict[str, Any]:
-        values: dict[str, Any] = {}
-        self._fill(field_type, values)
-        return values
-
-    def _fill(self, field_type: Structure, values: dict[str, Any]) -> None:
+    def _fill(self, field_type: ctf.Structure, values: dict[str, Any]) -> None:
         """Read a structure into `values`, in which later members look up lengths and selectors."""
         self._take(0, field_type.align)
         self._frames.append(values)
         for member in field_type.members:
-            if isinstance(member.type, Structure):
+            if isinstance(member.type, ctf.Structure):
                 inner: dict[str, Any] = {}
                 values[member.name] = inner
                 self._fill(member.type, inner)
             else:
                 values[member.name] = self._read(member.type)
         self._frames.pop()
-
-    def _variant(self, field_type: Variant) -> dict[str, Any]:
-        value = self._look_up(field_type.selector)
-        for choice in field_type.choices:
-            if choice.holds(value):
-                return {choice.name: self._read(choice.type)}
-        raise FieldError(f"a variant has no option for the value {value}")
-
-    def _optional(self, field_type: Optional) -> Any:
-        value = self._look_up(field_type.selector)
-        if any(first <= value <= last for first, last in field_type.ranges):
-            return self._read(field_type.content)
-        return None
 
     def _look_up(self, reference: Reference) -> int:
         value = None
@@ -241,28 +209,19 @@ def _member_of(value: Any, name: str | None) -> Any:
     return None
 
 
-def _smallest_size(field_type: Type) -> int:
+def _smallest_size(field_type: ctf.Type) -> int:
     """Return the fewest bits that a field of this type takes."""
     match field_type:
-        case Integer(size=size) | Real(size=size):
+        case ctf.Integer(size=size) | ctf.Real(size=size):
             return size
-        case String() | VariableInteger():
+        case ctf.String() | ctf.VariableInteger():
             return BYTE
-        case Array(element=element, length=length):
+        case ctf.Array(element=element, length=length):
             return length * _smallest_size(element)
-        case Structure(members=members):
+        case ctf.Structure(members=members):
             return sum(_smallest_size(member.type) for member in members)
         case _:
             return 0
-
-
-@dataclass(frozen=True, slots=True)
-class HeaderValues:
-    """Header of an event: its class, its time stamp and the size of the time stamp in bits."""
-
-    event: EventClass
-    time: int | None
-    time_bits: int
 
 
 class EventReader:
@@ -284,8 +243,11 @@ class EventReader:
         begin = aligned(position, self._stream.event_header.align)
         return min(begin, self._end) if position < self._end else self._end
 
-    def header(self, position: int) -> HeaderValues:
-        """Read the header of the event that begins at this bit."""
+    def header(self, position: int, clock: int = 0) -> tuple[EventClass, int]:
+        """Return the class of the event that begins at this bit, and the clock's value there.
+
+        `clock` is its value before: a time stamp may be only the low bits.
+        """
         reader = self._reader
         reader.position = position
         reader.found.pop(Role.TIME, None)
@@ -294,11 +256,12 @@ class EventReader:
         event = self._stream.events.get(reader.found[Role.EVENT_CLASS])
         if event is None:
             raise FieldError(f"there is no event class {reader.found[Role.EVENT_CLASS]}")
-        return HeaderValues(event, reader.found.get(Role.TIME), reader.time_bits)
+        time, bits = reader.found.get(Role.TIME, clock), reader.bits.get(Role.TIME, 64)
+        return event, time if bits == 64 else clock + (time - clock) % (1 << bits)
 
     def event(self, position: int) -> dict[Scope, dict[str, Any]]:
         """Read the contexts and payload of the event that begins at this bit."""
-        event = self.header(position).event
+        event, _ = self.header(position)
         read = self._reader.read_scope
         return {
             Scope.EVENT_CONTEXT: read(Scope.EVENT_CONTEXT, self._stream.event_context),

@@ -6,8 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from msgflow.trace.ctf.packets import Packet
-    from msgflow.trace.ctf.streams import Stream
+    from msgflow.trace.ctf.packets import Packet, Stream
     from msgflow.trace.time_base import ClockName
 
 Recording = tuple[str, int, int]

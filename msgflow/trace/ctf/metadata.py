@@ -44,9 +44,9 @@ _DEEPEST = 32
 
 def _check_sizes(trace: TraceClass) -> None:
     """Check all structures that a trace declares: types inside types can grow without limit."""
-    sizes = _Sizes()
+    known: dict[int, tuple[int, int]] = {}
     for structure in _structures(trace):
-        fields, depth = sizes.of(structure)
+        fields, depth = _size(structure, known)
         if fields > _MOST_FIELDS:
             raise MetadataError(f"a structure has more than {_MOST_FIELDS} fields")
         if depth > _DEEPEST:
@@ -61,17 +61,10 @@ def _structures(trace: TraceClass) -> Iterator[Structure]:
             yield from (event.specific_context, event.payload)
 
 
-class _Sizes:
-    """Numbers of fields and depths of types; each type is counted once."""
-
-    def __init__(self) -> None:
-        self._known: dict[int, tuple[int, int]] = {}
-
-    def of(self, declared: Type) -> tuple[int, int]:
-        known = self._known.get(id(declared))
-        if known is None:
-            inner = [self.of(part) for part in parts(declared)]
-            fields = 1 + sum(number for number, _ in inner)
-            known = fields, 1 + max((depth for _, depth in inner), default=0)
-            self._known[id(declared)] = known
-        return known
+def _size(declared: Type, known: dict[int, tuple[int, int]]) -> tuple[int, int]:
+    """Return the number of fields and the depth of a type; each type is counted once."""
+    if id(declared) not in known:
+        inner = [_size(part, known) for part in parts(declared)]
+        depth = max((depth for _, depth in inner), default=0)
+        known[id(declared)] = 1 + sum(number for number, _ in inner), 1 + depth
+    return known[id(declared)]

@@ -9,19 +9,10 @@ from msgflow.trace.ctf.packet_memory import Loader
 from msgflow.trace.ctf.packet_order import Entry
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     import numpy as np
     from numpy.typing import NDArray
 
-    from msgflow.trace.ctf.packets import Packet
-    from msgflow.trace.ctf.streams import Stream
-
-
-def numbers_of(streams: Iterable[Stream]) -> dict[Packet, tuple[int, int]]:
-    """Return a number for each packet, twice: for the clock's value, and for the time."""
-    packets = (packet for stream in streams for packet in stream.packets)
-    return {packet: (number, number) for number, packet in enumerate(packets)}
+    from msgflow.trace.ctf.packets import Packet, Stream
 
 
 def begins_of(stream: Stream) -> dict[Packet, tuple[int, int]]:
@@ -32,8 +23,7 @@ def begins_of(stream: Stream) -> dict[Packet, tuple[int, int]]:
     """
     if all(packet.header.begin is not None for packet in stream.packets):
         return {}
-    clock_class = stream.layout.stream.clock
-    assert clock_class is not None
+    clock_class = stream.layout.clock
     begins = {}
     clock = 0
     order_ns = clock_class.to_ns(0)

@@ -1,10 +1,10 @@
-"""Packets of a stream file, found by hopping from one to the next; damaged ones are reported."""
+"""Packets of streams, found by hopping from one to the next; damaged ones are reported."""
 
 from __future__ import annotations
 
 import os
 from bisect import bisect_right
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from msgflow.trace.ctf.packet_header import HeaderReader, PacketHeader
+    from msgflow.trace.ctf.stream_layout import StreamLayout
 
 _CHUNK = 1 << 20
 # Buffers of tracers are far smaller; a packet is loaded as a whole.
@@ -50,11 +51,8 @@ def packets_of(
     `report` gets all that is wrong: the file, the number of the packet, the offset in bytes and a
     message.
     """
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        packets = list(_PacketFinder(path, descriptor, reader, report).run())
-    finally:
-        os.close(descriptor)
+    with path.open("rb", buffering=0) as file:
+        packets = list(_PacketFinder(path, file.fileno(), reader, report).run())
     early = misplaced([packet.header.begin or 0 for packet in packets])
     for place in sorted(early):
         packet = packets[place]
@@ -262,3 +260,62 @@ def misplaced(values: Sequence[int]) -> set[int]:
         kept.add(place)
         place = previous[place]
     return set(range(len(values))) - kept
+
+
+@dataclass(eq=False)
+class Stream:
+    """One data stream: the packets of one buffer, from all its files."""
+
+    layout: StreamLayout
+    instance: int  # its number in its class
+    packets: list[Packet] = field(default_factory=list)  # in order of time
+    index: int = -1  # its place among the streams of the trace, by class and instance
+    rank: int = -1  # its place among the streams of all traces
+
+    @property
+    def class_id(self) -> int:
+        """Id of its stream class."""
+        return self.layout.stream.id
+
+    @property
+    def has_time(self) -> bool:
+        """Its events have times."""
+        return self.layout.stream.has_time
+
+    @property
+    def trace_index(self) -> int:
+        """Place of its trace in the set."""
+        return self.layout.trace_index
+
+
+def streams_of(
+    files: Sequence[Path],
+    reader: HeaderReader,
+    layouts: dict[int, StreamLayout],
+    report: Callable[[Path, int, int, str], None],
+) -> list[Stream]:
+    """Return the streams of a trace, in order of class and instance.
+
+    A stream may have several files (rotated or limited in size). Packets that do not name their
+    stream belong to a stream of their file alone, numbered in order of the file names.
+    """
+    streams: dict[tuple[int, int | None, Path | None], Stream] = {}
+    for path in files:
+        for packet in packets_of(path, reader, report):
+            header = packet.header
+            own_file = path if header.instance is None else None
+            key = (header.stream.id, header.instance, own_file)
+            if key not in streams:
+                unnamed = sum(known[2] is not None for known in streams)
+                instance = unnamed if header.instance is None else header.instance
+                streams[key] = Stream(layouts[header.stream.id], instance)
+            streams[key].packets.append(packet)
+    for stream in streams.values():
+        if all(packet.header.begin is not None for packet in stream.packets):
+            stream.packets.sort(
+                key=lambda packet: (packet.header.begin, packet.header.sequence or 0)
+            )
+    ordered = sorted(streams.values(), key=lambda stream: (stream.class_id, stream.instance))
+    for index, stream in enumerate(ordered):
+        stream.index = index
+    return ordered

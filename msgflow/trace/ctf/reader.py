@@ -2,28 +2,29 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
 from msgflow.trace.ctf import metadata
 from msgflow.trace.ctf.batches import Iteration
-from msgflow.trace.ctf.declarations import give_order, is_timeless
+from msgflow.trace.ctf.declarations import give_order
 from msgflow.trace.ctf.event_positions import BEYOND_END
 from msgflow.trace.ctf.field_types import MetadataError
 from msgflow.trace.ctf.losses import LossCounter
 from msgflow.trace.ctf.packet_header import HeaderReader
 from msgflow.trace.ctf.packet_index import orphans
 from msgflow.trace.ctf.packet_order import entries_of
-from msgflow.trace.ctf.packet_times import begins_of, numbers_of
+from msgflow.trace.ctf.packet_times import begins_of
+from msgflow.trace.ctf.packets import streams_of
 from msgflow.trace.ctf.stream_layout import StreamLayout
-from msgflow.trace.ctf.streams import streams_of
 from msgflow.trace.ctf.trace_info import corrected, describe
 from msgflow.trace.discovery import irregular_files, stream_files
 from msgflow.trace.metadata_frame import FILE_NAME
 from msgflow.trace.model import Damage, TraceInfo
 from msgflow.trace.regular_file import unreadable_error
 from msgflow.trace.time_base import on_one_base
-from msgflow.trace.trace_set import ExclusiveTraceSet
+from msgflow.trace.trace_set import TraceSet
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -31,13 +32,12 @@ if TYPE_CHECKING:
 
     from msgflow.trace.ctf.losses import Continuation
     from msgflow.trace.ctf.packet_order import Entry
-    from msgflow.trace.ctf.packets import Packet
-    from msgflow.trace.ctf.streams import Stream
+    from msgflow.trace.ctf.packets import Packet, Stream
     from msgflow.trace.model import TraceLocation
     from msgflow.trace.trace_set import Batches, Report, Wanted
 
 
-class CtfTraceSet(ExclusiveTraceSet):
+class CtfTraceSet(TraceSet):
     """Traces read by msgflow itself."""
 
     def __init__(
@@ -59,7 +59,6 @@ class CtfTraceSet(ExclusiveTraceSet):
         self._begins: dict[Packet, tuple[int, int]] | None = None
         self._found_early: list[Damage] = []
         self._losses = None if after is None else after.losses
-        self.damages: list[Damage] = []
         self.traces: tuple[TraceInfo, ...] = on_one_base(
             [self._open(location, index) for index, location in enumerate(locations)],
             {} if after is None else after.clock_offsets,
@@ -76,7 +75,7 @@ class CtfTraceSet(ExclusiveTraceSet):
             raise unreadable_error(error, path) from error
         if not location.size_bytes:
             return TraceInfo(index, path)
-        if is_timeless(declared):
+        if all(stream_class.clock is None for stream_class in declared.streams.values()):
             for stream_class in declared.streams.values():
                 give_order(stream_class)
         layouts = {}
@@ -114,7 +113,10 @@ class CtfTraceSet(ExclusiveTraceSet):
     def _batches(self, wanted: Wanted, progress: Report | None, batch_rows: int) -> Batches:
         self.damages = list(self._found_early)
         if self._begins is None:
-            self._begins = numbers_of(s for s in self._streams if not s.has_time)
+            # Packets without times have a number in place of the clock's value, and of the time.
+            timeless = (s.packets for s in self._streams if not s.has_time)
+            numbered = enumerate(itertools.chain.from_iterable(timeless))
+            self._begins = {packet: (number, number) for number, packet in numbered}
             for stream in self._streams:
                 if stream.has_time:
                     self._begins |= begins_of(stream)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-from msgflow.trace.columns import first_inner_value, inner_matching, matching, to_array
+from msgflow.trace.columns import COMMON_SCHEMA, first_inner_value, paths_of, to_array
 from msgflow.trace.ctf.arrow import (
     declared_schema,
     list_array,
@@ -18,9 +18,8 @@ from msgflow.trace.ctf.arrow import (
 )
 from msgflow.trace.ctf.event_body import Kind
 from msgflow.trace.ctf.field_columns import FieldRows
-from msgflow.trace.ctf.field_types import Scope, Structure, Type
+from msgflow.trace.ctf.field_types import Scope, Structure
 from msgflow.trace.numpy_arrow import integers_to_arrow, texts_to_arrow, to_arrow, to_numpy
-from msgflow.trace.schemas import COMMON_SCHEMA
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -32,18 +31,16 @@ if TYPE_CHECKING:
     from msgflow.trace.ctf.packet_memory import Memory
     from msgflow.trace.ctf.stream_layout import ClassLayout, StreamLayout
 
-CONTEXT_COLUMNS = ("vpid", "vtid", "procname", "pid_ns")
-
-_WITHOUT_CONTEXT = {"vpid": -1, "vtid": -1}
+_LEADING = 4
+"""So many columns are not read from fields: id, time, trace and CPU."""
 
 
 @dataclass(frozen=True)
 class Source:
-    """The field that fills a column."""
+    """The field that fills a column, or fields inside others, each in the events that have it."""
 
     scope: Scope  # the structure that it is in
-    name: str  # its name there
-    type: Type
+    paths: tuple[tuple[str, ...], ...]  # names from the member of that structure to the field
     number: int | None  # its place among the plain fields of the event, None if it is not plain
 
 
@@ -54,10 +51,7 @@ class ClassPlan:
     layout: ClassLayout
     stream: StreamLayout
     schema: pa.Schema  # of the batches, the common columns first
-    contexts: Mapping[str, Source]  # common column to field, where there is one
-    payload: Mapping[str, Source]  # payload column to field, where there is one
-    # Payload column to the names of the fields inside others that fill it.
-    inner: Mapping[str, tuple[tuple[str, ...], ...]]
+    sources: tuple[Source | None, ...]  # of the columns behind the leading ones; None: no field
 
     @property
     def is_field_by_field(self) -> bool:
@@ -65,30 +59,31 @@ class ClassPlan:
         body = self.layout.body
         if self.stream.header is None or body.fields is None:
             return True
-        sources = [*self.contexts.values(), *self.payload.values()]
-        paths = [path for paths in self.inner.values() for path in paths]
-        return any(source.number is None for source in sources) or not all(
-            body.variant is not None and path[0] == body.variant_name and body.variant.has(path[1:])
+        paths = [
+            path
+            for source in self.sources
+            if source is not None and source.number is None
+            for path in source.paths
+        ]
+        return not all(
+            body.variant is not None
+            and path[0] == body.variant_name
+            and len(path) > 1
+            and body.variant.has(path[1:])
             for path in paths
         )
 
 
 def make_plan(stream: StreamLayout, layout: ClassLayout, wanted: pa.Schema) -> ClassPlan:
     """Plan the batches of an event class whose payload columns are `wanted`."""
-    columns = [field for field in COMMON_SCHEMA if field.name in CONTEXT_COLUMNS]
-    contexts = _sources(layout, Scope.EVENT_CONTEXT, stream.stream.event_context, columns)
-    missing = [column for column in columns if column.name not in contexts]
+    columns = list(COMMON_SCHEMA)[_LEADING:]
+    common = _sources(layout, Scope.EVENT_CONTEXT, stream.stream.event_context, columns)
     specific = layout.event.specific_context
-    contexts |= _sources(layout, Scope.SPECIFIC_CONTEXT, specific, missing)
+    of_class = _sources(layout, Scope.SPECIFIC_CONTEXT, specific, columns)
+    contexts = [first or second for first, second in zip(common, of_class, strict=True)]
     payload = _sources(layout, Scope.PAYLOAD, layout.event.payload, wanted)
-    declared = declared_schema(layout.event.payload)
-    inner = {
-        column: paths
-        for column, paths in inner_matching(wanted, declared).items()
-        if column not in payload
-    }
     schema = pa.schema([*COMMON_SCHEMA, *wanted])
-    return ClassPlan(layout, stream, schema, contexts, payload, inner)
+    return ClassPlan(layout, stream, schema, (*contexts, *payload))
 
 
 def build_batch(
@@ -107,32 +102,25 @@ def build_batch(
     """
     count, packets = rows.size, batch.in_packet[rows]
     without_cpu = None if batch.has_cpu is None else ~batch.has_cpu[packets]
-    columns = {
-        "event_id": to_arrow(rows + first_id),
-        "ts_ns": to_arrow(batch.ts_ns[rows]),
-        "trace_index": to_arrow(np.full(count, plan.stream.trace_index, np.int32)),
-        "cpu_id": to_arrow(batch.cpus[packets], without_cpu),
-    }
+    arrays = [
+        to_arrow(rows + first_id),
+        to_arrow(batch.ts_ns[rows]),
+        to_arrow(np.full(count, plan.stream.trace_index, np.int32)),
+        to_arrow(batch.cpus[packets], without_cpu),
+    ]
     field_of: _GatheredColumns | _FieldByField
     if plan.is_field_by_field:
         at = map(reader_at, packets.tolist(), batch.positions[rows].tolist())
         field_of = _FieldByField([reader.event(bit) for reader, bit in at], names)
     else:
         field_of = _GatheredColumns(plan, batch.memory, batch.bodies[rows], names)
-    arrays = []
-    for position, field in enumerate(plan.schema):
-        is_common = position < len(COMMON_SCHEMA)
-        source = (plan.contexts if is_common else plan.payload).get(field.name)
-        if is_common and field.name in columns:
-            arrays.append(columns[field.name])
-        elif source is not None:
+    for field, source in zip(list(plan.schema)[_LEADING:], plan.sources, strict=True):
+        if source is not None:
             arrays.append(field_of.array(source, field.type))
-        elif not is_common and field.name in plan.inner:
-            arrays.append(field_of.inner_array(plan.inner[field.name], field.type))
-        elif is_common and field.name in _WITHOUT_CONTEXT:
-            arrays.append(to_arrow(np.full(count, _WITHOUT_CONTEXT[field.name], np.int32)))
-        else:
+        elif field.nullable:
             arrays.append(pa.nulls(count, field.type))
+        else:
+            arrays.append(to_arrow(np.full(count, -1, np.int32)))
     return pa.RecordBatch.from_arrays(arrays, schema=plan.schema)
 
 
@@ -143,17 +131,19 @@ class _GatheredColumns:
         self, plan: ClassPlan, memory: Memory, bodies: NDArray[np.int64], names: ThreadNames
     ) -> None:
         body = plan.layout.body
-        sources = [*plan.contexts.values(), *plan.payload.values()]
-        wanted = {source.number for source in sources if source.number is not None}
+        numbers = {source.number for source in plan.sources if source is not None}
+        wanted = sorted(number for number in numbers if number is not None)
         self._fields = body.fields or ()
         self._names = names
-        with_variant = bool(plan.inner)
-        self._rows = FieldRows(body, memory, bodies, sorted(wanted), with_variant=with_variant)
+        self._rows = FieldRows(body, memory, bodies, wanted, with_variant=None in numbers)
         self._count = bodies.size
 
     def array(self, source: Source, data_type: pa.DataType) -> pa.Array:
         number = source.number
-        assert number is not None
+        if number is None:
+            found = map(self._rows.in_variant, source.paths)
+            present = [values for values in found if values is not None]
+            return scattered_array(present, self._count, data_type)
         field = self._fields[number]
         if pa.types.is_dictionary(data_type):
             return self._thread_names(number)
@@ -162,11 +152,6 @@ class _GatheredColumns:
         if pa.types.is_string(data_type):
             return text_array(*self._rows.text(number))
         return list_array(*self._rows.elements(number), data_type)
-
-    def inner_array(self, paths: Sequence[Sequence[str]], data_type: pa.DataType) -> pa.Array:
-        found = [self._rows.in_variant(".".join(path)) for path in paths]
-        present = [values for values in found if values is not None]
-        return scattered_array(present, self._count, data_type)
 
     def _thread_names(self, number: int) -> pa.Array:
         field = self._fields[number]
@@ -185,31 +170,24 @@ class _FieldByField:
         self._names = names
 
     def array(self, source: Source, data_type: pa.DataType) -> pa.Array:
-        values: list[Any] = [event[source.scope][source.name] for event in self._events]
+        values = [first_inner_value(event[source.scope], source.paths) for event in self._events]
         if pa.types.is_dictionary(data_type):
             return self._names.array_of(values)
         return to_array(values, data_type)
 
-    def inner_array(self, paths: Sequence[Sequence[str]], data_type: pa.DataType) -> pa.Array:
-        """Return a column of fields inside others; of several fields, the first in each event."""
-        return to_array(
-            [first_inner_value(event[Scope.PAYLOAD], paths) for event in self._events], data_type
-        )
-
 
 def _sources(
     layout: ClassLayout, scope: Scope, structure: Structure, columns: Iterable[pa.Field]
-) -> dict[str, Source]:
-    types = {member.name: member.type for member in structure.members}
-    numbers = {
-        field.name: number
+) -> list[Source | None]:
+    numbers: dict[tuple[str, ...], int] = {
+        (field.name,): number
         for number, field in enumerate(layout.body.fields or ())
         if field.scope is scope
     }
-    return {
-        column: Source(scope, field.name, types[field.name], numbers.get(field.name))
-        for column, field in matching(columns, declared_schema(structure)).items()
-    }
+    return [
+        Source(scope, paths, numbers.get(paths[0])) if paths else None
+        for paths in paths_of(columns, declared_schema(structure))
+    ]
 
 
 class ThreadNames:

@@ -6,24 +6,12 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 from uuid import UUID
 
+from msgflow.trace.ctf import field_types as ctf
 from msgflow.trace.ctf.clock import Clock
 from msgflow.trace.ctf.declarations import EventClass, StreamClass, TraceClass
-from msgflow.trace.ctf.field_types import (
-    Array,
-    Choice,
-    Integer,
-    Member,
-    MetadataError,
-    Role,
-    Scope,
-    Structure,
-    Type,
-    Variant,
-    may_have,
-)
-from msgflow.trace.ctf.tsdl_tokens import Token, TokenStream, tokens_of
-from msgflow.trace.ctf.tsdl_types import TypeParser, Value
-from msgflow.trace.ctf.tsdl_variants import resolved
+from msgflow.trace.ctf.field_types import MetadataError, Reference, Role, Scope, may_have
+from msgflow.trace.ctf.tsdl_tokens import Token, tokens_of
+from msgflow.trace.ctf.tsdl_types import TypeParser, Value, without_prefix
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -53,6 +41,8 @@ _SCOPES = {
     "context": Scope.SPECIFIC_CONTEXT,
     "fields": Scope.PAYLOAD,
 }
+_MOST_FIELDS = 100_000
+Frames = list[dict[str, ctf.Type]]
 
 
 @dataclass
@@ -60,7 +50,7 @@ class _Block:
     """A `trace`, `stream`, `event`, `clock` or `env` block."""
 
     values: dict[str, Value] = field(default_factory=dict)
-    structures: dict[Scope, Structure] = field(default_factory=dict)
+    structures: dict[Scope, ctf.Structure] = field(default_factory=dict)
 
     def integer(self, name: str, default: int) -> int:
         value = self.values.get(name, default)
@@ -71,33 +61,30 @@ class _Block:
 
 def parse(text: str) -> TraceClass:
     """Parse metadata."""
-    tokens = tokens_of(text)
-    blocks = _Blocks(tokens)
+    blocks = _Blocks(tokens_of(text))
     blocks.parse()
     return _trace_class(blocks)
 
 
-class _Blocks:
+class _Blocks(TypeParser):
     """The blocks of a text, in the order of their appearance."""
 
     def __init__(self, tokens: list[Token]) -> None:
+        super().__init__(tokens, _is_big_endian(tokens))
         self.trace: _Block | None = None
         self.environment: dict[str, Value] = {}
         self.clocks: list[_Block] = []
         self.streams: list[_Block] = []
         self.events: list[_Block] = []
-        self._tokens = TokenStream(tokens)
-        self._types = TypeParser(self._tokens, _is_big_endian(tokens))
 
     def parse(self) -> None:
-        tokens = self._tokens
-        while tokens.token.kind != "end":
-            if self._types.at_declaration():
-                self._types.declaration()
+        while self.token.kind != "end":
+            if self.at_declaration():
+                self.declaration()
                 continue
-            kind = tokens.name()
+            kind = self.name()
             block = self._block()
-            tokens.expect(";")
+            self.expect(";")
             if kind == "trace":
                 self.trace = block
             elif kind == "env":
@@ -109,26 +96,25 @@ class _Blocks:
             elif kind == "event":
                 self.events.append(block)
             elif kind != "callsite":
-                raise tokens.error(f"there is no block {kind!r}")
+                raise self.error(f"there is no block {kind!r}")
 
     def _block(self) -> _Block:
-        tokens = self._tokens
         block = _Block()
-        self._types.open_block()
-        while tokens.token.value != "}":
-            if self._types.at_declaration():
-                self._types.declaration()
+        self.open_block()
+        while self.token.value != "}":
+            if self.at_declaration():
+                self.declaration()
                 continue
-            name = str(self._types.value())
-            if tokens.take_if(":="):
+            name = str(self.value())
+            if self.take_if(":="):
                 if name not in _SCOPES:
-                    raise tokens.error(f"there is no structure {name!r}")
-                block.structures[_SCOPES[name]] = self._types.structure()
+                    raise self.error(f"there is no structure {name!r}")
+                block.structures[_SCOPES[name]] = self.structure()
             else:
-                tokens.expect("=")
-                block.values[name] = self._types.value()
-            tokens.expect(";")
-        self._types.close_block()
+                self.expect("=")
+                block.values[name] = self.value()
+            self.expect(";")
+        self.close_block()
         return block
 
 
@@ -149,7 +135,7 @@ def _is_big_endian(tokens: list[Token]) -> bool:
 def _trace_class(blocks: _Blocks) -> TraceClass:
     if blocks.trace is None:
         raise MetadataError("there is no `trace` block")
-    outer = {Scope.PACKET_HEADER: Structure()}
+    outer = {Scope.PACKET_HEADER: ctf.Structure()}
     _add(outer, blocks.trace, Scope.PACKET_HEADER)
     trace = TraceClass(
         uuid=_uuid(blocks.trace),
@@ -160,7 +146,7 @@ def _trace_class(blocks: _Blocks) -> TraceClass:
         str(block.values.get("name", "")): _clock(block, trace.notes) for block in blocks.clocks
     }
     only_clock = next(iter(clocks.values())) if len(clocks) == 1 else None
-    scopes: dict[int, dict[Scope, Structure]] = {}
+    scopes: dict[int, dict[Scope, ctf.Structure]] = {}
     # A trace may have a single stream that is not worth a block.
     for block in blocks.streams or [_Block()]:
         stream_scopes = dict(outer)
@@ -194,37 +180,19 @@ def _trace_class(blocks: _Blocks) -> TraceClass:
     return trace
 
 
-def _add(scopes: dict[Scope, Structure], block: _Block, scope: Scope) -> None:
-    structure = resolved(block.structures.get(scope, Structure()), scope, scopes)
-    scopes[scope] = _with_roles(structure, _ROLES[scope]) if scope in _ROLES else structure
+def _add(scopes: dict[Scope, ctf.Structure], block: _Block, scope: Scope) -> None:
+    """Add the structure of a scope, after those that it may refer to."""
+    frames: dict[Scope, dict[str, ctf.Type]] = {
+        known: {member.name: member.type for member in of_scope.members}
+        for known, of_scope in scopes.items()
+        if known < scope
+    }
+    declared = block.structures.get(scope, ctf.Structure())
+    outer = [frames[known] for known in sorted(frames)]
+    scopes[scope] = _Resolver(scope, frames).structure(declared, outer)
 
 
-def _with_roles(structure: Structure, roles: Mapping[str, str]) -> Structure:
-    """Give the fields of these names their role, in nested structures and variants too."""
-    members = tuple(
-        Member(member.name, _with_role(member.name, member.type, roles))
-        for member in structure.members
-    )
-    return Structure(members, structure.minimum_align)
-
-
-def _with_role(name: str, declared: Type, roles: Mapping[str, str]) -> Type:
-    match declared:
-        case Structure():
-            return _with_roles(declared, roles)
-        case Variant():
-            choices = tuple(
-                Choice(choice.name, _with_role("", choice.type, roles), choice.ranges)
-                for choice in declared.choices
-            )
-            return replace(declared, choices=choices)
-        case Integer() | Array() if name in roles and may_have(declared, roles[name]):
-            return replace(declared, roles=declared.roles | {roles[name]})
-        case _:
-            return declared
-
-
-def _clock_of(scopes: Mapping[Scope, Structure], clocks: Mapping[str, Clock]) -> Clock | None:
+def _clock_of(scopes: Mapping[Scope, ctf.Structure], clocks: Mapping[str, Clock]) -> Clock | None:
     """Return the clock to which a field of the packet context or event header is mapped."""
     for scope in (Scope.EVENT_HEADER, Scope.PACKET_CONTEXT):
         for name in _mapped_clocks(scopes[scope]):
@@ -234,16 +202,10 @@ def _clock_of(scopes: Mapping[Scope, Structure], clocks: Mapping[str, Clock]) ->
     return None
 
 
-def _mapped_clocks(declared: Type) -> list[str]:
-    match declared:
-        case Structure(members=members):
-            return [name for member in members for name in _mapped_clocks(member.type)]
-        case Variant(choices=choices):
-            return [name for choice in choices for name in _mapped_clocks(choice.type)]
-        case Integer(roles=roles):
-            return [role.partition(".")[2] for role in roles if role.startswith("clock.")]
-        case _:
-            return []
+def _mapped_clocks(declared: ctf.Type) -> list[str]:
+    if isinstance(declared, ctf.Integer):
+        return [role.partition(".")[2] for role in declared.roles if role.startswith("clock.")]
+    return [name for part in ctf.parts(declared) for name in _mapped_clocks(part)]
 
 
 def _clock(block: _Block, notes: list[str]) -> Clock:
@@ -265,3 +227,88 @@ def _uuid(block: _Block) -> str | None:
         return str(UUID(str(value)))
     except ValueError as error:
         raise MetadataError(f"{value!r} is no uuid") from error
+
+
+class _Resolver:
+    """Gives fields their roles, and options of variants the values that choose them.
+
+    The selector is an enumeration declared before, and its labels are the names of the options.
+    """
+
+    def __init__(self, scope: Scope, scopes: dict[Scope, dict[str, ctf.Type]]) -> None:
+        self._scope = scope
+        self._scopes = scopes
+        self._roles = _ROLES.get(scope, {})
+        self._count = 0
+
+    def structure(self, declared: ctf.Structure, frames: Frames) -> ctf.Structure:
+        frame: dict[str, ctf.Type] = {}
+        self._scopes.setdefault(self._scope, frame)
+        members = []
+        for member in declared.members:
+            field = self._with_role(member.name, self._type(member.type, [*frames, frame]))
+            frame[member.name] = field
+            members.append(ctf.Member(member.name, field))
+        return ctf.Structure(tuple(members), declared.minimum_align)
+
+    def _with_role(self, name: str, declared: ctf.Type) -> ctf.Type:
+        role = self._roles.get(name)
+        if role and isinstance(declared, ctf.Integer | ctf.Array) and may_have(declared, role):
+            return replace(declared, roles=declared.roles | {role})
+        return declared
+
+    def _type(self, declared: ctf.Type, frames: Frames) -> ctf.Type:
+        self._count += 1
+        if self._count > _MOST_FIELDS:
+            # Structures that contain others by name can grow without limit.
+            raise MetadataError(f"a structure has more than {_MOST_FIELDS} fields")
+        match declared:
+            case ctf.Structure():
+                return self.structure(declared, frames)
+            case ctf.Array() | ctf.Sequence():
+                return replace(declared, element=self._type(declared.element, frames))
+            case ctf.Variant():
+                return self._variant(declared, frames)
+            case _:
+                return declared
+
+    def _variant(self, declared: ctf.Variant, frames: Frames) -> ctf.Variant:
+        selector = self._find(declared.selector, frames)
+        if not isinstance(selector, ctf.Integer) or selector.labels is None:
+            path = ".".join(map(str, declared.selector.path))
+            raise MetadataError(f"the selector {path!r} of a variant is no enumeration before it")
+        choices = []
+        for choice in declared.choices:
+            name = without_prefix(choice.name)
+            ranges = selector.labels.get(choice.name) or selector.labels.get(name) or ()
+            choices.append(ctf.Choice(name, self._type(choice.type, frames), ranges))
+        return replace(declared, choices=tuple(choices))
+
+    def _find(self, reference: Reference, frames: Frames) -> ctf.Type | None:
+        if reference.scope is not None:
+            return _follow(self._scopes.get(reference.scope), reference.path)
+        for frame in reversed(frames):
+            if reference.path[0] in frame:
+                return _follow(frame, reference.path)
+        return None
+
+
+def _follow(frame: dict[str, ctf.Type] | None, path: tuple[str | None, ...]) -> ctf.Type | None:
+    found: ctf.Type | None = None
+    for name in path:
+        if frame is None or name is None:
+            return None
+        found = frame.get(name)
+        match found:
+            case ctf.Structure(members=members):
+                frame = {member.name: member.type for member in members}
+            case ctf.Variant(choices=choices):
+                frame = {
+                    member.name: member.type
+                    for choice in choices
+                    if isinstance(choice.type, ctf.Structure)
+                    for member in choice.type.members
+                }
+            case _:
+                frame = None
+    return found

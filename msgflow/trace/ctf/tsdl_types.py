@@ -5,34 +5,18 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from msgflow.trace.ctf.field_types import (
-    BYTE,
-    Array,
-    Choice,
-    Integer,
-    Member,
-    Real,
-    Reference,
-    Scope,
-    Sequence,
-    String,
-    Structure,
-    Type,
-    Variant,
-)
-from msgflow.trace.ctf.tsdl_variants import without_prefix
+from msgflow.trace.ctf import field_types as ctf
+from msgflow.trace.ctf.field_types import BYTE, Reference, Scope
+from msgflow.trace.ctf.tsdl_tokens import TokenStream
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from msgflow.trace.ctf.tsdl_tokens import TokenStream
+    from msgflow.trace.ctf.tsdl_tokens import Token
 
 Labels = dict[str, tuple[tuple[int, int], ...]]
 Value = int | str
 
-_MOST_BITS = 64
-_MOST_ALIGN = 1 << 20
-_MOST_ELEMENTS = 1 << 40
 _BASES = dict.fromkeys(("16", "x", "hex", "hexadecimal", "p"), 16)
 _TEXT_ENCODINGS = {"utf8", "utf-8", "ascii"}
 _ABSOLUTE = (
@@ -45,36 +29,28 @@ _ABSOLUTE = (
 )
 
 
-class OpenVariant:
-    """A variant declared without its selector, which is named where it is used."""
-
-    def __init__(self, choices: tuple[Member, ...]) -> None:
-        self.choices = choices
-        self.align = 1
-
-
-class TypeParser:
+class TypeParser(TokenStream):
     """Parses types and keeps the names given to them, block by block."""
 
-    def __init__(self, tokens: TokenStream, big_endian: bool) -> None:
-        """Parse from `tokens`; `big_endian` is the trace's own byte order."""
-        self._tokens = tokens
+    def __init__(self, tokens: list[Token], big_endian: bool) -> None:
+        """Parse `tokens`; `big_endian` is the trace's own byte order."""
+        super().__init__(tokens)
         self._big_endian = big_endian
-        self._named: list[dict[str, Type | OpenVariant]] = [{}]
+        self._named: list[dict[str, ctf.Type]] = [{}]
 
     def open_block(self) -> None:
         """Begin a block: names declared in it are forgotten at its end."""
-        self._tokens.expect("{")
+        self.expect("{")
         self._named.append({})
 
     def close_block(self) -> None:
         """End the block."""
-        self._tokens.expect("}")
+        self.expect("}")
         self._named.pop()
 
     def at_declaration(self) -> bool:
         """Tell whether a `typealias`, `typedef` or named compound type follows."""
-        token = self._tokens.token
+        token = self.token
         return token.kind == "name" and token.value in {
             "typealias",
             "typedef",
@@ -85,110 +61,99 @@ class TypeParser:
 
     def declaration(self) -> None:
         """Parse a declaration that gives a type a name."""
-        tokens = self._tokens
-        if tokens.take_if("typealias"):
+        if self.take_if("typealias"):
             declared = self.type_before({":="})
-            tokens.expect(":=")
+            self.expect(":=")
             self._named[-1][self._words({";"})] = declared
-        elif tokens.take_if("typedef"):
+        elif self.take_if("typedef"):
             declared, name = self._declarator(self._specifier(one_name_is_left=True))
             self._named[-1][name] = declared
         else:
             self.type_before({";"})
-        tokens.expect(";")
+        self.expect(";")
 
-    def type_before(self, ends: set[str]) -> Type:
+    def type_before(self, ends: set[str]) -> ctf.Type:
         """Parse a type without declarator, which is followed by one of these signs."""
-        declared = self._specifier(ends=ends)
-        if isinstance(declared, OpenVariant):
-            # Only a declaration of its name: nothing can be read with it.
-            return Structure()
-        return declared
+        return self._specifier(ends=ends)
 
-    def structure(self) -> Structure:
+    def structure(self) -> ctf.Structure:
         """Parse the structure of a scope, up to its semicolon."""
         declared = self.type_before({";"})
-        if not isinstance(declared, Structure):
-            raise self._tokens.error("expected a structure")
+        if not isinstance(declared, ctf.Structure):
+            raise self.error("expected a structure")
         return declared
 
-    def _specifier(
-        self, ends: set[str] | None = None, one_name_is_left: bool = False
-    ) -> Type | OpenVariant:
-        tokens = self._tokens
-        while tokens.take_if("const"):
+    def _specifier(self, ends: set[str] | None = None, one_name_is_left: bool = False) -> ctf.Type:
+        while self.take_if("const"):
             pass
-        if tokens.take_if("integer"):
+        if self.take_if("integer"):
             return self._integer()
-        if tokens.take_if("floating_point"):
+        if self.take_if("floating_point"):
             return self._real()
-        if tokens.take_if("string"):
-            if tokens.token.value == "{":
+        if self.take_if("string"):
+            if self.token.value == "{":
                 self._attributes()
-            return String()
-        if tokens.take_if("struct"):
+            return ctf.String()
+        if self.take_if("struct"):
             return self._struct()
-        if tokens.take_if("variant"):
+        if self.take_if("variant"):
             return self._variant()
-        if tokens.take_if("enum"):
+        if self.take_if("enum"):
             return self._enumeration()
         return self._find(self._words(ends, one_name_is_left))
 
     def _words(self, ends: set[str] | None, one_name_is_left: bool = False) -> str:
         """Take the words of a type's name, without the declarator's name if that follows."""
-        tokens = self._tokens
         words: list[str] = []
-        while tokens.token.kind == "name":
-            if (ends is None or one_name_is_left) and words and tokens.after().kind != "name":
+        while self.token.kind == "name":
+            if (ends is None or one_name_is_left) and words and self.after().kind != "name":
                 break
-            word = tokens.take().value
+            word = self.take().value
             if word != "const":
                 words.append(word)
         if not words:
-            raise tokens.error(f"expected a type, found {tokens.token.value!r}")
+            raise self.error(f"expected a type, found {self.token.value!r}")
         return " ".join(words)
 
-    def _find(self, name: str) -> Type | OpenVariant:
+    def _find(self, name: str) -> ctf.Type:
         for block in reversed(self._named):
             if name in block:
                 return block[name]
-        raise self._tokens.error(f"there is no type {name!r}")
+        raise self.error(f"there is no type {name!r}")
 
     def _attributes(self) -> dict[str, Value]:
-        tokens = self._tokens
         values: dict[str, Value] = {}
-        tokens.expect("{")
-        while not tokens.take_if("}"):
-            name = tokens.name()
-            tokens.expect("=")
+        self.expect("{")
+        while not self.take_if("}"):
+            name = self.name()
+            self.expect("=")
             values[name] = self.value()
-            tokens.expect(";")
+            self.expect(";")
         return values
 
     def value(self) -> Value:
         """Take a number, a text, or a name with dots."""
-        tokens = self._tokens
-        if tokens.token.kind == "text":
-            return tokens.text()
-        if tokens.token.kind == "name":
-            words = [tokens.name()]
-            while tokens.take_if("."):
-                words.append(tokens.name())
+        if self.token.kind == "text":
+            return self.text()
+        if self.token.kind == "name":
+            words = [self.name()]
+            while self.take_if("."):
+                words.append(self.name())
             return ".".join(words)
-        return tokens.number()
+        return self.number()
 
     def _size_of(self, values: Mapping[str, Value], name: str, default: int | None) -> int:
         value = values.get(name, default)
         if not isinstance(value, int) or value < 1:
-            raise self._tokens.error(f"`{name}` is missing or makes no sense")
+            raise self.error(f"`{name}` is missing or makes no sense")
         return value
 
     def _align_of(self, values: Mapping[str, Value], default: int) -> int:
         return self._checked_align(self._size_of(values, "align", default))
 
     def _checked_align(self, align: int) -> int:
-        if align < 1 or align & (align - 1) or align > _MOST_ALIGN:
-            raise self._tokens.error(f"an alignment of {align} bits makes no sense")
+        if align < 1 or align & (align - 1) or align > ctf.MOST_ALIGN:
+            raise self.error(f"an alignment of {align} bits makes no sense")
         return align
 
     def _is_big_endian(self, values: Mapping[str, Value]) -> bool:
@@ -196,16 +161,16 @@ class TypeParser:
         if order in {"le", "be", "network"}:
             return order != "le"
         if order != "native":
-            raise self._tokens.error(f"there is no byte order {order!r}")
+            raise self.error(f"there is no byte order {order!r}")
         return self._big_endian
 
-    def _integer(self) -> Integer:
+    def _integer(self) -> ctf.Integer:
         values = self._attributes()
         size = self._size_of(values, "size", None)
-        if size > _MOST_BITS:
-            raise self._tokens.error(f"an integer of {size} bits is too large")
+        if size > ctf.MOST_BITS:
+            raise self.error(f"an integer of {size} bits is too large")
         encoding = str(values.get("encoding", "none"))
-        return Integer(
+        return ctf.Integer(
             size=size,
             align=self._align_of(values, 1 if size % BYTE else BYTE),
             big_endian=self._is_big_endian(values),
@@ -217,143 +182,126 @@ class TypeParser:
             else frozenset(),
         )
 
-    def _real(self) -> Real:
+    def _real(self) -> ctf.Real:
         values = self._attributes()
         digits = (values.get("exp_dig"), values.get("mant_dig"))
         sizes: dict[tuple[Value | None, Value | None], int] = {(8, 24): 32, (11, 53): 64}
         if digits not in sizes:
-            raise self._tokens.error("a floating point number must have 32 or 64 bits")
-        return Real(sizes[digits], self._align_of(values, 1), self._is_big_endian(values))
+            raise self.error("a floating point number must have 32 or 64 bits")
+        return ctf.Real(sizes[digits], self._align_of(values, 1), self._is_big_endian(values))
 
-    def _struct(self) -> Type:
-        tokens = self._tokens
-        name = (
-            tokens.name() if tokens.token.kind == "name" and tokens.token.value != "align" else ""
-        )
-        if name and tokens.token.value != "{":
-            declared = self._find(f"struct {name}")
-            if isinstance(declared, OpenVariant):
-                raise tokens.error(f"{name!r} is no structure")
-            return declared
+    def _struct(self) -> ctf.Type:
+        name = self.name() if self.token.kind == "name" and self.token.value != "align" else ""
+        if name and self.token.value != "{":
+            return self._find(f"struct {name}")
         members = self._members()
         align = 1
-        if tokens.take_if("align"):
-            tokens.expect("(")
-            align = self._checked_align(tokens.number())
-            tokens.expect(")")
-        structure = Structure(
-            tuple(Member(without_prefix(key), member) for key, member in members), align
+        if self.take_if("align"):
+            self.expect("(")
+            align = self._checked_align(self.number())
+            self.expect(")")
+        structure = ctf.Structure(
+            tuple(ctf.Member(without_prefix(key), member) for key, member in members), align
         )
         if name:
             self._named[-1][f"struct {name}"] = structure
         return structure
 
-    def _members(self) -> list[tuple[str, Type]]:
-        tokens = self._tokens
+    def _members(self) -> list[tuple[str, ctf.Type]]:
         members = []
         self.open_block()
-        while tokens.token.value != "}":
-            if tokens.token.value in {"typealias", "typedef"}:
+        while self.token.value != "}":
+            if self.token.value in {"typealias", "typedef"}:
                 self.declaration()
                 continue
             declared = self._specifier()
-            if tokens.take_if(";"):
+            if self.take_if(";"):
                 # A structure or enumeration that is only given a name here.
                 continue
             while True:
                 field, name = self._declarator(declared)
                 members.append((name, field))
-                if not tokens.take_if(","):
+                if not self.take_if(","):
                     break
-            tokens.expect(";")
+            self.expect(";")
         self.close_block()
         return members
 
-    def _declarator(self, declared: Type | OpenVariant) -> tuple[Type, str]:
+    def _declarator(self, declared: ctf.Type) -> tuple[ctf.Type, str]:
         """Parse a name and its array dimensions."""
-        tokens = self._tokens
-        name = tokens.name()
+        name = self.name()
         dimensions: list[int | Reference] = []
-        while tokens.take_if("["):
-            if tokens.token.kind == "number":
-                length = tokens.number()
-                if length > _MOST_ELEMENTS:
-                    raise tokens.error(f"an array of {length} elements makes no sense")
+        while self.take_if("["):
+            if self.token.kind == "number":
+                length = self.number()
+                if length > ctf.MOST_ELEMENTS:
+                    raise self.error(f"an array of {length} elements makes no sense")
                 dimensions.append(length)
             else:
                 dimensions.append(reference_of(str(self.value())))
-            tokens.expect("]")
-        if isinstance(declared, OpenVariant):
-            raise tokens.error(f"the variant {name!r} has no selector")
+            self.expect("]")
         field = declared
         for dimension in reversed(dimensions):
             field = (
-                Array(field, dimension)
+                ctf.Array(field, dimension)
                 if isinstance(dimension, int)
-                else Sequence(field, dimension)
+                else ctf.Sequence(field, dimension)
             )
         return field, name
 
-    def _variant(self) -> Type | OpenVariant:
-        tokens = self._tokens
-        name = tokens.name() if tokens.token.kind == "name" else ""
+    def _variant(self) -> ctf.Type:
+        """Parse a variant. One without a selector only gets a name: its users name the selector."""
+        name = self.name() if self.token.kind == "name" else ""
         selector = ""
-        if tokens.take_if("<"):
+        if self.take_if("<"):
             selector = str(self.value())
-            tokens.expect(">")
-        if tokens.token.value == "{":
-            declared: Type | OpenVariant = OpenVariant(
-                tuple(Member(key, member) for key, member in self._members())
-            )
+            self.expect(">")
+        if self.token.value == "{":
+            # Which values choose which option is resolved with the selector's labels.
+            choices = (ctf.Choice(key, member, ()) for key, member in self._members())
+            declared: ctf.Type = ctf.Variant(Reference(None, ()), tuple(choices))
             if name:
                 self._named[-1][f"variant {name}"] = declared
         else:
             declared = self._find(f"variant {name}")
-        if not selector:
-            return declared
-        if isinstance(declared, OpenVariant):
-            # Which values choose which option is resolved with the selector's labels.
-            choices = tuple(Choice(member.name, member.type, ()) for member in declared.choices)
-            return Variant(reference_of(selector), choices)
-        raise tokens.error(f"{name!r} is no variant without selector")
+        if selector and isinstance(declared, ctf.Variant):
+            return replace(declared, selector=reference_of(selector))
+        if self.token.kind == "name":
+            raise self.error(f"the variant {self.token.value!r} has no selector")
+        return ctf.Structure()
 
-    def _enumeration(self) -> Type:
-        tokens = self._tokens
-        name = tokens.name() if tokens.token.kind == "name" else ""
-        container: Type | OpenVariant | None = None
-        if tokens.take_if(":"):
+    def _enumeration(self) -> ctf.Type:
+        name = self.name() if self.token.kind == "name" else ""
+        container: ctf.Type | None = None
+        if self.take_if(":"):
             container = self._specifier(ends={"{"})
-        if tokens.token.value != "{":
-            declared = self._find(f"enum {name}")
-            if isinstance(declared, OpenVariant):
-                raise tokens.error(f"{name!r} is no enumeration")
-            return declared
+        if self.token.value != "{":
+            return self._find(f"enum {name}")
         if container is None:
             container = self._find("int")
-        if not isinstance(container, Integer):
-            raise tokens.error("an enumeration must be of an integer type")
+        if not isinstance(container, ctf.Integer):
+            raise self.error("an enumeration must be of an integer type")
         enumeration = replace(container, labels=self._labels(), is_text=False, base=10)
         if name:
             self._named[-1][f"enum {name}"] = enumeration
         return enumeration
 
     def _labels(self) -> Labels:
-        tokens = self._tokens
         labels: Labels = {}
         following = 0
-        tokens.expect("{")
-        while not tokens.take_if("}"):
-            label = tokens.text() if tokens.token.kind == "text" else tokens.name()
+        self.expect("{")
+        while not self.take_if("}"):
+            label = self.text() if self.token.kind == "text" else self.name()
             first = following
-            if tokens.take_if("="):
-                first = tokens.number()
+            if self.take_if("="):
+                first = self.number()
             last = first
-            if tokens.take_if("..."):
-                last = tokens.number()
+            if self.take_if("..."):
+                last = self.number()
             labels[label] = (*labels.get(label, ()), (first, last))
             following = last + 1
-            if not tokens.take_if(","):
-                tokens.expect("}")
+            if not self.take_if(","):
+                self.expect("}")
                 break
         return labels
 
@@ -365,3 +313,8 @@ def reference_of(text: str) -> Reference:
         if names[: len(prefix)] == prefix and len(names) > len(prefix):
             return Reference(scope, tuple(map(without_prefix, names[len(prefix) :])))
     return Reference(None, tuple(map(without_prefix, names)))
+
+
+def without_prefix(name: str) -> str:
+    """Remove the underscore that keeps names of fields apart from words of the language."""
+    return name.removeprefix("_")

@@ -18,7 +18,7 @@ from same_batches import Content, differences, read
 from thorough import examples
 
 from msgflow.errors import TraceError
-from msgflow.trace.ctf import batches, event_order, large_packets
+from msgflow.trace.ctf import batches, event_order
 from msgflow.trace.ctf.packet_memory import Loader
 from msgflow.trace.ctf.stream_layout import GAP
 
@@ -31,8 +31,8 @@ def read_in_pieces(trace: Path, most_bytes: int, most_events: int) -> Content:
         patch.setattr(batches, "SMALLEST_BATCH", most_bytes)
         patch.setattr(batches, "LARGEST_BATCH", most_bytes)
         patch.setattr(event_order, "MOST_EVENTS", most_events)
-        patch.setattr(large_packets, "PIECE", max(most_bytes // GAP, 1) * GAP)
-        patch.setattr(large_packets, "LARGEST_WHOLE", 0)
+        patch.setattr(event_order, "PIECE", max(most_bytes // GAP, 1) * GAP)
+        patch.setattr(event_order, "LARGEST_WHOLE", 0)
         return read(trace)
 
 

@@ -1,23 +1,88 @@
-"""Layout of a variant at the end of an event, whose options are structures of fixed size.
+"""Layout of types: places of their fields, where they do not depend on values.
 
-Kernel traces have the headers of network packets in such variants. An option may itself end in
-such a variant. With this layout the variants of many events are read at once.
+Kernel traces have the headers of network packets in a variant at the end of an event, whose options
+are structures of fixed size; an option may itself end in such a variant. With its layout the
+variants of many events are read at once.
 """
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeGuard
 
-from msgflow.trace.ctf.field_types import BYTE, Array, FieldError, Integer, Real, Structure, Variant
-from msgflow.trace.ctf.fixed_layout import DynamicError, Leaf, is_dense, lay_out
+from msgflow.trace.ctf import field_types as ctf
+from msgflow.trace.ctf.field_types import BYTE, FieldError, aligned
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from msgflow.trace.ctf.field_types import Choice, Type
 
+_MOST_STEPS = 100_000
 _WIDTHS = {8, 16, 32, 64}
+
+
+class DynamicError(Exception):
+    """The layout of a type is not fixed."""
+
+
+@dataclass(frozen=True)
+class Leaf:
+    """A number, or an array of numbers that follow each other without gaps."""
+
+    path: tuple[str, ...]  # names of the members from the outermost to this one
+    type: ctf.Integer | ctf.Real | ctf.Array
+    position: int  # in bits
+
+
+def lay_out(
+    declared: ctf.Type,
+    position: int,
+    leaves: list[Leaf] | None = None,
+    path: tuple[str, ...] = (),
+) -> int:
+    """Return the bit at which a field ends that begins at `position` or, aligned, behind it.
+
+    Positions are bits from the begin of the packet. The numbers in the field are added to `leaves`,
+    if given. `path` names the structures around it.
+
+    A DynamicError says that the layout depends on values, or has too many parts to go through.
+    """
+    # Arrays inside arrays may have more elements than a loop can count.
+    steps = itertools.count(1)
+
+    def end(declared: ctf.Type, position: int, path: tuple[str, ...]) -> int:
+        if next(steps) > _MOST_STEPS:
+            raise DynamicError
+        position = aligned(position, declared.align)
+        match declared:
+            case ctf.Integer() | ctf.Real():
+                if leaves is not None:
+                    leaves.append(Leaf(path, declared, position))
+                return position + declared.size
+            case ctf.Array() if is_dense(declared.element):
+                if leaves is not None:
+                    leaves.append(Leaf(path, declared, position))
+                return position + declared.length * declared.element.size
+            case ctf.Array():
+                if declared.length > _MOST_STEPS:
+                    raise DynamicError
+                for number in range(declared.length):
+                    position = end(declared.element, position, (*path, str(number)))
+                return position
+            case ctf.Structure():
+                for member in declared.members:
+                    position = end(member.type, position, (*path, member.name))
+                return position
+            case _:
+                raise DynamicError
+
+    return end(declared, position, path)
+
+
+def is_dense(element: ctf.Type) -> TypeGuard[ctf.Integer | ctf.Real]:
+    """Tell whether elements of this type follow each other without gaps."""
+    return isinstance(element, ctf.Integer | ctf.Real) and element.size % element.align == 0
 
 
 @dataclass(frozen=True)
@@ -46,7 +111,7 @@ class OptionLayout:
 class VariantLayout:
     """The options of a variant."""
 
-    options: tuple[tuple[Choice, OptionLayout], ...]  # declaration and layout of each option
+    options: tuple[tuple[ctf.Choice, OptionLayout], ...]  # declaration and layout of each option
     _chosen: dict[int, OptionLayout] = field(default_factory=dict, compare=False, repr=False)
 
     def option(self, value: int) -> OptionLayout:
@@ -88,11 +153,11 @@ class VariantLayout:
             )
 
 
-def lay_out_variant(variant: Variant) -> VariantLayout | None:
+def lay_out_variant(variant: ctf.Variant) -> VariantLayout | None:
     """Compile the layout of a variant; None if an option is no structure of fixed size."""
     options = []
     for choice in variant.choices:
-        if not isinstance(choice.type, Structure):
+        if not isinstance(choice.type, ctf.Structure):
             return None
         option = _lay_out_option(choice.type)
         if option is None:
@@ -101,19 +166,19 @@ def lay_out_variant(variant: Variant) -> VariantLayout | None:
     return VariantLayout(tuple(options))
 
 
-def is_selector(declared: Type) -> bool:
+def is_selector(declared: ctf.Type) -> bool:
     """Tell whether a field of this type can be a selector: an unsigned integer of whole bytes."""
-    return isinstance(declared, Integer) and not declared.signed and _is_whole(declared)
+    return isinstance(declared, ctf.Integer) and not declared.signed and _is_whole(declared)
 
 
-def _lay_out_option(structure: Structure) -> OptionLayout | None:
+def _lay_out_option(structure: ctf.Structure) -> OptionLayout | None:
     members = structure.members
     last = members[-1] if members else None
-    variant = last.type if last is not None and isinstance(last.type, Variant) else None
+    variant = last.type if last is not None and isinstance(last.type, ctf.Variant) else None
     fixed = members if variant is None else members[:-1]
     leaves: list[Leaf] = []
     try:
-        end = lay_out(Structure(fixed, structure.align), 0, leaves)
+        end = lay_out(ctf.Structure(fixed, structure.align), 0, leaves)
     except DynamicError:
         return None
     align, size = max(structure.align // BYTE, 1), -(-end // BYTE)
@@ -134,22 +199,22 @@ def _part(leaf: Leaf) -> Part | None:
     """Return the place of a number or array; None if it does not lie on whole bytes."""
     if leaf.position % BYTE:
         return None
-    element: Type = leaf.type
+    element: ctf.Type = leaf.type
     count: int | None = None
-    if isinstance(leaf.type, Array):
+    if isinstance(leaf.type, ctf.Array):
         if leaf.type.is_text or not is_dense(leaf.type.element):
             return None
         element, count = leaf.type.element, leaf.type.length
-    if not isinstance(element, Integer | Real) or not _is_whole(element):
+    if not isinstance(element, ctf.Integer | ctf.Real) or not _is_whole(element):
         return None
     return Part(leaf.position // BYTE, dtype_of(element), element.size // BYTE, count)
 
 
-def _is_whole(number: Integer | Real) -> bool:
+def _is_whole(number: ctf.Integer | ctf.Real) -> bool:
     return number.size in _WIDTHS
 
 
-def dtype_of(number: Integer | Real) -> str:
+def dtype_of(number: ctf.Integer | ctf.Real) -> str:
     """Return numpy's name for a number of whole bytes."""
-    kind = "f" if isinstance(number, Real) else "i" if number.signed else "u"
+    kind = "f" if isinstance(number, ctf.Real) else "i" if number.signed else "u"
     return f"{'>' if number.big_endian else '<'}{kind}{number.size // BYTE}"
