@@ -99,7 +99,7 @@ def paths(
 ) -> None:
     """Print the paths of a run as a file with names, to choose from: paths.yaml."""
     from msgflow.database import Database
-    from msgflow.paths import suggest_paths
+    from msgflow.paths.suggested_paths import suggest_paths
 
     with Database(database) as opened:
         result = opened.query("e2e-latency", run=run)

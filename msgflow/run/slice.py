@@ -22,14 +22,12 @@ class TimeWords(TypedDict, total=False):
     end: str | int | None
 
 
-class RunWords(TypedDict, total=False):
-    """The runs of a slice, as a keyword of a method."""
+class SliceWords(TypedDict, total=False):
+    """A slice, as keywords of a method."""
 
     run: str | int | None
-
-
-class SliceWords(RunWords, TimeWords, total=False):
-    """A slice, as keywords of a method."""
+    start: str | int | None
+    end: str | int | None
 
 
 @dataclass(frozen=True)
