@@ -55,7 +55,7 @@ def command(
             f"a report is a page, or Markdown: its name ends with .html or .md — {output}",
             "-o FILE.html",
         )
-    size = read_size(max_size)
+    size = bytes_of(max_size, "--max-size 20MB, at most 1GB", _MOST)
     given = (*part.values(), compare, through, targets)
     if lake is None:
         require_no_where(where)
@@ -90,11 +90,3 @@ def command(
             sys.stdout.buffer.write(target.read_bytes())
         else:
             print_status(status + ": open it in a browser" * is_page)
-
-
-def read_size(text: str) -> int:
-    """Return the bytes that '20MB' means."""
-    size = bytes_of(text)
-    if not 0 < size <= _MOST:
-        raise UsageError(f"cannot read the size — {text}", "--max-size 20MB, at most 1GB")
-    return size
