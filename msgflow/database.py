@@ -1116,9 +1116,7 @@ def _places(
         except UsageError as error:
             targets.file.fail(text.line, error.message, error.hint)
         named.require(connection, runs, path)
-        found[text.value] = {
-            word: [place.value for place in places] for word, places in path.places.items()
-        }
+        found[text.value] = path.words()
     return found
 
 

@@ -44,7 +44,7 @@ def _printed(
     memory_limit: str | None = None,
     database: Path = DEFAULT_DATABASE,
 ) -> None:
-    """Have the options of a query that are not those of `Database.query`.
+    """Declare the options of a query that are not those of `Database.query`.
 
     Args:
         show: Print the SQL and run nothing.

@@ -386,7 +386,7 @@ class _Painter:
 
 
 def _is_alone(item: Item) -> bool:
-    """Return whether no line before it has the node that sends: of a request it has the client."""
+    """Tell whether its line has to name the node: no line before it does, but that of a client."""
     return all(cause.node["kind"] == "request" for cause, _ in item.causes)
 
 

@@ -375,6 +375,10 @@ def _compared(
     *,
     is_strict: bool = True,
 ) -> Comparison:
+    """Return how two runs differ, with notes; unless `is_strict`, they may have nothing in common.
+
+    `asked` are the parameters of `internal.comparison`.
+    """
     what = str(asked["what"])
     asked = asked | require_places(connection, [first, second], asked)
     for run in (first, second):

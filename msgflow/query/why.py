@@ -49,8 +49,8 @@ _LINKS = ("suggest", "links")
 _DEAD_ENDS = (
     "SELECT subject, detail FROM main.finding WHERE name = 'dead_end' AND list_contains(?, run_id)"
 )
-# What an explanation has by then takes less: waits explained are those of the breakdown, and more;
-# the flow that is shown is one of those broken down.
+# Steps whose rows an earlier query of the explanation has in its tables: it costs less to read them
+# there. The breakdown explains the waits of all flows, and one of these is the flow that is shown.
 _KNOWN = {
     "explained_wait": "FROM main.executor_wait_explained("
     "$runs, arrivals := 'exact_arrival', waits := 'ready_wait')",

@@ -112,6 +112,8 @@ def write_report(
 
 @dataclass
 class _Maker:
+    """Makes a report: it keeps the answers to what its pages will ask, each under its question."""
+
     asked: Question
     pages: Pages
     verification: Verification | None
