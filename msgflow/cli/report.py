@@ -11,6 +11,7 @@ from msgflow.cli.operation import operation
 from msgflow.cli.options import LAKE_PAGE, bytes_of
 from msgflow.cli.output import print_note, print_runs, print_status
 from msgflow.cli.ui import require_no_where
+from msgflow.database import Database
 from msgflow.errors import UsageError
 from msgflow.files.default_files import DEFAULT_DATABASE, DEFAULT_PATHS
 from msgflow.run.slice import SliceWords
@@ -46,8 +47,6 @@ def command(
             so.
         targets: Requirements, as YAML: the summary has the verdicts on them.
     """
-    from msgflow.database import Database
-
     to_stdout = str(output) == "-"
     is_page = to_stdout or output.suffix.lower() in (".html", ".htm")
     if not is_page and (lake is not None or output.suffix.lower() != ".md"):

@@ -93,21 +93,18 @@ def require_start(connection: duckdb.DuckDBPyConnection, start: Start) -> Run:
     return next(run for run in read_runs(connection) if run.run_id == found[0][0])
 
 
-def flow_parameters(start: Start, run: Run, given: Mapping[str, Value]) -> dict[str, Any]:
-    """Return the value of every parameter of `internal.flow_steps`."""
+def read_steps(
+    connection: duckdb.DuckDBPyConnection, start: Start, run: Run, given: Mapping[str, Value]
+) -> tuple[dict[str, Any], pa.Table]:
+    """Return the parameters of a flow, and its steps: the nearest to the start first."""
     place: dict[str, Value] = {"kind": start.kind, "id": start.id, "run_id": run.run_id}
     asked: dict[str, Any] = bind(
         internal_sql().header("flow_steps"), {**given, **place}, "msgflow flow"
     )
     if asked["limit"] > MOST_VERTICES:
         raise UsageError(f"--limit is at most {MOST_VERTICES} — {asked['limit']}", "1000 is usual")
-    return asked
-
-
-def read_steps(connection: duckdb.DuckDBPyConnection, asked: Mapping[str, Value]) -> pa.Table:
-    """Return the steps of a flow, the nearest first, and how long executors were busy."""
     with query_errors("the flow", "the flow cannot be read: {}"):
-        return internal_sql().run(connection, "flow_steps", asked).to_arrow_table()
+        return asked, internal_sql().run(connection, "flow_steps", asked).to_arrow_table()
 
 
 def _place(time_ns: int, run: Run) -> str:
