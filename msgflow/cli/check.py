@@ -22,7 +22,6 @@ from msgflow.text.wrapping import wrap
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
-    from pathlib import Path
 
     from msgflow.db.finding import Finding
 
