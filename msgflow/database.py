@@ -279,14 +279,9 @@ class Database:
         found = self.query("links-suggested", run=run)
 
         def of_file(name: str) -> list[dict[str, Any]]:
-            return [
-                row
-                for one in found.runs
-                for row in internal_sql()
-                .run(self.connection, name, {"run_id": one.run_id})
-                .to_arrow_table()
-                .to_pylist()
-            ]
+            chosen = ({"run_id": one.run_id} for one in found.runs)
+            asked = (internal_sql().rows(self.connection, name, each) for each in chosen)
+            return [row for rows in asked for row in rows]
 
         return LinkSuggestions(
             found.runs,
@@ -446,7 +441,9 @@ class Database:
         if path is not None:
             if via or without or {"from", "from_", "to", "to_"} & set(parameters):
                 raise _path_and_others(path)
-            words = self._ask(self._named_path, header, path, Path(paths), part)
+            if not any(param.name == "from" for param in header.params):
+                raise UsageError(f"{header.words} has no paths — --path {path}", "leave it out")
+            words = self._ask(_words_of_path, path, Path(paths), part)
             via, without = words.pop("via", None), words.pop("without", None)
             parameters |= {word: [*names] for word, names in words.items()}
         selection = {
@@ -471,19 +468,6 @@ class Database:
             return with_path_numbers(connection, result)
 
         return self._ask(ask)
-
-    def _named_path(
-        self,
-        connection: duckdb.DuckDBPyConnection,
-        header: Header,
-        name: str,
-        file: Path,
-        part: Slice,
-    ) -> dict[str, list[str]]:
-        """Return the arguments of `query` that a named path stands for."""
-        if not any(param.name == "from" for param in header.params):
-            raise UsageError(f"{header.words} has no paths — --path {name}", "leave it out")
-        return _words_of_path(connection, name, file, part)
 
     def why(self, place: str | None = None, **part: Unpack[SliceWords]) -> Explanation:
         """Explain why a topic is late: who is to blame, where the time goes, what to ask next.
@@ -1101,7 +1085,8 @@ class Database:
 def _words_of_path(
     connection: duckdb.DuckDBPyConnection, name: str, file: Path, part: Slice
 ) -> dict[str, list[str]]:
-    from msgflow.paths import read_paths
+    """Return the arguments of `query` that a path stands for."""
+    from msgflow.paths.paths_file import read_paths
     from msgflow.query.path_numbers import numbered_path
 
     runs = part.runs(connection)
@@ -1117,7 +1102,7 @@ def _places(
     connection: duckdb.DuckDBPyConnection, targets: TargetsFile, file: Path, part: Slice
 ) -> dict[str, dict[str, list[str]]]:
     """Return topics and nodes of the named paths of requirements."""
-    from msgflow.paths import read_paths
+    from msgflow.paths.paths_file import read_paths
 
     called = [target.path_name for target in targets.targets if target.path_name is not None]
     if not called:
@@ -1131,9 +1116,7 @@ def _places(
         except UsageError as error:
             targets.file.fail(text.line, error.message, error.hint)
         named.require(connection, runs, path)
-        found[text.value] = {
-            word: [place.value for place in places] for word, places in path.places.items()
-        }
+        found[text.value] = path.words()
     return found
 
 

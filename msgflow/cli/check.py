@@ -22,7 +22,6 @@ from msgflow.text.wrapping import wrap
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
-    from pathlib import Path
 
     from msgflow.db.finding import Finding
 
@@ -74,7 +73,7 @@ def command(
         print_lines(_text(findings, labels))
         if quality is not None and len(quality):
             print_lines([""] if findings else [])
-            print_result(quality, None, None)
+            print_result(quality)
     else:
         columns = ["number", *Finding.__dataclass_fields__]
         rows = [{"number": number, **asdict(finding)} for number, finding in _numbered(findings)]

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Unpack
 
 import typer
 
 from msgflow.cli.operation import asks
 from msgflow.cli.options import OUTPUT
-from msgflow.cli.output import print_error, print_result
+from msgflow.cli.output import Shown, print_error, print_result
 from msgflow.database import Database
 from msgflow.errors import ExitCode
 from msgflow.export.formats import Format
 
 if TYPE_CHECKING:
-    from msgflow.fleet.compare import FleetComparison
-    from msgflow.query.compare import Comparison
+    from msgflow.query.compare import Comparison, Differences
 
 # Rows on a terminal, where long paths take several lines.
 _MOST_ROWS = 10
@@ -57,31 +55,26 @@ def command(
     *,
     fail_on: FailOn = None,
     only_different: OnlyDifferent = None,
-    form: Format | None = None,
-    wide: bool = False,
-    output: Path | None = None,
+    **shown: Unpack[Shown],
 ) -> None:
     """`msgflow compare RUN_A RUN_B --fail-on 'p95>5%'` is a check for CI."""
-    print_comparison(comparison, fail_on or (), only_different, form=form, wide=wide, output=output)
+    print_comparison(comparison, fail_on or (), only_different, **shown)
 
 
 def print_comparison(
-    comparison: Comparison | FleetComparison,
+    comparison: Differences,
     fail_on: Sequence[str],
     only_different: bool | None,
-    *,
-    form: Format | None,
-    wide: bool,
-    output: Path | None,
+    **shown: Unpack[Shown],
 ) -> None:
     """Print a comparison, and exit with 1 where a condition of `fail_on` holds."""
     result = comparison.result
-    is_table = form in (None, Format.TABLE) and output is None
+    is_table = shown.get("form") in (None, Format.TABLE) and shown.get("output") is None
     if comparison.parts is not None:
         result = comparison.parts
-    elif only_different is not None or (is_table and not wide):
+    elif only_different is not None or (is_table and not shown.get("wide")):
         result = comparison.changes(only_different=only_different is True)
-    print_result(result, form, output, wide=wide, most_rows=_MOST_ROWS)
+    print_result(result, **shown, most_rows=_MOST_ROWS)
     failures = comparison.failures(fail_on)
     for failure in failures:
         print_error(f"{failure.condition}: {failure.reason} — {failure.subject}")

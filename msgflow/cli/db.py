@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Unpack
 
 import typer
 
 from msgflow.cli.completion import complete
 from msgflow.cli.operation import operation
-from msgflow.cli.output import print_result, print_status
-from msgflow.export.formats import Format
+from msgflow.cli.output import Shown, print_result, print_status
+from msgflow.database import Database
 from msgflow.files.default_files import DEFAULT_DATABASE
 from msgflow.text.values import count
 
@@ -37,18 +37,14 @@ def upgrade(*, database: Path = DEFAULT_DATABASE) -> None:
 def schema(
     view: Annotated[str | None, typer.Argument(autocompletion=complete("view"))] = None,
     *,
-    form: Format | None = None,
-    wide: bool = False,
-    output: Path | None = None,
     database: Path = DEFAULT_DATABASE,
+    **shown: Unpack[Shown],
 ) -> None:
     """List the public views; with the name of one, its columns with type and meaning.
 
     Args:
         view ([VIEW]): A view: list its columns.
     """
-    from msgflow.database import Database
-
     with Database(database) as opened:
         result = opened.views() if view is None else opened.schema(view)
-    print_result(result, form, output, wide=wide)
+    print_result(result, **shown)

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 import typer
 
 from msgflow.cli.compare import FailOn, OnlyDifferent, print_comparison
 from msgflow.cli.operation import operation
 from msgflow.cli.options import Reader, bytes_of, one_text
-from msgflow.cli.output import print_list, print_note, print_result, print_status
+from msgflow.cli.output import Shown, print_list, print_note, print_result, print_status
 from msgflow.cli.sql import DEFAULT_LIMIT, FileOption, sql_of
 from msgflow.errors import ExitCode, UsageError
-from msgflow.export.formats import Format
 from msgflow.result.layout import MOST_ROWS
+from msgflow.run.window import duration_ns
 from msgflow.text.values import count
 
 if TYPE_CHECKING:
@@ -24,9 +24,7 @@ if TYPE_CHECKING:
 
 app = typer.Typer()
 
-_TIME = re.compile(r"(\d+(?:\.\d+)?) ?(s|min|h|d)?")
 _SHARD = re.compile(r"(\d{1,9})/(\d{1,9})", re.ASCII)
-_SECONDS = {None: 1.0, "s": 1.0, "min": 60.0, "h": 3_600.0, "d": 86_400.0}
 _MOST_FAILURES = 20
 _MOST_WORST = 1_000
 
@@ -82,7 +80,9 @@ def ingest(
             f"a fleet has no offsets in common — {clock_sync}", "--clock-sync messages, or none"
         )
     labels = _labels(label or [])
-    seconds, most, part = _time(timeout), _size(memory), _shard(shard)
+    seconds = duration_ns(timeout, "--timeout") / 1e9
+    most = None if memory is None else bytes_of(memory, "--memory 4GB")
+    part = _shard(shard)
     from msgflow.cli.progress import fleet_progress
     from msgflow.fleet.ingest import Options, fleet_ingest
 
@@ -142,32 +142,20 @@ def _print_report(report: FleetProgress, lake: str, quiet: bool) -> None:
 
 @app.command("runs")
 @operation
-def runs(
-    *,
-    lake: str,
-    form: Format | None = None,
-    output: Path | None = None,
-    wide: bool = False,
-) -> None:
+def runs(*, lake: str, **shown: Unpack[Shown]) -> None:
     """List the runs of a lake."""
     from msgflow.fleet.listing import list_runs
 
-    print_result(list_runs(_opened(lake)), form, output, wide=wide)
+    print_result(list_runs(_opened(lake)), **shown)
 
 
 @app.command("failures")
 @operation
-def failures(
-    *,
-    lake: str,
-    form: Format | None = None,
-    output: Path | None = None,
-    wide: bool = False,
-) -> None:
+def failures(*, lake: str, **shown: Unpack[Shown]) -> None:
     """List the recordings that did not go into a lake, and why."""
     from msgflow.fleet.listing import list_failures
 
-    print_result(list_failures(_opened(lake)), form, output, wide=wide)
+    print_result(list_failures(_opened(lake)), **shown)
 
 
 @app.command("query")
@@ -190,10 +178,8 @@ def query(
     sort: list[str] | None = None,
     limit: int | None = None,
     internal: bool = False,
-    form: Format | None = None,
     columns: str | None = None,
-    output: Path | None = None,
-    wide: bool = False,
+    **shown: Unpack[Shown],
 ) -> None:
     """Ask a named query of many runs, as msgflow query asks it of one.
 
@@ -237,7 +223,7 @@ def query(
         },
         **own,
     )
-    print_result(result, form, output, wide=wide, columns=columns, most_rows=limit or MOST_ROWS)
+    print_result(result, **shown, columns=columns, most_rows=limit or MOST_ROWS)
 
 
 @app.command("sql")
@@ -249,9 +235,7 @@ def sql(
     where: str | None = None,
     file: FileOption = None,
     limit: Annotated[int, typer.Option(min=0)] = DEFAULT_LIMIT,
-    form: Format | None = None,
-    wide: bool = False,
-    output: Path | None = None,
+    **shown: Unpack[Shown],
 ) -> None:
     """Run SQL on the tables of a lake, read-only and without access to anything else.
 
@@ -267,7 +251,7 @@ def sql(
 
     query = sql_of(text, file, "msgflow fleet sql 'FROM run'")
     result = fleet_sql(_opened(lake), query, where=where, limit=limit or None)
-    print_result(result, form, output, wide=wide)
+    print_result(result, **shown)
 
 
 @app.command("worst")
@@ -278,10 +262,8 @@ def worst(
     lake: str,
     where: str | None = None,
     limit: Annotated[int, typer.Option(min=1, max=_MOST_WORST)] = 10,
-    form: Format | None = None,
     columns: str | None = None,
-    output: Path | None = None,
-    wide: bool = False,
+    **shown: Unpack[Shown],
 ) -> None:
     """Show the flows of a path that took longest, with what opens each.
 
@@ -292,7 +274,7 @@ def worst(
     from msgflow.fleet.lake_query import fleet_worst
 
     result = fleet_worst(_opened(lake), path, where=where, limit=limit)
-    print_result(result, form, output, wide=wide, columns=columns, most_rows=limit)
+    print_result(result, **shown, columns=columns, most_rows=limit)
 
 
 @app.command("open")
@@ -354,9 +336,7 @@ def compare(
     at_least: str = "5%",
     fail_on: FailOn = None,
     only_different: OnlyDifferent = None,
-    form: Format | None = None,
-    output: Path | None = None,
-    wide: bool = False,
+    **shown: Unpack[Shown],
 ) -> None:
     """Compare paths in runs of one version (robot, site) with those of another.
 
@@ -388,7 +368,7 @@ def compare(
         confidence=confidence,
         at_least=at_least,
     )
-    print_comparison(comparison, fail_on or [], only_different, form=form, wide=wide, output=output)
+    print_comparison(comparison, fail_on or [], only_different, **shown)
 
 
 def _labels(texts: list[str]) -> dict[str, str]:
@@ -414,22 +394,6 @@ def _shard(text: str | None) -> tuple[int, int] | None:
     if match is None or int(match[1]) >= int(match[2]):
         raise UsageError(f"--shard takes I/N — {text}", "the shards of 3 are 0/3, 1/3 and 2/3")
     return int(match[1]), int(match[2])
-
-
-def _size(text: str | None) -> int | None:
-    if text is None:
-        return None
-    size = bytes_of(text)
-    if not size:
-        raise UsageError(f"--memory takes a size — {text}", "--memory 4GB")
-    return size
-
-
-def _time(text: str) -> float:
-    match = _TIME.fullmatch(text.strip())
-    if match is None:
-        raise UsageError(f"--timeout takes a time — {text}", "--timeout 90s, --timeout 2h")
-    return float(match[1]) * _SECONDS[match[2]]
 
 
 def _opened(lake: str) -> Lake:

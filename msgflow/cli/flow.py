@@ -19,6 +19,7 @@ from msgflow.cli.output import (
     print_status,
     print_text,
 )
+from msgflow.database import Database
 from msgflow.errors import UsageError
 from msgflow.export.formats import Format, by_suffix
 from msgflow.files.default_files import DEFAULT_DATABASE
@@ -100,8 +101,6 @@ def command(
         form (table|json|html): A tree, nodes and edges, or a page with its timeline; by default by
             the suffix of FILE, else table.
     """
-    from msgflow.database import Database
-
     if form is None and output is not None and output.suffix:
         form = by_suffix(output, _SUFFIXES)
     if form is FlowFormat.HTML and output is None:

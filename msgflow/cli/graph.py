@@ -33,7 +33,7 @@ class AnyFormat(StrEnum):
 
 
 def _options(*, form: AnyFormat | None = None) -> None:
-    """Have what is other than in a query.
+    """Declare what differs from a query.
 
     Args:
         form (FORMAT): The graph as dot, mermaid or json; its rows as table, csv, csv-safe, jsonl,

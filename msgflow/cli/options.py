@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from enum import StrEnum
@@ -12,6 +13,7 @@ import typer
 from typer.core import TyperGroup
 
 from msgflow.cli.completion import complete, complete_path
+from msgflow.errors import UsageError
 from msgflow.export.formats import Format
 from msgflow.query.selection import CASES, KINDS
 
@@ -39,10 +41,13 @@ class DefaultGroup(TyperGroup):
         return super().parse_args(ctx, args)
 
 
-def bytes_of(size: str) -> int:
-    """Return the bytes of a size such as '20MB'; 0 where the text is no size."""
+def bytes_of(size: str, example: str, most: float = math.inf) -> int:
+    """Return the bytes of a size such as '20MB'."""
     match = _SIZE.fullmatch(size.strip())
-    return round(float(match[1]) * _UNITS[(match[2] or "").upper()]) if match else 0
+    number = round(float(match[1]) * _UNITS[(match[2] or "").upper()]) if match else 0
+    if not 0 < number <= most:
+        raise UsageError(f"cannot read the size — {size}", example)
+    return number
 
 
 def plain(help_option: Any) -> Any:

@@ -8,7 +8,7 @@ import shlex
 import shutil
 import sys
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, cast
+from typing import IO, TYPE_CHECKING, TypedDict, cast
 
 import typer
 from rich.cells import cell_len
@@ -69,10 +69,18 @@ def confirm(question: str) -> bool:
     return typer.confirm(_shown(question), err=True)
 
 
+class Shown(TypedDict, total=False):
+    """How a command writes rows, as its options."""
+
+    form: Format | None
+    output: Path | None
+    wide: bool
+
+
 def print_result(
     result: QueryResult,
-    form: Format | None,
-    path: Path | None,
+    form: Format | None = None,
+    output: Path | None = None,
     *,
     wide: bool = False,
     columns: str | None = None,
@@ -82,14 +90,14 @@ def print_result(
     from msgflow.files.atomic import replacing
     from msgflow.text.values import count
 
-    form = form or format_of(path)
+    form = form or format_of(output)
     if columns is not None:
         result = result.with_columns([name.strip() for name in columns.split(",")])
     print_runs(result.runs)
-    if path is not None:
-        with replacing(path) as temporary, temporary.open("wb") as stream:
+    if output is not None:
+        with replacing(output) as temporary, temporary.open("wb") as stream:
             write_result(result, form, stream)
-        print_status(f"{count(len(result), 'row')} written to {path}")
+        print_status(f"{count(len(result), 'row')} written to {output}")
     else:
         stdout = data_stream()
         if form is Format.PARQUET and stdout.isatty():
@@ -101,7 +109,7 @@ def print_result(
             _print_for_screen(result, columns is not None, most_rows if on_terminal else None)
         else:
             write_result(result, form, terminal(stdout) if on_terminal else stdout)
-    if path is None and not len(result):
+    if output is None and not len(result):
         print_note(result.when_empty)
     for note in result.notes:
         print_note(note)

@@ -44,7 +44,7 @@ def _printed(
     memory_limit: str | None = None,
     database: Path = DEFAULT_DATABASE,
 ) -> None:
-    """Have the options of a query that are not those of `Database.query`.
+    """Declare the options of a query that are not those of `Database.query`.
 
     Args:
         show: Print the SQL and run nothing.
@@ -160,7 +160,7 @@ def build_command(
         write(result if times is None else result.with_times(times), form, given)
 
     own = {param.name for param in header.params}
-    chosen = [_fitting(each, header) for each in _ASKED if each.name not in own]
+    chosen = [_shown_if_useful(each, header) for each in _ASKED if each.name not in own]
     printed = [form if form and each.name == "form" else each for each in _PRINTED]
     declared = (param for param in header.params if param.name not in _WITHOUT_OPTION)
     set_parameters(command, [*map(header_parameter, declared), *chosen, *printed])
@@ -185,15 +185,15 @@ def _result(name: str, own: dict[str, Any], given: dict[str, Any]) -> QueryResul
         return database.query(name, **said, **own)
 
 
-def _fitting(parameter: Parameter, header: Header) -> Parameter:
+def _shown_if_useful(parameter: Parameter, header: Header) -> Parameter:
     """Return an option, hidden where the query has nothing to choose: it says so when used."""
     kind, info = get_args(parameter.annotation)
     info = copy(info)
-    info.hidden = not _chooses(parameter.name, header)
+    info.hidden = not _is_useful(parameter.name, header)
     return parameter.replace(annotation=Annotated[kind, info])
 
 
-def _chooses(name: str, header: Header) -> bool:
+def _is_useful(name: str, header: Header) -> bool:
     if name in KINDS:
         return bool(columns_of(header, name))
     if name in ("via", "without"):

@@ -127,7 +127,7 @@ def command(
             has_failed = True
         with Database(database) as opened:
             latencies = opened.query("e2e-latency")
-            print_result(latencies, None, None)
+            print_result(latencies)
             for sentence in part_of_latencies(opened, latencies):
                 print_status(sentence)
     if has_failed:

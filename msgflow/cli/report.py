@@ -11,6 +11,7 @@ from msgflow.cli.operation import operation
 from msgflow.cli.options import LAKE_PAGE, bytes_of
 from msgflow.cli.output import print_note, print_runs, print_status
 from msgflow.cli.ui import require_no_where
+from msgflow.database import Database
 from msgflow.errors import UsageError
 from msgflow.files.default_files import DEFAULT_DATABASE, DEFAULT_PATHS
 from msgflow.run.slice import SliceWords
@@ -46,8 +47,6 @@ def command(
             so.
         targets: Requirements, as YAML: the summary has the verdicts on them.
     """
-    from msgflow.database import Database
-
     to_stdout = str(output) == "-"
     is_page = to_stdout or output.suffix.lower() in (".html", ".htm")
     if not is_page and (lake is not None or output.suffix.lower() != ".md"):
@@ -55,7 +54,7 @@ def command(
             f"a report is a page, or Markdown: its name ends with .html or .md — {output}",
             "-o FILE.html",
         )
-    size = read_size(max_size)
+    size = bytes_of(max_size, "--max-size 20MB, at most 1GB", _MOST)
     given = (*part.values(), compare, through, targets)
     if lake is None:
         require_no_where(where)
@@ -90,11 +89,3 @@ def command(
             sys.stdout.buffer.write(target.read_bytes())
         else:
             print_status(status + ": open it in a browser" * is_page)
-
-
-def read_size(text: str) -> int:
-    """Return the bytes that '20MB' means."""
-    size = bytes_of(text)
-    if not 0 < size <= _MOST:
-        raise UsageError(f"cannot read the size — {text}", "--max-size 20MB, at most 1GB")
-    return size

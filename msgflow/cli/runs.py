@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import shlex
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Unpack
 
 import typer
 
 from msgflow.cli.completion import complete
 from msgflow.cli.operation import operation
 from msgflow.cli.options import DefaultGroup
-from msgflow.cli.output import confirm, is_asked, print_result, print_status
+from msgflow.cli.output import Shown, confirm, is_asked, print_result, print_status
+from msgflow.database import Database
 from msgflow.errors import ExitCode, UsageError
-from msgflow.export.formats import Format
 from msgflow.files.default_files import DEFAULT_DATABASE
 from msgflow.run.choice import choose_runs
 
@@ -24,22 +25,12 @@ _Runs = Annotated[str, typer.Argument(metavar="RUN|all", autocompletion=complete
 
 @app.command("list")
 @operation
-def list_runs(
-    *,
-    form: Format | None = None,
-    output: Path | None = None,
-    wide: bool = False,
-    database: Path = DEFAULT_DATABASE,
-) -> None:
+def list_runs(*, database: Path = DEFAULT_DATABASE, **shown: Unpack[Shown]) -> None:
     """List the runs of a database."""
-    from dataclasses import replace
-
-    from msgflow.database import Database
-
     with Database(database) as opened:
         result = opened.query("info", run="all")
     # The rows name the runs already.
-    print_result(replace(result, runs=()), form, output, wide=wide)
+    print_result(replace(result, runs=()), **shown)
 
 
 @app.command("rename")
@@ -51,8 +42,6 @@ def rename(run: _Run, name: str, *, database: Path = DEFAULT_DATABASE) -> None:
         run: Name or id of the run.
         name: Its new name.
     """
-    from msgflow.database import Database
-
     with Database(database) as opened:
         before = opened.rename_run(run, name)
     print_status(f"run {before.run_id} renamed: {before.name} is {name}")
@@ -69,8 +58,6 @@ def label(run: _Runs, labels: list[str], *, database: Path = DEFAULT_DATABASE) -
         run: Name or id of the run, or all.
         labels (KEY=VALUE...): Labels; KEY= takes one away.
     """
-    from msgflow.database import Database
-
     values: dict[str, str | None] = {}
     for text in labels:
         key, sign, value = text.partition("=")
@@ -105,8 +92,6 @@ def remove(
         run: Name or id of the run, or all.
         yes: Ask nothing on a terminal either.
     """
-    from msgflow.database import Database
-
     with Database(database) as opened:
         if not yes and is_asked():
             runs = choose_runs(opened.runs(), run)

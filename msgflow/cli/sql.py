@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Unpack
 
 import typer
 
 from msgflow.cli.operation import operation
-from msgflow.cli.output import print_result
+from msgflow.cli.output import Shown, print_result
+from msgflow.database import Database
 from msgflow.errors import UsageError
-from msgflow.export.formats import Format
 from msgflow.files.default_files import DEFAULT_DATABASE
 from msgflow.files.text_file import read_text
 
@@ -28,10 +28,8 @@ def command(
     *,
     file: FileOption = None,
     limit: Annotated[int, typer.Option(min=0)] = DEFAULT_LIMIT,
-    form: Format | None = None,
-    wide: bool = False,
-    output: Path | None = None,
     database: Path = DEFAULT_DATABASE,
+    **shown: Unpack[Shown],
 ) -> None:
     """Run SQL on the public views, read-only and without access to other files.
 
@@ -42,20 +40,19 @@ def command(
         file: Read the query from FILE.
         limit (ROWS): Maximum number of rows to print; 0 for all.
     """
-    from msgflow.database import Database
 
     def answer(query: str) -> QueryResult:
         # Opened for each: at the prompt, others may write meanwhile.
         with Database(database) as opened:
             return opened.sql(query, limit=limit or None)
 
-    if text is None and file is None and output is None and sys.stdin.isatty():
+    if text is None and file is None and shown.get("output") is None and sys.stdin.isatty():
         from msgflow.cli.sql_prompt import prompt
 
-        prompt(database, lambda query: print_result(answer(query), form, None, wide=wide))
+        prompt(database, lambda query: print_result(answer(query), **shown))
         return
     query = sql_of(text, file, 'msgflow sql "SELECT * FROM run"')
-    print_result(answer(query), form, output, wide=wide)
+    print_result(answer(query), **shown)
 
 
 def sql_of(text: str | None, file: Path | None, example: str) -> str:

@@ -67,7 +67,7 @@ def _answer(database: Path, line: str) -> None:
         return
     with Database(database) as opened:
         asked = word == ".schema" and view.strip()
-        print_result(opened.schema(asked) if asked else opened.views(), None, None, most_rows=None)
+        print_result(opened.schema(asked) if asked else opened.views(), most_rows=None)
 
 
 def completer(words: Iterable[str]) -> Callable[[str, int], str | None]:

@@ -17,6 +17,7 @@ from msgflow.cli.output import (
     print_status,
     print_text,
 )
+from msgflow.database import Database
 from msgflow.errors import UsageError
 from msgflow.files.default_files import DEFAULT_DATABASE, DEFAULT_LINKS, DEFAULT_PATHS
 from msgflow.text.values import count
@@ -45,7 +46,6 @@ def links(
         apply: Declare those without a doubt, and write the file (-o, else msgflow-links.yaml).
     """
     from msgflow.cli.links import print_applied
-    from msgflow.database import Database
     from msgflow.files.atomic import replacing
 
     if run == "all":
@@ -98,8 +98,7 @@ def paths(
     *, run: str | None = None, output: Path | None = None, database: Path = DEFAULT_DATABASE
 ) -> None:
     """Print the paths of a run as a file with names, to choose from: paths.yaml."""
-    from msgflow.database import Database
-    from msgflow.paths import suggest_paths
+    from msgflow.paths.suggested_paths import suggest_paths
 
     with Database(database) as opened:
         result = opened.query("e2e-latency", run=run)
@@ -132,8 +131,6 @@ def targets(
     Args:
         margin (PERCENT): How much more than measured is allowed.
     """
-    from msgflow.database import Database
-
     with Database(database) as opened:
         text = opened.suggest_targets(run=run, start=start, margin=margin / 100)
     print_text(text, output)

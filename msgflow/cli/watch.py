@@ -272,7 +272,7 @@ def _published(reports: Iterator[WindowReport], publisher: Diagnostics) -> Itera
 
 
 def _alarm(targets: Path, paths: Path, *, with_flows: bool) -> Alarm:
-    from msgflow.paths import read_paths
+    from msgflow.paths.paths_file import read_paths
     from msgflow.verify import read_targets
     from msgflow.watch import Alarm
 

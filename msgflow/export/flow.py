@@ -17,7 +17,7 @@ from rich.tree import Tree
 
 from msgflow.export.flow_layout import NOT_TAKEN, lay_out_flow, walk
 from msgflow.query.clock_notes import clock_notes
-from msgflow.query.flow import STEPS_PER_MESSAGE, flow_parameters, read_steps, require_start
+from msgflow.query.flow import STEPS_PER_MESSAGE, read_steps, require_start
 from msgflow.run.window import format_epoch
 from msgflow.text.json_value import json_value
 from msgflow.text.values import format_cell, format_duration, short_symbol
@@ -189,8 +189,7 @@ class Flow:
 def read_flow(connection: duckdb.DuckDBPyConnection, /, start: Start, **given: Value) -> Flow:
     """Return the flow through `start`; `given` are parameters of `internal.flow_steps`."""
     run = require_start(connection, start)
-    asked = flow_parameters(start, run, given)
-    table = read_steps(connection, asked)
+    asked, table = read_steps(connection, start, run, given)
     flow = Flow(
         start, asked["direction"], asked["depth"], asked["limit"], run, table, list(start.notes)
     )
@@ -386,7 +385,7 @@ class _Painter:
 
 
 def _is_alone(item: Item) -> bool:
-    """Return whether no line before it has the node that sends: of a request it has the client."""
+    """Tell whether its line has to name the node: no line before it does, but that of a client."""
     return all(cause.node["kind"] == "request" for cause, _ in item.causes)
 
 

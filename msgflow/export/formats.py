@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from enum import StrEnum
+from itertools import chain, pairwise
 from typing import IO, TYPE_CHECKING, TypeVar
 
 from msgflow.errors import UsageError
@@ -97,15 +98,10 @@ def json_rows(result: QueryResult) -> Iterator[str]:
 def _json_array(result: QueryResult) -> Iterator[str]:
     if not len(result):
         yield "[]"
-        return
     before = "["
-    row = ""
-    for following in json_rows(result):
-        if row:
-            yield f"{before}{row},"
-            before = " "
-        row = following
-    yield f"{before}{row}]"
+    for row, following in pairwise(chain(json_rows(result), [None])):
+        yield f"{before}{row}{']' if following is None else ','}"
+        before = " "
 
 
 def csv_batch(batch: pa.RecordBatch) -> pa.RecordBatch:

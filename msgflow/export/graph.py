@@ -208,12 +208,49 @@ class Graph:
         return json.dumps(content, ensure_ascii=False, indent=1)
 
     def to_dot(self) -> str:
-        """Return it in the language of Graphviz."""
-        return _dot(self)
+        """Return it in the language of Graphviz: executors are clusters."""
+        lines = ["digraph msgflow {", "  rankdir=LR;", "  node [fontname=sans, fontsize=10];"]
+        lines.append("  edge [fontname=sans, fontsize=8];")
+        for number, (title, members) in enumerate(self._groups()):
+            indent = "  "
+            if title is not None:
+                lines += [
+                    f"  subgraph cluster_{number} {{",
+                    f"    label={_quoted(title)}; fontname=sans; fontsize=9; style=rounded;",
+                ]
+                indent = "    "
+            for vertex in members:
+                label = "\\n".join(map(_escaped, vertex.lines))
+                lines.append(f'{indent}{vertex.id} [label="{label}", {_SHAPES[vertex.kind]}];')
+            if title is not None:
+                lines.append("  }")
+        for edge in self.edges:
+            attributes = [f"label={_quoted(edge.label)}"] if edge.label else []
+            attributes.append(f"tooltip={_quoted(f'{edge.kind}: {edge.count}')}")
+            if edge.indirect:
+                attributes.append(_STYLES[edge.indirect.split(",")[0]])
+            elif edge.is_call:
+                attributes.append("arrowhead=empty, color=gray40")
+            lines.append(f"  {edge.source} -> {edge.target} [{', '.join(attributes)}];")
+        return "\n".join([*lines, "}"])
 
     def to_mermaid(self) -> str:
-        """Return it as a Mermaid flowchart."""
-        return _mermaid(self)
+        """Return it as a Mermaid flowchart: executors are subgraphs."""
+        lines = ["flowchart LR"]
+        for number, (title, members) in enumerate(self._groups()):
+            if title is not None:
+                lines.append(f'  subgraph g{number}["{_coded(title)}"]')
+            for vertex in members:
+                opening, closing = _BOXES[vertex.kind]
+                label = "<br/>".join(map(_coded, vertex.lines))
+                lines.append(f'  {vertex.id}{opening}"{label}"{closing}')
+            if title is not None:
+                lines.append("  end")
+        for edge in self.edges:
+            label = f'|"{_coded(edge.label)}"|' if edge.label else ""
+            arrow = "-.->" if edge.indirect else "==>" if edge.is_call else "-->"
+            lines.append(f"  {edge.source} {arrow}{label} {edge.target}")
+        return "\n".join(lines)
 
     def to(self, form: GraphFormat) -> str:
         """Return it in a format."""
@@ -223,6 +260,12 @@ class Graph:
             GraphFormat.JSON: self.to_json,
         }
         return write[form]()
+
+    def _groups(self) -> Iterator[tuple[str | None, list[Vertex]]]:
+        """Yield each executor with its nodes, and last the vertices without an executor."""
+        for executor, title in self.executors.items():
+            yield title, [one for one in self.vertices.values() if one.executor == executor]
+        yield None, [one for one in self.vertices.values() if one.executor is None]
 
     def __repr__(self) -> str:
         return f"<{self}>"
@@ -248,60 +291,6 @@ def read_graph(
     header = load_query("graph")
     result = run_query(connection, header, {}, replace(part, run=run.run_id), internal=internal)
     return Graph(run, result, result.notes)
-
-
-def _dot(graph: Graph) -> str:
-    """Return a graph in the language of Graphviz: executors are clusters."""
-    lines = ["digraph msgflow {", "  rankdir=LR;", "  node [fontname=sans, fontsize=10];"]
-    lines.append("  edge [fontname=sans, fontsize=8];")
-    for number, (title, members) in enumerate(_groups(graph)):
-        indent = "  "
-        if title is not None:
-            lines += [
-                f"  subgraph cluster_{number} {{",
-                f"    label={_quoted(title)}; fontname=sans; fontsize=9; style=rounded;",
-            ]
-            indent = "    "
-        for vertex in members:
-            label = "\\n".join(map(_escaped, vertex.lines))
-            lines.append(f'{indent}{vertex.id} [label="{label}", {_SHAPES[vertex.kind]}];')
-        if title is not None:
-            lines.append("  }")
-    for edge in graph.edges:
-        attributes = [f"label={_quoted(edge.label)}"] if edge.label else []
-        attributes.append(f"tooltip={_quoted(f'{edge.kind}: {edge.count}')}")
-        if edge.indirect:
-            attributes.append(_STYLES[edge.indirect.split(",")[0]])
-        elif edge.is_call:
-            attributes.append("arrowhead=empty, color=gray40")
-        lines.append(f"  {edge.source} -> {edge.target} [{', '.join(attributes)}];")
-    return "\n".join([*lines, "}"])
-
-
-def _mermaid(graph: Graph) -> str:
-    """Return a graph as a Mermaid flowchart: executors are subgraphs."""
-    lines = ["flowchart LR"]
-    for number, (title, members) in enumerate(_groups(graph)):
-        if title is not None:
-            lines.append(f'  subgraph g{number}["{_coded(title)}"]')
-        for vertex in members:
-            opening, closing = _BOXES[vertex.kind]
-            label = "<br/>".join(map(_coded, vertex.lines))
-            lines.append(f'  {vertex.id}{opening}"{label}"{closing}')
-        if title is not None:
-            lines.append("  end")
-    for edge in graph.edges:
-        label = f'|"{_coded(edge.label)}"|' if edge.label else ""
-        arrow = "-.->" if edge.indirect else "==>" if edge.is_call else "-->"
-        lines.append(f"  {edge.source} {arrow}{label} {edge.target}")
-    return "\n".join(lines)
-
-
-def _groups(graph: Graph) -> Iterator[tuple[str | None, list[Vertex]]]:
-    """Yield each executor with its nodes, and last the vertices without an executor."""
-    for executor, title in graph.executors.items():
-        yield title, [one for one in graph.vertices.values() if one.executor == executor]
-    yield None, [one for one in graph.vertices.values() if one.executor is None]
 
 
 def _escaped(text: str) -> str:

@@ -16,7 +16,7 @@ from msgflow.sql.statement import internal_sql
 from msgflow.version import __version__
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
     from pathlib import Path
 
     import duckdb
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from msgflow.run.slice import Slice
 
 LOG_TOPIC = "/msgflow/log"
-_AT_ONCE = 20_000
 _NS_IN_S = 1_000_000_000
 _VALUE = ("std_msgs/msg/Float64", "float64 data")
 _LOG = (
@@ -94,14 +93,14 @@ def write_mcap(
         writer: Any = Writer(file)
         writer.add_metadata("msgflow", {"run": run.name, "version": __version__})
         schema = writer.register_msgdef(*_VALUE)
-        for row in _rows(connection, "mcap_value", bindings):
+        for row in internal_sql().rows(connection, "mcap_value", bindings):
             topics.add(row["topic"])
             message = {"data": row["value_ms"]}
             writer.write_message(row["topic"], schema, message, row["at_ns"], sequence=values)
             values += 1
             end_ns = row["at_ns"]
         schema = writer.register_msgdef(*_LOG)
-        for row in _rows(connection, "mcap_loss", bindings):
+        for row in internal_sql().rows(connection, "mcap_loss", bindings):
             message = _log(row["at_ns"], _WARNING, row["node"], row["message"])
             writer.write_message(LOG_TOPIC, schema, message, row["at_ns"])
             losses += 1
@@ -111,15 +110,6 @@ def write_mcap(
             writer.write_message(LOG_TOPIC, schema, message, at_ns)
         writer.finish()
     return ExportedMcap(path, run, len(topics), values, losses, len(violations))
-
-
-def _rows(
-    connection: duckdb.DuckDBPyConnection, name: str, bindings: dict[str, Any]
-) -> Iterator[dict[str, Any]]:
-    relation = internal_sql().run(connection, name, bindings)
-    with relation.to_arrow_reader(_AT_ONCE) as reader:
-        for batch in reader:
-            yield from batch.to_pylist()
 
 
 def _log(at_ns: int, level: int, name: str, text: str) -> dict[str, Any]:

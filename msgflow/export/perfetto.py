@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from msgflow.run.choice import Run
     from msgflow.run.slice import Slice
 
-_AT_ONCE = 20_000
 _SEQUENCE = 1
 # Ids of things, by the code of the Perfetto slice.
 _IDENTITIES = (
@@ -101,10 +100,7 @@ class _Writer:
     bindings: dict[str, Any]
 
     def rows(self, name: str) -> Iterator[dict[str, Any]]:
-        relation = internal_sql().run(self.connection, name, self.bindings)
-        with relation.to_arrow_reader(_AT_ONCE) as reader:
-            for batch in reader:
-                yield from batch.to_pylist()
+        return internal_sql().rows(self.connection, name, self.bindings)
 
     def describe(self) -> None:
         start_ns = self.run.start_ns or 0

@@ -21,17 +21,12 @@ if TYPE_CHECKING:
     from msgflow.run.slice import Slice
 
 _ROWS_AT_ONCE = 100_000
-_VIEWS = """
-SELECT views.view_name, list(columns.column_name)
-FROM duckdb_views() AS views
-JOIN duckdb_columns() AS columns
-    ON columns.database_name = views.database_name
-    AND columns.schema_name = views.schema_name
-    AND columns.table_name = views.view_name
-WHERE views.database_name = current_database() AND views.schema_name = 'main'
-    AND NOT views.internal
-GROUP BY views.view_name
-ORDER BY views.view_name
+_COLUMNS = """
+SELECT table_name, list(column_name)
+FROM duckdb_columns()
+WHERE database_name = current_database() AND schema_name = 'main'
+GROUP BY table_name
+ORDER BY table_name
 """
 # The time of a row is the first of these columns that the view has …
 _TIMES = ("start_ns", "sent_ns", "published_ns", "taken_ns", "at_ns", "from_ns")
@@ -111,7 +106,7 @@ def select_views(
     """Return the views to export, by their names; all that msgflow declares when there are none."""
     # A database of somebody else may have views of any name, which would become names of files.
     declared = set(public_names())
-    found = connection.execute(_VIEWS).fetchall()
+    found = connection.execute(_COLUMNS).fetchall()
     columns = {view: names for view, names in found if view in declared}
     for view in views:
         if view not in columns:

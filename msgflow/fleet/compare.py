@@ -5,18 +5,18 @@ from __future__ import annotations
 import re
 import shlex
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from msgflow.errors import UsageError
 from msgflow.fleet.lake_connection import Choice, Reading, choose
-from msgflow.query.compare import STATISTICS, Failure, failures, share_of
+from msgflow.query.compare import STATISTICS, Differences, share_of
 from msgflow.query.selection import CASES, CUT_COLUMN
 from msgflow.query.several_runs import compared
 from msgflow.text.name_suggestions import meant_or, nearest
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Iterator, Mapping
 
     from msgflow.fleet.lake import Lake
     from msgflow.result.query_result import QueryResult
@@ -24,25 +24,7 @@ if TYPE_CHECKING:
 _TABLES = ("flow", "e2e_latency")
 _SHOWN = ("B is longer", "B is shorter")
 _MOST_NAMED = 10
-
-
-@dataclass(frozen=True)
-class FleetComparison:
-    """Runs of one side compared with those of another."""
-
-    result: QueryResult  # one row per path and statistic, see `internal.fleet_comparison`
-    parts: None = None  # only a comparison of two runs has them
-
-    def changes(self, *, only_different: bool = True) -> QueryResult:
-        """Return a row for each path, the greatest change first."""
-        from msgflow.query.comparison_summary import changes
-
-        return changes(self.result, only_different)
-
-    def failures(self, conditions: Iterable[str]) -> list[Failure]:
-        """Return the rows that exceed side A by more than conditions such as 'p95>5%' allow."""
-        hint = "--where chooses runs whose paths were all found: is_cut of fleet query e2e-latency"
-        return failures(self.result, conditions, hint)
+_ALL_PATHS = "--where chooses runs whose paths were all found: is_cut of fleet query e2e-latency"
 
 
 def compare(
@@ -56,7 +38,7 @@ def compare(
     case: str = "first",
     confidence: float = 0.95,
     at_least: str = "5%",
-) -> FleetComparison:
+) -> Differences:
     """Compare runs whose label has one value with those of another.
 
     `by` is the key of the label, `base` and `other` its values on side A and B. They may be left
@@ -97,7 +79,7 @@ def compare(
     result.notes.extend(_left_out(by, known, sides, len(labels)))
     result.notes.extend(_one_sided(result, by))
     result.notes.extend(_doubts(result, confidence))
-    return FleetComparison(result)
+    return Differences(result=result, all_paths=_ALL_PATHS)
 
 
 def _require_label(choice: Choice, key: str | None) -> None:

@@ -89,19 +89,9 @@ def make_server(path: Path, *, seconds: float = MOST_SECONDS) -> MCPServer[Any]:
         return call
 
     tools = _Tools(path)
-    for tool in (
-        tools.info,
-        tools.check,
-        tools.list_queries,
-        tools.run_query,
-        tools.schema,
-        tools.sql,
-        tools.flow,
-        tools.why,
-        tools.compare,
-        tools.verify,
-    ):
-        server.tool(structured_output=False)(confined(tool))
+    for name in vars(_Tools):
+        if not name.startswith("_"):
+            server.tool(structured_output=False)(confined(getattr(tools, name)))
     return server
 
 
@@ -114,7 +104,7 @@ def answer(
 
 
 class _Tools:
-    """What agents may call; the docstrings are what they read."""
+    """What agents may call: each method is a tool, its docstring what they read."""
 
     def __init__(self, path: Path, memory_limit: str = MEMORY_LIMIT) -> None:
         self._path = path

@@ -18,18 +18,6 @@ if TYPE_CHECKING:
 
 
 _ASKED = ("from", "to", "case", "max_depth", "max_paths")
-# Where the kernel was traced: what callbacks did with their time, all instances together.
-_STATES = """
-SELECT
-    l.node, l.label AS what, sum(s.running_ns) AS running,
-    sum(s.preempted_ns + s.runnable_ns) AS run_queue,
-    sum(s.sleeping_ns + s.uninterruptible_ns) AS blocked
-FROM main.callback_schedule AS s
-JOIN main.callback_instance AS i ON s.callback_instance_id = i.callback_instance_id
-JOIN main.callback_label AS l ON i.callback_id = l.callback_id
-WHERE i.run_id = $run_id AND i.start_ns >= $start_ns AND i.start_ns < $end_ns
-GROUP BY l.node, l.label
-"""
 
 
 def change_parts(
@@ -53,7 +41,8 @@ def change_parts(
             found = run_query(connection, load_query("path-breakdown"), parameters, part)
             con.register(f"part_{side}", found.table)
             values = {"run_id": run.run_id, **part.window([run]).bindings}
-            con.register(f"state_{side}", connection.sql(_STATES, params=values).to_arrow_table())
+            states = internal_sql().run(connection, "callback_state", values)
+            con.register(f"state_{side}", states.to_arrow_table())
         table = internal_sql().run(con, "change_part", {}).to_arrow_table()
     header = replace(internal_sql().header("change_part"), name="compare --explain")
     return QueryResult(table, header, compared.runs, compared.notes)

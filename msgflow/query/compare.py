@@ -90,31 +90,21 @@ class Failure:
     reason: str
 
 
-@dataclass(frozen=True)
-class Comparison:
-    """Run B compared with run A.
+@dataclass(frozen=True, kw_only=True)
+class Differences:
+    """How runs of one side differ from those of another.
 
     Attributes:
         result: one row per path (callback, topic) and statistic, see `main.comparison`; of several
             runs `internal.fleet_comparison`.
-        run_a: the baseline; of several runs the first.
-        run_b: the run that is compared with it, likewise.
-        skipped: seconds that were left out at the start of each run.
         parts: what the differences of the means of paths consist of, see `internal.change_part`;
             None unless asked for.
+        all_paths: how to compare all paths, where some are left out.
     """
 
     result: QueryResult
-    run_a: Run
-    run_b: Run
-    skipped: float = 0.0
     parts: QueryResult | None = None
-
-    def __str__(self) -> str:
-        return str(self.changes(only_different=False))
-
-    def _repr_html_(self) -> str:
-        return self.changes(only_different=False)._repr_html_()
+    all_paths: str = "a higher --max-paths or --max-depth, or --from and --to"
 
     def changes(self, *, only_different: bool = True) -> QueryResult:
         """Return a row for each path, callback or topic, the greatest change first.
@@ -127,39 +117,48 @@ class Comparison:
         return changes(self.result, only_different)
 
     def failures(self, conditions: Iterable[str]) -> list[Failure]:
-        """Return what exceeds run A by more than conditions such as 'p95>5%' or 'median>2ms' allow.
+        """Return what exceeds A by more than conditions such as 'p95>5%' or 'median>2ms' allow.
 
-        As `failures` of this module says.
+        'share<-1%' limits how much less may arrive: the share in B may be that many points below
+        the share in A. A subject with values in A and none in B fails, too. The measured values
+        decide, even if the difference may be chance.
         """
-        return failures(self.result, conditions)
+        wanted = parse_conditions(conditions)
+        rows = self.result.to_arrow().to_pylist()
+        if wanted and any(row[CUT_COLUMN] for row in rows):
+            raise UsageError(
+                f"not all paths were compared, so that nothing holds of all — {wanted[0].text}",
+                self.all_paths,
+            )
+        return [
+            Failure(condition.text, row["subject"], reason + _chance(condition, row))
+            for condition in wanted
+            for row in rows
+            if row["statistic"]
+            == (STATISTICS[0] if condition.statistic == SHARE else condition.statistic)
+            and (reason := _excess(condition, row)) is not None
+        ]
 
 
-def failures(
-    result: QueryResult,
-    conditions: Iterable[str],
-    hint: str = "a higher --max-paths or --max-depth, or --from and --to",
-) -> list[Failure]:
-    """Return what exceeds A by more than conditions such as 'p95>5%' or 'median>2ms' allow.
+@dataclass(frozen=True, kw_only=True)
+class Comparison(Differences):
+    """Run B compared with run A.
 
-    'share<-1%' limits how much less may arrive: the share in B may be that many points below the
-    share in A. A subject with values in A and none in B fails, too. The measured values decide,
-    even if the difference may be chance.
+    Attributes:
+        run_a: the baseline; of several runs the first.
+        run_b: the run that is compared with it, likewise.
+        skipped: seconds that were left out at the start of each run.
     """
-    wanted = parse_conditions(conditions)
-    rows = result.to_arrow().to_pylist()
-    if wanted and any(row[CUT_COLUMN] for row in rows):
-        raise UsageError(
-            f"not all paths were compared, so that nothing holds of all — {wanted[0].text}",
-            hint,
-        )
-    return [
-        Failure(condition.text, row["subject"], reason + _chance(condition, row))
-        for condition in wanted
-        for row in rows
-        if row["statistic"]
-        == (STATISTICS[0] if condition.statistic == SHARE else condition.statistic)
-        and (reason := _excess(condition, row)) is not None
-    ]
+
+    run_a: Run
+    run_b: Run
+    skipped: float
+
+    def __str__(self) -> str:
+        return str(self.changes(only_different=False))
+
+    def _repr_html_(self) -> str:
+        return self.changes(only_different=False)._repr_html_()
 
 
 def parse_conditions(texts: Iterable[str]) -> list[Condition]:
@@ -325,7 +324,7 @@ def _several(
             f"{LEAST_RUNS} runs on either side tell a change from chance, one has {least}:"
             " a_spread_percent and b_spread_percent of --wide say how much its runs differ"
         )
-    return Comparison(result, first, second, skipped=asked["skip_first"])
+    return Comparison(result=result, run_a=first, run_b=second, skipped=asked["skip_first"])
 
 
 def share_of(text: str) -> float:
@@ -376,6 +375,10 @@ def _compared(
     *,
     is_strict: bool = True,
 ) -> Comparison:
+    """Return how two runs differ, with notes; unless `is_strict`, they may have nothing in common.
+
+    `asked` are the parameters of `internal.comparison`.
+    """
     what = str(asked["what"])
     asked = asked | require_places(connection, [first, second], asked)
     for run in (first, second):
@@ -391,7 +394,7 @@ def _compared(
     result.notes.extend(_doubts(connection, result, what, first, second))
     if len(result):
         result.notes.extend(clock_notes(connection, list(dict.fromkeys((first, second)))))
-    return Comparison(result, first, second, skipped=asked["skip_first"])
+    return Comparison(result=result, run_a=first, run_b=second, skipped=asked["skip_first"])
 
 
 def _warm_up(compared: Comparison) -> float:

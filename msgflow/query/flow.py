@@ -26,51 +26,6 @@ KINDS = ("publication", "take", "callback_instance", "request", "response")
 STEPS_PER_MESSAGE = 3
 MOST_VERTICES = 10_000
 
-# A topic and a node may have the same name: then it means the topic.
-_FIRST = """
-WITH named AS (
-    SELECT
-        'publication' AS kind, b.publication_id AS id, b.start_ns,
-        p.topic_name = $place AS is_topic
-    FROM main.publication AS b
-    JOIN main.publisher AS p ON b.publisher_id = p.publisher_id
-    LEFT JOIN main.node AS n ON p.node_id = n.node_id
-    WHERE b.run_id = $run_id
-        AND (p.topic_name = $place OR n.full_name = $place AND NOT p.is_internal)
-    UNION ALL
-    SELECT 'callback_instance', i.callback_instance_id, i.start_ns, false
-    FROM main.callback_instance AS i
-    JOIN main.callback_label AS l ON i.callback_id = l.callback_id
-    WHERE i.run_id = $run_id AND l.node = $place AND NOT l.is_internal
-),
-meant AS (
-    SELECT kind, id, start_ns
-    FROM named
-    WHERE is_topic OR NOT (SELECT bool_or(is_topic) FROM named)
-)
-SELECT kind, id, start_ns, (SELECT max(start_ns) FROM meant) AS last_ns
-FROM meant
-WHERE start_ns >= $at_ns
-UNION ALL
-SELECT NULL, NULL, NULL, max(start_ns) FROM meant
-ORDER BY start_ns NULLS LAST, kind DESC, id
-LIMIT 1
-"""
-_TAKE = """
-SELECT t.take_id, s.topic_name, t.run_id
-FROM main.take AS t
-JOIN main.subscription AS s ON t.subscription_id = s.subscription_id
-LEFT JOIN main.link_transport AS l ON t.take_id = l.take_id
-LEFT JOIN main.callback_instance AS i ON t.take_id = i.take_id
-WHERE CASE $kind
-    WHEN 'take' THEN t.take_id
-    WHEN 'publication' THEN l.publication_id
-    WHEN 'callback_instance' THEN i.callback_instance_id
-END = $id
-ORDER BY l.latency_ns DESC NULLS LAST, t.take_id
-LIMIT 1
-"""
-
 
 @dataclass(frozen=True)
 class Start:
@@ -92,7 +47,7 @@ def find_start(
     require_names(connection, (one,), "place", [place])
     at_ns = MINIMUM_NS if at is None else time_point(at, (one,), "--at")
     bindings = {"run_id": one.run_id, "place": place, "at_ns": at_ns}
-    ((kind, number, _, last_ns),) = connection.execute(_FIRST, bindings).fetchall()
+    ((kind, number, last_ns),) = internal_sql().run(connection, "flow_begin", bindings).fetchall()
     if last_ns is None:
         raise UsageError(
             f"the trace shows no message that was published there — {place}",
@@ -111,7 +66,8 @@ def find_start(
 
 def find_take(connection: duckdb.DuckDBPyConnection, start: Start) -> tuple[int, str, int]:
     """Return the take of longest latency that a start means, its topic, and the id of its run."""
-    found = connection.execute(_TAKE, {"kind": start.kind, "id": start.id}).fetchall()
+    thing = {"kind": start.kind, "id": start.id}
+    found = internal_sql().run(connection, "longest_take", thing).fetchall()
     if not found:
         is_message = start.kind == "publication"
         said = "no subscription took this message" if is_message else "no message was taken for it"
@@ -137,21 +93,18 @@ def require_start(connection: duckdb.DuckDBPyConnection, start: Start) -> Run:
     return next(run for run in read_runs(connection) if run.run_id == found[0][0])
 
 
-def flow_parameters(start: Start, run: Run, given: Mapping[str, Value]) -> dict[str, Any]:
-    """Return the value of every parameter of `internal.flow_steps`."""
+def read_steps(
+    connection: duckdb.DuckDBPyConnection, start: Start, run: Run, given: Mapping[str, Value]
+) -> tuple[dict[str, Any], pa.Table]:
+    """Return the parameters of a flow, and its steps: the nearest to the start first."""
     place: dict[str, Value] = {"kind": start.kind, "id": start.id, "run_id": run.run_id}
     asked: dict[str, Any] = bind(
         internal_sql().header("flow_steps"), {**given, **place}, "msgflow flow"
     )
     if asked["limit"] > MOST_VERTICES:
         raise UsageError(f"--limit is at most {MOST_VERTICES} — {asked['limit']}", "1000 is usual")
-    return asked
-
-
-def read_steps(connection: duckdb.DuckDBPyConnection, asked: Mapping[str, Value]) -> pa.Table:
-    """Return the steps of a flow, the nearest first, and how long executors were busy."""
     with query_errors("the flow", "the flow cannot be read: {}"):
-        return internal_sql().run(connection, "flow_steps", asked).to_arrow_table()
+        return asked, internal_sql().run(connection, "flow_steps", asked).to_arrow_table()
 
 
 def _place(time_ns: int, run: Run) -> str:

@@ -174,10 +174,10 @@ def run_query(
     table, missing, has_rows = shown_rows(table, internal=internal, on_hidden=_on_hidden)
     notes = [] if runs else ["the database holds no run yet"]
     if part.has_window:
-        notes += _beside(runs, window)
+        notes += _outside(runs, window)
     notes += missing
     if runs and not has_rows:
-        untraced = _untraced(connection, runs, header.note)
+        untraced = _not_traced(connection, runs, header.note)
         notes += untraced
         narrowing = _narrowing(own, selection)
         if narrowing and not untraced:
@@ -247,7 +247,7 @@ def bind(
     bound: dict[str, Value] = {}
     for param in header.params:
         if param.name in by_name:
-            bound[param.name] = _fit(command, param, by_name[param.name])
+            bound[param.name] = _checked(command, param, by_name[param.name])
         elif param.has_default:
             bound[param.name] = param.default
         else:
@@ -258,7 +258,7 @@ def bind(
     return bound
 
 
-def _fit(command: str, param: Param, value: Value) -> Value:
+def _checked(command: str, param: Param, value: Value) -> Value:
     option = f"--{param.name.replace('_', '-')}"
     if param.name in PLACE_PARAMETERS and isinstance(value, list | tuple):
         value = [str(each) for each in value] or None
@@ -283,7 +283,7 @@ def _fit(command: str, param: Param, value: Value) -> Value:
     return value
 
 
-def _beside(runs: Sequence[Run], window: Window) -> list[str]:
+def _outside(runs: Sequence[Run], window: Window) -> list[str]:
     """Return a note if the runs have nothing in the time window."""
     seen = [
         (run.start_ns, run.end_ns)
@@ -301,7 +301,7 @@ def _beside(runs: Sequence[Run], window: Window) -> list[str]:
     return [f"{nothing}: it lasts {format_duration(last - first)}, from {format_epoch(first)}"]
 
 
-def _untraced(
+def _not_traced(
     connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], note: str | None
 ) -> list[str]:
     """Return notes on missing events, if the rows would have come from them."""

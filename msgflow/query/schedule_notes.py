@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from msgflow.sql.statement import internal_sql
@@ -34,8 +35,8 @@ def schedule_notes(
     if not changed:
         return
     given = {name: asked[name] for name in _ASKED}
-    found = internal_sql().run(connection, "callback_time", {**given, "subjects": sorted(changed)})
-    for row in found.to_arrow_table().to_pylist()[:_MOST]:
+    found = internal_sql().rows(connection, "callback_time", given | {"subjects": sorted(changed)})
+    for row in islice(found, _MOST):
         yield f"{row['subject']}, on average {_change(row, 'duration_ns')}: {_parts(row)}"
 
 
@@ -48,8 +49,7 @@ def function_notes(
     if sampled < len({*runs.values()}):
         return
     given = {name: asked[name] for name in (*_ASKED, "at_least")}
-    found = internal_sql().run(connection, "changed_function", given).to_arrow_table()
-    for row in found.to_pylist()[:_MOST]:
+    for row in islice(internal_sql().rows(connection, "changed_function", given), _MOST):
         a, b = (format_duration(row[name]) for name in ("a_ns", "b_ns"))
         yield (
             f"{row['node']} · {row['callback']}: CPU time per call in {row['function']} {a} → {b}"

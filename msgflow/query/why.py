@@ -49,8 +49,8 @@ _LINKS = ("suggest", "links")
 _DEAD_ENDS = (
     "SELECT subject, detail FROM main.finding WHERE name = 'dead_end' AND list_contains(?, run_id)"
 )
-# What an explanation has by then takes less: waits explained are those of the breakdown, and more;
-# the flow that is shown is one of those broken down.
+# Steps whose rows an earlier query of the explanation has in its tables: it costs less to read them
+# there. The breakdown explains the waits of all flows, and one of these is the flow that is shown.
 _KNOWN = {
     "explained_wait": "FROM main.executor_wait_explained("
     "$runs, arrivals := 'exact_arrival', waits := 'ready_wait')",
@@ -182,7 +182,7 @@ def _explained(
     # No path may pass what only others do.
     flow = ask("critical-path", **ends, **only_path(path, shown), quantile="p95")
     pieces = flow.table.to_pylist()
-    parts = _chosen(parts, lambda row: row["path"] == path)
+    parts = _rows_where(parts, lambda row: row["path"] == path)
     callbacks = {(row["node"], row["what"]) for row in parts.table.to_pylist()}
     # What is said of paths that end at a node which publishes.
     ends_of = [each.split(" → ")[-2:] for each in ([path] if place is None else shown)]
@@ -193,8 +193,8 @@ def _explained(
         if any(node == last and f" on {topic} " in detail for topic, last in ends_of)
     )
     ends_here = list(dict.fromkeys(said))
-    waits = _chosen(waits, lambda row: (row["node"], row["callback"]) in callbacks)
-    losses = _chosen(
+    waits = _rows_where(waits, lambda row: (row["node"], row["callback"]) in callbacks)
+    losses = _rows_where(
         losses,
         lambda row: (
             (row["topic_name"] or _UNNAMED) in places
@@ -209,8 +209,8 @@ def _explained(
         place=place,
         verdict=replace(paths, table=verdict, header=None, notes=[], path_numbers={}),
         paths=paths,
-        nodes=_told(connection, "node_share", "breakdown", parts, path=path),
-        slow_flow=_told(connection, "longest_piece", "slow_flow", flow, count=_PIECES),
+        nodes=_derived(connection, "node_share", "breakdown", parts, path=path),
+        slow_flow=_derived(connection, "longest_piece", "slow_flow", flow, count=_PIECES),
         waits=waits.first(_WAITS),
         losses=losses,
         steps=tuple(dict.fromkeys(_steps(places, ends_here, pieces, losses, skipped))),
@@ -284,12 +284,12 @@ def _nothing(ask: Ask, place: str | None) -> NoFlowError:
     return NoFlowError(message, "msgflow check says where flows break off")
 
 
-def _chosen(result: QueryResult, is_wanted: Callable[[dict[str, Any]], bool]) -> QueryResult:
+def _rows_where(result: QueryResult, is_wanted: Callable[[dict[str, Any]], bool]) -> QueryResult:
     rows = result.table.to_pylist()
-    return _taken(result, [place for place, row in enumerate(rows) if is_wanted(row)])
+    return _rows_at(result, [place for place, row in enumerate(rows) if is_wanted(row)])
 
 
-def _taken(result: QueryResult, places: Sequence[int]) -> QueryResult:
+def _rows_at(result: QueryResult, places: Sequence[int]) -> QueryResult:
     import pyarrow
 
     # Table.take() would load pandas, which takes longer than all these rows.
@@ -304,10 +304,10 @@ def _worst_first(paths: QueryResult, first: str) -> QueryResult:
         range(len(rows)),
         key=lambda place: (rows[place]["path"] != first, -(rows[place]["p95_ns"] or 0)),
     )
-    return _taken(paths, places)
+    return _rows_at(paths, places)
 
 
-def _told(
+def _derived(
     connection: duckdb.DuckDBPyConnection, name: str, rows: str, of: QueryResult, **values: Value
 ) -> QueryResult:
     """Return what a statement makes of a result, whose rows it reads by this name."""
@@ -332,7 +332,7 @@ def _steps(
         yield _LINKS
     # A name that no trace has, such as a blank, may lead to no flow.
     if pieces:
-        yield from _into(pieces, since)
+        yield from _into_flow(pieces, since)
     if len(losses):
         topics = set(losses.table["topic_name"].to_pylist())
         named = (
@@ -343,7 +343,9 @@ def _steps(
         yield ("query", "topics", "--measure", "unmatched", *named)
 
 
-def _into(pieces: Sequence[dict[str, Any]], since: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
+def _into_flow(
+    pieces: Sequence[dict[str, Any]], since: tuple[str, ...]
+) -> Iterator[tuple[str, ...]]:
     longest = max(pieces, key=lambda row: row["duration_ns"])
     if of_state := _BY_STATE.get(longest["state"] or ""):
         yield ("query", "scheduling", "--measure", of_state, *since)

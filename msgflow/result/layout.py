@@ -93,7 +93,7 @@ def lay_out(
     zero_rows = 0
     if not keeps_all:
         result, zero_rows = _without_zero_rows(result)
-    kept, nothing = _that_say_something(result, keeps_all)
+    kept, nothing = _columns_with_content(result, keeps_all)
     first = result.table if most_rows is None else result.table.slice(0, most_rows)
     lines = _LINES_OF_ALL if is_whole or result.header is None else _LINES
     columns = [_column(result, name, first[name], lines) for name in kept]
@@ -105,12 +105,12 @@ def lay_out(
     if first.num_rows < len(result):
         notes.append(f"the first {first.num_rows} of {len(result):,} rows: {remedy}")
     if keeps_all or is_whole:
-        shown = columns if _least(columns) <= width else _broken(columns)
+        shown = columns if _least_width(columns) <= width else _with_broken_names(columns)
     else:
-        shown = _that_fit(result, columns, width)
+        shown = _columns_that_fit(result, columns, width)
     names = {column.name for column in shown}
     left_out = [column for column in columns if column.name not in names]
-    is_table = _least(shown) <= width and not (left_out and first.num_rows == 1)
+    is_table = _least_width(shown) <= width and not (left_out and first.num_rows == 1)
     if not keeps_all:
         brief = () if result.header is None else (*result.order, *result.header.brief)[:_ESSENTIAL]
         important = [column for column in columns if column.name in brief]
@@ -134,7 +134,7 @@ def _without_zero_rows(result: Rows) -> tuple[Rows, int]:
     return (replace(result, table=table), count) if table.num_rows else (result, 0)
 
 
-def _that_say_something(result: Rows, keeps_all: bool) -> tuple[list[str], list[str]]:
+def _columns_with_content(result: Rows, keeps_all: bool) -> tuple[list[str], list[str]]:
     """Return the columns with content, and the titles of those that are 0 or empty in all rows."""
     if keeps_all or not len(result):
         return list(result.columns), []
@@ -292,39 +292,43 @@ def _by_importance(result: Rows, columns: list[ShownColumn]) -> list[ShownColumn
     )
 
 
-def _that_fit(result: Rows, columns: list[ShownColumn], width: int) -> list[ShownColumn]:
+def _columns_that_fit(result: Rows, columns: list[ShownColumn], width: int) -> list[ShownColumn]:
     """Return the most important columns that fit, in the order of the result."""
-    if _least(columns) <= width:
+    if _least_width(columns) <= width:
         return columns
     ranked = _by_importance(result, columns)
-    chosen = _greedy(ranked, width)
+    chosen = _as_many_as_fit(ranked, width)
     # Paths and runs are shown besides those of `brief`.
     first = ranked[: _WANTED + sum(column.name in (PATH, RUN) for column in columns)]
     if any(column not in chosen for column in first):
         # Names are broken for the wanted columns only.
-        wanted = {column.name for column in _greedy(_broken(first), width)}
+        wanted = {column.name for column in _as_many_as_fit(_with_broken_names(first), width)}
         first = [column for column in ranked if column.name in wanted]
         rest = [column for column in ranked if column.name not in wanted]
-        chosen = _greedy(rest, width, first) if _least(first) <= width else _broken(first)
+        chosen = (
+            _as_many_as_fit(rest, width, first)
+            if _least_width(first) <= width
+            else _with_broken_names(first)
+        )
     by_name = {column.name: column for column in chosen}
     return [by_name[column.name] for column in columns if column.name in by_name]
 
 
-def _broken(columns: list[ShownColumn]) -> list[ShownColumn]:
+def _with_broken_names(columns: list[ShownColumn]) -> list[ShownColumn]:
     return [replace(column, least=column.broken) for column in columns]
 
 
-def _greedy(
+def _as_many_as_fit(
     ranked: list[ShownColumn], width: int, first: Sequence[ShownColumn] = ()
 ) -> list[ShownColumn]:
     chosen = list(first)
     for column in ranked:
-        if _least([*chosen, column]) <= width:
+        if _least_width([*chosen, column]) <= width:
             chosen.append(column)
     return chosen
 
 
-def _least(columns: list[ShownColumn]) -> int:
+def _least_width(columns: list[ShownColumn]) -> int:
     return sum(column.least for column in columns) + GAP * max(0, len(columns) - 1)
 
 

@@ -22,14 +22,12 @@ class TimeWords(TypedDict, total=False):
     end: str | int | None
 
 
-class RunWords(TypedDict, total=False):
-    """The runs of a slice, as a keyword of a method."""
+class SliceWords(TypedDict, total=False):
+    """A slice, as keywords of a method."""
 
     run: str | int | None
-
-
-class SliceWords(RunWords, TimeWords, total=False):
-    """A slice, as keywords of a method."""
+    start: str | int | None
+    end: str | int | None
 
 
 @dataclass(frozen=True)
@@ -56,34 +54,15 @@ class Slice:
         return not self.start is self.end is None
 
     def runs(self, connection: duckdb.DuckDBPyConnection) -> tuple[Run, ...]:
-        """Return the runs, none if the database holds none.
-
-        Raises:
-            UsageError: no such run, or a name that several runs have.
-        """
+        """Return the runs, none if the database holds none."""
         return choose_runs(read_runs(connection), self.run)
 
     def one_run(self, connection: duckdb.DuckDBPyConnection, what: str) -> Run:
-        """Return the only run, for something that reads one run.
-
-        Args:
-            connection: to a database with the public views.
-            what: that something for messages, such as 'a graph'.
-
-        Raises:
-            UsageError: no such run, no run at all, or several.
-        """
+        """Return the only run, for something that reads one, such as 'a graph'."""
         return choose_one(read_runs(connection), self.run, what)
 
     def window(self, runs: Sequence[Run]) -> Window:
-        """Return the time window, without limits if none are given.
-
-        Args:
-            runs: the runs of the slice.
-
-        Raises:
-            UsageError: a time that cannot be read or is out of range, or an empty window.
-        """
+        """Return the time window of these runs, without limits if none are given."""
         limits = {}
         if self.start is not None:
             limits["start_ns"] = time_point(self.start, runs, "--start")

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     import duckdb
     import pyarrow as pa
 
+_AT_ONCE = 20_000
+
 
 class Statements:
     """The statements of a folder and those below it.
@@ -67,6 +69,14 @@ class Statements:
         (statement,) = connection.extract_statements(self.text(name))
         bound = self._bound(name, statement, values)
         return connection.sql(statement, params=bound)
+
+    def rows(
+        self, connection: duckdb.DuckDBPyConnection, name: str, values: Mapping[str, Any]
+    ) -> Iterator[dict[str, Any]]:
+        """Yield the rows of a statement; memory never holds all of them."""
+        with self.run(connection, name, values).to_arrow_reader(_AT_ONCE) as reader:
+            for batch in reader:
+                yield from batch.to_pylist()
 
     def keep(
         self, connection: duckdb.DuckDBPyConnection, name: str, values: Mapping[str, Any]

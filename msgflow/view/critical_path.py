@@ -16,30 +16,23 @@ from msgflow.view.page_query import run_page_query
 from msgflow.view.table_encoding import encode
 
 if TYPE_CHECKING:
-    import duckdb
+    from msgflow.sql.value import Value
+    from msgflow.view.question import Question
 
-    from msgflow.run.choice import Run
 
-
-def critical_path(
-    connection: duckdb.DuckDBPyConnection,
-    run: Run,
-    origin_ns: int,
-    kind: str,
-    number: int,
-    from_topic: str | None = None,
-) -> bytes:
+def critical_path(asked: Question) -> bytes:
     """Return the pieces of the critical path as bytes, with the command that prints them.
 
     It belongs to the longest flow that ends where the picked one does, see critical_end.sql. It
-    starts on `from_topic`, or when None on the topic of its first message.
+    starts on the topic `from`, or without it on the topic of its first message.
     """
-    ends = run_page_query(connection, "critical_end", {"kind": kind, "id": number}).to_pylist()
+    picked: dict[str, Value] = {"kind": asked.kind, "id": asked.whole("id")}
+    ends = run_page_query(asked.connection, "critical_end", picked).to_pylist()
     if not ends:
         return encode(pa.table({"at_ns": pa.array([], pa.int64())}))
     (end,) = ends
-    first = from_topic or end["from_topic"]
-    asked = {
+    first = str(asked.params.get("from") or end["from_topic"])
+    chosen: dict[str, Value] = {
         "from": [first],
         "to": [end["to_topic"]],
         "take": end["take_id"],
@@ -48,8 +41,8 @@ def critical_path(
         "detail": "full",
     }
     header = load_query("critical-path")
-    result = run_query(connection, header, asked, Slice(run.run_id))
-    command = ["msgflow", "flow", "--take", str(asked["take"]), "--why"]
+    result = run_query(asked.connection, header, chosen, Slice(asked.run.run_id))
+    command = ["msgflow", "flow", "--take", str(end["take_id"]), "--why"]
     # The page shows the path itself.
     shown = replace(
         result,
@@ -59,7 +52,7 @@ def critical_path(
     meta = {
         "from": first,
         "to": end["to_topic"],
-        "take_id": asked["take"],
+        "take_id": end["take_id"],
         "command": shell_joined([*command, "--from", first, "--detail", "full"]),
     }
-    return encoded_result(shown, meta, origin_ns)
+    return encoded_result(shown, meta, asked.origin_ns)

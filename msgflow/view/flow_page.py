@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import pyarrow as pa
 from pyarrow import compute
@@ -13,6 +13,7 @@ from msgflow.run.window import Window
 from msgflow.view.critical_path import critical_path
 from msgflow.view.page_query import run_page_query
 from msgflow.view.pages import Pages
+from msgflow.view.question import Params, Question
 from msgflow.view.single_page import Parts, single_page
 from msgflow.view.table_encoding import encode
 
@@ -44,23 +45,22 @@ def write_flow_page(
 ) -> int:
     """Write the timeline of everything that a thing led to and came from; return its bytes."""
     pages = Pages()
-    params: dict[str, Any] = {"run": str(run.run_id)}
-    extent = pages.extent(connection, params)
-    asked: dict[str, Any] = {
-        "origin_ns": extent.origin_ns, "kind": kind, "id": number, "direction": direction,
+    params: Params = {"run": str(run.run_id)}
+    asked = Question(connection, {**params, "kind": kind, "id": number})
+    flow = run_page_query(connection, "flow", {
+        "origin_ns": asked.origin_ns, "kind": kind, "id": number, "direction": direction,
         "limit": limit, "steps": depth * STEPS_PER_MESSAGE,
-    }  # fmt: skip
-    flow = run_page_query(connection, "flow", asked)
+    })  # fmt: skip
     ((count,),) = connection.execute(_COUNTS[direction], [kind, number]).fetchall()
     bars = flow.group_by(_BAR, use_threads=False).aggregate([])
     begin = compute.min(bars["start_at"]).as_py() or 0
     end = compute.max(compute.add(bars["start_at"], bars["length"])).as_py() or 0
     known = compute.is_valid(flow["from_id"])
     edges = flow.filter(known).select(["kind", "id", "from_kind", "from_id", "link_kind"])
-    window = Window(extent.origin_ns + begin - 1, extent.origin_ns + end + 1)
-    rows = run_page_query(connection, "row", {"run": run.run_id})
-    links = pages.links(connection, extent.frame(window), 2**40)
-    events = run_page_query(connection, "event", extent.frame(window))
+    window = Window(asked.origin_ns + begin - 1, asked.origin_ns + end + 1)
+    rows = asked.rows("row")
+    links = asked.links(2**40, window)
+    events = asked.rows("event", window)
     instances = bars.filter(compute.equal(bars["kind"], 0))["id"]
     events = events.filter(compute.is_in(events["id"], instances))
     shown = pa.concat_tables([bars, events.select(bars.column_names).cast(bars.schema)])
@@ -77,10 +77,7 @@ def write_flow_page(
     parts.add("row?", encode(rows.filter(compute.is_in(rows["row_key"], shown["row_key"]))))
     for name in ("gap", "thread_name"):
         parts.add(f"{name}?", pages.answer(connection, name, params))
-    parts.add(
-        f"critical?id={number}&kind={kind}",
-        critical_path(connection, run, extent.origin_ns, kind, number),
-    )
+    parts.add(f"critical?id={number}&kind={kind}", critical_path(asked))
     parts.add("detail?place=0", encode(shown))
     # Arrows that lead to a bar of the flow, from a row of it.
     to_bars = links.filter(compute.is_in(links["from_row"], bars["row_key"])).join(

@@ -7,7 +7,7 @@ around the slowest flows of each path, with the whole run in bins beside them.
 from __future__ import annotations
 
 import gzip
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
@@ -22,12 +22,8 @@ from msgflow.run.window import WHOLE, Window
 from msgflow.text.values import format_duration
 from msgflow.view.encoded import encoded_comparison, encoded_section
 from msgflow.view.page_query import run_page_query
-from msgflow.view.pages import (
-    LEVEL_BINS,
-    NAMED,
-    SUMMARY,
-    Pages,
-)
+from msgflow.view.pages import LEVEL_BINS, NAMED, SUMMARY, Pages, named
+from msgflow.view.question import Params, Question
 from msgflow.view.single_page import Parts, single_page
 from msgflow.view.summary import change_section, verdict_section
 from msgflow.view.summary_markdown import markdown
@@ -93,7 +89,9 @@ def write_report(
 ) -> Report:
     """Write the pages of a run into one file that any browser opens, or its summary as Markdown."""
     one = part.one_run(connection, "a report")
-    maker = _Maker(connection, one.run_id, part.window([one]), verification, through, max_size)
+    window = part.window([one])
+    asked = Question(connection, {"run": one.run_id}, window)
+    maker = _Maker(asked, Pages(window), verification, through, max_size)
     try:
         if path.suffix.lower() == MARKDOWN:
             content, notes = maker.make_markdown(compare)
@@ -112,72 +110,63 @@ def write_report(
     return Report(path, len(written), one, tuple(notes))
 
 
+@dataclass
 class _Maker:
-    def __init__(
-        self,
-        connection: duckdb.DuckDBPyConnection,
-        run: int,
-        window: Window,
-        verification: Verification | None,
-        through: str | None,
-        max_size: int,
-    ) -> None:
-        self.connection = connection
-        self.params: dict[str, Any] = {"run": run}
-        self.pages = Pages(window)
-        self.extent = self.pages.extent(connection, self.params)
-        self.window = window
-        self.through = through
-        self.max_size = max_size
-        self.notes: list[str] = []
-        self.parts = Parts()
-        self.named: dict[str, QueryResult] = {}
-        self.verification = verification
+    """Makes a report: it keeps the answers to what its pages will ask, each under its question."""
+
+    asked: Question
+    pages: Pages
+    verification: Verification | None
+    through: str | None
+    max_size: int
+    notes: list[str] = field(default_factory=list)
+    parts: Parts = field(default_factory=Parts)
+    named: dict[str, QueryResult] = field(default_factory=dict)
 
     def answer(self, name: str, /, **params: Any) -> bytes:
-        return self.pages.answer(self.connection, name, self.params | params)
+        return self.pages.answer(self.asked.connection, name, self.asked.params | params)
 
     def keep(self, name: str, /, **params: Any) -> None:
         known = "&".join(sorted(f"{key}={value}" for key, value in params.items()))
         self.parts.add(f"{name}?{known}", self.answer(name, **params))
 
     def make(self, compare: str | int | None) -> tuple[str, list[str]]:
-        shown = self.shown()
-        other = None if compare is None else self.other(compare)
-        self.runs(other)
+        shown = self.shown_window()
+        other = None if compare is None else self.other_run(compare)
+        self.keep_runs(other)
         self.keep("finding")
         for name in NAMED:
-            self.named[name], content = self.pages.named(self.connection, name, self.params)
+            self.named[name], content = named(self.asked, name)
             self.parts.add(f"query?name={name}", content)
         for name in (
             "row", "gap", "path", "executor_node", "executor_share", "callback", "loss",
             "loss_point", "thread_name",
         ):  # fmt: skip
             self.keep(name)
-        self.panels()
-        chosen = self.paths()
+        self.keep_panels()
+        chosen = self.keep_paths()
         comparison = None
         if other is not None:
-            comparison = self.comparison(other)
-            self.compared(other, comparison, chosen)
+            comparison = self.compare_with(other)
+            self.keep_comparison(other, comparison, chosen)
         sections = self.sections(comparison)
         for section in sections:
-            content = encoded_section(section, self.extent.origin_ns)
+            content = encoded_section(section, self.asked.origin_ns)
             self.parts.add(f"summary?part={section.name}", content)
         names = [section.name for section in sections]
-        said = {"summary": names, "absent": self.absent(other)}
-        head = self.timeline(shown, chosen, said)
+        said = {"summary": names, "absent": self.empty_pages(other)}
+        head = self.keep_timeline(shown, chosen, said)
         return single_page(self.parts, head), self.notes
 
     def make_markdown(self, compare: str | int | None) -> tuple[str, list[str]]:
-        self.shown()
-        run = self.extent.run
+        self.shown_window()
+        run = self.asked.run
         if self.through is not None:
-            self.chosen(run_page_query(self.connection, "path", {"run": run.run_id}))
+            self.paths_through(self.asked.rows("path"))
             self.notes.append(f"Its slowest paths are those with {self.through} (--through).")
-        comparison = None if compare is None else self.comparison(self.other(compare))
+        comparison = None if compare is None else self.compare_with(self.other_run(compare))
         (row,) = [
-            row for row in run_page_query(self.connection, "run", {}).to_pylist()
+            row for row in run_page_query(self.asked.connection, "run", {}).to_pylist()
             if row["run_id"] == run.run_id
         ]  # fmt: skip
         facts = [
@@ -186,57 +175,49 @@ class _Maker:
             f"{row['host_count']} {'host' if row['host_count'] == 1 else 'hosts'}",
             f"msgflow {row['msgflow_version']}",
         ]
-        findings = read_findings(self.connection, [run.run_id])
+        findings = read_findings(self.asked.connection, [run.run_id])
         sections = self.sections(comparison)
         return markdown(run, facts, self.notes, findings, sections), self.notes
 
-    def shown(self) -> Window:
+    def shown_window(self) -> Window:
         """Return the times that the report shows; note that they are not the whole run."""
-        extent = self.extent
-        begin = max(extent.origin_ns, self.window.start_ns)
-        end = min(extent.origin_ns + extent.length_ns + 1, self.window.end_ns)
-        if extent.length_ns and begin >= end:
+        origin_ns, length_ns = self.asked.origin_ns, self.asked.length_ns
+        begin = max(origin_ns, self.asked.shown.start_ns)
+        end = min(origin_ns + length_ns + 1, self.asked.shown.end_ns)
+        if length_ns and begin >= end:
             raise UsageError(
                 "nothing was recorded in the time window",
-                f"the run lasts {extent.length_ns / 1e9:.3f} s: --start 0s",
+                f"the run lasts {length_ns / 1e9:.3f} s: --start 0s",
             )
-        if self.window != WHOLE:
+        if self.asked.shown != WHOLE:
             self.notes.append(
-                f"Only {(begin - extent.origin_ns) / 1e9:.3f} s to"
-                f" {(end - extent.origin_ns) / 1e9:.3f} s of the run are in this report"
+                f"Only {(begin - origin_ns) / 1e9:.3f} s to"
+                f" {(end - origin_ns) / 1e9:.3f} s of the run are in this report"
                 " (--start, --end)."
             )
         return Window(begin, end)
 
-    def comparison(self, other: Run) -> Comparison:
-        return compare_runs(self.connection, str(other.run_id), str(self.extent.run.run_id))
+    def compare_with(self, other: Run) -> Comparison:
+        return compare_runs(self.asked.connection, str(other.run_id), str(self.asked.run.run_id))
 
     def sections(self, comparison: Comparison | None) -> list[Section]:
         through = self.through or ""
-        return [
-            *(
-                []
-                if self.verification is None
-                else [verdict_section(self.verification, self.pages.part(self.extent, {}))]
-            ),
-            *([] if comparison is None else [change_section(comparison)]),
-            *(self.pages.summary(self.connection, self.extent, part, through) for part in SUMMARY),
-        ]
+        sections = [self.pages.summary(self.asked, part, through) for part in SUMMARY]
+        if comparison is not None:
+            sections.insert(0, change_section(comparison))
+        if self.verification is not None:
+            sections.insert(0, verdict_section(self.verification, self.asked.options))
+        return sections
 
-    def absent(self, other: Run | None) -> list[str]:
+    def empty_pages(self, other: Run | None) -> list[str]:
         """Return the pages that would show nothing."""
         needed = {"paths": "path", "graph": "row", "timeline": "row"}
-        run = {"run": self.extent.run.run_id}
-        empty = [
-            page
-            for page, name in needed.items()
-            if not run_page_query(self.connection, name, run).num_rows
-        ]
+        empty = [page for page, name in needed.items() if not self.asked.rows(name).num_rows]
         named = {"nodes": "info-nodes", "topics": "topics-summary"}
         empty += [page for page, name in named.items() if not len(self.named[name])]
         return [*empty, *([] if other else ["compare"])]
 
-    def panels(self) -> None:
+    def keep_panels(self) -> None:
         """Keep what callbacks, topics and services did over time: of the first ones of each."""
         for query, column, key, names in _PANELS:
             for value in dict.fromkeys(
@@ -246,30 +227,29 @@ class _Maker:
                 for name in names:
                     self.keep(name, **given)
 
-    def other(self, compare: str | int) -> Run:
-        other = Slice(compare).one_run(self.connection, "the other side")
-        if other.run_id == self.extent.run.run_id:
+    def other_run(self, compare: str | int) -> Run:
+        other = Slice(compare).one_run(self.asked.connection, "the other side")
+        if other.run_id == self.asked.run.run_id:
             raise UsageError("a run is not compared with itself", "give another --compare")
         return other
 
-    def runs(self, other: Run | None) -> None:
-        table = run_page_query(self.connection, "run", {})
-        wanted = [*([] if other is None else [other.run_id]), self.extent.run.run_id]
+    def keep_runs(self, other: Run | None) -> None:
+        table = run_page_query(self.asked.connection, "run", {})
+        wanted = [*([] if other is None else [other.run_id]), self.asked.run.run_id]
         rows = [table.filter(compute.equal(table["run_id"], run_id)) for run_id in wanted]
         self.parts.add("run", encode(pa.concat_tables(rows)))
 
-    def paths(self) -> list[int]:
+    def keep_paths(self) -> list[int]:
         """Keep the pictures of paths; return the numbers of those kept."""
-        rows = run_page_query(self.connection, "path", {"run": self.extent.run.run_id})
-        numbers = self.chosen(rows)
+        rows = self.asked.rows("path")
+        numbers = self.paths_through(rows)
         if self.through is not None:
             self.notes.append(
                 f"Pictures of {len(numbers)} of {rows.num_rows} paths are in this report, and the"
                 f" timeline has the rows on these: those with {self.through} (--through)."
             )
         if numbers:
-            self.pages.fill_flows(self.connection, self.extent)
-            worst = self.pages.ask("path_slowest", {"run": self.extent.run.run_id, "limit": 1})
+            worst = self.pages.slowest_flows(self.asked)
             longest = dict(
                 zip(worst["path_id"].to_pylist(), worst["latency"].to_pylist(), strict=True)
             )
@@ -284,10 +264,12 @@ class _Maker:
                 self.keep(name, path=number)
         self.keep("path_slowest", limit=1)
         if numbers:
-            self.critical(worst.filter(compute.is_in(worst["path_id"], pa.array(numbers))), rows)
+            self.keep_critical_paths(
+                worst.filter(compute.is_in(worst["path_id"], pa.array(numbers))), rows
+            )
         return numbers
 
-    def chosen(self, paths: pa.Table) -> list[int]:
+    def paths_through(self, paths: pa.Table) -> list[int]:
         numbers: list[int] = paths["path_id"].to_pylist()
         if self.through is None:
             return numbers
@@ -297,7 +279,7 @@ class _Maker:
             raise UsageError(f"no path has this text — {self.through}", "msgflow query e2e-latency")
         return numbers
 
-    def critical(self, slowest: pa.Table, paths: pa.Table) -> None:
+    def keep_critical_paths(self, slowest: pa.Table, paths: pa.Table) -> None:
         """Keep the critical paths of the slowest flows: of few, as each takes a query."""
         topics = zip(paths["path_id"].to_pylist(), paths["topics"].to_pylist(), strict=True)
         first = {path: names[0] for path, names in topics}
@@ -311,47 +293,46 @@ class _Maker:
             content = self.answer("critical", kind="take", id=take, **{"from": topic})
             self.parts.add(f"critical?id={take}&kind=take", content)
 
-    def compared(self, other: Run, comparison: Comparison, chosen: list[int]) -> None:
+    def keep_comparison(self, other: Run, comparison: Comparison, chosen: list[int]) -> None:
         content = encoded_comparison(comparison, "paths")
         self.parts.add(f"compare?other={other.run_id}&what=paths", content)
         for what in ("callbacks", "topics"):
             self.keep("compare", other=other.run_id, what=what)
-        params = {"run": other.run_id}
-        extent = self.pages.extent(self.connection, params)
+        params: Params = {"run": other.run_id}
         for name in ("path", "row"):
             self.parts.add(
-                f"{name}?@{other.run_id}", self.pages.answer(self.connection, name, params)
+                f"{name}?@{other.run_id}", self.pages.answer(self.asked.connection, name, params)
             )
-        rows = run_page_query(self.connection, "path", {"run": extent.run.run_id})
+        rows = Question(self.asked.connection, params).rows("path")
         for number in rows["path_id"].to_pylist()[:MOST_PATHS]:
             self.parts.add(
                 f"path_share?path={number}@{other.run_id}",
-                self.pages.answer(self.connection, "path_share", params | {"path": number}),
+                self.pages.answer(self.asked.connection, "path_share", params | {"path": number}),
             )
         # The page of the comparison shows the distributions of both runs for any path.
-        own = run_page_query(self.connection, "path", {"run": self.extent.run.run_id})
-        for number in own["path_id"].to_pylist()[:MOST_PATHS]:
+        for number in self.asked.rows("path")["path_id"].to_pylist()[:MOST_PATHS]:
             if number not in chosen:
                 self.keep("path_share", path=number)
 
-    def timeline(self, window: Window, paths: list[int], said: dict[str, Any]) -> dict[str, Any]:
+    def keep_timeline(
+        self, window: Window, paths: list[int], said: dict[str, Any]
+    ) -> dict[str, Any]:
         """Keep bars, arrows and links; return the head, which says that beside what is `said`."""
-        origin = self.extent.origin_ns
+        origin = self.asked.origin_ns
         head: dict[str, Any] = said | {
             "start": window.start_ns - origin,
             "end": window.end_ns - origin,
             "stretches": [],
             "count": 0,
         }
-        values = self.extent.frame(window)
-        if not self.extent.length_ns:
-            self.stretch(0, window, None)
-            self.parts.add("edge?", encode(self.edges(window)))
+        if not self.asked.length_ns:
+            self.keep_stretch(0, window, None)
+            self.parts.add("edge?", encode(self.asked.rows("edge", window)))
             head["stretches"] = [{"start": 0, "end": 1, "whole": True}]
             head["notes"] = self.notes
             return head
         rows = self.rows_on(paths) if self.through is not None else None
-        (count,) = run_page_query(self.connection, "segment_count", values)["count"].to_pylist()
+        (count,) = self.asked.rows("segment_count", window)["count"].to_pylist()
         head["count"] = count
         used = len(single_page(self.parts, head | {"notes": self.notes}).encode())
         room = self.max_size - used
@@ -361,18 +342,17 @@ class _Maker:
                 "give a larger --max-size, or cut the report with --start, --end or --through",
             )
         if count * _BYTES_PER_BAR <= room or rows is not None:
-            self.stretch(0, window, rows)
-            self.parts.add("edge?", encode(self.edges(window)))
+            self.keep_stretch(0, window, rows)
+            self.parts.add("edge?", encode(self.asked.rows("edge", window)))
             head["stretches"] = [{"start": head["start"], "end": head["end"], "whole": True}]
         else:
-            self.thinned(head, window, room, count)
+            self.keep_thinned(head, window, room, count)
         head["notes"] = self.notes
         return head
 
-    def stretch(self, place: int, window: Window, rows: list[int] | None) -> int:
-        values = self.extent.frame(window)
-        table = run_page_query(self.connection, "segments", values)
-        links = self.pages.links(self.connection, values, 2**40)
+    def keep_stretch(self, place: int, window: Window, rows: list[int] | None) -> int:
+        table = self.asked.rows("segments", window)
+        links = self.asked.links(2**40, window)
         if rows is not None:
             known = pa.array(rows, pa.int64())
             table = table.filter(compute.is_in(table["row_key"], known))
@@ -386,17 +366,14 @@ class _Maker:
         self.parts.add(f"links?place={place}", encode(links))
         return int(table.num_rows)
 
-    def edges(self, window: Window) -> pa.Table:
-        return run_page_query(self.connection, "edge", self.extent.frame(window))
-
     def rows_on(self, paths: list[int]) -> list[int]:
         """Return the rows of the timeline on some paths: objects, timers, events, executors."""
-        chosen = run_page_query(self.connection, "path", {"run": self.extent.run.run_id})
+        chosen = self.asked.rows("path")
         chosen = chosen.filter(compute.is_in(chosen["path_id"], pa.array(paths, pa.int64())))
         publishers = {one for several in chosen["publishers"].to_pylist() for one in several}
         subscriptions = {one for several in chosen["subscriptions"].to_pylist() for one in several}
         keys = {8 * one + 4 for one in publishers} | {8 * one + 1 for one in subscriptions}
-        rows = run_page_query(self.connection, "row", {"run": self.extent.run.run_id}).to_pylist()
+        rows = self.asked.rows("row").to_pylist()
         nodes = {(row["process_id"], row["node"]) for row in rows if row["row_key"] in keys}
         processes = {process for process, _ in nodes}
         return [
@@ -411,14 +388,13 @@ class _Maker:
             or row["kind"] == "core"
         ]
 
-    def thinned(self, head: dict[str, Any], window: Window, room: int, count: int) -> None:
+    def keep_thinned(self, head: dict[str, Any], window: Window, room: int, count: int) -> None:
         """Keep the run in bins, and single bars around the slowest flows."""
-        origin = self.extent.origin_ns
-        values = self.extent.frame(window)
+        origin = self.asked.origin_ns
         bins = LEVEL_BINS
         while True:
             bin_ns = (window.end_ns - window.start_ns) // bins + 1
-            table = run_page_query(self.connection, "segments", values | {"bin_ns": bin_ns})
+            table = self.asked.rows("segments", window, bin_ns=bin_ns)
             level = encode(table, units={})
             size = len(gzip.compress(level, compresslevel=1)) * 4 // 3
             if size <= room * _LEVEL_SHARE or bins <= 256:
@@ -430,8 +406,7 @@ class _Maker:
         each = window.end_ns - window.start_ns
         share = max(room, 0) / (count * _BYTES_PER_BAR)
         # When the slowest flow of each path began, the slowest first.
-        self.pages.fill_flows(self.connection, self.extent)
-        worst = self.pages.ask("path_slowest", {"run": self.extent.run.run_id, "limit": 1})
+        worst = self.pages.slowest_flows(self.asked)
         begins = worst.sort_by([("latency", "descending")])["root_at"].to_pylist()
         middles = begins[:_STRETCHES] or [window.start_ns - origin + each // 2]
         length = max(int(each * share / len(middles)), 1)
@@ -444,8 +419,10 @@ class _Maker:
                 stretches[-1] = Window(last.start_ns, max(high, last.end_ns))
             else:
                 stretches.append(Window(low, high))
-        held = sum(self.stretch(place, stretch, None) for place, stretch in enumerate(stretches))
-        edges = pa.concat_tables(map(self.edges, stretches))
+        held = sum(
+            self.keep_stretch(place, stretch, None) for place, stretch in enumerate(stretches)
+        )
+        edges = pa.concat_tables(self.asked.rows("edge", stretch) for stretch in stretches)
         distinct = edges.group_by(edges.column_names).aggregate([])
         order = [
             (name, "ascending")

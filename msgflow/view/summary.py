@@ -24,13 +24,10 @@ from msgflow.text.shell import shell_joined
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import duckdb
-
     from msgflow.query.compare import Comparison
-    from msgflow.run.choice import Run
-    from msgflow.run.slice import Slice
     from msgflow.sql.value import Value
     from msgflow.verify import Verification
+    from msgflow.view.question import Question
 
 # The slowest paths whose latency is taken apart.
 MOST_PATHS = 3
@@ -116,73 +113,52 @@ class Section:
         return _WHEN_EMPTY[self.name]
 
 
-@dataclass(frozen=True)
-class Part:
-    """The run and the window that a section is about."""
-
-    slice: Slice  # as queries read it
-    options: Sequence[str] = ()  # of the command line, which choose the same window
-
-
-def query_section(
-    connection: duckdb.DuckDBPyConnection, run: Run, part: Part, name: str, through: str = ""
-) -> Section:
+def query_section(asked: Question, name: str, through: str = "") -> Section:
     """Return 'paths', 'drops' or 'threads' of a run."""
     query, selection = _QUERIES[name]
     if through and name == "paths":
         where = f"{selection.where} AND contains(path, {literal(through)})"
         selection = replace(selection, where=where)
-    header = load_query(query)
-    result = run_query(connection, header, {}, part.slice, selection=selection)
-    words = [*header.command.split(), "--where", selection.where or ""]
-    words += ["--sort", *selection.sort, "--limit", str(selection.limit)]
-    command = shell_joined([*words, *part.options, "--run", run.name])
-    return Section(name, result, (command,))
+    return _chosen(asked, name, query, selection)
 
 
-def why_section(connection: duckdb.DuckDBPyConnection, run: Run, part: Part) -> Section:
+def why_section(asked: Question) -> Section:
     """Return the verdict of `msgflow why`: a sentence for each culprit, the worst first."""
-    command = shell_joined(["msgflow", "why", *part.options, "--run", run.name])
+    command = shell_joined(["msgflow", "why", *asked.options, "--run", asked.run.name])
     try:
-        return Section("why", explain(connection, run, part.slice).verdict, (command,))
+        verdict = explain(asked.connection, asked.run, asked.slice).verdict
     except NoFlowError:
         return Section("why", QueryResult(pa.table({"sentence": pa.array([], pa.string())})), ())
+    return Section("why", verdict, (command,))
 
 
-def area_section(
-    connection: duckdb.DuckDBPyConnection,
-    run: Run,
-    part: Part,
-    name: str,
-    of: Sequence[str | int],
-) -> Section:
+def area_section(asked: Question, name: str, of: Sequence[str | int]) -> Section:
     """Return sums of a part of the timeline."""
     if name not in _AREA:
         raise UsageError(f"there are no such sums — {name}", f"one of {', '.join(_AREA)}")
     query, sort = _AREA[name]
     column = "node" if name == "callbacks" else "thread_id"
     wanted = ", ".join(literal(each) if isinstance(each, str) else str(int(each)) for each in of)
-    where = f"{column} IN ({wanted})"
+    return _chosen(asked, name, query, Selection(where=f"{column} IN ({wanted})", sort=(sort,)))
+
+
+def _chosen(asked: Question, name: str, query: str, selection: Selection) -> Section:
+    """Return the section with the rows of a query that are chosen."""
     header = load_query(query)
-    selection = Selection(where=where, sort=(sort,))
-    result = run_query(connection, header, {}, part.slice, selection=selection)
-    words = [*header.command.split(), "--where", where, "--sort", sort]
-    command = shell_joined([*words, *part.options, "--run", run.name])
+    result = run_query(asked.connection, header, {}, asked.slice, selection=selection)
+    words = [*header.command.split(), "--where", selection.where or "", "--sort", *selection.sort]
+    words += [] if selection.limit is None else ["--limit", str(selection.limit)]
+    command = shell_joined([*words, *asked.options, "--run", asked.run.name])
     return Section(name, result, (command,))
 
 
-def blame_section(
-    connection: duckdb.DuckDBPyConnection,
-    run: Run,
-    part: Part,
-    flows: Sequence[tuple[str, str, int]],
-) -> Section:
+def blame_section(asked: Question, flows: Sequence[tuple[str, str, int]]) -> Section:
     """Return how long each node took of each flow, the slowest flow first."""
     header = load_query("critical-path")
     results, commands = [], []
     for rank, (first, last, take) in enumerate(flows, 1):
         given: dict[str, Value] = {"from": [first], "to": [last], "take": take, "by": "node"}
-        result = run_query(connection, header, given, part.slice)
+        result = run_query(asked.connection, header, given, asked.slice)
         table = result.table
         ranks = pa.array([rank] * len(result), pa.int64())
         results.append(table.set_column(table.column_names.index("rank"), "rank", ranks))
@@ -193,13 +169,13 @@ def blame_section(
     return Section("blame", replace(result, table=pa.concat_tables(results)), tuple(commands))
 
 
-def verdict_section(verification: Verification, part: Part) -> Section:
+def verdict_section(verification: Verification, options: Sequence[str]) -> Section:
     """Return the verdicts on requirements for a run and window, those that are not met first."""
     numbers = [
         f"{verification.count(verdict)} {verdict}"
         for verdict in ("failed", "not measured", "no data", "passed")
     ]
-    words = ["msgflow", "verify", verification.file, *part.options]
+    words = ["msgflow", "verify", verification.file, *options]
     if verification.paths != DEFAULT_PATHS:
         words += ["--paths", verification.paths]
     command = shell_joined([*words, "--run", verification.run.name])

@@ -9,7 +9,8 @@ import pytest
 
 from msgflow.database import Database
 from msgflow.errors import UsageError
-from msgflow.paths import read_paths, suggest_paths
+from msgflow.paths.paths_file import read_paths
+from msgflow.paths.suggested_paths import suggest_paths
 
 GOOD = """\
 paths:

@@ -200,7 +200,7 @@ def test_headers_of_what_the_program_asks_are_those_of_its_sql(
     values |= {p.name: [1, 1] if p.type.endswith("[]") else 1 for p in file.header.params} | values
     # Those without columns say of what they have the columns; some read what is made for them.
     made = ("changes", "fleet_run_value", "fleet_comparison", "bag_joined", "bag_topic")
-    made += ("node_share", "change_part")
+    made += ("node_share", "change_part", "otlp_request")
     made += ("suspect", "verdict", "warm_up", "why_callback")
     if file.header.columns and name not in made:
         assert described(internal_sql().run(connection, name, values)) == declared(file)

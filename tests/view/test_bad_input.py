@@ -15,7 +15,7 @@ from hostile import HOSTILE, renamed
 from served import Page, Served
 from thorough import few, thorough
 
-from msgflow.cli.report import read_size
+from msgflow.cli.options import bytes_of
 from msgflow.database import open_db
 from msgflow.errors import UsageError
 from msgflow.run.window import Window
@@ -266,13 +266,13 @@ def test_a_browser_without_what_the_page_needs(
 @pytest.mark.parametrize("text", ["", "0", "-1MB", "2 TB", "lots", "1e9", "20GB"])
 def test_sizes_that_make_no_sense(text: str) -> None:
     with pytest.raises(UsageError, match="cannot read the size"):
-        read_size(text)
+        bytes_of(text, "--max-size 20MB", 1e9)
 
 
 def test_sizes() -> None:
-    assert read_size("20MB") == 20_000_000
-    assert read_size("1.5 kB") == 1_500
-    assert read_size("77") == 77
+    assert bytes_of("20MB", "") == 20_000_000
+    assert bytes_of("1.5 kB", "") == 1_500
+    assert bytes_of("77", "") == 77
 
 
 def said_bytes(raised: pytest.ExceptionInfo[UsageError]) -> int:

@@ -16,6 +16,7 @@ from thorough import thorough
 from msgflow.sql.statement import Statements
 from msgflow.view.page_query import DIRECTORY, page_query, run_page_query
 from msgflow.view.pages import LEVEL_BINS, Pages
+from msgflow.view.question import Question
 
 PAGES = Statements(DIRECTORY)
 NAMES = PAGES.names()
@@ -23,10 +24,8 @@ OVER_SCRATCH = {"level", "path_histogram", "path_point", "path_share", "path_slo
 Read = Callable[[Path], duckdb.DuckDBPyConnection]
 
 
-def values(connection: duckdb.DuckDBPyConnection, pages: Pages, run: int | None = None) -> Any:
-    params = {} if run is None else {"run": str(run)}
-    extent = pages.extent(connection, params)
-    return extent.frame(pages.window(extent, params))
+def values(connection: duckdb.DuckDBPyConnection, run: int | None = None) -> Any:
+    return Question(connection, {} if run is None else {"run": str(run)}).frame()
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -60,8 +59,7 @@ def test_numbers_of_rows_and_pieces_have_bounds() -> None:
 
 def test_bars_are_the_instances_of_the_views(demo: Path, read: Read) -> None:
     connection = read(demo)
-    pages = Pages()
-    bars = run_page_query(connection, "segments", values(connection, pages))
+    bars = run_page_query(connection, "segments", values(connection))
     connection.register("bars", bars)
     ((origin,),) = connection.execute("SELECT start_ns FROM run").fetchall()
     for kind, sql in enumerate((
@@ -86,7 +84,7 @@ def test_lanes_of_executors_are_what_their_threads_did(
     simulated: Callable[..., Path], read: Read
 ) -> None:
     connection = read(simulated("multi_threaded", 0.3))
-    bars = run_page_query(connection, "segments", values(connection, Pages()))
+    bars = run_page_query(connection, "segments", values(connection))
     connection.register("bars", bars)
     ((origin,),) = connection.execute("SELECT start_ns FROM run").fetchall()
     for kind, sql in (
@@ -127,7 +125,7 @@ def test_every_bar_has_a_row(
     name: str, run: int, request: pytest.FixtureRequest, read: Read
 ) -> None:
     connection = read(request.getfixturevalue(name))
-    known = values(connection, Pages(), run)
+    known = values(connection, run)
     bars = run_page_query(connection, "segments", known)
     rows = run_page_query(connection, "row", {"run": run})
     keys = rows["row_key"].to_pylist()
@@ -137,11 +135,9 @@ def test_every_bar_has_a_row(
 
 def test_a_window_has_the_bars_that_overlap_it(demo: Path, read: Read) -> None:
     connection = read(demo)
-    pages = Pages()
-    extent = pages.extent(connection, {})
-    whole = run_page_query(connection, "segments", values(connection, pages)).to_pylist()
+    whole = run_page_query(connection, "segments", values(connection)).to_pylist()
     window = {"start": 700_000_000, "end": 900_000_000}
-    known = extent.frame(pages.window(extent, window))
+    known = Question(connection, window).frame()
     part = run_page_query(connection, "segments", known).to_pylist()
     wanted = [
         bar
@@ -156,8 +152,7 @@ def test_a_window_has_the_bars_that_overlap_it(demo: Path, read: Read) -> None:
 
 def test_bins_lose_nothing(demo: Path, read: Read) -> None:
     connection = read(demo)
-    pages = Pages()
-    known = values(connection, pages)
+    known = values(connection)
     single = run_page_query(connection, "segments", known)
     bin_ns = 5_000_000
     binned = run_page_query(connection, "segments", known | {"bin_ns": bin_ns})
@@ -190,14 +185,13 @@ def test_bins_lose_nothing(demo: Path, read: Read) -> None:
 def test_a_level_put_together_says_the_same_as_bins_made_at_once(demo: Path, read: Read) -> None:
     connection = read(demo)
     pages = Pages(most_bars=1)
-    extent = pages.extent(connection, {})
     content = decoded(pages.answer(connection, "segments", {}))
     bin_ns = content.meta["bin"]
-    level_ns = extent.length_ns // LEVEL_BINS + 1
+    level_ns = Question(connection, {}).length_ns // LEVEL_BINS + 1
     assert bin_ns % level_ns == 0
     assert bin_ns > level_ns
     direct = run_page_query(
-        connection, "segments", values(connection, pages) | {"bin_ns": bin_ns}
+        connection, "segments", values(connection) | {"bin_ns": bin_ns}
     ).to_pylist()
     assert content.meta["count"] == sum(bar["count"] for bar in direct)
     assert content.rows == [{**bar, "id": bar["id"]} for bar in direct]
@@ -250,8 +244,7 @@ def test_a_flow_is_what_flow_both_says(systems: Path, demo: Path, read: Read) ->
 @pytest.mark.thorough
 def test_arrows_are_the_links(systems: Path, read: Read) -> None:
     connection = read(systems)
-    known = values(connection, Pages(), 3)
-    arrows = Pages().links(connection, known, 10**6).to_pylist()
+    arrows = Question(connection, {"run": "3"}).links(10**6).to_pylist()
     transport = connection.execute(
         "SELECT count(*), sum(latency_ns) FROM link_transport WHERE run_id = 3"
     ).fetchall()
@@ -279,15 +272,14 @@ def test_arrows_are_the_links(systems: Path, read: Read) -> None:
 def test_arrows_of_a_window_are_those_that_overlap_it(demo: Path, read: Read) -> None:
     """On two hosts whose clocks were brought together."""
     connection = read(demo)
-    pages = Pages()
-    extent = pages.extent(connection, {})
-    arrows = pages.links(connection, values(connection, pages), 10**6).to_pylist()
-    for width in (extent.length_ns // 10, extent.length_ns // 1000, 20_000):
+    whole = Question(connection, {})
+    arrows = whole.links(10**6).to_pylist()
+    for width in (whole.length_ns // 10, whole.length_ns // 1000, 20_000):
         for tenth in range(0, 11, 2):
-            start = tenth * extent.length_ns // 10 - width // 2
-            window = pages.window(extent, {"start": start, "end": start + width})
-            found = pages.links(connection, extent.frame(window), 10**6).to_pylist()
-            begin, end = (at - extent.origin_ns for at in astuple(window))
+            start = tenth * whole.length_ns // 10 - width // 2
+            asked = Question(connection, {"start": start, "end": start + width})
+            found = asked.links(10**6).to_pylist()
+            begin, end = (at - whole.origin_ns for at in astuple(asked.window))
             assert found == [
                 arrow
                 for arrow in arrows
@@ -301,11 +293,9 @@ def test_arrows_of_a_window_do_not_take_memory_for_what_is_far_from_it(
     systems: Path, read: Read
 ) -> None:
     connection = read(systems)
-    pages = Pages()
-    extent = pages.extent(connection, {"run": "3"})
-    middle = extent.length_ns // 2
-    window = pages.window(extent, {"start": middle, "end": middle + extent.length_ns // 100})
-    known = extent.frame(window) | {"limit": 10**6}
+    length_ns = Question(connection, {"run": "3"}).length_ns
+    window = {"start": length_ns // 2, "end": length_ns // 2 + length_ns // 100}
+    known = Question(connection, {"run": "3", **window}).frame() | {"limit": 10**6}
     known |= run_page_query(connection, "window_ids", known).to_pylist()[0]
     sql = PAGES.text("links")
     named = connection.extract_statements(sql)[0].named_parameters

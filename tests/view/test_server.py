@@ -29,6 +29,7 @@ from msgflow.errors import QueryError, UsageError
 from msgflow.view import pages
 from msgflow.view.connection import timed
 from msgflow.view.pages import Pages
+from msgflow.view.question import Question
 from msgflow.view.server import is_local, listen, running
 from msgflow.view.shared_database import Ahead, Turns
 
@@ -212,10 +213,10 @@ def test_a_database_is_replaced_during_questions(
 ) -> None:
     is_asked = threading.Event()
 
-    def wait(_: Pages, connection: duckdb.DuckDBPyConnection, params: dict[str, Any]) -> bytes:
+    def wait(_: Pages, asked: Question) -> bytes:
         is_asked.set()
         return bytes(
-            connection.execute("SELECT count(*) FROM range(1000000000000)").fetchall()[0][0]
+            asked.connection.execute("SELECT count(*) FROM range(1000000000000)").fetchall()[0][0]
         )
 
     path = shutil.copyfile(demo, tmp_path / "copy.duckdb")
@@ -274,7 +275,7 @@ def test_an_answer_from_a_file_that_was_written_meanwhile_is_none(
 ) -> None:
     path = shutil.copyfile(demo, tmp_path / "copy.duckdb")
 
-    def write(_: Pages, connection: duckdb.DuckDBPyConnection, params: dict[str, Any]) -> bytes:
+    def write(*_: Any) -> bytes:
         os.utime(path, ns=(1, 1))
         return b"a part of each"
 
@@ -353,10 +354,12 @@ def test_what_nobody_waits_for_ends(
     server = serve(demo)
     ended: list[float] = []
 
-    def long(pages: Any, connection: Any, params: Any) -> bytes:
+    def long(_: Pages, asked: Question) -> bytes:
         begin = time.monotonic()
         try:
-            connection.execute("SELECT count(*) FROM range(10000000) a, range(10000000)").fetchall()
+            asked.connection.execute(
+                "SELECT count(*) FROM range(10000000) a, range(10000000)"
+            ).fetchall()
         finally:
             ended.append(time.monotonic() - begin)
         return b""

@@ -16,9 +16,9 @@ from typer.testing import CliRunner
 from msgflow.cli.app import app
 from msgflow.database import open_db
 from msgflow.errors import UsageError
-from msgflow.run.slice import Slice
 from msgflow.view.pages import SUMMARY, Pages
-from msgflow.view.summary import Part, Section, query_section
+from msgflow.view.question import Question
+from msgflow.view.summary import Section, query_section
 
 Report = Callable[..., str]
 _TARGETS = "targets:\n  - topic: '*'\n    loss: < 1 %\n  - topic: /nowhere\n    rate: 1 Hz ± 5 %\n"
@@ -28,7 +28,7 @@ def section(database: Path, part: str) -> Section:
     """Return a section of the summary of the only run."""
     pages = Pages()
     with open_db(database) as opened:
-        found = pages.summary(opened.connection, pages.extent(opened.connection, {}), part)
+        found = pages.summary(Question(opened.connection, {}), part)
     pages.close()
     return found
 
@@ -78,11 +78,8 @@ def test_flows_of_the_summary_are_the_slowest(dropping: Path) -> None:
 
 def test_a_window_is_in_the_command(dropping: Path) -> None:
     with open_db(dropping) as opened:
-        (run,) = opened.runs()
-        assert run.start_ns is not None
-        window = Slice(run.run_id, run.start_ns, run.start_ns + 100_000_000)
-        options = ("--start", "0s", "--end", "0.1s")
-        found = query_section(opened.connection, run, Part(window, options), "threads")
+        asked = Question(opened.connection, {"start": 0, "end": 100_000_000})
+        found = query_section(asked, "threads")
     (command,) = found.commands
     assert "--start 0s --end 0.1s" in command
     assert printed(command, dropping) == found.result.table.to_pylist()
