@@ -7,12 +7,15 @@ its outcome into files of the directory, which the parent removes.
 from __future__ import annotations
 
 import contextlib
+import errno
 import json
 import os
 import re
+import shutil
 import sys
 import threading
 import time
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -33,7 +36,7 @@ def main() -> None:
     from msgflow.fleet.task import Task
 
     outcome = do(Task(**json.loads(text)), directory)
-    (directory / RESULT).write_text(json.dumps(outcome.as_dict()), encoding="utf-8")
+    (directory / RESULT).write_text(json.dumps(asdict(outcome)), encoding="utf-8")
 
 
 def _end_with_parent() -> None:
@@ -46,36 +49,30 @@ def do(task: Task, directory: Path) -> Outcome:
     """Fetch, ingest, check and write one recording; commit nothing."""
     from msgflow.fleet.task import Outcome
 
-    begin = time.monotonic()
-    stage = _Stage(directory / STAGE)
+    begin, stage = time.monotonic(), ""
+
+    def enter(name: str) -> None:
+        nonlocal stage
+        stage = name
+        # The parent reads it when this process hangs or has gone.
+        (directory / STAGE).write_text(name, encoding="utf-8")
+
     try:
-        values = _values(task, directory, stage.enter)
+        values = _values(task, directory, enter)
         return Outcome(
             values=values,
             signature=values["source_signature"],
             seconds=time.monotonic() - begin,
         )
     except Exception as error:
-        return failed_outcome(error, stage.name, time.monotonic() - begin)
-
-
-class _Stage:
-    """The current stage, in a file: the parent reads it when the process hangs or has gone."""
-
-    def __init__(self, file: Path) -> None:
-        self._file = file
-        self.name = ""
-
-    def enter(self, name: str) -> None:
-        self.name = name
-        self._file.write_text(name, encoding="utf-8")
+        return failed_outcome(error, stage, time.monotonic() - begin)
 
 
 def _values(task: Task, directory: Path, enter: Callable[[str], None]) -> dict[str, Any]:
     from msgflow.database import Database
     from msgflow.fleet.file_store import S3
     from msgflow.fleet.lake import Lake
-    from msgflow.fleet.part import Content, write_part
+    from msgflow.fleet.part import write_part
     from msgflow.fleet.recording import fetch, look_at
 
     enter("looking at the source")
@@ -105,7 +102,8 @@ def _values(task: Task, directory: Path, enter: Callable[[str], None]) -> dict[s
             database,
             lake.store,
             directory,
-            Content(views=task.views, database=task.database),
+            views=task.views,
+            database=task.database,
         )
     return {
         **part,
@@ -121,13 +119,10 @@ class ChangedError(Exception):
 
 
 def _require_space(task: Task, directory: Path) -> None:
-    import shutil
-
     free = shutil.disk_usage(directory).free
     if free < task.disk:
-        raise OSError(
-            28, f"some {task.disk:,} bytes of scratch space are needed, {free:,} are free"
-        )
+        words = f"some {task.disk:,} bytes of scratch space are needed, {free:,} are free"
+        raise OSError(errno.ENOSPC, words)
 
 
 def _rename_paths(database: Path, before: str, after: str) -> None:
@@ -180,11 +175,9 @@ def failed_outcome(error: Exception, stage: str, seconds: float) -> Outcome:
 
 
 def _is_full(error: Exception, message: str) -> bool:
-    if isinstance(error, OSError) and error.errno in (28, 122):
+    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
         return True
-    return any(
-        words in message.lower() for words in ("no space left", "not enough free", "disk quota")
-    )
+    return re.search("(?i:no space left|not enough free|disk quota)", message) is not None
 
 
 if __name__ == "__main__":

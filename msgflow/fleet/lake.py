@@ -178,25 +178,24 @@ class Lake:
         Returns:
             Their number, without keys that are given twice.
         """
-        wanted = dict.fromkeys(keys)
+        wanted = set(keys)
         # Of two at the same time, the second would write again what the first one took out.
         with self.changing():
+            own = set(self.names()) - {PACKED}
             rows = self._rows(PACKED)
-            packed = rows.to_pylist() if rows is not None else []
+            packed = {row["run"]: row for row in (() if rows is None else rows.to_pylist())}
             if of is not None:
-                now = {row["run"]: row["source"] for row in packed}
-                now |= {key: row["source"] for key in wanted if (row := self.run(key))}
-                wanted = {key: None for key in wanted if now.get(key) == of}
-            kept = [row for row in packed if row["run"] not in wanted]
-            here = {row["run"] for row in packed}
-            for key in wanted:
-                if key not in here and self._rows(key) is None:
-                    raise UsageError(
-                        f"the lake has no such run — {key}",
-                        f"msgflow fleet runs --lake {shlex.quote(self.store.url)}",
-                    )
+                now = {key: self.run(key) or packed.get(key) for key in wanted}
+                wanted = {key for key, row in now.items() if row and row["source"] == of}
+            for key in sorted(wanted - own - packed.keys()):
+                raise UsageError(
+                    f"the lake has no such run — {key}",
+                    f"msgflow fleet runs --lake {shlex.quote(self.store.url)}",
+                )
+            kept = [row for key, row in packed.items() if key not in wanted]
             # This first: else the earlier row would count, once the own file of the run is gone.
-            if len(kept) < len(packed):
+            # Where no run is left, the file without a row says so to `pack`.
+            if len(kept) < len(packed) or (wanted and not kept and own <= wanted):
                 self.pack_runs(kept)
             for key in wanted:
                 self.store.delete(run_path(key))

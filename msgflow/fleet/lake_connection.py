@@ -121,7 +121,7 @@ def what_there_is(name: str, labels: Sequence[str], columns: Sequence[str]) -> s
     return meant_or(near, f"{have}; columns of run are {', '.join(columns)}", "?")
 
 
-class Reading:
+class Reading(ExitStack):
     """A connection to chosen runs of a lake. Use it as a context manager, or call `close`."""
 
     def __init__(
@@ -132,13 +132,13 @@ class Reading:
         `tables` are those to read, and public views as `view/NAME`; all when None. `listed` says
         that names and columns of all others are wanted, too.
         """
+        super().__init__()
         self.choice = choice
         self.tables: set[str] = set()  # those asked for that these runs have
         self._local_files: list[str] = []
-        self._resources = ExitStack()
         # It has the table `run`, and a view of each table that was asked for, without the column
         # `part`.
-        self.connection = self._resources.enter_context(open_memory())
+        self.connection = self.enter_context(open_memory())
         try:
             with lake_errors(choice.lake):
                 self._fill(tables, listed)
@@ -146,16 +146,6 @@ class Reading:
         except BaseException:
             self.close()
             raise
-
-    def __enter__(self) -> Reading:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Close the connection."""
-        self._resources.close()
 
     def _fill(self, tables: Sequence[str] | None, listed: bool) -> None:
         con = self.connection
@@ -200,7 +190,7 @@ class Reading:
         ]
         if not runs or not (wanted is None or wanted or listed):
             return {}
-        folder = self._resources.enter_context(tempfile.TemporaryDirectory(prefix="msgflow-"))
+        folder = self.enter_context(tempfile.TemporaryDirectory(prefix="msgflow-"))
         return write_views(self.choice.lake, runs, Path(folder), wanted, listed=listed)
 
     def _files(self, table: str, key: str) -> dict[str, str]:

@@ -205,6 +205,12 @@ def _clean_up(lake: Lake, own: set[str], runs: Iterable[Mapping[str, Any]]) -> l
             for entry in lake.store.entries(folder)
             if (part := part_of(entry.path)) is not None and part not in parts
         ]
+    # `remove` leaves a file here, also where it took out the last run.
+    if unneeded and not lake.names():
+        raise DatabaseError(
+            f"the lake has answers, but no run — {lake.store.url_of(RUN)}",
+            "is its file system mounted? If an ingest was killed, start that again",
+        )
     for entry in unneeded:
         lake.store.delete(entry.path)
     return unneeded

@@ -7,7 +7,6 @@ time or before, stays as it is.
 from __future__ import annotations
 
 import shutil
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from msgflow.db.objects import public_names
@@ -33,14 +32,6 @@ _RUN_ID = "run_id"
 _LEFT_OUT = (RUN,)
 
 
-@dataclass(frozen=True)
-class Content:
-    """What to write besides the answers."""
-
-    views: bool = False  # the public views
-    database: bool = True  # the database itself
-
-
 def run_key(connection: duckdb.DuckDBPyConnection, run_id: int) -> str:
     """Return the key of a run: equal for equal packets, whatever their paths."""
     ((key,),) = internal_sql().run(connection, "run_identity", {"runs": [run_id]}).fetchall()
@@ -51,12 +42,19 @@ def run_key(connection: duckdb.DuckDBPyConnection, run_id: int) -> str:
 
 def write_part(
     connection: duckdb.DuckDBPyConnection,
-    database: Path,
+    file: Path,
     store: Store,
     scratch: Path,
-    content: Content,
+    *,
+    views: bool = False,
+    database: bool = True,
 ) -> dict[str, Any]:
-    """Write all files of the only run of a database, and return its row as far as that knows it."""
+    """Write all files of the only run of a database, and return its row as far as that knows it.
+
+    `views` are the public views, `database` is the file of the database itself.
+    """
+    import pyarrow as pa
+
     from msgflow.db.connection import recorded_revision
 
     ((run_id, name, start_ns, end_ns, event_count),) = connection.execute(
@@ -65,20 +63,27 @@ def write_part(
     key = run_key(connection, run_id)
     part = new_part(key)
     revision = recorded_revision(connection.cursor()) or ""
-    writer = _Writer(store, scratch, {KEY: key, PART: part}, revision)
+    first = {KEY: key, PART: part}
+    table, compressed = scratch / "table.parquet", scratch / "compressed"
     for answer in answers():
         rows = answer.read(connection, run_id).to_reader(_ROWS_AT_ONCE)
-        writer.table(answer.table, part_path(answer.table, part), rows)
-    if content.views:
+        write_rows(table, answer.table, rows, first, revision)
+        store.put(part_path(answer.table, part), table)
+    if views:
         for view in public_views(connection):
-            writer.table(view, view_path(view, part), view_rows(connection, view))
-    if content.database:
-        writer.database(database, database_path(part))
+            write_rows(table, view, view_rows(connection, view), first, revision)
+            store.put(view_path(view, part), table)
+    if database:
+        with file.open("rb") as source, pa.CompressedOutputStream(str(compressed), "zstd") as sink:
+            shutil.copyfileobj(source, sink, 1 << 20)
+        store.put(database_path(part), compressed)
+    for each in (table, compressed):
+        each.unlink(missing_ok=True)
     return {
         KEY: key,
         PART: part,
-        "view_part": part if content.views else None,
-        "database_part": part if content.database else None,
+        "view_part": part if views else None,
+        "database_part": part if database else None,
         "name": name,
         "start_ns": start_ns,
         "end_ns": end_ns,
@@ -129,35 +134,3 @@ def write_rows(
             same = [pa.repeat(pa.scalar(value), len(batch)) for value in first.values()]
             columns = [*same, *(batch[each] for each in schema.names[len(same) :])]
             writer.write_batch(pa.record_batch(columns, schema=schema))
-
-
-class _Writer:
-    """Writes files to the lake by way of the scratch directory."""
-
-    def __init__(
-        self, store: Store, scratch: Path, first: Mapping[str, str], revision: str
-    ) -> None:
-        self._store = store
-        self._scratch = scratch
-        self._first = first
-        self._revision = revision
-
-    def table(self, name: str, path: str, rows: pa.RecordBatchReader) -> None:
-        file = self._scratch / "table.parquet"
-        write_rows(file, name, rows, self._first, self._revision)
-        self._put(path, file)
-
-    def database(self, database: Path, path: str) -> None:
-        import pyarrow as pa
-
-        file = self._scratch / "compressed"
-        with (
-            database.open("rb") as source,
-            pa.CompressedOutputStream(str(file), "zstd") as target,
-        ):
-            shutil.copyfileobj(source, target, 1 << 20)
-        self._put(path, file)
-
-    def _put(self, path: str, file: Path) -> None:
-        self._store.put(path, file)
-        file.unlink()

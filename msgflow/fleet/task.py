@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
@@ -58,10 +58,6 @@ class Task:
     memory: int = 0  # estimated bytes of memory
     disk: int = 0  # estimated bytes of scratch space
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return the attributes, as values for JSON."""
-        return asdict(self)
-
 
 @dataclass(frozen=True)
 class Outcome:
@@ -75,10 +71,6 @@ class Outcome:
     signature: str | None = None  # of the source, if known
     seconds: float = 0.0
     worker: str = ""  # machine and process
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the attributes, as values for JSON."""
-        return asdict(self)
 
 
 def needs(size: int, *, is_archive: bool, is_remote: bool) -> tuple[int, int]:

@@ -13,6 +13,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -49,7 +50,7 @@ def run_task(given: dict[str, Any]) -> dict[str, Any]:
             " --scratch",
             seconds=time.monotonic() - begin,
         )
-    return {**outcome.as_dict(), "worker": f"{socket.gethostname()}:{os.getpid()}"}
+    return {**asdict(outcome), "worker": f"{socket.gethostname()}:{os.getpid()}"}
 
 
 @contextlib.contextmanager
@@ -82,7 +83,7 @@ def _watched(task: Task, directory: Path, begin: float) -> Outcome:
         assert child.stdin is not None
         with contextlib.suppress(BrokenPipeError):
             # It stays open: the child ends when it is closed.
-            child.stdin.write(json.dumps(task.as_dict()).encode() + b"\n")
+            child.stdin.write(json.dumps(asdict(task)).encode() + b"\n")
             child.stdin.flush()
         while child.poll() is None:
             if time.monotonic() - begin > task.timeout:

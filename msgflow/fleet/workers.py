@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -45,7 +46,7 @@ class OneProcess:
         """Do the tasks, without a limit of time, and yield their outcomes."""
         while self._tasks:
             task = self._tasks.pop(0)
-            yield task, Outcome(**run_task(task.as_dict()))
+            yield task, Outcome(**run_task(asdict(task)))
 
     def close(self) -> None:
         """Forget all tasks."""
@@ -113,7 +114,7 @@ class RayWorkers:
         # Only some clusters declare their scratch space; on others none can be reserved.
         more = {"resources": {_SCRATCH: task.disk}} if resources.get(_SCRATCH) else {}
         ask = self._run.options(num_cpus=1, memory=task.memory, **more)
-        self._running[ask.remote(task.as_dict())] = task
+        self._running[ask.remote(asdict(task))] = task
 
     def wait(self, seconds: float) -> Iterator[tuple[Task, Outcome]]:
         """Yield finished tasks; wait for the first, at most `seconds`."""

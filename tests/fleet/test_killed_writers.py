@@ -31,7 +31,7 @@ from msgflow import Database
 from msgflow.fleet.file_store import Store
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.pack import pack
-from msgflow.fleet.part import Content, write_part
+from msgflow.fleet.part import write_part
 
 lake, left = Lake.open(sys.argv[1]), int(sys.argv[2])
 
@@ -50,8 +50,7 @@ _PACKS = "pack(lake)"
 _WRITES = """
 database, scratch = map(Path, sys.argv[3:])
 with Database(database) as opened:
-    content = Content(views=False, database=False)
-    lake.commit([write_part(opened.connection, database, lake.store, scratch, content)])
+    lake.commit([write_part(opened.connection, database, lake.store, scratch, database=False)])
 """
 _COMMITS = """
 import json, sys

@@ -17,6 +17,7 @@ from msgflow.fleet.file_store import Store
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.layout import (
     PACKED,
+    RUN,
     VIEWS,
     part_of,
     part_path,
@@ -25,16 +26,15 @@ from msgflow.fleet.layout import (
     view_path,
 )
 from msgflow.fleet.pack import pack
-from msgflow.fleet.part import Content, write_part
+from msgflow.fleet.part import write_part
 
 Row = dict[str, Any]
 
 
 def write(lake: Lake, database: Path, scratch: Path) -> Row:
     """Write the answers of a database into a lake, without a commit."""
-    content = Content(views=False, database=False)
     with Database(database) as opened:
-        return write_part(opened.connection, database, lake.store, scratch, content)
+        return write_part(opened.connection, database, lake.store, scratch, database=False)
 
 
 @pytest.fixture
@@ -162,6 +162,9 @@ def test_the_last_row_of_a_run_counts(
     assert {values[0] for values in rows_of(lake, "flow")} == {other["run"]}
     with pytest.raises(UsageError, match="no such run"):
         lake.remove([other["run"], first["run"]])
+    for key in ("\0", f"../run/{other['run']}", PACKED):
+        with pytest.raises(UsageError, match="no such run"):
+            lake.remove([key])
     assert len(lake.runs()) == 1
 
 
@@ -273,6 +276,8 @@ def test_packing_changes_no_answer(
     answered = slice(1, 1 + len(answers()))
     assert content(lake)[answered] == before[answered]
     assert paths(lake, "run") == {run_path(PACKED), run_path(first["run"])}
+    with pytest.raises(UsageError, match="no such run — packed"):
+        lake.remove([PACKED])
     # Neither row is left after a removal.
     lake.remove([first["run"]])
     assert lake.run(first["run"]) is None
@@ -291,6 +296,32 @@ def test_packing_changes_no_answer(
     pack(lake)
     assert paths(lake, "") == {"lake.json"}
     assert len(lake.runs()) == 0
+
+
+@pytest.mark.parametrize("is_packed", [False, True])
+def test_packing_deletes_no_answers_of_runs_that_are_out_of_sight(
+    holding: tuple[Lake, Row, Row], tmp_path: Path, is_packed: bool
+) -> None:
+    """The file system with the folder `run` may not be mounted."""
+    lake, first, other = holding
+    lake.commit([first, other])
+    if is_packed:
+        pack(lake)
+    folder = Path(lake.store.full(RUN))
+    files, before = paths(lake, ""), content(lake)
+    folder.rename(tmp_path / "run")
+    folder.mkdir()
+    with pytest.raises(DatabaseError, match=f"the lake has answers, but no run — .*/{RUN}"):
+        pack(lake)
+    folder.rmdir()
+    (tmp_path / "run").rename(folder)
+    assert paths(lake, "") == files
+    assert content(lake) == before
+    # A lake that has lost its last run by a removal says so.
+    lake.remove([first["run"], other["run"]])
+    assert paths(lake, RUN) == {run_path(PACKED)}
+    pack(lake)
+    assert paths(lake, "") == {"lake.json"}
 
 
 @pytest.mark.thorough
