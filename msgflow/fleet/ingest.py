@@ -18,7 +18,7 @@ from msgflow.errors import MsgflowError, TraceError, UsageError
 from msgflow.fleet.failure import forget_failure, read_failures, write_failure
 from msgflow.fleet.file_store import S3, normal_url
 from msgflow.fleet.lake import Lake
-from msgflow.fleet.recording import Recording, is_archive_name, look_at
+from msgflow.fleet.recording import Recording, look_at
 from msgflow.fleet.sources import find_recordings
 from msgflow.fleet.task import PASSING, Outcome, Reason, Task, needs, without_secrets
 from msgflow.fleet.workers import make_workers
@@ -276,7 +276,7 @@ class _Ingest:
         assert item.state is not None
         memory, disk = needs(
             item.state.size,
-            is_archive=item.state.is_archive and is_archive_name(source),
+            is_archive=item.state.is_archive,
             is_remote=source.startswith(S3),
         )
         task = Task(
@@ -301,7 +301,6 @@ class _Ingest:
                     stage="giving it to a worker",
                     error=words,
                     hint="a machine that has it, or --memory if it needs less",
-                    signature=item.state.signature,
                 ),
             )
             return
@@ -321,10 +320,12 @@ class _Ingest:
         self._forget(item)
         with self._lake.changing():
             there = self._as_it_is_now(key)
-            is_other = there is not None and there["source"] != item.recording.source
-            if there is None or not is_other or self._takes(item, there):
+            # The run is that of another recording, which has the same packets.
+            other = there if there and there["source"] != item.recording.source else None
+            stays = other is not None and not self._takes(item, other)
+            if not stays:
                 # A recording without labels keeps those that it had.
-                had = {} if is_other and self._all else there or before or {}
+                had = {} if other and self._all else there or before or {}
                 labels = dict(item.recording.labels) or dict(had.get("labels") or ())
                 row = {
                     **outcome.values,
@@ -334,12 +335,11 @@ class _Ingest:
                     "tries": item.tries,
                     "worker": outcome.worker,
                 }
-                if there is not None and is_other:
-                    self._displace(there, row)
+                if other is not None:
+                    self._displace(other, row)
                 self._commit(row)
-                is_other = False
-        if there is not None and is_other:
-            self._same_packets(item, there, before, outcome)
+        if other is not None and stays:
+            self._same_packets(item, other, before, outcome)
             return
         self._leave(item, before)
         self._written.add(key)

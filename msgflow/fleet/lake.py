@@ -30,6 +30,7 @@ from msgflow.fleet.layout import (
     run_schema,
 )
 from msgflow.fleet.parquet import read_parquet
+from msgflow.sql.failure import first_line
 
 try:
     import fcntl
@@ -136,9 +137,8 @@ class Lake:
         try:
             rows = read_parquet(content, run_schema())
         except (pa.ArrowException, OSError) as error:
-            line = (str(error).strip().splitlines() or [type(error).__name__])[0]
             raise DatabaseError(
-                f"cannot read the runs of the lake: {line} — {url}",
+                f"cannot read the runs of the lake: {first_line(error)} — {url}",
                 "check that nobody else than msgflow has written there",
             ) from error
         _require_sound(rows, name, url)

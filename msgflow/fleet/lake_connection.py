@@ -22,8 +22,9 @@ from msgflow.db.sandbox import open_memory, shut_in
 from msgflow.db.sql_guard import require_condition
 from msgflow.errors import DatabaseError, UsageError
 from msgflow.fleet.answers import answers
-from msgflow.fleet.layout import RUN, VIEWS, part_path
-from msgflow.fleet.run_views import write_views
+from msgflow.fleet.layout import RUN, VIEWS, part_path, view_path
+from msgflow.fleet.part import KEY, PART, public_views, view_rows, write_rows
+from msgflow.fleet.run_database import run_database
 from msgflow.sql.failure import first_line
 from msgflow.sql.quoting import identifier, literal
 from msgflow.text.name_suggestions import meant_or, nearest
@@ -179,7 +180,10 @@ class Reading(ExitStack):
             )
 
     def _made(self, tables: Sequence[str] | None, listed: bool) -> dict[str, list[str]]:
-        """Return files with the views of runs that have them in their databases only."""
+        """Write views that runs have in their databases only, and return the files of each.
+
+        `listed` also writes all views of the first run, so that their names and columns are known.
+        """
         wanted = (
             None if tables is None else {each for each in tables if each.startswith(f"{VIEWS}/")}
         )
@@ -190,8 +194,22 @@ class Reading(ExitStack):
         ]
         if not runs or not (wanted is None or wanted or listed):
             return {}
-        folder = self.enter_context(tempfile.TemporaryDirectory(prefix="msgflow-"))
-        return write_views(self.choice.lake, runs, Path(folder), wanted, listed=listed)
+        folder = Path(self.enter_context(tempfile.TemporaryDirectory(prefix="msgflow-")))
+        made: dict[str, list[str]] = {}
+        for run in runs:
+            # The part of such views is that of the database, which is in the folder for a moment.
+            part = run["database_part"]
+            with run_database(self.choice.lake, run, folder) as connection:
+                for name in public_views(connection):
+                    view = f"{VIEWS}/{name}"
+                    if wanted is None or view in wanted or listed:
+                        file = folder / view_path(name, part)
+                        file.parent.mkdir(parents=True, exist_ok=True)
+                        rows = view_rows(connection, name)
+                        write_rows(file, name, rows, {KEY: run["run"], PART: part}, "")
+                        made.setdefault(view, []).append(str(file))
+            listed = False
+        return made
 
     def _files(self, table: str, key: str) -> dict[str, str]:
         """Return the files of a table, each with the version that wrote it; earlier may lack it."""

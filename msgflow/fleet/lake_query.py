@@ -262,7 +262,7 @@ def _group(
         for value, column in zip(values, columns, strict=True)
     )
     number = f"dense_rank() OVER (ORDER BY {', '.join(values)})" if values else "1::BIGINT"
-    rows = con.sql(f"SELECT run, {number} AS {GROUP} FROM run", params=_used(bound, number))
+    rows = con.sql(f"SELECT run, {number} AS {GROUP} FROM run", params=bound)
     con.register("run_group", rows.to_arrow_table())
     if not columns:
         kept = tuple(column for column in header.columns if column.name != GROUP)
@@ -279,10 +279,6 @@ def _group(
     first = tuple(column.name for column in columns)
     brief = (*header.brief[:1], *first, *header.brief[1:])
     return replace(header, columns=(*columns, *kept), body=body, brief=brief)
-
-
-def _used(bound: Mapping[str, str], text: str) -> dict[str, str]:
-    return {key: value for key, value in bound.items() if f"${key}]" in text}
 
 
 def _text(header: Header) -> str:

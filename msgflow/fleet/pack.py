@@ -26,6 +26,7 @@ from msgflow.fleet.layout import (
     run_path,
 )
 from msgflow.fleet.parquet import read_parquet
+from msgflow.sql.failure import first_line
 from msgflow.version import __version__
 
 if TYPE_CHECKING:
@@ -177,8 +178,7 @@ def _read(lake: Lake, table: str, part: str, runs: Sequence[str]) -> pa.Table | 
         is_wanted = pc.is_in(read["run"], value_set=pa.array(runs, pa.string()))
         return read.filter(pc.and_(is_wanted, pc.equal(read["part"], part)))
     except (pa.ArrowException, KeyError, OSError) as error:
-        words = (str(error).strip().splitlines() or [type(error).__name__])[0]
-        raise _unusable(lake, table, part, runs, words) from error
+        raise _unusable(lake, table, part, runs, first_line(error)) from error
 
 
 def _unusable(lake: Lake, table: str, part: str, runs: Sequence[str], why: str) -> DatabaseError:

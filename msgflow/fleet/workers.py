@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from msgflow.errors import UsageError
 from msgflow.fleet.task import Outcome, Reason, Task
 from msgflow.fleet.task_process import run_task
+from msgflow.sql.failure import first_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -85,9 +86,8 @@ class RayWorkers:
                         **more,
                     )
             except Exception as error:
-                line = (str(error).strip().splitlines() or [type(error).__name__])[0]
                 raise UsageError(
-                    f"cannot reach the Ray cluster: {line} — {address}",
+                    f"cannot reach the Ray cluster: {first_line(error)} — {address}",
                     "ray status --address ADDRESS; --ray local starts one of this machine",
                 ) from error
         # `ingest` counts the tries of a task whose worker was lost.
@@ -126,15 +126,8 @@ class RayWorkers:
             try:
                 yield task, Outcome(**self._ray.get(reference))
             except self._ray.exceptions.RayError as error:
-                line = (str(error).strip().splitlines() or [""])[0]
-                yield (
-                    task,
-                    Outcome(
-                        reason=Reason.WORKER_LOST,
-                        stage="on a worker",
-                        error=f"its worker is gone ({type(error).__name__}): {line}",
-                    ),
-                )
+                words = f"its worker is gone ({type(error).__name__}): {first_line(error)}"
+                yield task, Outcome(reason=Reason.WORKER_LOST, stage="on a worker", error=words)
 
     def close(self) -> None:
         """Cancel all tasks and leave the cluster."""
