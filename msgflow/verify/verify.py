@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from fnmatch import fnmatchcase
-from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -174,21 +173,17 @@ class _Work:
 
     def rows(self, target: Target) -> Iterator[dict[str, Any]]:
         metrics = SUBJECTS[target.kind].metrics
-        found: list[tuple[int, int, dict[str, Any]]] = []
-        numbered = list(enumerate(target.requirements))
-
-        def query_of(item: tuple[int, Requirement]) -> str:
-            return metrics[item[1].metric].query
-
-        for name, group in groupby(sorted(numbered, key=query_of), key=query_of):
-            asked = list(group)
-            measured = self._measure(target, name, [requirement for _, requirement in asked])
-            for place, (number, requirement) in enumerate(asked):
-                if not measured:
-                    found.append((number, 0, self._missing(target, requirement)))
-                for position, row in enumerate(measured):
-                    found.append((number, position, self._row(target, requirement, row, place)))
-        yield from (row for _, _, row in sorted(found, key=lambda item: item[:2]))
+        asked: dict[str, list[Requirement]] = {}
+        for requirement in target.requirements:
+            asked.setdefault(metrics[requirement.metric].query, []).append(requirement)
+        measured = {name: self._measure(target, name, asked[name]) for name in sorted(asked)}
+        for requirement in target.requirements:
+            name = metrics[requirement.metric].query
+            place = asked[name].index(requirement)
+            for row in measured[name]:
+                yield self._row(target, requirement, row, place)
+            if not measured[name]:
+                yield self._missing(target, requirement)
 
     def _measure(
         self, target: Target, name: str, requirements: Sequence[Requirement]
@@ -205,28 +200,31 @@ class _Work:
             columns.append(f"{key} AS key_{place}")
         if any(column.name == AMBIGUOUS for column in load_query(name).columns):
             columns.append(AMBIGUOUS)
-        given: dict[str, Value] = {}
+        where, given = self._conditions(target, load_query(name))
+        condition = " AND ".join(where) or "true"
+        sql = f"SELECT {', '.join(columns)} FROM ({{}}) AS result WHERE {condition} ORDER BY ALL"
+        return self._ask(name, sql, target, given)
+
+    def _conditions(self, target: Target, header: Header) -> tuple[list[str], dict[str, Value]]:
+        """Return which rows of a query a target means, with the values of its conditions."""
         if target.path_name is not None:
             places = self.paths[target.path_name.value]
             visited = Selection(
                 via=tuple(places.get("via", ())), without=tuple(places.get("without", ()))
             )
-            where, given = conditions_of(load_query(name), visited)
-        elif target.kind == PATH:
-            given["via"] = [topic.value for topic in target.topics]
-            where = ["list_has_all(string_split(path, ' → '), $via)"]
-        elif target.kind == ENDS:
+            return conditions_of(header, visited)
+        if target.kind == PATH:
+            topics: list[Value] = [topic.value for topic in target.topics]
+            return ["list_has_all(string_split(path, ' → '), $via)"], {"via": topics}
+        if target.kind == ENDS:
             # The parameters of the query choose.
-            where = []
-        else:
-            where = [
-                self._matches(load_query(name), field, subject.filters[field].columns[name])
-                for field in target.chosen
-            ]
-            given = {f"wanted_{field}": text.value for field, text in target.chosen.items()}
-        condition = " AND ".join(where) or "true"
-        sql = f"SELECT {', '.join(columns)} FROM ({{}}) AS result WHERE {condition} ORDER BY ALL"
-        return self._ask(name, sql, target, given)
+            return [], {}
+        filters = SUBJECTS[target.kind].filters
+        where = [
+            self._matches(header, field, filters[field].columns[header.name])
+            for field in target.chosen
+        ]
+        return where, {f"wanted_{field}": text.value for field, text in target.chosen.items()}
 
     @staticmethod
     def _matches(header: Header, field: str, columns: tuple[str, ...]) -> str:

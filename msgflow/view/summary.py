@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from msgflow.run.choice import Run
     from msgflow.run.slice import Slice
     from msgflow.sql.value import Value
-    from msgflow.verify import Verification
+    from msgflow.verify.verify import Verification
 
 # The slowest paths whose latency is taken apart.
 MOST_PATHS = 3

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from msgflow.errors import UsageError
 from msgflow.text.values import format_duration
-from msgflow.verify import Verdict
+from msgflow.verify.verify import Verdict
 from msgflow.watch.alarm import violation_line
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def _sentence(row: dict[str, Any]) -> str:
     subject = row["subject"] or row["target"]
     if row["value"] is None:
         return f"{subject}: {row['metric']} {row['condition']}: {row['reason']}"
-    return violation_line(row | {"subject": subject, "is_final": True, "why": None})
+    return violation_line(row | {"subject": subject, "is_final": True})
 
 
 class Diagnostics:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.files.yaml_file import quoted
-from msgflow.links import LinksFile, read_links
+from msgflow.links.links_file import LinksFile, read_links
 
 if TYPE_CHECKING:
     import duckdb
@@ -59,7 +59,6 @@ class LearnedAnswers:
     """
 
     def __init__(self) -> None:
-        """Know nothing yet."""
         self._scores: Counter[_Pair] = Counter()
 
     def doubted(self, con: duckdb.DuckDBPyConnection) -> str | None:
