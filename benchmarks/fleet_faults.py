@@ -55,7 +55,7 @@ from msgflow.fleet.failure import read_failures
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.lake_connection import Reading, choose
 from msgflow.fleet.pack import pack
-from msgflow.fleet.part import Content, write_part
+from msgflow.fleet.part import write_part
 from msgflow.ingest import ingest
 
 if TYPE_CHECKING:
@@ -281,7 +281,8 @@ def ingest_alone(job: tuple[Path, str, str]) -> dict[str, Any]:
                 database,
                 Lake.open(url).store,
                 Path(name),
-                Content(views=False, database=False),
+                views=False,
+                database=False,
             )
     return {**part, "source": source}
 

@@ -19,8 +19,9 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from msgflow.clocks import read_clock_sync
-from msgflow.watch import Watcher, watch_finished
+from msgflow.clocks.clocks_file import read_clock_sync
+from msgflow.watch.follow import watch_finished
+from msgflow.watch.watcher import Watcher
 from msgflow_sim import Recording, simulate
 
 if TYPE_CHECKING:

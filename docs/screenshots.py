@@ -15,7 +15,8 @@ from pathlib import Path
 
 from playwright.sync_api import sync_playwright
 
-from msgflow.clocks import apply_clocks, read_clock_sync
+from msgflow.clocks.clocks_file import read_clock_sync
+from msgflow.clocks.correction import apply_clocks
 from msgflow.database import Database, open_db
 from msgflow.ingest import ingest
 from msgflow_sim import simulate

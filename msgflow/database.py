@@ -31,7 +31,8 @@ if TYPE_CHECKING:
     from msgflow.export.perfetto import PerfettoTrace
     from msgflow.export.views import ExportedView
     from msgflow.ingest import IngestProgress, IngestReport
-    from msgflow.links import AppliedLinks, LinkSuggestions
+    from msgflow.links.annotations import AppliedLinks
+    from msgflow.links.suggested_links import LinkSuggestions
     from msgflow.query.compare import Comparison
     from msgflow.query.flow import Start
     from msgflow.query.why import Explanation
@@ -39,7 +40,8 @@ if TYPE_CHECKING:
     from msgflow.run.choice import Run
     from msgflow.sql.header import Header
     from msgflow.sql.value import Value
-    from msgflow.verify import TargetsFile, Verification
+    from msgflow.verify.targets_file import TargetsFile
+    from msgflow.verify.verify import Verification
     from msgflow.view.report import Report
 
 _T = TypeVar("_T")
@@ -166,7 +168,9 @@ class Database:
             UsageError: there is no such program, or no such rate.
             TraceError: nothing of ROS 2 was recorded.
         """
-        from msgflow.record import Channel, read_rate, record
+        from msgflow.record.profile import read_rate
+        from msgflow.record.recording import record
+        from msgflow.record.session import Channel
 
         place = Path(directory).absolute()
         recorded = record(
@@ -258,7 +262,8 @@ class Database:
         Raises:
             UsageError: not such a file, no such run, or a link that does not fit the run.
         """
-        from msgflow.links import apply_links, read_links
+        from msgflow.links.annotations import apply_links
+        from msgflow.links.links_file import read_links
 
         links = read_links(Path(file), content)
         self.close()
@@ -273,7 +278,7 @@ class Database:
         Raises:
             UsageError: no such run.
         """
-        from msgflow.links import LinkSuggestions
+        from msgflow.links.suggested_links import LinkSuggestions
         from msgflow.sql.statement import internal_sql
 
         found = self.query("links-suggested", run=run)
@@ -305,7 +310,8 @@ class Database:
         Raises:
             UsageError: no such file or run, or a file that does not fit the run.
         """
-        from msgflow.clocks import apply_clocks, read_clock_sync
+        from msgflow.clocks.clocks_file import read_clock_sync
+        from msgflow.clocks.correction import apply_clocks
 
         sync = read_clock_sync(clock_sync)
         self.close()
@@ -711,7 +717,8 @@ class Database:
         Raises:
             UsageError: not such a file, no such run or time, or a name that nothing in the run has.
         """
-        from msgflow.verify import read_targets, verify
+        from msgflow.verify.targets_file import read_targets
+        from msgflow.verify.verify import verify
 
         file = read_targets(Path(targets))
         chosen = Slice(**part)

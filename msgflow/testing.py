@@ -24,7 +24,9 @@ from typing import TypeAlias
 import pytest
 
 from msgflow.database import Database
-from msgflow.record import Channel, recording_session, session_daemon, with_python_nodes
+from msgflow.record.daemon import session_daemon
+from msgflow.record.python_path import with_python_nodes
+from msgflow.record.session import Channel, recording_session
 
 __all__ = ["Latency", "RecordedDatabase", "ms", "msgflow_recorded", "recorded"]
 

@@ -15,7 +15,7 @@ from msgflow.files.default_files import DEFAULT_DATABASE
 from msgflow.text.values import count
 
 if TYPE_CHECKING:
-    from msgflow.links import AppliedLinks
+    from msgflow.links.annotations import AppliedLinks
 
 
 class _LinksGroup(AskingGroup):

@@ -18,7 +18,7 @@ from msgflow.run.choice import require_run_name
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from msgflow.record import Status
+    from msgflow.record.recording import Status
 
 _SECONDS_BETWEEN_LINES = 10.0
 
@@ -69,10 +69,13 @@ def command(
     from msgflow.cli import check
     from msgflow.cli import ingest as ingest_command
     from msgflow.cli.tracing_cost import part_of_latencies
-    from msgflow.clocks import read_clock_sync
+    from msgflow.clocks.clocks_file import read_clock_sync
     from msgflow.database import Database
-    from msgflow.links import read_links
-    from msgflow.record import EVENTS, PYTHON_NODES, Channel, read_rate, record
+    from msgflow.links.links_file import read_links
+    from msgflow.record.profile import read_rate
+    from msgflow.record.python_path import PYTHON_NODES
+    from msgflow.record.recording import record
+    from msgflow.record.session import EVENTS, Channel
 
     if print_python_path:
         typer.echo(PYTHON_NODES)
@@ -176,7 +179,7 @@ def _status_shown(*, beside_program: bool) -> Iterator[Callable[[Status], None]]
 
 
 def _words(status: Status) -> str:
-    from msgflow.record import BYTES_OF_EVENT
+    from msgflow.record.recording import BYTES_OF_EVENT
 
     events = status.event_bytes / BYTES_OF_EVENT
     words = [

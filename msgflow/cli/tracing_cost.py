@@ -27,7 +27,7 @@ WHERE run_id = {run} AND domain = 'ust'
 
 def share_of_cpu(database: Database, runs: Sequence[Run]) -> Iterator[str]:
     """Yield a sentence for each run: what share of a CPU its events took."""
-    from msgflow.record import USUAL_NS
+    from msgflow.record.event_cost import USUAL_NS
 
     for run in runs:
         events, took_ns, measured = _traced(database, run.run_id)
@@ -43,7 +43,7 @@ def share_of_cpu(database: Database, runs: Sequence[Run]) -> Iterator[str]:
 
 def part_of_latencies(database: Database, latencies: QueryResult) -> Iterator[str]:
     """Yield a sentence about the paths with the longest latencies, of rows of e2e-latency."""
-    from msgflow.record import USUAL_NS
+    from msgflow.record.event_cost import USUAL_NS
 
     columns = ["run_id", "path", "median_ns"]
     rows = [row for row in latencies.to_arrow().select(columns).to_pylist() if row["median_ns"]]
@@ -61,7 +61,7 @@ def part_of_latencies(database: Database, latencies: QueryResult) -> Iterator[st
 
 
 def _traced(database: Database, run: int) -> tuple[int | None, int | None, float | None]:
-    from msgflow.record import event_cost_ns
+    from msgflow.record.event_cost import event_cost_ns
 
     (row,) = database.sql(_TRACED.format(run=run)).table.to_pylist()
     return row["events"], row["took_ns"], event_cost_ns(row["paths"] or [])

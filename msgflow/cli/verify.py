@@ -15,7 +15,7 @@ from msgflow.errors import ExitCode
 from msgflow.export.formats import Format
 
 if TYPE_CHECKING:
-    from msgflow.verify import Verification
+    from msgflow.verify.verify import Verification
 
 
 class VerifyFormat(StrEnum):
@@ -45,7 +45,7 @@ def command(
         allow_not_measured: Exit with 0 if nothing failed, even if something has no value.
         form (table|json|csv|markdown|junit): By default junit into FILE.xml, else table.
     """
-    from msgflow.verify import Verdict
+    from msgflow.verify.verify import Verdict
 
     if form is None and output is not None and output.suffix.lower() == ".xml":
         form = VerifyFormat.JUNIT

@@ -27,8 +27,11 @@ from msgflow.text.values import printable
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from msgflow.record import Status
-    from msgflow.watch import Alarm, Diagnostics, WindowDatabase, WindowReport
+    from msgflow.record.recording import Status
+    from msgflow.watch.alarm import Alarm
+    from msgflow.watch.diagnostics import Diagnostics
+    from msgflow.watch.window_database import WindowDatabase
+    from msgflow.watch.window_report import WindowReport
 
 _START = "starts, records and watches a program"
 
@@ -98,22 +101,18 @@ def command(
     """
     from msgflow.cli.show.watch_screen import show_screen
     from msgflow.cli.show.window_line import window_line
-    from msgflow.clocks import read_clock_sync
-    from msgflow.links import read_links
+    from msgflow.clocks.clocks_file import read_clock_sync
+    from msgflow.links.links_file import read_links
     from msgflow.sql.interrupt import until_interrupted
-    from msgflow.verify import Verdict
-    from msgflow.watch import (
-        Diagnostics,
-        Exporter,
-        FlightRecorder,
-        WatchedSessions,
-        Watcher,
-        remove_chunk,
-        violation_line,
-        watch_finished,
-        watch_live,
-        watched_place,
-    )
+    from msgflow.verify.verify import Verdict
+    from msgflow.watch.alarm import violation_line
+    from msgflow.watch.chunk import remove_chunk
+    from msgflow.watch.diagnostics import Diagnostics
+    from msgflow.watch.flight_recorder import FlightRecorder
+    from msgflow.watch.follow import watch_finished, watch_live
+    from msgflow.watch.prometheus import Exporter
+    from msgflow.watch.watched_sessions import WatchedSessions, watched_place
+    from msgflow.watch.watcher import Watcher
 
     program = context.args
     word = _only_word(words or [], program, once=once, directory=output)
@@ -249,10 +248,10 @@ def _pages(port: int | None, clock_sync: str) -> Iterator[WindowDatabase | None]
         yield None
         return
     from msgflow.cli.sql_process import WarmSql
-    from msgflow.record import temporary_directory
+    from msgflow.record.session import temporary_directory
     from msgflow.view.server import serving
     from msgflow.view.sql_page import MOST_SECONDS
-    from msgflow.watch import WindowDatabase
+    from msgflow.watch.window_database import WindowDatabase
 
     with temporary_directory() as directory:
         path = directory / "window.duckdb"
@@ -273,8 +272,8 @@ def _published(reports: Iterator[WindowReport], publisher: Diagnostics) -> Itera
 
 def _alarm(targets: Path, paths: Path, *, with_flows: bool) -> Alarm:
     from msgflow.paths.paths_file import read_paths
-    from msgflow.verify import read_targets
-    from msgflow.watch import Alarm
+    from msgflow.verify.targets_file import read_targets
+    from msgflow.watch.alarm import Alarm
 
     file = read_targets(targets)
     named = [target.path_name.value for target in file.targets if target.path_name is not None]
@@ -301,7 +300,8 @@ def _record(
     on_screen: bool,
 ) -> bool:
     """Start a program, record it, and watch the recording until it ends; tell whether it failed."""
-    from msgflow.record import Channel, record, temporary_directory
+    from msgflow.record.recording import record
+    from msgflow.record.session import Channel, temporary_directory
 
     name = f"watch-{time.strftime('%Y%m%d-%H%M%S')}-{os.getpid()}"
     # A file, since the program would stop if it wrote to a full pipe.

@@ -7,21 +7,30 @@ its outcome into files of the directory, which the parent removes.
 from __future__ import annotations
 
 import contextlib
+import errno
 import json
 import os
 import re
+import shutil
 import sys
 import threading
 import time
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from msgflow.database import Database
+from msgflow.db.connection import connect
+from msgflow.errors import DatabaseError, MsgflowError, TraceError, UsageError
+from msgflow.fleet.file_store import S3
+from msgflow.fleet.lake import Lake
+from msgflow.fleet.part import write_part
+from msgflow.fleet.recording import fetch, look_at
+from msgflow.fleet.task import RESULT, STAGE, Outcome, Reason, Task, without_secrets
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from msgflow.fleet.task import Outcome, Task
-
-STAGE, RESULT = "stage", "result.json"
 _ORPHAN = 1
 
 
@@ -30,10 +39,8 @@ def main() -> None:
     directory = Path(sys.argv[1])
     text = sys.stdin.readline()
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    from msgflow.fleet.task import Task
-
     outcome = do(Task(**json.loads(text)), directory)
-    (directory / RESULT).write_text(json.dumps(outcome.as_dict()), encoding="utf-8")
+    (directory / RESULT).write_text(json.dumps(asdict(outcome)), encoding="utf-8")
 
 
 def _end_with_parent() -> None:
@@ -44,40 +51,26 @@ def _end_with_parent() -> None:
 
 def do(task: Task, directory: Path) -> Outcome:
     """Fetch, ingest, check and write one recording; commit nothing."""
-    from msgflow.fleet.task import Outcome
+    begin, stage = time.monotonic(), ""
 
-    begin = time.monotonic()
-    stage = _Stage(directory / STAGE)
+    def enter(name: str) -> None:
+        nonlocal stage
+        stage = name
+        # The parent reads it when this process hangs or has gone.
+        (directory / STAGE).write_text(name, encoding="utf-8")
+
     try:
-        values = _values(task, directory, stage.enter)
+        values = _values(task, directory, enter)
         return Outcome(
             values=values,
             signature=values["source_signature"],
             seconds=time.monotonic() - begin,
         )
     except Exception as error:
-        return failed_outcome(error, stage.name, time.monotonic() - begin)
-
-
-class _Stage:
-    """The current stage, in a file: the parent reads it when the process hangs or has gone."""
-
-    def __init__(self, file: Path) -> None:
-        self._file = file
-        self.name = ""
-
-    def enter(self, name: str) -> None:
-        self.name = name
-        self._file.write_text(name, encoding="utf-8")
+        return failed_outcome(error, stage, time.monotonic() - begin)
 
 
 def _values(task: Task, directory: Path, enter: Callable[[str], None]) -> dict[str, Any]:
-    from msgflow.database import Database
-    from msgflow.fleet.file_store import S3
-    from msgflow.fleet.lake import Lake
-    from msgflow.fleet.part import Content, write_part
-    from msgflow.fleet.recording import fetch, look_at
-
     enter("looking at the source")
     before = look_at(task.source)
     _require_space(task, directory)
@@ -105,7 +98,8 @@ def _values(task: Task, directory: Path, enter: Callable[[str], None]) -> dict[s
             database,
             lake.store,
             directory,
-            Content(views=task.views, database=task.database),
+            views=task.views,
+            database=task.database,
         )
     return {
         **part,
@@ -121,19 +115,14 @@ class ChangedError(Exception):
 
 
 def _require_space(task: Task, directory: Path) -> None:
-    import shutil
-
     free = shutil.disk_usage(directory).free
     if free < task.disk:
-        raise OSError(
-            28, f"some {task.disk:,} bytes of scratch space are needed, {free:,} are free"
-        )
+        words = f"some {task.disk:,} bytes of scratch space are needed, {free:,} are free"
+        raise OSError(errno.ENOSPC, words)
 
 
 def _rename_paths(database: Path, before: str, after: str) -> None:
     """Replace the path of the local copy by the address of the source in all texts."""
-    from msgflow.db.connection import connect
-
     with contextlib.closing(connect(database, read_only=False)) as con:
         columns = con.execute(
             "SELECT table_name, column_name FROM duckdb_columns() WHERE data_type = 'VARCHAR' "
@@ -149,9 +138,6 @@ def _rename_paths(database: Path, before: str, after: str) -> None:
 
 def failed_outcome(error: Exception, stage: str, seconds: float) -> Outcome:
     """Return the outcome of a recording at which an error was raised."""
-    from msgflow.errors import DatabaseError, MsgflowError, TraceError, UsageError
-    from msgflow.fleet.task import Outcome, Reason, without_secrets
-
     message = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
     hint = None
     if isinstance(error, MsgflowError):
@@ -180,11 +166,9 @@ def failed_outcome(error: Exception, stage: str, seconds: float) -> Outcome:
 
 
 def _is_full(error: Exception, message: str) -> bool:
-    if isinstance(error, OSError) and error.errno in (28, 122):
+    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
         return True
-    return any(
-        words in message.lower() for words in ("no space left", "not enough free", "disk quota")
-    )
+    return re.search("(?i:no space left|not enough free|disk quota)", message) is not None
 
 
 if __name__ == "__main__":

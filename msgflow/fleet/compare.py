@@ -8,6 +8,8 @@ from collections import Counter
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+import pyarrow as pa
+
 from msgflow.errors import UsageError
 from msgflow.fleet.lake_connection import Choice, Reading, choose
 from msgflow.query.compare import STATISTICS, Differences, share_of
@@ -16,10 +18,11 @@ from msgflow.query.several_runs import compared
 from msgflow.text.name_suggestions import meant_or, nearest
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator, Mapping, Sequence
 
     from msgflow.fleet.lake import Lake
-    from msgflow.result.query_result import QueryResult
+
+Row = dict[str, Any]
 
 _TABLES = ("flow", "e2e_latency")
 _SHOWN = ("B is longer", "B is shorter")
@@ -65,8 +68,6 @@ def compare(
         for key, each in zip(keys, labels, strict=True)
         if each.get(by) in sides
     ]
-    import pyarrow as pa
-
     runs, sides_of_runs, units = map(list, zip(*sided, strict=True))
     table = pa.table({"run": runs, "side": sides_of_runs, "unit": units})
     wanted = pa.array([each.get(by) in sides for each in labels])
@@ -75,10 +76,12 @@ def compare(
         result = compared(
             reading.connection, case=case, confidence=confidence, at_least=share_of(at_least)
         )
+    rows = result.to_arrow().to_pylist()
     result.notes.extend(_who(by, base, other, sided, unit))
     result.notes.extend(_left_out(by, known, sides, len(labels)))
-    result.notes.extend(_one_sided(result, by))
-    result.notes.extend(_doubts(result, confidence))
+    paths = [row for row in rows if row["statistic"] == STATISTICS[0]]
+    result.notes.extend(_one_sided(paths, by))
+    result.notes.extend(_doubts(rows, paths, confidence))
     return Differences(result=result, all_paths=_ALL_PATHS)
 
 
@@ -151,30 +154,28 @@ def _left_out(
         yield f"left out: {others:,} runs with other values of {by}, {without:,} without it"
 
 
-def _one_sided(result: QueryResult, by: str) -> Iterator[str]:
+def _one_sided(paths: Sequence[Row], by: str) -> Iterator[str]:
     """Yield a note for each side that has paths of its own."""
-    rows = _of_paths(result)
-    if not any(row["a_count"] and row["b_count"] for row in rows):
+    if not any(row["a_count"] and row["b_count"] for row in paths):
         raise UsageError(
             "the two sides have no path with latencies in common",
             f"msgflow fleet query e2e-latency --group-by {shlex.quote(by)} tells what each has",
         )
     for side in ("A", "B"):
-        number = sum(row["verdict"] == f"only in {side}" for row in rows)
+        number = sum(row["verdict"] == f"only in {side}" for row in paths)
         if number:
             yield f"{number} path{'s' * (number != 1)} with values only in {side}"
 
 
-def _doubts(result: QueryResult, confidence: float) -> Iterator[str]:
+def _doubts(rows: Sequence[Row], paths: Sequence[Row], confidence: float) -> Iterator[str]:
     """Yield notes that limit what the numbers show."""
-    rows = result.to_arrow().to_pylist()
     if any(row[CUT_COLUMN] for row in rows):
         yield "some runs have more paths than an ingest looks for, and those are left out"
     for side in ("a", "b"):
-        affected = sum(row[f"{side}_loss_affected"] or 0 for row in _of_paths(result))
+        affected = sum(row[f"{side}_loss_affected"] or 0 for row in paths)
         if affected:
             yield f"{affected:,} flows of {side.upper()} have a gap of a trace in their time"
-        doubted = sum(row[f"{side}_ambiguous"] or 0 for row in _of_paths(result))
+        doubted = sum(row[f"{side}_ambiguous"] or 0 for row in paths)
         if doubted:
             yield f"{doubted:,} flows of {side.upper()} pass a link that may be another one"
     intervals = [row for row in rows if row["low_ns"] is not None]
@@ -184,7 +185,3 @@ def _doubts(result: QueryResult, confidence: float) -> Iterator[str]:
             f"{shown:,} of {len(intervals):,} intervals show a difference; if there were none,"
             f" some {(1 - confidence) * len(intervals):.2g} would"
         )
-
-
-def _of_paths(result: QueryResult) -> list[dict[str, Any]]:
-    return [row for row in result.to_arrow().to_pylist() if row["statistic"] == STATISTICS[0]]

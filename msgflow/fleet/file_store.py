@@ -21,6 +21,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, TypeVar
 from urllib.parse import urlsplit
 
+from pyarrow.fs import (
+    AwsStandardS3RetryStrategy,
+    FileSelector,
+    FileType,
+    LocalFileSystem,
+    S3FileSystem,
+)
+
 from msgflow.errors import DatabaseError, UsageError, require_utf8
 from msgflow.files.temporary_owner import mark
 from msgflow.trace.regular_file import open_regular
@@ -46,7 +54,10 @@ _ENDPOINTS = ("AWS_ENDPOINT_URL_S3", "AWS_ENDPOINT_URL")
 _HOPELESS = re.compile(
     r"NETWORK_CONNECTION|ACCESS_DENIED|NO_SUCH|NOT_FOUND|INVALID|SIGNATURE|HTTP status 40[0134]"
 )
-_OF_THIS_MACHINE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES)
+# Nor helps another try where there is no such file, or where this machine cannot write its copy.
+_HOPELESS_ERRORS = (
+    errno.ENOENT, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES,
+)  # fmt: skip
 # A name of a user or a password before the host; a password may have any character.
 _USERINFO = re.compile(r"(//)(?:[^/]*:.*|[^/@]*)@")
 # The same where `//` was forgotten: names of folders may have a colon as well.
@@ -83,8 +94,6 @@ class Store:
     @cached_property
     def filesystem(self) -> Any:
         """The `pyarrow.fs.FileSystem`; `full` gives its paths."""
-        from pyarrow.fs import LocalFileSystem
-
         return LocalFileSystem() if self.is_local else _s3()
 
     def full(self, path: str = "") -> str:
@@ -137,12 +146,7 @@ class Store:
 
     def entries(self, path: str = "", *, recursive: bool = True) -> list[Entry]:
         """Return the files below a path, sorted; an empty list if there is no such path."""
-        from pyarrow.fs import FileSelector, FileType
-
-        selector = FileSelector(self.full(path), allow_not_found=True, recursive=recursive)
-        with _reaching(self.url):
-            found = self._patiently(lambda: self.filesystem.get_file_info(selector))
-        files = [info for info in found if info.type == FileType.File]
+        files = self._found(path, FileType.File, recursive=recursive)
         if self.is_local and not self._follows_links:
             folders = {info.path.rpartition("/")[0] for info in files}
             here = {each for each in folders if not self._is_elsewhere(self._below(each))}
@@ -161,27 +165,24 @@ class Store:
 
     def folders(self, path: str = "") -> list[str]:
         """Return the names of the folders directly below a path, sorted."""
-        from pyarrow.fs import FileSelector, FileType
+        return sorted(info.base_name for info in self._found(path, FileType.Directory))
 
-        selector = FileSelector(self.full(path), allow_not_found=True)
-        with _reaching(self.url):
-            found = self._patiently(lambda: self.filesystem.get_file_info(selector))
-        return sorted(info.base_name for info in found if info.type == FileType.Directory)
+    def _found(self, path: str, kind: Any, *, recursive: bool = False) -> list[Any]:
+        """Return what pyarrow says of the files or folders below a path."""
+        selector = FileSelector(self.full(path), allow_not_found=True, recursive=recursive)
+        found = self._patiently(lambda: self.filesystem.get_file_info(selector))
+        return [info for info in found if info.type == kind]
 
     def entry(self, path: str = "") -> Entry | None:
         """Return the entry of one file, None if there is no such file."""
-        from pyarrow.fs import FileType
-
         self._require_here(path)
-        with _reaching(self.url):
-            info = self._patiently(lambda: self.filesystem.get_file_info(self.full(path)))
+        info = self._patiently(lambda: self.filesystem.get_file_info(self.full(path)))
         if info.type != FileType.File:
             return None
         return Entry(path, info.size, info.mtime_ns or 0)
 
     def read(self, path: str, most: int | None = None) -> bytes | None:
         """Return the content of a small file, None if there is no such file."""
-
         self._require_here(path)
 
         def read() -> bytes | None:
@@ -191,8 +192,7 @@ class Store:
             except FileNotFoundError:
                 return None
 
-        with _reaching(self.url):
-            content = self._patiently(read)
+        content = self._patiently(read)
         if content is not None and most is not None and len(content) > most:
             raise DatabaseError(
                 f"no file for this: it has more than {most:,} bytes — {self.url_of(path)}",
@@ -202,34 +202,29 @@ class Store:
 
     def fetch(self, path: str, target: Path) -> None:
         """Copy a file into a new local file."""
-
         self._require_here(path)
 
         def copy() -> None:
             with self._reading(path) as stream, target.open("wb") as file:
                 shutil.copyfileobj(stream, file, _CHUNK)
 
-        with _reaching(self.url):
-            self._patiently(copy)
+        self._patiently(copy)
 
     def _patiently(self, work: Callable[[], _T]) -> _T:
-        """Return what `work` returns; try again if a bucket refuses.
+        """Return what `work` reads; try again if a bucket refuses.
 
         The client of AWS tries again by itself, but not during a download, and not always when it
         lists files.
         """
-        for pause in () if self.is_local else PAUSES:
-            try:
-                return work()
-            except FileNotFoundError:
-                raise
-            except OSError as error:
-                if error.errno is not None and error.errno in _OF_THIS_MACHINE:
-                    raise
-                if _HOPELESS.search(str(error)):
-                    raise
-                time.sleep(pause * random.uniform(0.5, 1.5))
-        return work()
+        with _reaching(self.url):
+            for pause in () if self.is_local else PAUSES:
+                try:
+                    return work()
+                except OSError as error:
+                    if error.errno in _HOPELESS_ERRORS or _HOPELESS.search(str(error)):
+                        raise
+                    time.sleep(pause * random.uniform(0.5, 1.5))
+            return work()
 
     def put(self, path: str, content: bytes | Path) -> None:
         """Write a file, in place of an existing one."""
@@ -295,16 +290,9 @@ def normal_url(url: str | Path) -> str:
     return S3 + path
 
 
-def endpoint() -> str | None:
-    """Return the endpoint that the environment names, None for that of AWS."""
-    return next((os.environ[name] for name in _ENDPOINTS if os.environ.get(name)), None)
-
-
 def _s3() -> Any:
-    from pyarrow.fs import AwsStandardS3RetryStrategy, S3FileSystem
-
     options: dict[str, Any] = {}
-    if (url := endpoint()) is not None:
+    if url := next((os.environ[name] for name in _ENDPOINTS if os.environ.get(name)), None):
         parts = urlsplit(url)
         if parts.scheme not in ("http", "https") or not parts.netloc or "@" in parts.netloc:
             # It may hold a password, also one without `//` in front of it.

@@ -18,7 +18,7 @@ from msgflow.errors import MsgflowError, TraceError, UsageError
 from msgflow.fleet.failure import forget_failure, read_failures, write_failure
 from msgflow.fleet.file_store import S3, normal_url
 from msgflow.fleet.lake import Lake
-from msgflow.fleet.recording import Recording, is_archive_name, look_at
+from msgflow.fleet.recording import Recording, look_at
 from msgflow.fleet.sources import find_recordings
 from msgflow.fleet.task import PASSING, Outcome, Reason, Task, needs, without_secrets
 from msgflow.fleet.workers import make_workers
@@ -114,12 +114,12 @@ def fleet_ingest(
     if not recordings:
         raise UsageError(f"the lake itself is no recording — {url}", "give other sources")
     opened = Lake.open_or_create(lake)
-    mine, places = recordings, {}
+    mine, of_all = recordings, {}
     if shard is not None:
         mine = [each for each in recordings if is_in_shard(each.source, *shard)]
-        places = {each.source: (place, each) for place, each in enumerate(recordings)}
+        of_all = {each.source: each for each in recordings}
     with opened.writing():
-        return _Ingest(opened, mine, places, options or Options(), progress).run(ray)
+        return _Ingest(opened, mine, of_all, options or Options(), progress).run(ray)
 
 
 def is_in_shard(source: str, shard: int, shards: int) -> bool:
@@ -141,27 +141,22 @@ class _Item:
     tries: int = 0
 
 
+@dataclass
 class _Ingest:
     """The state of one call: runs of the lake, tasks and progress."""
 
-    def __init__(
-        self,
-        lake: Lake,
-        recordings: Sequence[Recording],
-        places: Mapping[str, tuple[int, Recording]],
-        options: Options,
-        progress: Callable[[FleetProgress], None] | None,
-    ) -> None:
-        self._lake = lake
-        self._options = options
-        self._recordings = recordings
-        # The order of the recordings of all shards, by source; empty if this process does all.
-        self._places = places
-        self._report = progress
+    _lake: Lake
+    _recordings: Sequence[Recording]
+    # Those of all shards in their order, by source; empty if this process does all.
+    _all: Mapping[str, Recording]
+    _options: Options
+    _report: Callable[[FleetProgress], None] | None
+
+    def __post_init__(self) -> None:
         self._begin = time.monotonic()
-        self._progress = FleetProgress(len(recordings))
-        self._runs = {row["run"]: row for row in lake.runs().to_pylist()}
-        own = set(lake.names())
+        self._progress = FleetProgress(len(self._recordings))
+        self._runs = {row["run"]: row for row in self._lake.runs().to_pylist()}
+        own = set(self._lake.names())
         self._packed = {key: row for key, row in self._runs.items() if key not in own}
         # Of two runs of a source, which a killed writer left, the earlier one is to go.
         latest_first = sorted(self._runs.values(), key=lambda row: -row["committed_ns"])
@@ -169,7 +164,7 @@ class _Ingest:
         # Runs that this call wrote, and other sources with the packets of a run.
         self._written: set[str] = set()
         self._alike: dict[str, Mapping[str, Any]] = {}
-        self._failed = {row["source"]: row for row in read_failures(lake).to_pylist()}
+        self._failed = {row["source"]: row for row in read_failures(self._lake).to_pylist()}
         # (when, tie, item): recordings to try again after a pause.
         self._paused: list[tuple[float, int, _Item]] = []
         self._ties = itertools.count()
@@ -236,12 +231,12 @@ class _Ingest:
             return None
         item.state = found
         run = self._runs.get(self._sources.get(recording.source, ""))
-        is_relabelled = run is not None and _is_relabelled(run, recording)
-        if run is not None and is_relabelled:
+        labels = dict(recording.labels)
+        if run is not None and labels and dict(run["labels"] or ()) != labels:
             with self._lake.changing():
                 run = self._as_it_is_now(run["run"])
                 if run is not None and self._is_there(run, recording, found):
-                    self._commit({**run, "labels": dict(recording.labels)})
+                    self._commit({**run, "labels": labels})
         if run is not None and self._is_there(run, recording, found):
             self._forget(item)
             self._progress.there += 1
@@ -281,7 +276,7 @@ class _Ingest:
         assert item.state is not None
         memory, disk = needs(
             item.state.size,
-            is_archive=item.state.is_archive and is_archive_name(source),
+            is_archive=item.state.is_archive,
             is_remote=source.startswith(S3),
         )
         task = Task(
@@ -306,7 +301,6 @@ class _Ingest:
                     stage="giving it to a worker",
                     error=words,
                     hint="a machine that has it, or --memory if it needs less",
-                    signature=item.state.signature,
                 ),
             )
             return
@@ -326,10 +320,12 @@ class _Ingest:
         self._forget(item)
         with self._lake.changing():
             there = self._as_it_is_now(key)
-            is_other = there is not None and there["source"] != item.recording.source
-            if there is None or not is_other or self._takes(item, there):
+            # The run is that of another recording, which has the same packets.
+            other = there if there and there["source"] != item.recording.source else None
+            stays = other is not None and not self._takes(item, other)
+            if not stays:
                 # A recording without labels keeps those that it had.
-                had = {} if is_other and self._places else there or before or {}
+                had = {} if other and self._all else there or before or {}
                 labels = dict(item.recording.labels) or dict(had.get("labels") or ())
                 row = {
                     **outcome.values,
@@ -339,12 +335,11 @@ class _Ingest:
                     "tries": item.tries,
                     "worker": outcome.worker,
                 }
-                if there is not None and is_other:
-                    self._displace(there, row)
+                if other is not None:
+                    self._displace(other, row)
                 self._commit(row)
-                is_other = False
-        if there is not None and is_other:
-            self._same_packets(item, there, before, outcome)
+        if other is not None and stays:
+            self._same_packets(item, other, before, outcome)
             return
         self._leave(item, before)
         self._written.add(key)
@@ -357,20 +352,20 @@ class _Ingest:
 
     def _takes(self, item: _Item, there: Mapping[str, Any]) -> bool:
         """Tell whether a recording takes the run of another one with the same packets."""
-        other = self._places.get(there["source"])
-        if other is None:
+        if there["source"] not in self._all:
             return self._options.replace and there["run"] not in self._written
         # The first one in the order of the command that has them, whichever shard was faster.
-        return self._places[item.recording.source][0] < other[0] or _has_changed(there)
+        order = [*self._all].index
+        return order(item.recording.source) < order(there["source"]) or _has_changed(there)
 
     def _displace(self, there: Mapping[str, Any], row: Mapping[str, Any]) -> None:
         """Write what a recording of another shard would say of the one that takes its run."""
-        _, other = self._places.get(there["source"], (0, None))
+        other = self._all.get(there["source"])
         if other is None or not other.labels or dict(other.labels) == row["labels"]:
             return
         if not _has_changed(there):
-            known = {name: there[name] for name in ("source", "source_signature", "tries")}
-            known |= {"labels": dict(other.labels), "worker": there["worker"]}
+            kept = ("source", "source_signature", "tries", "worker")
+            known = {name: there[name] for name in kept} | {"labels": dict(other.labels)}
             write_failure(self._lake, known | self._of_same_packets(row))
 
     def _of_same_packets(self, there: Mapping[str, Any]) -> dict[str, Any]:
@@ -447,10 +442,7 @@ class _Ingest:
             "source": source,
             "source_signature": signature,
             "labels": dict(item.recording.labels),
-            "reason": str(outcome.reason),
-            "stage": outcome.stage,
-            "error": outcome.error,
-            "hint": outcome.hint,
+            **{name: getattr(outcome, name) for name in ("reason", "stage", "error", "hint")},
             "tries": item.tries,
             "worker": outcome.worker or None,
         }
@@ -464,10 +456,6 @@ class _Ingest:
         self._progress.seconds = time.monotonic() - self._begin
         if self._report is not None:
             self._report(self._progress)
-
-
-def _is_relabelled(run: Mapping[str, Any], recording: Recording) -> bool:
-    return bool(recording.labels) and dict(run["labels"] or ()) != dict(recording.labels)
 
 
 def _has_changed(run: Mapping[str, Any]) -> bool:

@@ -17,13 +17,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import duckdb
+import pyarrow as pa
+import pyarrow.parquet as pq
 
 from msgflow.db.sandbox import open_memory, shut_in
 from msgflow.db.sql_guard import require_condition
 from msgflow.errors import DatabaseError, UsageError
-from msgflow.fleet.answers import answers
-from msgflow.fleet.layout import RUN, VIEWS, part_path
-from msgflow.fleet.run_views import write_views
+from msgflow.fleet.answers import ANSWERS
+from msgflow.fleet.layout import RUN, VIEWS, part_path, view_path
+from msgflow.fleet.part import KEY, PART, public_views, view_rows, write_rows
+from msgflow.fleet.run_database import run_database
 from msgflow.sql.failure import first_line
 from msgflow.sql.quoting import identifier, literal
 from msgflow.text.name_suggestions import meant_or, nearest
@@ -31,8 +34,6 @@ from msgflow.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
-
-    import pyarrow as pa
 
     from msgflow.fleet.lake import Lake
 
@@ -48,23 +49,21 @@ class Choice:
     """Runs of a lake, some or all."""
 
     lake: Lake
-    runs: pa.Table  # the chosen ones, one row each, ordered by key; columns of `run_schema`
+    runs: pa.Table  # the chosen ones, one row each, ordered by key; columns of `RUN_SCHEMA`
     labels: tuple[str, ...]  # keys of the labels of all runs of the lake, sorted
     total: int  # number of runs of the lake
 
 
 def choose(lake: Lake, where: str | None = None) -> Choice:
     """Return the runs of a lake that fit a condition."""
-    with open_memory() as con:
-        shut_in(con)
-        runs = lake.runs(con)
-        if not len(runs):
-            raise UsageError(f"the lake holds no run yet — {lake.store.url}", _NONE_YET)
-        labels = tuple(
-            sorted({key for pairs in runs["labels"].to_pylist() for key, _ in pairs or ()})
-        )
-        chosen = runs
-        if where is not None:
+    runs = lake.runs()
+    if not len(runs):
+        raise UsageError(f"the lake holds no run yet — {lake.store.url}", _NONE_YET)
+    labels = tuple(sorted({key for pairs in runs["labels"].to_pylist() for key, _ in pairs or ()}))
+    chosen = runs
+    if where is not None:
+        with open_memory() as con:
+            shut_in(con)
             require_condition(con, where, _EXAMPLE)
             chosen = _fitting(con, runs, labels, where)
     if not len(chosen):
@@ -85,8 +84,6 @@ def label_columns(labels: Sequence[str], columns: Sequence[str]) -> list[str]:
 def _fitting(
     con: duckdb.DuckDBPyConnection, runs: pa.Table, labels: Sequence[str], where: str
 ) -> pa.Table:
-    import pyarrow as pa
-
     con.register("known_run", runs)
     named = label_columns(labels, runs.column_names)
     columns = [f"labels[$label_{n}] AS {identifier(key)}" for n, key in enumerate(named)]
@@ -121,7 +118,7 @@ def what_there_is(name: str, labels: Sequence[str], columns: Sequence[str]) -> s
     return meant_or(near, f"{have}; columns of run are {', '.join(columns)}", "?")
 
 
-class Reading:
+class Reading(ExitStack):
     """A connection to chosen runs of a lake. Use it as a context manager, or call `close`."""
 
     def __init__(
@@ -132,13 +129,13 @@ class Reading:
         `tables` are those to read, and public views as `view/NAME`; all when None. `listed` says
         that names and columns of all others are wanted, too.
         """
+        super().__init__()
         self.choice = choice
         self.tables: set[str] = set()  # those asked for that these runs have
         self._local_files: list[str] = []
-        self._resources = ExitStack()
         # It has the table `run`, and a view of each table that was asked for, without the column
         # `part`.
-        self.connection = self._resources.enter_context(open_memory())
+        self.connection = self.enter_context(open_memory())
         try:
             with lake_errors(choice.lake):
                 self._fill(tables, listed)
@@ -146,16 +143,6 @@ class Reading:
         except BaseException:
             self.close()
             raise
-
-    def __enter__(self) -> Reading:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Close the connection."""
-        self._resources.close()
 
     def _fill(self, tables: Sequence[str] | None, listed: bool) -> None:
         con = self.connection
@@ -170,7 +157,7 @@ class Reading:
         made = self._made(tables, listed)
         if tables is None or listed:
             views = {f"{VIEWS}/{name}" for name in self.choice.lake.store.folders(VIEWS)}
-            tables = [*(answer.table for answer in answers()), *sorted(views | made.keys())]
+            tables = [*ANSWERS, *sorted(views | made.keys())]
         for table in tables:
             is_view = table.startswith(f"{VIEWS}/")
             found = self._files(table, "view_part" if is_view else "part")
@@ -189,7 +176,10 @@ class Reading:
             )
 
     def _made(self, tables: Sequence[str] | None, listed: bool) -> dict[str, list[str]]:
-        """Return files with the views of runs that have them in their databases only."""
+        """Write views that runs have in their databases only, and return the files of each.
+
+        `listed` also writes all views of the first run, so that their names and columns are known.
+        """
         wanted = (
             None if tables is None else {each for each in tables if each.startswith(f"{VIEWS}/")}
         )
@@ -200,8 +190,22 @@ class Reading:
         ]
         if not runs or not (wanted is None or wanted or listed):
             return {}
-        folder = self._resources.enter_context(tempfile.TemporaryDirectory(prefix="msgflow-"))
-        return write_views(self.choice.lake, runs, Path(folder), wanted, listed=listed)
+        folder = Path(self.enter_context(tempfile.TemporaryDirectory(prefix="msgflow-")))
+        made: dict[str, list[str]] = {}
+        for run in runs:
+            # The part of such views is that of the database, which is in the folder for a moment.
+            part = run["database_part"]
+            with run_database(self.choice.lake, run, folder) as connection:
+                for name in public_views(connection):
+                    view = f"{VIEWS}/{name}"
+                    if wanted is None or view in wanted or listed:
+                        file = folder / view_path(name, part)
+                        file.parent.mkdir(parents=True, exist_ok=True)
+                        rows = view_rows(connection, name)
+                        write_rows(file, name, rows, {KEY: run["run"], PART: part}, "")
+                        made.setdefault(view, []).append(str(file))
+            listed = False
+        return made
 
     def _files(self, table: str, key: str) -> dict[str, str]:
         """Return the files of a table, each with the version that wrote it; earlier may lack it."""
@@ -212,7 +216,7 @@ class Reading:
         }
         there = {entry.path for entry in self.choice.lake.store.entries(table, recursive=False)}
         have_it = {version for path, version in wanted.items() if path in there}
-        if table in {answer.table for answer in answers()}:
+        if table in ANSWERS:
             have_it.add(__version__)
         for path, version in sorted(wanted.items()):
             if path not in there and version in have_it:
@@ -230,9 +234,8 @@ class Reading:
         paths = [store.full(path) for path in files]
         if store.is_local:
             return self._local_scan(name, paths)
-        import pyarrow as pa
+        # Only here: it imports pandas, if that is installed.
         import pyarrow.dataset as ds
-        import pyarrow.parquet as pq
 
         system = store.filesystem
         # Files of one version have the same columns.

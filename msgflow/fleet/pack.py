@@ -12,8 +12,11 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import pyarrow as pa
+import pyarrow.compute as pc
+
 from msgflow.errors import DatabaseError
-from msgflow.fleet.answers import answers
+from msgflow.fleet.answers import ANSWERS
 from msgflow.fleet.layout import (
     DATABASE,
     PACKED,
@@ -26,12 +29,11 @@ from msgflow.fleet.layout import (
     run_path,
 )
 from msgflow.fleet.parquet import read_parquet
+from msgflow.sql.failure import first_line
 from msgflow.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
-
-    import pyarrow as pa
 
     from msgflow.fleet.file_store import Entry
     from msgflow.fleet.lake import Lake
@@ -63,7 +65,7 @@ def pack(lake: Lake) -> Packed:
         before = dict(packed)
         packs = 0
         views = sorted({entry.path.rpartition("/")[0] for entry in lake.store.entries(VIEWS)})
-        for key, tables in (("part", [answer.table for answer in answers()]), ("view_part", views)):
+        for key, tables in (("part", [*ANSWERS]), ("view_part", views)):
             sizes = Counter[str]()
             for table in tables:
                 for entry in lake.store.entries(table):
@@ -138,9 +140,6 @@ def _together(
     lake: Lake, table: str, rows: Sequence[Mapping[str, Any]], key: str, pack: str
 ) -> pa.Table | None:
     """Return the rows of some runs, run after run; None if no part has the table."""
-    import pyarrow as pa
-    import pyarrow.compute as pc
-
     wanted: dict[str, list[str]] = {}
     for row in rows:
         wanted.setdefault(row[key], []).append(row["run"])
@@ -166,9 +165,6 @@ def _together(
 
 
 def _read(lake: Lake, table: str, part: str, runs: Sequence[str]) -> pa.Table | None:
-    import pyarrow as pa
-    import pyarrow.compute as pc
-
     content = lake.store.read(part_path(table, part))
     if content is None:
         return None
@@ -177,8 +173,7 @@ def _read(lake: Lake, table: str, part: str, runs: Sequence[str]) -> pa.Table | 
         is_wanted = pc.is_in(read["run"], value_set=pa.array(runs, pa.string()))
         return read.filter(pc.and_(is_wanted, pc.equal(read["part"], part)))
     except (pa.ArrowException, KeyError, OSError) as error:
-        words = (str(error).strip().splitlines() or [type(error).__name__])[0]
-        raise _unusable(lake, table, part, runs, words) from error
+        raise _unusable(lake, table, part, runs, first_line(error)) from error
 
 
 def _unusable(lake: Lake, table: str, part: str, runs: Sequence[str], why: str) -> DatabaseError:
@@ -195,7 +190,7 @@ def _clean_up(lake: Lake, own: set[str], runs: Iterable[Mapping[str, Any]]) -> l
         entry for entry in lake.store.entries(RUN) if entry.path in own or part_of(entry.path) == ""
     ]
     needed = {
-        **{answer.table: {row["part"] for row in runs} for answer in answers()},
+        **{table: {row["part"] for row in runs} for table in ANSWERS},
         VIEWS: {row["view_part"] for row in runs},
         DATABASE: {row["database_part"] for row in runs},
     }
@@ -205,6 +200,12 @@ def _clean_up(lake: Lake, own: set[str], runs: Iterable[Mapping[str, Any]]) -> l
             for entry in lake.store.entries(folder)
             if (part := part_of(entry.path)) is not None and part not in parts
         ]
+    # `remove` leaves a file here, also where it took out the last run.
+    if unneeded and not lake.names():
+        raise DatabaseError(
+            f"the lake has answers, but no run — {lake.store.url_of(RUN)}",
+            "is its file system mounted? If an ingest was killed, start that again",
+        )
     for entry in unneeded:
         lake.store.delete(entry.path)
     return unneeded

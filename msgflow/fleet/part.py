@@ -7,12 +7,15 @@ time or before, stays as it is.
 from __future__ import annotations
 
 import shutil
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import pyarrow as pa
+import pyarrow.parquet
+
+from msgflow.db.connection import recorded_revision
 from msgflow.db.objects import public_names
 from msgflow.errors import TraceError
-from msgflow.fleet.answers import answers
+from msgflow.fleet.answers import ANSWERS
 from msgflow.fleet.layout import RUN, database_path, metadata, new_part, part_path, view_path
 from msgflow.sql.statement import internal_sql
 from msgflow.version import __version__
@@ -22,7 +25,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     import duckdb
-    import pyarrow as pa
 
     from msgflow.fleet.file_store import Store
 
@@ -31,14 +33,6 @@ _ROWS_AT_ONCE = 100_000
 _RUN_ID = "run_id"
 # Public views that a lake does not hold: its own table `run` has the useful columns.
 _LEFT_OUT = (RUN,)
-
-
-@dataclass(frozen=True)
-class Content:
-    """What to write besides the answers."""
-
-    views: bool = False  # the public views
-    database: bool = True  # the database itself
 
 
 def run_key(connection: duckdb.DuckDBPyConnection, run_id: int) -> str:
@@ -51,34 +45,44 @@ def run_key(connection: duckdb.DuckDBPyConnection, run_id: int) -> str:
 
 def write_part(
     connection: duckdb.DuckDBPyConnection,
-    database: Path,
+    file: Path,
     store: Store,
     scratch: Path,
-    content: Content,
+    *,
+    views: bool = False,
+    database: bool = True,
 ) -> dict[str, Any]:
-    """Write all files of the only run of a database, and return its row as far as that knows it."""
-    from msgflow.db.connection import recorded_revision
+    """Write all files of the only run of a database, and return its row as far as that knows it.
 
+    `views` are the public views, `database` is the file of the database itself.
+    """
     ((run_id, name, start_ns, end_ns, event_count),) = connection.execute(
         "SELECT run_id, name, start_ns, end_ns, event_count FROM main.run"
     ).fetchall()
     key = run_key(connection, run_id)
     part = new_part(key)
     revision = recorded_revision(connection.cursor()) or ""
-    writer = _Writer(store, scratch, {KEY: key, PART: part}, revision)
-    for answer in answers():
-        rows = answer.read(connection, run_id).to_reader(_ROWS_AT_ONCE)
-        writer.table(answer.table, part_path(answer.table, part), rows)
-    if content.views:
+    first = {KEY: key, PART: part}
+    table, compressed = scratch / "table.parquet", scratch / "compressed"
+    for answer, read in ANSWERS.items():
+        rows = read(connection, run_id).to_reader(_ROWS_AT_ONCE)
+        write_rows(table, answer, rows, first, revision)
+        store.put(part_path(answer, part), table)
+    if views:
         for view in public_views(connection):
-            writer.table(view, view_path(view, part), view_rows(connection, view))
-    if content.database:
-        writer.database(database, database_path(part))
+            write_rows(table, view, view_rows(connection, view), first, revision)
+            store.put(view_path(view, part), table)
+    if database:
+        with file.open("rb") as source, pa.CompressedOutputStream(str(compressed), "zstd") as sink:
+            shutil.copyfileobj(source, sink, 1 << 20)
+        store.put(database_path(part), compressed)
+    for each in (table, compressed):
+        each.unlink(missing_ok=True)
     return {
         KEY: key,
         PART: part,
-        "view_part": part if content.views else None,
-        "database_part": part if content.database else None,
+        "view_part": part if views else None,
+        "database_part": part if database else None,
         "name": name,
         "start_ns": start_ns,
         "end_ns": end_ns,
@@ -86,14 +90,6 @@ def write_part(
         "msgflow_version": __version__,
         "schema_revision": revision,
     }
-
-
-def _keyed(schema: pa.Schema) -> pa.Schema:
-    """Return the columns of a table of the lake: first the key of the run, and its part."""
-    import pyarrow as pa
-
-    rest = [field for field in schema if field.name != _RUN_ID]
-    return pa.schema([pa.field(KEY, pa.string()), pa.field(PART, pa.string()), *rest])
 
 
 def public_views(connection: duckdb.DuckDBPyConnection) -> list[str]:
@@ -120,44 +116,11 @@ def write_rows(
     file: Path, table: str, rows: pa.RecordBatchReader, first: Mapping[str, str], revision: str
 ) -> None:
     """Write rows of a run into a file, behind columns with the same value in each of them."""
-    import pyarrow as pa
-    import pyarrow.parquet
-
-    schema = _keyed(rows.schema).with_metadata(metadata(table, revision))
+    same = [pa.field(name, pa.string()) for name in first]
+    own = [field for field in rows.schema if field.name != _RUN_ID]
+    schema = pa.schema([*same, *own], metadata=metadata(table, revision))
     with pyarrow.parquet.ParquetWriter(file, schema, compression="zstd") as writer:
         for batch in rows:
-            same = [pa.repeat(pa.scalar(value), len(batch)) for value in first.values()]
-            columns = [*same, *(batch[each] for each in schema.names[len(same) :])]
+            values = [pa.repeat(pa.scalar(value), len(batch)) for value in first.values()]
+            columns = [*values, *(batch[field.name] for field in own)]
             writer.write_batch(pa.record_batch(columns, schema=schema))
-
-
-class _Writer:
-    """Writes files to the lake by way of the scratch directory."""
-
-    def __init__(
-        self, store: Store, scratch: Path, first: Mapping[str, str], revision: str
-    ) -> None:
-        self._store = store
-        self._scratch = scratch
-        self._first = first
-        self._revision = revision
-
-    def table(self, name: str, path: str, rows: pa.RecordBatchReader) -> None:
-        file = self._scratch / "table.parquet"
-        write_rows(file, name, rows, self._first, self._revision)
-        self._put(path, file)
-
-    def database(self, database: Path, path: str) -> None:
-        import pyarrow as pa
-
-        file = self._scratch / "compressed"
-        with (
-            database.open("rb") as source,
-            pa.CompressedOutputStream(str(file), "zstd") as target,
-        ):
-            shutil.copyfileobj(source, target, 1 << 20)
-        self._put(path, file)
-
-    def _put(self, path: str, file: Path) -> None:
-        self._store.put(path, file)
-        file.unlink()

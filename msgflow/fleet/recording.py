@@ -30,7 +30,7 @@ class State:
 
     signature: str  # hash of names, sizes and times of all its files
     size: int  # their bytes
-    is_archive: bool  # it is one file
+    is_archive: bool  # by its name
 
 
 def look_at(source: str) -> State:
@@ -48,7 +48,8 @@ def look_at(source: str) -> State:
         raise TraceError(f"no such recording — {source}", "check the path")
     text = "\n".join(f"{name}\t{size}\t{time}" for name, size, time in files)
     digest = hashlib.sha256(text.encode(errors="surrogateescape")).hexdigest()
-    return State(digest[:32], sum(size for _, size, _ in files), file is not None)
+    is_archive = file is not None and source.lower().endswith(SUFFIXES)
+    return State(digest[:32], sum(size for _, size, _ in files), is_archive)
 
 
 def fetch(source: str, directory: Path) -> Path:
@@ -66,11 +67,6 @@ def fetch(source: str, directory: Path) -> Path:
         place.parent.mkdir(parents=True, exist_ok=True)
         store.fetch(entry.path, place)
     return target
-
-
-def is_archive_name(source: str) -> bool:
-    """Tell whether a source is an archive, by its name."""
-    return source.lower().endswith(SUFFIXES)
 
 
 def _local_files(source: str) -> Iterator[tuple[str, int, int]]:

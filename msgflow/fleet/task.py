@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import os
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
 # Variables with secrets, which messages of libraries could repeat.
 _SECRETS = ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY", "AWS_SESSION_TOKEN")
 _MEGABYTE = 1_000_000
+# Files in which the process of a task says what it is doing, and its outcome.
+STAGE, RESULT = "stage", "result.json"
 
 
 class Reason(StrEnum):
@@ -58,10 +60,6 @@ class Task:
     memory: int = 0  # estimated bytes of memory
     disk: int = 0  # estimated bytes of scratch space
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return the attributes, as values for JSON."""
-        return asdict(self)
-
 
 @dataclass(frozen=True)
 class Outcome:
@@ -75,10 +73,6 @@ class Outcome:
     signature: str | None = None  # of the source, if known
     seconds: float = 0.0
     worker: str = ""  # machine and process
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the attributes, as values for JSON."""
-        return asdict(self)
 
 
 def needs(size: int, *, is_archive: bool, is_remote: bool) -> tuple[int, int]:

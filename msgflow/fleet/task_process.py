@@ -13,12 +13,12 @@ import subprocess
 import sys
 import tempfile
 import time
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from msgflow.files.temporary_owner import is_abandoned, mark
-from msgflow.fleet.child_process import RESULT, STAGE
-from msgflow.fleet.task import Outcome, Reason, Task, without_secrets
+from msgflow.fleet.task import RESULT, STAGE, Outcome, Reason, Task, without_secrets
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -49,7 +49,7 @@ def run_task(given: dict[str, Any]) -> dict[str, Any]:
             " --scratch",
             seconds=time.monotonic() - begin,
         )
-    return {**outcome.as_dict(), "worker": f"{socket.gethostname()}:{os.getpid()}"}
+    return {**asdict(outcome), "worker": f"{socket.gethostname()}:{os.getpid()}"}
 
 
 @contextlib.contextmanager
@@ -82,7 +82,7 @@ def _watched(task: Task, directory: Path, begin: float) -> Outcome:
         assert child.stdin is not None
         with contextlib.suppress(BrokenPipeError):
             # It stays open: the child ends when it is closed.
-            child.stdin.write(json.dumps(task.as_dict()).encode() + b"\n")
+            child.stdin.write(json.dumps(asdict(task)).encode() + b"\n")
             child.stdin.flush()
         while child.poll() is None:
             if time.monotonic() - begin > task.timeout:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from msgflow.errors import UsageError
 from msgflow.fleet.task import Outcome, Reason, Task
 from msgflow.fleet.task_process import run_task
+from msgflow.sql.failure import first_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -45,7 +47,7 @@ class OneProcess:
         """Do the tasks, without a limit of time, and yield their outcomes."""
         while self._tasks:
             task = self._tasks.pop(0)
-            yield task, Outcome(**run_task(task.as_dict()))
+            yield task, Outcome(**run_task(asdict(task)))
 
     def close(self) -> None:
         """Forget all tasks."""
@@ -84,9 +86,8 @@ class RayWorkers:
                         **more,
                     )
             except Exception as error:
-                line = (str(error).strip().splitlines() or [type(error).__name__])[0]
                 raise UsageError(
-                    f"cannot reach the Ray cluster: {line} — {address}",
+                    f"cannot reach the Ray cluster: {first_line(error)} — {address}",
                     "ray status --address ADDRESS; --ray local starts one of this machine",
                 ) from error
         # `ingest` counts the tries of a task whose worker was lost.
@@ -113,7 +114,7 @@ class RayWorkers:
         # Only some clusters declare their scratch space; on others none can be reserved.
         more = {"resources": {_SCRATCH: task.disk}} if resources.get(_SCRATCH) else {}
         ask = self._run.options(num_cpus=1, memory=task.memory, **more)
-        self._running[ask.remote(task.as_dict())] = task
+        self._running[ask.remote(asdict(task))] = task
 
     def wait(self, seconds: float) -> Iterator[tuple[Task, Outcome]]:
         """Yield finished tasks; wait for the first, at most `seconds`."""
@@ -125,15 +126,8 @@ class RayWorkers:
             try:
                 yield task, Outcome(**self._ray.get(reference))
             except self._ray.exceptions.RayError as error:
-                line = (str(error).strip().splitlines() or [""])[0]
-                yield (
-                    task,
-                    Outcome(
-                        reason=Reason.WORKER_LOST,
-                        stage="on a worker",
-                        error=f"its worker is gone ({type(error).__name__}): {line}",
-                    ),
-                )
+                words = f"its worker is gone ({type(error).__name__}): {first_line(error)}"
+                yield task, Outcome(reason=Reason.WORKER_LOST, stage="on a worker", error=words)
 
     def close(self) -> None:
         """Cancel all tasks and leave the cluster."""

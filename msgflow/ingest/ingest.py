@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 import duckdb
 
 from msgflow import trace as trace_package
-from msgflow.clocks import read_clock_sync, set_clocks
+from msgflow.clocks.clocks_file import read_clock_sync
+from msgflow.clocks.correction import set_clocks
 from msgflow.db import migration
 from msgflow.db.connection import attach
 from msgflow.db.derivation import derive
@@ -27,7 +28,8 @@ from msgflow.ingest.hostnames import hostnames_of
 from msgflow.ingest.load import load_traces
 from msgflow.ingest.samples import load_samples
 from msgflow.ingest.stored_run import fallback_name, require_free_name, store_run
-from msgflow.links import declare_links, read_links
+from msgflow.links.annotations import declare_links
+from msgflow.links.links_file import read_links
 from msgflow.run.choice import require_run_name
 from msgflow.sql.failure import database_errors, in_words
 from msgflow.sql.interrupt import interruptible, noted_interrupts
@@ -35,9 +37,9 @@ from msgflow.sql.interrupt import interruptible, noted_interrupts
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
-    from msgflow.clocks import ClockSync
+    from msgflow.clocks.clocks_file import ClockSync
     from msgflow.db.finding import Finding
-    from msgflow.links import LinksFile
+    from msgflow.links.links_file import LinksFile
     from msgflow.sql.interrupt import Interrupts
     from msgflow.trace import Progress, TraceSet
 

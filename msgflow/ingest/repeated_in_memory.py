@@ -6,7 +6,7 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from msgflow.clocks import set_clocks
+from msgflow.clocks.correction import set_clocks
 from msgflow.db import empty_database
 from msgflow.db.derivation import derive
 from msgflow.db.sandbox import open_memory, shut_in
@@ -15,7 +15,7 @@ from msgflow.db.transaction import transaction
 from msgflow.ingest import model, staging
 from msgflow.ingest.load import load_traces
 from msgflow.ingest.stored_run import store_run
-from msgflow.links import declare_links
+from msgflow.links.annotations import declare_links
 from msgflow.sql.interrupt import noted_interrupts
 from msgflow.sql.quoting import literal
 
@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 
     import duckdb
 
-    from msgflow.clocks import ClockSync
+    from msgflow.clocks.clocks_file import ClockSync
     from msgflow.errors import UsageError
-    from msgflow.links import DeclaredLink, LinksFile
+    from msgflow.links.links_file import DeclaredLink, LinksFile
     from msgflow.trace import TraceSet
 
 

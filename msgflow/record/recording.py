@@ -7,14 +7,14 @@ import shlex
 import shutil
 import time
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
 from msgflow.errors import RecordingError
 from msgflow.record.daemon import session_daemon
 from msgflow.record.event_cost import measure_event_cost
-from msgflow.record.lttng import losses, providers, sessions
+from msgflow.record.lttng import losses, ros_processes, sessions
 from msgflow.record.profile import recorded_samples, with_python_functions
 from msgflow.record.program import Program, require_program
 from msgflow.record.python_path import with_python_nodes
@@ -173,74 +173,64 @@ def _written(log: Path) -> Iterator[IO[bytes]]:
                     log.unlink()
 
 
+@dataclass
 class _Watch:
     """Looks at a recording that runs, and says what goes wrong as soon as it does."""
 
-    def __init__(
-        self,
-        name: str,
-        directory: Path,
-        channel: Channel,
-        note: Callable[[str], None],
-        show: Callable[[Status], None],
-        *,
-        expects_nodes: bool,
-    ) -> None:
-        self._name = name
-        self._directory = directory
-        self._channel = channel
-        self._note = note
-        self._show = show
-        self._expects_nodes = expects_nodes
-        self._has_failed = False
-        self._begin = time.monotonic()
-        self.status = Status(0.0, 0, 0, shutil.disk_usage(directory).free)
+    name: str
+    directory: Path
+    channel: Channel
+    note: Callable[[str], None]
+    show: Callable[[Status], None]
+    expects_nodes: bool
+    has_failed: bool = False
+    begin: float = field(default_factory=time.monotonic)
+
+    def __post_init__(self) -> None:
+        self.status = Status(0.0, 0, 0, shutil.disk_usage(self.directory).free)
 
     def is_over(self, program: Program | None, seconds: float | None) -> bool:
         """Look, and tell whether the recording has to end."""
         try:
             self._look()
         except RecordingError as error:
-            if self._is_gone():
-                self._note(
-                    f"the session {self._name} was destroyed by another program, or its daemon"
+            is_gone = False
+            with suppress(RecordingError):
+                is_gone = not is_there(self.name)
+            if is_gone:
+                self.note(
+                    f"the session {self.name} was destroyed by another program, or its daemon"
                     " ended: the recording ends here"
                 )
                 return True
             # The recording goes on all the same: LTTng writes it.
-            if not self._has_failed:
-                self._note(f"not everything about the recording is known: {error.message}")
-            self._has_failed = True
+            if not self.has_failed:
+                self.note(f"not everything about the recording is known: {error.message}")
+            self.has_failed = True
         if self.status.free_bytes < _LEAST_FREE_BYTES:
-            self._note("the disk is full: the recording ends here; remove files, or use -o DIR")
+            self.note("the disk is full: the recording ends here; remove files, or use -o DIR")
             return True
         if program is not None and program.exit_code is not None:
             return True
         return seconds is not None and self.status.seconds >= seconds
 
-    def _is_gone(self) -> bool:
-        try:
-            return not is_there(self._name)
-        except RecordingError:
-            return False
-
     def _look(self) -> None:
         before = self.status
-        passed = time.monotonic() - self._begin
-        free = shutil.disk_usage(self._directory).free
-        written = recorded_bytes(self._directory)
+        passed = time.monotonic() - self.begin
+        free = shutil.disk_usage(self.directory).free
+        written = recorded_bytes(self.directory)
         self.status = replace(before, seconds=passed, event_bytes=written, free_bytes=free)
-        self.status = replace(self.status, discarded=losses(self._name))
-        self._show(self.status)
+        self.status = replace(self.status, discarded=losses(self.name))
+        self.show(self.status)
         if self.status.discarded and not before.discarded:
-            self._note(
+            self.note(
                 "events are being discarded, the buffers are too small: record again with a"
-                f" --subbuf-size several times as large as {self._channel.sub_buffer_size}"
+                f" --subbuf-size several times as large as {self.channel.sub_buffer_size}"
             )
-        if self._expects_nodes and passed >= _UNTIL_FIRST_NODE:
-            self._expects_nodes = False
-            if not any(provider.is_ros for provider in providers()):
-                self._note(
+        if self.expects_nodes and passed >= _UNTIL_FIRST_NODE:
+            self.expects_nodes = False
+            if not ros_processes():
+                self.note(
                     f"after {passed:.0f} s no process has the tracepoints of ROS 2: is tracing"
                     " built in (ros2 run tracetools status), are nodes running?"
                 )
@@ -290,12 +280,12 @@ def _require_room(directory: Path, note: Callable[[str], None], seconds: float |
 
 def _note_running(note: Callable[[str], None]) -> None:
     try:
-        running = [provider for provider in providers() if provider.is_ros]
+        running = ros_processes()
     except RecordingError as error:
         note(f"it is not known what runs already: {error.message}")
         return
     if running:
-        first = f"{running[0].program} ({running[0].pid})"
+        command, pid = running[0]
         others = f" and {len(running) - 1} more" if len(running) > 1 else ""
         kept = next((session.name for session in sessions() if session.is_snapshot), None)
         cure = (
@@ -304,6 +294,6 @@ def _note_running(note: Callable[[str], None]) -> None:
             else f"--dual {shlex.quote(kept)} has them"
         )
         note(
-            f"{first}{others} of ROS 2 run already: the names of their nodes and topics are not"
-            f" recorded; {cure}"
+            f"{command} ({pid}){others} of ROS 2 run already: the names of their nodes and topics"
+            f" are not recorded; {cure}"
         )

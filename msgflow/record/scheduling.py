@@ -1,4 +1,4 @@
-"""What the kernel's scheduler does, recorded with `perf` where LTTng has no kernel modules."""
+"""Events of the kernel's scheduler, recorded with `perf` where LTTng has no kernel modules."""
 
 from __future__ import annotations
 
@@ -9,14 +9,31 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from msgflow.record import perf
-from msgflow.record.kernel_events import PERF_EVENTS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from pathlib import Path
 
+# As docs/scheduling.md asks for them, by the name of LTTng: that of perf.
+_NAMES = {
+    "sched_switch": "sched:sched_switch",
+    "sched_waking": "sched:sched_waking",
+    "sched_wakeup_new": "sched:sched_wakeup_new",
+    "sched_migrate_task": "sched:sched_migrate_task",
+    "sched_process_fork": "sched:sched_process_fork",
+    "power_cpu_frequency": "power:cpu_frequency",
+    "irq_handler_entry": "irq:irq_handler_entry",
+    "irq_handler_exit": "irq:irq_handler_exit",
+    "irq_softirq_entry": "irq:softirq_entry",
+    "irq_softirq_exit": "irq:softirq_exit",
+    "timer_hrtimer_expire_entry": "timer:hrtimer_expire_entry",
+    "timer_hrtimer_expire_exit": "timer:hrtimer_expire_exit",
+}
+KERNEL_EVENTS = tuple(_NAMES)
+"""Names of LTTng."""
+
 # Pages of memory of each CPU.
-_OPTIONS = ("--all-cpus", "--mmap-pages=8192", *(f"--event={name}" for name in PERF_EVENTS))
+_OPTIONS = ("--all-cpus", "--mmap-pages=8192", *(f"--event={name}" for name in _NAMES.values()))
 _TRACE = "perf"
 
 

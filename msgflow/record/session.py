@@ -6,19 +6,19 @@ import shlex
 import shutil
 import tempfile
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.errors import RecordingError, UsageError
 from msgflow.files.temporary_owner import is_abandoned, mark
-from msgflow.record.kernel_events import KERNEL_EVENTS
 from msgflow.record.lttng import is_daemon_running, lttng, sessions
+from msgflow.record.scheduling import KERNEL_EVENTS
 from msgflow.trace.regular_file import read_regular
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Sequence
 
 # Of ROS 2; of an instrumented DDS; of CARET; of Agnocast.
 EVENTS = ("ros2:*", "dds:*", "ros2_caret:*", "agnocast:*")
@@ -65,9 +65,13 @@ def recording_session(
         owner.unlink()
         raise
     try:
-        _set_up(name, channel)
+        _set_up("--userspace", name, channel, CONTEXTS)
         if with_kernel:
-            _set_up_kernel(name, channel)
+            # All in one call.
+            of_kernel = replace(channel, events=(",".join(KERNEL_EVENTS),), without=())
+            _set_up("--kernel", name, of_kernel, KERNEL_CONTEXTS)
+            with suppress(RecordingError):
+                _add_contexts("--kernel", name, _LATER_CONTEXT)
         if channel.rotation_ns is not None:
             _rotate(name, channel.rotation_ns)
         lttng("start", name)
@@ -171,23 +175,24 @@ def can_trace_kernel() -> bool:
     return True
 
 
-def _set_up(name: str, channel: Channel) -> None:
-    to_channel = ("--userspace", f"--session={name}", f"--channel={_CHANNEL}")
-    _enable_channel("--userspace", name, channel)
+def _set_up(domain: str, name: str, channel: Channel, contexts: Sequence[str]) -> None:
+    sizes = (f"--subbuf-size={channel.sub_buffer_size}", f"--num-subbuf={channel.sub_buffers}")
+    lttng("enable-channel", domain, f"--session={name}", *sizes, _CHANNEL)
     for event in channel.events:
         # LTTng refuses what the event does not have.
         out = [each for each in channel.without if fnmatchcase(each, event)]
-        lttng("enable-event", *to_channel, *([f"--exclude={','.join(out)}"] if out else []), event)
-    lttng("add-context", *to_channel, *(f"--type={context}" for context in CONTEXTS))
+        without = [f"--exclude={','.join(out)}"] if out else []
+        lttng("enable-event", *_to_channel(domain, name), *without, event)
+    _add_contexts(domain, name, *contexts)
 
 
-def _set_up_kernel(name: str, channel: Channel) -> None:
-    to_channel = ("--kernel", f"--session={name}", f"--channel={_CHANNEL}")
-    _enable_channel("--kernel", name, channel)
-    lttng("enable-event", *to_channel, ",".join(KERNEL_EVENTS))
-    lttng("add-context", *to_channel, *(f"--type={context}" for context in KERNEL_CONTEXTS))
-    with suppress(RecordingError):
-        lttng("add-context", *to_channel, f"--type={_LATER_CONTEXT}")
+def _add_contexts(domain: str, name: str, *contexts: str) -> None:
+    types = [f"--type={context}" for context in contexts]
+    lttng("add-context", *_to_channel(domain, name), *types)
+
+
+def _to_channel(domain: str, name: str) -> tuple[str, ...]:
+    return domain, f"--session={name}", f"--channel={_CHANNEL}"
 
 
 def _rotate(name: str, length_ns: int) -> None:
@@ -203,17 +208,6 @@ def _is_first_to_rotate(name: str, length_ns: int) -> bool:
             raise
         return False
     return True
-
-
-def _enable_channel(domain: str, name: str, channel: Channel) -> None:
-    lttng(
-        "enable-channel",
-        domain,
-        f"--session={name}",
-        f"--subbuf-size={channel.sub_buffer_size}",
-        f"--num-subbuf={channel.sub_buffers}",
-        _CHANNEL,
-    )
 
 
 def _is_left(directory: Path | None) -> bool:

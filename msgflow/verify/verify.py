@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from fnmatch import fnmatchcase
-from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import pyarrow as pa
 
 from msgflow.files.default_files import DEFAULT_PATHS
 from msgflow.query.catalogue import load_query
@@ -19,8 +20,9 @@ from msgflow.run.slice import Slice
 from msgflow.sql.header import Column, Header, Param
 from msgflow.text.name_suggestions import did_you_mean
 from msgflow.verify.condition import format_value
+from msgflow.verify.junit import junit_xml
 from msgflow.verify.metrics import ENDS, PATH, SUBJECTS
-from msgflow.verify.worst_case import KEYS, LOST_FLOW, WorstCase, find_worst_case, worst_case_of
+from msgflow.verify.worst_case import KEYS, LOST_FLOW, find_worst_case, worst_case_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -119,8 +121,6 @@ class Verification:
 
     def to_junit(self, *, allow_not_measured: bool = False) -> str:
         """Return the verdicts as JUnit XML: one without a value is an error, or skipped."""
-        from msgflow.verify.junit import junit_xml
-
         return junit_xml(self.result, self.run, allow_not_measured=allow_not_measured)
 
 
@@ -151,8 +151,6 @@ def verify(
     ]
     # Failures come first; otherwise the order of the file stays.
     rows.sort(key=lambda row: _ORDER.index(row["verdict"]))
-    import pyarrow as pa
-
     types = {"VARCHAR": pa.string(), "DOUBLE": pa.float64(), "BIGINT": pa.int64()}
     schema = pa.schema([(column.name, types[column.type]) for column in _COLUMNS])
     notes = list(work.notes)
@@ -174,21 +172,17 @@ class _Work:
 
     def rows(self, target: Target) -> Iterator[dict[str, Any]]:
         metrics = SUBJECTS[target.kind].metrics
-        found: list[tuple[int, int, dict[str, Any]]] = []
-        numbered = list(enumerate(target.requirements))
-
-        def query_of(item: tuple[int, Requirement]) -> str:
-            return metrics[item[1].metric].query
-
-        for name, group in groupby(sorted(numbered, key=query_of), key=query_of):
-            asked = list(group)
-            measured = self._measure(target, name, [requirement for _, requirement in asked])
-            for place, (number, requirement) in enumerate(asked):
-                if not measured:
-                    found.append((number, 0, self._missing(target, requirement)))
-                for position, row in enumerate(measured):
-                    found.append((number, position, self._row(target, requirement, row, place)))
-        yield from (row for _, _, row in sorted(found, key=lambda item: item[:2]))
+        asked: dict[str, list[Requirement]] = {}
+        for requirement in target.requirements:
+            asked.setdefault(metrics[requirement.metric].query, []).append(requirement)
+        measured = {name: self._measure(target, name, asked[name]) for name in sorted(asked)}
+        for requirement in target.requirements:
+            name = metrics[requirement.metric].query
+            place = asked[name].index(requirement)
+            for row in measured[name]:
+                yield self._row(target, requirement, row, place)
+            if not measured[name]:
+                yield self._missing(target, requirement)
 
     def _measure(
         self, target: Target, name: str, requirements: Sequence[Requirement]
@@ -205,28 +199,31 @@ class _Work:
             columns.append(f"{key} AS key_{place}")
         if any(column.name == AMBIGUOUS for column in load_query(name).columns):
             columns.append(AMBIGUOUS)
-        given: dict[str, Value] = {}
+        where, given = self._conditions(target, load_query(name))
+        condition = " AND ".join(where) or "true"
+        sql = f"SELECT {', '.join(columns)} FROM ({{}}) AS result WHERE {condition} ORDER BY ALL"
+        return self._ask(name, sql, target, given)
+
+    def _conditions(self, target: Target, header: Header) -> tuple[list[str], dict[str, Value]]:
+        """Return which rows of a query a target means, with the values of its conditions."""
         if target.path_name is not None:
             places = self.paths[target.path_name.value]
             visited = Selection(
                 via=tuple(places.get("via", ())), without=tuple(places.get("without", ()))
             )
-            where, given = conditions_of(load_query(name), visited)
-        elif target.kind == PATH:
-            given["via"] = [topic.value for topic in target.topics]
-            where = ["list_has_all(string_split(path, ' → '), $via)"]
-        elif target.kind == ENDS:
+            return conditions_of(header, visited)
+        if target.kind == PATH:
+            topics: list[Value] = [topic.value for topic in target.topics]
+            return ["list_has_all(string_split(path, ' → '), $via)"], {"via": topics}
+        if target.kind == ENDS:
             # The parameters of the query choose.
-            where = []
-        else:
-            where = [
-                self._matches(load_query(name), field, subject.filters[field].columns[name])
-                for field in target.chosen
-            ]
-            given = {f"wanted_{field}": text.value for field, text in target.chosen.items()}
-        condition = " AND ".join(where) or "true"
-        sql = f"SELECT {', '.join(columns)} FROM ({{}}) AS result WHERE {condition} ORDER BY ALL"
-        return self._ask(name, sql, target, given)
+            return [], {}
+        filters = SUBJECTS[target.kind].filters
+        where = [
+            self._matches(header, field, filters[field].columns[header.name])
+            for field in target.chosen
+        ]
+        return where, {f"wanted_{field}": text.value for field, text in target.chosen.items()}
 
     @staticmethod
     def _matches(header: Header, field: str, columns: tuple[str, ...]) -> str:
@@ -278,12 +275,12 @@ class _Work:
         # It is made of links that may be other ones.
         doubted = row.get(AMBIGUOUS)
         doubt = f"values by links that may be other ones: {doubted:,}" if doubted else None
-        worst: WorstCase | None = None
+        found = self._verdict(target, requirement)
         if value is not None:
             verdict = Verdict.PASSED if condition.holds(value) else Verdict.FAILED
             if condition.is_exceeded_by(value) and metric.worst:
-                worst = self._worst(target, metric.worst, row["subject"], row[f"key_{place}"])
-        return self._verdict(target, requirement) | {
+                found |= self._worst(target, metric.worst, row["subject"], row[f"key_{place}"])
+        return found | {
             "verdict": verdict,
             "subject": target.name if target.kind == PATH else row["subject"],
             "path": row["subject"] if target.kind == PATH else None,
@@ -291,9 +288,6 @@ class _Work:
             "value": value,
             "samples": row[f"samples_{place}"],
             "reason": (metric.lacking or metric.missing) if value is None else doubt,
-            "worst_ns": worst.duration_ns if worst else None,
-            "worst_at_ns": worst.at_ns if worst else None,
-            "see": worst.command if worst else None,
         }
 
     def _missing(self, target: Target, requirement: Requirement) -> dict[str, Any]:
@@ -327,12 +321,12 @@ class _Work:
             "line": requirement.line,
         }
 
-    def _worst(self, target: Target, kind: str, subject: str, key: Any) -> WorstCase | None:
+    def _worst(self, target: Target, kind: str, subject: str, key: Any) -> dict[str, Any]:
         if kind in ("flow", "first_flow", "last_flow"):
             return worst_case_of([*key, "take"])
         if kind == "lost_flow":
             rows = self._ask("flows", LOST_FLOW, target, {"subject": subject})
-            return worst_case_of(list(rows[0].values())) if rows else None
+            return worst_case_of(list(rows[0].values())) if rows else {}
         return find_worst_case(self.connection, kind, key, self.window)
 
 

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from msgflow.query.compare import Comparison
     from msgflow.result.query_result import QueryResult
     from msgflow.run.choice import Run
-    from msgflow.verify import Verification
+    from msgflow.verify.verify import Verification
     from msgflow.view.summary import Section
 
 MARKDOWN = ".md"

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from msgflow.query.compare import Comparison
     from msgflow.sql.value import Value
-    from msgflow.verify import Verification
+    from msgflow.verify.verify import Verification
     from msgflow.view.question import Question
 
 # The slowest paths whose latency is taken apart.

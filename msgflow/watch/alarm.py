@@ -11,8 +11,9 @@ from msgflow.query.runner import run_query
 from msgflow.query.why import explain
 from msgflow.run.slice import Slice
 from msgflow.text.values import format_duration
-from msgflow.verify import Verdict, take_of, verify
 from msgflow.verify.metrics import ENDS
+from msgflow.verify.verify import Verdict, verify
+from msgflow.verify.worst_case import take_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     import duckdb
 
     from msgflow.run.window import Window
-    from msgflow.verify import TargetsFile
+    from msgflow.verify.targets_file import TargetsFile
 
 Row = dict[str, Any]
 
@@ -43,6 +44,8 @@ _BLAME_OF_STATE = {
     "sleeping": "{node} slept {time}",
     "uninterruptible": "{node} waited {time} for a page or a disk",
 }
+# What is said of the causes of what fails: of its worst case, and of the whole window.
+_CAUSES = ("culprit", "why")
 _OTHER = "{node} spent {time} on {activity}"
 # A requirement has the first of these that a window gave it.
 _STRONGEST = (Verdict.FAILED, Verdict.PASSED, Verdict.NO_DATA, Verdict.NOT_MEASURED)
@@ -61,44 +64,35 @@ class _Told:
 
     worst_ns: int  # the worst case so far; 0 of requirements that have no worst case
     until_ns: int  # until when all was judged
-    culprit: str | None  # what was to blame when it was told
+    causes: Row  # those that were told of it
 
     @classmethod
     def of(cls, row: Row, until_ns: int, before: _Told | None) -> _Told:
         worst_ns = max(row["worst_ns"] or 0, 0 if before is None else before.worst_ns)
-        return cls(worst_ns, until_ns, row["culprit"])
+        return cls(worst_ns, until_ns, {name: row[name] for name in _CAUSES})
 
     def is_surpassed(self, worst_ns: int | None, at_ns: int | None) -> bool:
         is_later = at_ns is not None and at_ns >= self.until_ns
         return is_later or (worst_ns or 0) > self.worst_ns
 
 
+@dataclass
 class Alarm:
     """The targets, and which of them were met since the begin."""
 
-    def __init__(
-        self,
-        targets: TargetsFile,
-        paths: Mapping[str, Mapping[str, Sequence[str]]],
-        note: Callable[[str], None],
-        *,
-        with_flows: bool = False,
-    ) -> None:
-        """Start without a verdict.
+    targets: TargetsFile
+    # Places of the named paths of the requirements, as `verify` takes them.
+    paths: Mapping[str, Mapping[str, Sequence[str]]]
+    # Gets a sentence about each requirement that had data and has none any more.
+    note: Callable[[str], None]
+    with_flows: bool = False  # also ask what became of the flows of paths
 
-        `paths` are places of the named paths of the requirements, as `verify` takes them. `note`
-        gets a sentence about each requirement that had data and has none any more. `with_flows`
-        also asks what became of the flows of paths.
-        """
-        self._targets = targets
-        self._with_flows = with_flows
+    def __post_init__(self) -> None:
         self._places = {
             target.name: {field: text.value for field, text in target.chosen.items()}
-            for target in targets.targets
+            for target in self.targets.targets
             if target.kind == ENDS
         }
-        self._paths = paths
-        self._say = note
         # By (target, metric, condition).
         self._verdicts: dict[tuple[str, str, str], Verdict] = {}
         self._failing: dict[tuple[Any, ...], _Told] = {}
@@ -120,35 +114,36 @@ class Alarm:
         """Verify a window, of whose times those from `final_ns` on are not final yet.
 
         It returns what is violated there and was not before; and the rows of `verify`, each with
-        the `culprit` of what fails, and as `flows` the row of `e2e-latency` of a path if asked for.
+        `culprit` and `why` of what fails, and as `flows` the row of `e2e-latency` of a path if
+        asked for.
         """
         part = Slice(start=window.start_ns, end=window.end_ns)
-        rows = verify(con, self._targets, part, paths=self._paths).result.table.to_pylist()
-        found = []
+        rows = verify(con, self.targets, part, paths=self.paths).result.table.to_pylist()
+        found: list[Row] = []
         failing = {}
+        culprits: list[Row] | None = None
         for row in rows:
-            self._note(row)
-            row |= {"culprit": None, "flows": self._flows(con, row, part)}
+            self._remember(row)
+            row |= dict.fromkeys(_CAUSES) | {"flows": self._flows(con, row, part)}
             if row["verdict"] != Verdict.FAILED:
                 continue
             key = tuple(row[name] for name in ("target", "metric", "condition", "subject", "path"))
             told = self._failing.get(key)
             if told is None or told.is_surpassed(row["worst_ns"], row["worst_at_ns"]):
-                found.append(self._violation(con, row, part, final_ns))
-                row["culprit"] = found[-1]["culprit"]
+                culprits = _culprits(con, part) if culprits is None else culprits
+                violation = self._violation(con, row, part, final_ns)
+                found.append(violation | {"why": _why(culprits, row["path"])})
+                row |= {name: found[-1][name] for name in _CAUSES}
             else:
-                row["culprit"] = told.culprit
+                row |= told.causes
             failing[key] = _Told.of(row, window.end_ns, told)
-        if found:
-            said = _told(con, part)
-            found = [row | {"why": _sentence(said, row["path"])} for row in found]
         self._failing = failing
         self._note_silence(rows)
         return found, rows
 
     def _flows(self, con: duckdb.DuckDBPyConnection, row: Row, part: Slice) -> Row | None:
         """Return `median_ns`, `p99_ns`, `lost` and `dropped` of a path, or between two topics."""
-        if not self._with_flows or row["subject"] is None:
+        if not self.with_flows or row["subject"] is None:
             return None
         if row["path"] is not None:
             query, subject, prefix, ends = "e2e-latency", row["path"], "", _ends(row["path"])
@@ -164,7 +159,7 @@ class Alarm:
                 return numbers | {name: each[name] for name in ("lost", "dropped")}
         return None
 
-    def _note(self, row: Row) -> None:
+    def _remember(self, row: Row) -> None:
         key, verdict = _key(row), Verdict(row["verdict"])
         before = self._verdicts.get(key, verdict)
         self._verdicts[key] = min(before, verdict, key=_STRONGEST.index)
@@ -177,7 +172,7 @@ class Alarm:
             had_data = self._verdicts[_key(row)] in (Verdict.FAILED, Verdict.PASSED)
             if had_data and _key(row) in silent - self._silent:
                 name = row["subject"] or row["target"]
-                self._say(f"no data of {name}: {row['metric']} {row['condition']}: {row['reason']}")
+                self.note(f"no data of {name}: {row['metric']} {row['condition']}: {row['reason']}")
         self._silent = silent
 
     @staticmethod
@@ -205,19 +200,19 @@ def _key(row: Row) -> tuple[str, str, str]:
     return row["target"], row["metric"], row["condition"]
 
 
-def _told(con: duckdb.DuckDBPyConnection, part: Slice) -> list[Row]:
-    """Return what `msgflow why` says first of a window."""
+def _culprits(con: duckdb.DuckDBPyConnection, part: Slice) -> list[Row]:
+    """Return what `msgflow why` says first of a window, the worst culprit first."""
     try:
-        verdict = explain(con, part.one_run(con, "an alarm"), part).verdict.table
+        found = explain(con, part.one_run(con, "an alarm"), part)
     except NoFlowError:
         return []
-    rows: list[Row] = verdict.to_pylist()
+    rows: list[Row] = found.verdict.table.to_pylist()
     return rows
 
 
-def _sentence(told: Sequence[Row], path: str | None) -> str | None:
+def _why(culprits: Sequence[Row], path: str | None) -> str | None:
     """Return the sentence of the worst culprit on a path, which may be part of a longer one."""
-    for row in told:
+    for row in culprits:
         if path and row["cost_ns"] is not None and f" → {path} → " in f" → {row['path']} → ":
             return str(row["sentence"])
     return None

@@ -49,7 +49,6 @@ class ChunkFinder:
     """Finds the finished chunks below a directory, of all hosts, each once."""
 
     def __init__(self, directory: Path, refuse: Callable[[TraceError], None]) -> None:
-        """Find nothing yet."""
         self._directory = directory
         self._refuse = refuse
         self._refused: set[Path] = set()

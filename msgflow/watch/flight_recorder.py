@@ -7,6 +7,7 @@ import shutil
 import stat
 import time
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import KW_ONLY, dataclass
 from itertools import count
 from typing import TYPE_CHECKING
 
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Future
     from pathlib import Path
 
-    from msgflow.links import LinksFile
+    from msgflow.links.links_file import LinksFile
     from msgflow.watch.kept_traces import KeptTraces
 
 _DATABASE = "msgflow.duckdb"
@@ -27,6 +28,7 @@ _DATABASE = "msgflow.duckdb"
 _MARK = ".msgflow-violation"
 
 
+@dataclass
 class FlightRecorder:
     """Directories of violations, also of earlier watchers; the oldest are removed.
 
@@ -34,28 +36,15 @@ class FlightRecorder:
     goes on meanwhile.
     """
 
-    def __init__(
-        self,
-        directory: Path,
-        *,
-        most: int,
-        window_ns: int,
-        earlier_ns: int,
-        clock_sync: str,
-        note: Callable[[str], None],
-    ) -> None:
-        """Keep nothing yet.
+    directory: Path  # it gets a copy per violation
+    _: KW_ONLY
+    most: int  # how many of them it keeps, the last ones
+    window_ns: int
+    earlier_ns: int  # how much of what came before the window of a violation is kept, too
+    clock_sync: str  # as `ingest` takes it
+    note: Callable[[str], None]  # gets a sentence about what was kept, or why not
 
-        The directory gets a copy per violation, and keeps the last `most` of them. `ingest` has the
-        meaning of `clock_sync`. `note` gets a sentence about what was kept, or why not.
-        """
-        self._directory = directory
-        self._most = most
-        self._window_ns = window_ns
-        # How much of what came before the window of a violation is kept, too.
-        self.earlier_ns = earlier_ns
-        self._clock_sync = clock_sync
-        self._note = note
+    def __post_init__(self) -> None:
         self._until_ns = 0
         self._beside = ThreadPoolExecutor(1)
         self._writing: Future[None] | None = None
@@ -76,11 +65,11 @@ class FlightRecorder:
         """
         if end_ns < self._until_ns:
             return
-        self._until_ns = end_ns + self._window_ns
+        self._until_ns = end_ns + self.window_ns
         # Several at once would take the memory of the system that is watched.
         self._finish()
         moment = time.strftime("%Y%m%d-%H%M%S", time.gmtime(end_ns // 1_000_000_000))
-        target = self._directory / f"violation-{moment}"
+        target = self.directory / f"violation-{moment}"
         is_ours = False
         # Whatever fails must not end the view.
         try:
@@ -119,24 +108,24 @@ class FlightRecorder:
                 target / _DATABASE,
                 name=target.name,
                 links=links,
-                clock_sync=self._clock_sync,
+                clock_sync=self.clock_sync,
                 traces=traces,
             )
         except Exception as error:
             shutil.rmtree(target, ignore_errors=True)
             self._note_failure(target, error)
             return
-        kept = {path: _end_ns(path) for path in self._directory.glob("violation-*")}
+        kept = {path: _end_ns(path) for path in self.directory.glob("violation-*")}
         # A violation that another watcher keeps just now may be older.
         others = sorted(
             (end_ns, path) for path, end_ns in kept.items() if end_ns is not None and path != target
         )
-        for _, oldest in others[: max(len(others) + 1 - self._most, 0)]:
+        for _, oldest in others[: max(len(others) + 1 - self.most, 0)]:
             shutil.rmtree(oldest, ignore_errors=True)
-        self._note(f"kept: msgflow why --db {target / _DATABASE}")
+        self.note(f"kept: msgflow why --db {target / _DATABASE}")
 
     def _note_failure(self, target: Path, error: Exception) -> None:
-        self._note(f"the violation is not kept in {target}: {_reason(error)}")
+        self.note(f"the violation is not kept in {target}: {_reason(error)}")
 
 
 def _made(path: Path) -> Path:

@@ -10,7 +10,7 @@ from msgflow.run.window import Window
 from msgflow.watch.kept_traces import KeptTraces
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping, Sequence
+    from collections.abc import Collection, Sequence
     from pathlib import Path
 
     from msgflow.watch.kept_chunk import KeptChunk
@@ -28,13 +28,13 @@ class History:
     """
 
     def __init__(self, window_ns: int, step_ns: int, late_ns: int) -> None:
-        """Start with nothing."""
         self._window_ns = window_ns
         self._step_ns = step_ns
         self._late_ns = late_ns
         self._lasting: dict[Path, KeptChunk] = {}
         self._chunks: list[KeptChunk] = []
-        self._ends: dict[Path, int] = {}
+        # Up to when each source has recorded.
+        self.ends_ns: dict[Path, int] = {}
         self._begin_ns = 0
         # The end of the last window that is closed; before the first one, where that begins.
         self.closed_ns = 0
@@ -43,18 +43,13 @@ class History:
         self._further = 0
 
     @property
-    def ends_ns(self) -> Mapping[Path, int]:
-        """Up to when each source has recorded."""
-        return self._ends
-
-    @property
     def newest_ns(self) -> int:
         """The newest time of all sources; 0 before the first chunk."""
-        return max(self._ends.values(), default=0)
+        return max(self.ends_ns.values(), default=0)
 
     def newest_without(self, sources: Collection[Path]) -> int:
         """Return the newest time of the other sources, or of all if there are no others."""
-        ends = (end for source, end in self._ends.items() if source not in sources)
+        ends = (end for source, end in self.ends_ns.items() if source not in sources)
         return max(ends, default=self.newest_ns)
 
     @property
@@ -67,7 +62,7 @@ class History:
         self._further += chunk.times_ns.size
         self._chunks.append(chunk)
         self._chunks.sort(key=lambda each: each.end_ns)
-        self._ends[chunk.source] = max(chunk.end_ns, self._ends.get(chunk.source, chunk.end_ns))
+        self.ends_ns[chunk.source] = max(chunk.end_ns, self.ends_ns.get(chunk.source, 0))
         if not self._has_closed:
             self._begin()
             return 0
@@ -78,9 +73,9 @@ class History:
 
         Nothing happens to the only source.
         """
-        if not self._ends.keys() - {source}:
+        if not self.ends_ns.keys() - {source}:
             return
-        self._ends.pop(source, None)
+        self.ends_ns.pop(source, None)
         self._chunks = [chunk for chunk in self._chunks if chunk.source != source]
         if self.closed_ns > self.newest_ns:
             # Windows so far had its time.

@@ -11,6 +11,7 @@ from msgflow.errors import UsageError
 from msgflow.query.catalogue import load_query
 from msgflow.query.runner import run_query
 from msgflow.run.slice import Slice
+from msgflow.sql.statement import registered
 from msgflow.watch.window_report import discarded_events
 
 if TYPE_CHECKING:
@@ -61,7 +62,6 @@ class Exporter:
     """Metrics of a recording that is watched; `serve` lets Prometheus read them."""
 
     def __init__(self) -> None:
-        """Start with nothing counted."""
         # The server reads in threads of its own.
         self._lock = Lock()
         self._statuses: Counter[tuple[str, str]] = Counter()
@@ -104,14 +104,11 @@ class Exporter:
         times = Slice(start=part.start_ns, end=part.end_ns)
         flows = run_query(con, load_query("flows"), {}, times).table
         losses = con.execute(_LOSSES, part.bindings).fetchall()
-        con.register("watched_flow", flows)
-        try:
+        with registered(con, watched_flow=flows):
             statuses = con.execute(_STATUSES).fetchall()
             sums = con.execute(_SUMS).fetchall()
             counts = con.execute(_COUNTS).fetchall()
             buckets = con.execute(_BUCKETS, {"bounds": list(BOUNDS_S)}).fetchall()
-        finally:
-            con.unregister("watched_flow")
         discarded = discarded_events(con, part)
         with self._lock:
             self._statuses.update({(path, status): number for path, status, number in statuses})
@@ -155,7 +152,7 @@ class Exporter:
         yield from metrics
 
     def _flows(self) -> Iterator[Metric]:
-        from prometheus_client.core import CounterMetricFamily, HistogramMetricFamily
+        from prometheus_client.core import HistogramMetricFamily
 
         latency = HistogramMetricFamily(
             "msgflow_path_latency_seconds", "Latency from end to end", labels=["path"]
@@ -166,29 +163,28 @@ class Exporter:
                 [path], [*buckets, ("+Inf", number)], self._sums_ns[path] / _SECOND_NS
             )
         yield latency
-        flows = CounterMetricFamily(
-            "msgflow_path_flows", "Flows by what became of them", labels=["path", "status"]
-        )
-        for labels, number in self._statuses.items():
-            flows.add_metric(list(labels), number)
-        yield flows
 
     def _counters(self) -> Iterator[Metric]:
         from prometheus_client.core import CounterMetricFamily
 
-        messages = CounterMetricFamily(
-            "msgflow_messages_undelivered", "Messages that a subscription did not get",
-            labels=["topic", "subscriber", "kind", "reason"],
-        )  # fmt: skip
-        for labels, number in self._losses.items():
-            messages.add_metric(list(labels), number)
-        yield messages
-        violations = CounterMetricFamily(
-            "msgflow_violations", "Targets that were not met", labels=["subject", "metric"]
-        )
-        for names, number in self._violations.items():
-            violations.add_metric(list(names), number)
-        yield violations
+        for name, meaning, labels, counted in (
+            (
+                "msgflow_path_flows", "Flows by what became of them",
+                ["path", "status"], self._statuses,
+            ),
+            (
+                "msgflow_messages_undelivered", "Messages that a subscription did not get",
+                ["topic", "subscriber", "kind", "reason"], self._losses,
+            ),
+            (
+                "msgflow_violations", "Targets that were not met",
+                ["subject", "metric"], self._violations,
+            ),
+        ):  # fmt: skip
+            family = CounterMetricFamily(name, meaning, labels=labels)
+            for values, number in counted.items():
+                family.add_metric(list(values), number)
+            yield family
         yield CounterMetricFamily(
             "msgflow_discarded_events", "Events that the tracer lost", value=self._discarded
         )

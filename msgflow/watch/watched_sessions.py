@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.errors import RecordingError, UsageError
-from msgflow.record import rotated, sessions
+from msgflow.record.lttng import sessions
+from msgflow.record.session import rotated
 from msgflow.text.name_suggestions import did_you_mean
 
 if TYPE_CHECKING:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import time
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
-from msgflow.clocks import ClockSync
+from msgflow.clocks.clocks_file import ClockSync
 from msgflow.errors import TraceError, UsageError
 from msgflow.ingest.repeated_in_memory import database_in_memory, ingest_again, link_again
 from msgflow.run.window import Window
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from pathlib import Path
 
-    from msgflow.links import DeclaredLink, LinksFile
+    from msgflow.links.links_file import DeclaredLink, LinksFile
     from msgflow.watch.alarm import Alarm
     from msgflow.watch.chunk import Chunk
     from msgflow.watch.flight_recorder import FlightRecorder
@@ -37,51 +37,34 @@ _SECOND_NS = 1_000_000_000
 _LEAST_STEP_NS = 500_000_000
 
 
+@dataclass(kw_only=True)
 class Watcher:
     """What is known of a recording so far, and the windows over it."""
 
-    def __init__(
-        self,
-        *,
-        window_ns: int,
-        step_ns: int,
-        late_ns: int,
-        links: LinksFile | None,
-        clocks: ClockSync,
-        note: Callable[[str], None],
-        alarm: Alarm | None = None,
-        recorder: FlightRecorder | None = None,
-        exporter: Exporter | None = None,
-        database: WindowDatabase | None = None,
-        has_node: bool = False,
-    ) -> None:
-        """Start before the first chunk.
+    window_ns: int
+    step_ns: int  # a window is so far from the one before
+    late_ns: int  # a window waits so long for what is late
+    links: LinksFile | None
+    clocks: ClockSync
+    note: Callable[[str], None]  # gets sentences about what is wrong with the recording
+    alarm: Alarm | None = None
+    recorder: FlightRecorder | None = None  # keeps the chunks around a violation
+    exporter: Exporter | None = None  # counts each moment once
+    database: WindowDatabase | None = None  # gets each window, for pages
+    has_node: bool = False  # this process has a node, which the windows leave out
+    # Gets the directory of each chunk that no window needs any more.
+    on_passed: Callable[[Path], None] | None = None
 
-        A window is `step_ns` from the one before, and waits `late_ns` for what is late. `note` gets
-        sentences about what is wrong with the recording. The recorder keeps the chunks around a
-        violation, the exporter counts each moment once, and the database gets each window, for
-        pages. `has_node` says that this process has a node, which the windows leave out.
-        """
-        self.history = History(window_ns, step_ns, late_ns)
-        self._links = links
-        self._clocks = clocks
-        self._note = note
-        self._alarm = alarm
-        self._recorder = recorder
-        self._earlier_ns = 0 if recorder is None else recorder.earlier_ns
-        self._exporter = exporter
-        self._database = database
-        self._has_node = has_node
-        # Gets the directory of each chunk that no window needs any more.
-        self.on_passed: Callable[[Path], None] | None = None
+    def __post_init__(self) -> None:
+        self.history = History(self.window_ns, self.step_ns, self.late_ns)
+        self._earlier_ns = 0 if self.recorder is None else self.recorder.earlier_ns
         self._said: set[str] = set()
         # Since the last report.
         self._late_events = 0
         self._clock_offset_ns = self._last_clock_offset_ns = _clock_offset_ns()
         self._answers = LearnedAnswers()
-        self._violated: tuple[int, KeptTraces, list[Path], LinksFile | None, str | None] | None = (
-            None
-        )
+        # Keeps the violation of the last report, if it has one.
+        self._keep: Callable[[], None] | None = None
         self._after = Continuation()
         self._con = database_in_memory()
         # Of the last chunk of each source.
@@ -92,22 +75,22 @@ class Watcher:
         before = self._numbers.get(chunk.source)
         self._numbers[chunk.source] = chunk.number
         if before is not None and chunk.number <= before:
-            self._note(f"a new recording has begun in {chunk.source}: the view goes on with it")
+            self.note(f"a new recording has begun in {chunk.source}: the view goes on with it")
         elif before is not None and chunk.number > before + 1:
-            self._note(
+            self.note(
                 f"chunks are missing before number {chunk.number} of {chunk.source}:"
                 f" {chunk.number - before - 1}"
             )
         try:
-            kept = read_chunk(chunk, self._after, without_own=self._has_node)
+            kept = read_chunk(chunk, self._after, without_own=self.has_node)
         except TraceError as error:
-            self._note(f"a chunk cannot be read: {error.message}")
+            self.note(f"a chunk cannot be read: {error.message}")
             return
         if kept is None:
             return
         if kept.damages:
             first = kept.damages[0]
-            self._note(f"{len(kept.damages)} damages in {chunk.path}, the first: {first.message}")
+            self.note(f"{len(kept.damages)} damages in {chunk.path}, the first: {first.message}")
         late = self.history.add(kept)
         self._late_events += late
         if late:
@@ -134,9 +117,9 @@ class Watcher:
 
     def keep_violation(self) -> None:
         """Keep the chunks of the last report if it has a violation, once it has been told."""
-        if self._violated is not None and self._recorder is not None:
-            self._recorder.keep(*self._violated)
-        self._violated = None
+        if self._keep is not None:
+            self._keep()
+        self._keep = None
 
     def close(self) -> None:
         """Free the memory of the database."""
@@ -160,9 +143,9 @@ class Watcher:
             self._note_once(f"a link is left out for now: {error.message}")
 
         ingest = partial(
-            ingest_again, self._con, traces, _RUN, links=self._links, leave_out=leave_out
+            ingest_again, self._con, traces, _RUN, links=self.links, leave_out=leave_out
         )
-        clocks = self._clocks
+        clocks = self.clocks
         try:
             ingest(clocks=clocks)
         except UsageError as error:
@@ -173,7 +156,7 @@ class Watcher:
             clocks = ClockSync("none")
             ingest(clocks=clocks)
         learned = self._answers.doubted(self._con)
-        links = self._links
+        links = self.links
         if learned is not None:
             both = with_learned(links, learned)
             try:
@@ -188,7 +171,7 @@ class Watcher:
 
     def _note_once(self, said: str) -> None:
         if said not in self._said:
-            self._note(said)
+            self.note(said)
         self._said.add(said)
 
     def _lag_s(self) -> float:
@@ -198,7 +181,7 @@ class Watcher:
         self._last_clock_offset_ns = offset_ns
         # What time servers correct bit by bit is no step.
         if abs(step_ns) > _LEAST_STEP_NS:
-            self._note(
+            self.note(
                 f"the clock of this machine was set by {step_ns / _SECOND_NS:+.1f} s, or the"
                 " machine slept: times of the tracer go on as before"
             )
@@ -213,21 +196,21 @@ class Watcher:
         links, learned = self._ingest(traces)
         report = replace(report_of(self._con, window), late_events=self._late_events)
         self._late_events = 0
-        if self._alarm is not None:
-            found, rows = self._alarm.judge(self._con, judged, window.end_ns)
+        if self.alarm is not None:
+            found, rows = self.alarm.judge(self._con, judged, window.end_ns)
             report = replace(report, violations=found, judged=rows)
-        if self._exporter is not None:
-            self._exporter.count(self._con, Window(history.closed_ns, window.end_ns))
-        if self._database is not None:
-            self._database.offer(window.end_ns, traces, links)
-        if report.violations:
+        if self.exporter is not None:
+            self.exporter.count(self._con, Window(history.closed_ns, window.end_ns))
+        if self.database is not None:
+            self.database.offer(window.end_ns, traces, links)
+        if report.violations and self.recorder is not None:
             kept = history.traces(judged, earlier_ns=self._earlier_ns)
             paths = history.paths(judged, earlier_ns=self._earlier_ns)
-            self._violated = (newest_ns, kept, paths, links, learned)
+            self._keep = partial(self.recorder.keep, newest_ns, kept, paths, links, learned)
         if is_live:
             report = replace(report, lag_s=self._lag_s())
-        if self._exporter is not None:
-            self._exporter.show(report)
+        if self.exporter is not None:
+            self.exporter.show(report)
         self._pass(history.close(window, earlier_ns=self._earlier_ns))
         return report
 

@@ -13,7 +13,7 @@ from msgflow.ingest import ingest
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from msgflow.links import LinksFile
+    from msgflow.links.links_file import LinksFile
     from msgflow.watch.kept_traces import KeptTraces
 
 

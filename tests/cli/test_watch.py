@@ -36,7 +36,7 @@ def _nothing_starts(monkeypatch: pytest.MonkeyPatch, there_are: object) -> None:
     def fail(*_: object, **__: object) -> None:
         raise AssertionError("a program is started")
 
-    monkeypatch.setattr("msgflow.record.record", fail)
+    monkeypatch.setattr("msgflow.record.recording.record", fail)
 
 
 def refused(result: Result, *words: str) -> None:
@@ -91,7 +91,7 @@ def test_windows_wait_for_two_steps_unless_late_says_more(
         waits.append(given["late_ns"])
         raise TraceError("enough", "no more")
 
-    monkeypatch.setattr("msgflow.watch.Watcher", made)
+    monkeypatch.setattr("msgflow.watch.watcher.Watcher", made)
     lates = ((), ("--step", "3s"), ("--step", "3s", "--late", "500ms"), ("--late", "0"))
     for words in lates:
         assert msgflow("watch", "--once", tmp_path, *words).exit_code == ExitCode.TRACE
@@ -118,9 +118,9 @@ def test_without_a_word_the_only_session_is_watched(
 ) -> None:
     watched = []
     monkeypatch.setattr(
-        "msgflow.watch.watch_live", lambda place, *_, **__: watched.append(place) or iter(())
+        "msgflow.watch.follow.watch_live", lambda place, *_, **__: watched.append(place) or iter(())
     )
-    monkeypatch.setattr("msgflow.watch.WatchedSessions", lambda *_: _Nothing())
+    monkeypatch.setattr("msgflow.watch.watched_sessions.WatchedSessions", lambda *_: _Nothing())
     there_are(DRIVE, SNAPSHOT)
     assert msgflow("watch").exit_code == 0
     assert watched == [DRIVE.directory]

@@ -8,7 +8,8 @@ import duckdb
 import pytest
 from drifting_clocks import Clock, fill_clocks
 
-from msgflow.clocks import read_clock_sync, set_clocks
+from msgflow.clocks.clocks_file import read_clock_sync
+from msgflow.clocks.correction import set_clocks
 from msgflow.errors import UsageError
 
 

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from msgflow.clocks import read_clock_sync
+from msgflow.clocks.clocks_file import read_clock_sync
 from msgflow.errors import UsageError
 from msgflow.files.text_file import MOST_BYTES
-from msgflow.links import read_links
+from msgflow.links.links_file import read_links
 from msgflow.run.choice import choose_runs
 from msgflow.run.window import time_point
 

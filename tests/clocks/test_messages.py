@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 from possible_lines import Bound, PossibleLines
 from thorough import examples, thorough
 
-from msgflow.clocks import read_clock_sync, set_clocks
+from msgflow.clocks.clocks_file import read_clock_sync
+from msgflow.clocks.correction import set_clocks
 from msgflow.db.derivation import derive_findings
 
 SECOND = 1_000_000_000

@@ -12,12 +12,14 @@ import pytest
 from thorough import few
 
 import msgflow
-from msgflow.clocks import apply_clocks, read_clock_sync
+from msgflow.clocks.clocks_file import read_clock_sync
+from msgflow.clocks.correction import apply_clocks
 from msgflow.db import definition_check, migration, objects
 from msgflow.db.connection import connect
 from msgflow.errors import DatabaseError
 from msgflow.ingest import ingest
-from msgflow.links import LinksFile, apply_links
+from msgflow.links.annotations import apply_links
+from msgflow.links.links_file import LinksFile
 from msgflow_sim import simulate
 
 # What was done to the database, and what an upgrade cannot undo.

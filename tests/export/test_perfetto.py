@@ -16,7 +16,8 @@ import pytest
 from thorough import few
 
 from msgflow import Database, DatabaseError, UsageError
-from msgflow.clocks import apply_clocks, read_clock_sync
+from msgflow.clocks.clocks_file import read_clock_sync
+from msgflow.clocks.correction import apply_clocks
 from msgflow.database import open_db
 
 SYSTEMS = ("demo", "services", "nested", "partial_sync", "multi_threaded")

@@ -11,7 +11,7 @@ from lakes import copied
 
 from msgflow import Database
 from msgflow.fleet.lake import Lake
-from msgflow.fleet.part import Content, write_part
+from msgflow.fleet.part import write_part
 from msgflow.ingest import ingest
 from msgflow_sim import simulate
 
@@ -45,9 +45,10 @@ def written(
         parts = []
         for database in databases:
             with Database(database) as opened:
-                content = Content(views=True)
                 folder = path.parent
-                parts.append(write_part(opened.connection, database, lake.store, folder, content))
+                parts.append(
+                    write_part(opened.connection, database, lake.store, folder, views=True)
+                )
         (path.parent / "parts").write_bytes(pickle.dumps(parts))
 
     folder = made_once(tmp_path_factory, "written", make).parent

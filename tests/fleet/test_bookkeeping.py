@@ -10,6 +10,7 @@ import json
 import os
 import shutil
 from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -39,7 +40,7 @@ def run_task(given: dict[str, Any]) -> dict[str, Any]:
     task = Task(**given)
     key = (Path(task.source) / "packets").read_text()
     if key == BROKEN:
-        return Outcome(reason="broken", stage="ingesting", error="no trace").as_dict()
+        return asdict(Outcome(reason="broken", stage="ingesting", error="no trace"))
     values = {
         "run": key,
         "part": new_part(key),
@@ -50,7 +51,7 @@ def run_task(given: dict[str, Any]) -> dict[str, Any]:
         "event_count": 1,
         "schema_revision": "",
     }
-    return Outcome(values=values).as_dict()
+    return asdict(Outcome(values=values))
 
 
 @pytest.fixture(autouse=True)
@@ -296,7 +297,7 @@ def test_a_pack_is_refused_while_others_write(place: Path) -> None:
 def test_scratch_space_that_cannot_be_made_is_not_full(place: Path) -> None:
     Path("file").write_text("")
     task = Task(0, str(place), str(place / "lake"), scratch=str(place / "file"))
-    found = Outcome(**task_process.run_task(task.as_dict()))
+    found = Outcome(**task_process.run_task(asdict(task)))
     assert (found.reason, found.stage) == ("no_scratch", "making scratch space")
 
 

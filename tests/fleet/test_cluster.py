@@ -29,7 +29,7 @@ from object_store import KEYS, ObjectStore, object_store
 from msgflow import Database
 from msgflow.fleet.failure import read_failures
 from msgflow.fleet.lake import Lake
-from msgflow.fleet.part import Content, write_part
+from msgflow.fleet.part import write_part
 from msgflow.fleet.workers import LOCAL, RayWorkers
 from msgflow.ingest import ingest
 from msgflow_sim import simulate
@@ -118,7 +118,8 @@ def test_much_goes_wrong(
                 database,
                 other.store,
                 tmp_path,
-                Content(views=False, database=False),
+                views=False,
+                database=False,
             )["part"]
         for table in ("flow", "callbacks", "topics_delivery", "distribution", "finding"):
             alone = read_part(other, table, part, run["run"])

@@ -9,7 +9,7 @@ import signal
 import stat
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -179,7 +179,7 @@ def test_what_was_mended_is_tried_again(
 ) -> None:
     def here(given: dict[str, Any]) -> dict[str, Any]:
         with TemporaryDirectory() as directory:
-            return child_process.do(Task(**given), Path(directory)).as_dict()
+            return asdict(child_process.do(Task(**given), Path(directory)))
 
     # That each has a process of its own is shown by the other tests.
     monkeypatch.setattr("msgflow.fleet.workers.run_task", here)
@@ -222,7 +222,7 @@ def task(filled: Filled) -> Task:
 
 
 def outcome(task: Task, **more: Any) -> Outcome:
-    return Outcome(**task_process.run_task({**task.as_dict(), **more}))
+    return Outcome(**task_process.run_task({**asdict(task), **more}))
 
 
 def test_what_hangs_or_grows_is_ended(task: Task, tmp_path: Path) -> None:
@@ -270,7 +270,7 @@ def test_a_source_that_changes_while_it_is_read(
     monkeypatch.setattr(recording, "look_at", then_it_grows)
     (tmp_path / "scratch").mkdir()
     changed = child_process.do(
-        Task(**{**task.as_dict(), "source": str(source)}), tmp_path / "scratch"
+        Task(**{**asdict(task), "source": str(source)}), tmp_path / "scratch"
     )
     assert (changed.reason, changed.stage) == ("changed", "looking at the source again")
 
@@ -410,7 +410,7 @@ def test_a_lake_that_cannot_be_reached(filled: Filled, monkeypatch: pytest.Monke
 def test_secrets_are_in_no_text(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("AWS_SECRET_ACCESS_KEY", "hush-hush")
     assert without_secrets("denied for hush-hush") == "denied for …"
-    given = Task(0, "s3://bucket/x", "s3://bucket/lake").as_dict()
+    given = asdict(Task(0, "s3://bucket/x", "s3://bucket/lake"))
     assert "hush" not in json.dumps(given)
 
 

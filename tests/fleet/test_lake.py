@@ -12,29 +12,29 @@ from lakes import EXAMPLE, PAGE, content, copied, paths, read, rows_of
 
 from msgflow import Database
 from msgflow.errors import DatabaseError, UsageError
-from msgflow.fleet.answers import answers
+from msgflow.fleet.answers import ANSWERS
 from msgflow.fleet.file_store import Store
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.layout import (
     PACKED,
+    RUN,
+    RUN_SCHEMA,
     VIEWS,
     part_of,
     part_path,
     run_path,
-    run_schema,
     view_path,
 )
 from msgflow.fleet.pack import pack
-from msgflow.fleet.part import Content, write_part
+from msgflow.fleet.part import write_part
 
 Row = dict[str, Any]
 
 
 def write(lake: Lake, database: Path, scratch: Path) -> Row:
     """Write the answers of a database into a lake, without a commit."""
-    content = Content(views=False, database=False)
     with Database(database) as opened:
-        return write_part(opened.connection, database, lake.store, scratch, content)
+        return write_part(opened.connection, database, lake.store, scratch, database=False)
 
 
 @pytest.fixture
@@ -131,9 +131,9 @@ def test_writing_again_leaves_what_is_there(
     assert first["part"] != again["part"]
     names = {"part", "view_part", "database_part"}
     assert {**first, **dict.fromkeys(names)} == {**again, **dict.fromkeys(names)}
-    for answer in answers():
+    for table in ANSWERS:
         one, other = (
-            pq.ParquetFile(lake.store.full(part_path(answer.table, row["part"]))).read()
+            pq.ParquetFile(lake.store.full(part_path(table, row["part"]))).read()
             for row in (first, again)
         )
         assert one["part"].unique().to_pylist() in ([], [first["part"]])
@@ -162,6 +162,9 @@ def test_the_last_row_of_a_run_counts(
     assert {values[0] for values in rows_of(lake, "flow")} == {other["run"]}
     with pytest.raises(UsageError, match="no such run"):
         lake.remove([other["run"], first["run"]])
+    for key in ("\0", f"../run/{other['run']}", PACKED):
+        with pytest.raises(UsageError, match="no such run"):
+            lake.remove([key])
     assert len(lake.runs()) == 1
 
 
@@ -180,9 +183,9 @@ def test_files_say_what_they_are(holding: tuple[Lake, Row, Row]) -> None:
 
 def test_the_page_names_all_tables_and_columns() -> None:
     lake_section = PAGE.split("### Why not")[0]
-    for answer in answers():
-        assert f"`{answer.table}`" in lake_section
-    for name in run_schema().names:
+    for table in ANSWERS:
+        assert f"`{table}`" in lake_section
+    for name in RUN_SCHEMA.names:
         assert f"`{name}`" in lake_section
 
 
@@ -261,7 +264,7 @@ def test_packing_changes_no_answer(
     assert content(lake) == before
     assert paths(lake, "run") == {run_path(PACKED)}
     views = lake.store.folders(VIEWS)
-    for key, tables in (("part", [a.table for a in answers()]), ("view_part", [VIEWS])):
+    for key, tables in (("part", [*ANSWERS]), ("view_part", [VIEWS])):
         (part,) = set(lake.runs()[key].to_pylist())
         assert {part_of(path) for path in paths(lake, *tables)} == {part}
     assert len(paths(lake, VIEWS)) == len(views) > 60
@@ -270,9 +273,11 @@ def test_packing_changes_no_answer(
     # A replaced run has a file of its own again.
     again = write(lake, databases[0], tmp_path)
     lake.commit([again])
-    answered = slice(1, 1 + len(answers()))
+    answered = slice(1, 1 + len(ANSWERS))
     assert content(lake)[answered] == before[answered]
     assert paths(lake, "run") == {run_path(PACKED), run_path(first["run"])}
+    with pytest.raises(UsageError, match="no such run — packed"):
+        lake.remove([PACKED])
     # Neither row is left after a removal.
     lake.remove([first["run"]])
     assert lake.run(first["run"]) is None
@@ -291,6 +296,32 @@ def test_packing_changes_no_answer(
     pack(lake)
     assert paths(lake, "") == {"lake.json"}
     assert len(lake.runs()) == 0
+
+
+@pytest.mark.parametrize("is_packed", [False, True])
+def test_packing_deletes_no_answers_of_runs_that_are_out_of_sight(
+    holding: tuple[Lake, Row, Row], tmp_path: Path, is_packed: bool
+) -> None:
+    """The file system with the folder `run` may not be mounted."""
+    lake, first, other = holding
+    lake.commit([first, other])
+    if is_packed:
+        pack(lake)
+    folder = Path(lake.store.full(RUN))
+    files, before = paths(lake, ""), content(lake)
+    folder.rename(tmp_path / "run")
+    folder.mkdir()
+    with pytest.raises(DatabaseError, match=f"the lake has answers, but no run — .*/{RUN}"):
+        pack(lake)
+    folder.rmdir()
+    (tmp_path / "run").rename(folder)
+    assert paths(lake, "") == files
+    assert content(lake) == before
+    # A lake that has lost its last run by a removal says so.
+    lake.remove([first["run"], other["run"]])
+    assert paths(lake, RUN) == {run_path(PACKED)}
+    pack(lake)
+    assert paths(lake, "") == {"lake.json"}
 
 
 @pytest.mark.thorough

@@ -30,7 +30,7 @@ from msgflow.fleet.lake_query import (
     names,
     statements,
 )
-from msgflow.fleet.part import Content, write_part
+from msgflow.fleet.part import write_part
 from msgflow.ingest import ingest
 from msgflow.query.catalogue import load_query
 from msgflow.query.selection import make_selection
@@ -193,7 +193,7 @@ def test_goals_of_several_runs_are_added_up(tmp_path: Path) -> None:
         ingest([recording], path)
         with Database(path) as database:
             part = write_part(
-                database.connection, path, lake.store, tmp_path, Content(views=True, database=False)
+                database.connection, path, lake.store, tmp_path, views=True, database=False
             )
             alone += database.query("action-latency").to_arrow().to_pylist()
         commits.append({**part, "labels": {}, "source": str(seed)})

@@ -9,7 +9,7 @@ import duckdb
 import pytest
 
 from msgflow import trace
-from msgflow.clocks import read_clock_sync
+from msgflow.clocks.clocks_file import read_clock_sync
 from msgflow.db.tables import STORE
 from msgflow.ingest.repeated_in_memory import database_in_memory, ingest_again
 from msgflow_sim import simulate

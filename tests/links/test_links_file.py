@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from msgflow.errors import UsageError
-from msgflow.links import LinkSuggestions, read_links
+from msgflow.links.links_file import read_links
+from msgflow.links.suggested_links import LinkSuggestions
 
 GOOD = """# ours
 links:

@@ -11,7 +11,7 @@ from ingested import rows
 from msgflow import Database
 from msgflow.errors import UsageError
 from msgflow.ingest.ingest import ingest
-from msgflow.links import read_links
+from msgflow.links.links_file import read_links
 from msgflow_sim import Recording, simulate
 
 LATE = Recording(start_ns=300_000_000)

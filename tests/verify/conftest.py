@@ -12,7 +12,7 @@ from golden import SYSTEMS, fill, fill_case
 
 from msgflow.database import Database
 from msgflow.db.derivation import derive
-from msgflow.verify import Verification
+from msgflow.verify.verify import Verification
 
 
 @pytest.fixture(scope="session")

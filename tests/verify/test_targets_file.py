@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from msgflow.errors import UsageError
-from msgflow.verify import Verification, read_targets
+from msgflow.verify.targets_file import read_targets
+from msgflow.verify.verify import Verification
 
 
 @pytest.mark.parametrize(

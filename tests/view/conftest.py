@@ -16,7 +16,8 @@ from browser import ARGUMENTS, find_browser
 from ingested import made_once
 from served import Page, Served
 
-from msgflow.clocks import apply_clocks, read_clock_sync
+from msgflow.clocks.clocks_file import read_clock_sync
+from msgflow.clocks.correction import apply_clocks
 from msgflow.database import open_db
 from msgflow.db.connection import connect
 from msgflow.ingest import ingest

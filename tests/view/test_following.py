@@ -10,9 +10,12 @@ import pytest
 from served import Page, colors
 
 from msgflow.cli.sql_process import WarmSql
-from msgflow.clocks import read_clock_sync
+from msgflow.clocks.clocks_file import read_clock_sync
 from msgflow.view.server import serving
-from msgflow.watch import Watcher, WindowDatabase, WindowReport, watch_finished
+from msgflow.watch.follow import watch_finished
+from msgflow.watch.watcher import Watcher
+from msgflow.watch.window_database import WindowDatabase
+from msgflow.watch.window_report import WindowReport
 
 SECOND = 1_000_000_000
 Followed = tuple[str, Iterator[WindowReport]]

@@ -19,7 +19,7 @@ from msgflow.fleet.failure import write_failure
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.lake_page import lake_page, write_lake_page
 from msgflow.fleet.lake_query import fleet_query
-from msgflow.fleet.part import Content, write_part
+from msgflow.fleet.part import write_part
 from msgflow.view.server import listening, single_application
 
 _DAY = 86_400 * 10**9
@@ -33,7 +33,7 @@ def lake(simulated: Callable[..., Path], tmp_path_factory: pytest.TempPathFactor
     database = simulated("pipeline", 0.01)
     lake = Lake.open_or_create(folder / "lake")
     with Database(database) as opened:
-        part = write_part(opened.connection, database, lake.store, folder, Content(views=False))
+        part = write_part(opened.connection, database, lake.store, folder)
     rows = [
         {
             **copied(lake, part, f"{number:020x}", slower=3 if number == _SLOW else 1),

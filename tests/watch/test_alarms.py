@@ -22,10 +22,11 @@ from msgflow.database import Database
 from msgflow.errors import UsageError
 from msgflow.run.window import Window
 from msgflow.trace import Continuation
-from msgflow.verify import TargetsFile, Verdict
-from msgflow.watch import FlightRecorder
+from msgflow.verify.targets_file import TargetsFile
+from msgflow.verify.verify import Verdict
 from msgflow.watch.alarm import Alarm, blamed
 from msgflow.watch.chunk import Chunk
+from msgflow.watch.flight_recorder import FlightRecorder
 from msgflow.watch.kept_chunk import read_chunk
 from msgflow.watch.kept_traces import KeptTraces
 from msgflow_sim import Recording, simulate
@@ -248,7 +249,7 @@ def test_an_error_of_the_targets_is_told_as_it_is(watched, monkeypatch) -> None:
 
 
 def test_without_a_window_nothing_is_measured(watched, monkeypatch) -> None:
-    monkeypatch.setattr("msgflow.watch.watch_finished", lambda place, watcher: iter(()))
+    monkeypatch.setattr("msgflow.watch.follow.watch_finished", lambda place, watcher: iter(()))
     assert watched(TARGETS).exit_code == 5
 
 
@@ -275,14 +276,16 @@ def test_a_callback_that_had_no_cpu_did_not_run(
     assert list(blamed([piece | thread | rest], None)) == [words]
 
 
-def told(monkeypatch: pytest.MonkeyPatch, *windows: list[dict[str, Any]]) -> list[list[str]]:
-    """Return the subjects that an alarm tells of in windows of ten seconds, one second apart.
+Rows = list[dict[str, Any]]
+
+
+def judged(monkeypatch: pytest.MonkeyPatch, *windows: Rows) -> list[tuple[Rows, Rows]]:
+    """Return violations and verdicts of an alarm in windows of ten seconds, one second apart.
 
     Args:
         windows: for each, `subject`, `worst_ns` and `worst_at_ns` of the requirements that failed.
     """
     alarm = Alarm(TargetsFile((), ()), {}, print)
-    monkeypatch.setattr("msgflow.watch.alarm._told", lambda *_: [])
     found = []
     for number, failed in enumerate(windows):
         rows = [
@@ -295,9 +298,29 @@ def told(monkeypatch: pytest.MonkeyPatch, *windows: list[dict[str, Any]]) -> lis
         verified = SimpleNamespace(result=SimpleNamespace(table=pa.Table.from_pylist(rows)))
         monkeypatch.setattr("msgflow.watch.alarm.verify", lambda *_, v=verified, **__: v)
         window = Window((number - 10) * SECOND, number * SECOND)
-        violations, _ = alarm.judge(None, window, window.end_ns)
-        found.append([each["subject"] for each in violations])
+        found.append(alarm.judge(None, window, window.end_ns))
     return found
+
+
+def told(monkeypatch: pytest.MonkeyPatch, *windows: Rows) -> list[list[str]]:
+    """Return the subjects that an alarm tells of, see `judged`."""
+    monkeypatch.setattr("msgflow.watch.alarm._culprits", lambda *_: [])
+    found = judged(monkeypatch, *windows)
+    return [[each["subject"] for each in violations] for violations, _ in found]
+
+
+def test_what_goes_on_failing_keeps_what_was_to_blame(monkeypatch) -> None:
+    """Diagnostics show each verdict of a window; `why` is asked when a violation is told."""
+    path = "/a → /x → /b"
+    row = {"subject": "a", "path": path, "worst_ns": 90, "worst_at_ns": -SECOND}
+    sentences = iter(["the first", "the second"])
+    monkeypatch.setattr(
+        "msgflow.watch.alarm._culprits",
+        lambda *_: [{"path": path, "cost_ns": 1, "sentence": next(sentences)}],
+    )
+    windows = [[row, row | {"subject": "b"}]] * 2 + [[row | {"worst_ns": 95}]]
+    found = [[row["why"] for row in rows] for _, rows in judged(monkeypatch, *windows)]
+    assert found == [["the first"] * 2, ["the first"] * 2, ["the second"]]
 
 
 def test_what_becomes_the_worst_when_the_worst_has_passed_is_no_news(monkeypatch) -> None:

@@ -9,8 +9,7 @@ import pytest
 
 from msgflow.errors import TraceError
 from msgflow.watch import chunk as chunk_module
-from msgflow.watch import finished_chunks
-from msgflow.watch.chunk import Chunk, ChunkFinder
+from msgflow.watch.chunk import Chunk, ChunkFinder, finished_chunks
 
 
 def make(session: Path, number: int, begin: int = 0, length: int = 2) -> Path:

@@ -14,13 +14,14 @@ from typer.testing import CliRunner
 from msgflow.cli.app import app
 from msgflow.errors import UsageError
 from msgflow.run.window import Window
-from msgflow.watch import Diagnostics, WindowReport
+from msgflow.watch.diagnostics import Diagnostics
+from msgflow.watch.window_report import WindowReport
 
 PATH = "/camera → /image → /detector"
 ROW = {
     "target": "image", "subject": PATH, "metric": "latency", "condition": "p99 < 10 ms",
     "measured": "61.000 ms", "value": 61e6, "worst_ns": 70_000_000, "reason": None, "path": PATH,
-    "culprit": "/detector ran 60.000 ms",
+    "culprit": "/detector ran 60.000 ms", "why": None,
     "flows": {"median_ns": 50_000_000, "p99_ns": 61_000_000, "lost": 2, "dropped": 1},
 }  # fmt: skip
 
@@ -79,7 +80,7 @@ def test_a_target_is_a_status(published: list[Any]) -> None:
     passed = ROW | {"verdict": "passed", "target": "scan", "culprit": None, "flows": None}
     silent = passed | {"verdict": "no data", "target": "imu", "value": None, "reason": "silent"}
     unknown = silent | {"verdict": "not measured", "target": "odom", "reason": "events are missing"}
-    failed = ROW | {"verdict": "failed"}
+    failed = ROW | {"verdict": "failed", "why": "the CPU is busy"}
     with closing(Diagnostics()) as diagnostics:
         diagnostics.show(report(passed | {"target": "image"}, failed, passed, silent, unknown))
     node, message, *ended = published
@@ -91,6 +92,7 @@ def test_a_target_is_a_status(published: list[Any]) -> None:
     assert image.level == b"\2"
     assert image.message == (
         f"{PATH}: latency 61.000 ms, up to 70.000 ms, required p99 < 10 ms: /detector ran 60.000 ms"
+        "; why: the CPU is busy"
     )
     assert {each.key: each.value for each in image.values} == {
         "p50": "50.000 ms", "p99": "61.000 ms", "lost": "3", "lag": "0.4 s",

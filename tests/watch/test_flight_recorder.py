@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from msgflow.watch import FlightRecorder, flight_recorder
+from msgflow.watch import flight_recorder
+from msgflow.watch.flight_recorder import FlightRecorder
 
 _SECOND_NS = 1_000_000_000
 

@@ -9,7 +9,7 @@ import pyarrow as pa
 import pytest
 
 from msgflow.trace import Continuation
-from msgflow.watch import finished_chunks
+from msgflow.watch.chunk import finished_chunks
 from msgflow.watch.kept_chunk import KeptChunk, read_chunk
 from msgflow.watch.kept_traces import KeptTraces
 from msgflow_sim import Recording, simulate

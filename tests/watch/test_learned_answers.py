@@ -8,11 +8,13 @@ import duckdb
 import pytest
 from thorough import thorough
 
-from msgflow.clocks import read_clock_sync
+from msgflow.clocks.clocks_file import read_clock_sync
 from msgflow.database import Database
-from msgflow.links import read_links
-from msgflow.watch import Watcher, WindowDatabase, watch_finished
+from msgflow.links.links_file import read_links
+from msgflow.watch.follow import watch_finished
 from msgflow.watch.learned_answers import LearnedAnswers, with_learned
+from msgflow.watch.watcher import Watcher
+from msgflow.watch.window_database import WindowDatabase
 
 NODE_NAME = Path(__file__).parents[2] / "schema" / "public" / "node_name.sql"
 SECOND = 1_000_000_000

@@ -19,12 +19,15 @@ from typing import Any
 import pyarrow.compute as pc
 import pytest
 
-from msgflow.clocks import read_clock_sync
+from msgflow.clocks.clocks_file import read_clock_sync
 from msgflow.database import Database
 from msgflow.errors import UsageError
 from msgflow.query.runner import run_query
 from msgflow.run.window import Window
-from msgflow.watch import Exporter, Watcher, WindowReport, watch_finished
+from msgflow.watch.follow import watch_finished
+from msgflow.watch.prometheus import Exporter
+from msgflow.watch.watcher import Watcher
+from msgflow.watch.window_report import WindowReport
 from msgflow_sim import Recording, simulate
 
 prometheus = pytest.importorskip("prometheus_client")

@@ -8,7 +8,7 @@ from rich.console import Console
 
 from msgflow.cli.show.watch_screen import WatchScreen
 from msgflow.run.window import Window
-from msgflow.watch import WindowReport
+from msgflow.watch.window_report import WindowReport
 
 FATES = {"dropped": 0, "lost": 0, "no_output": 0, "unknown": 3, "ambiguous": 0}
 

@@ -19,18 +19,20 @@ import pytest
 from thorough import few, thorough
 
 from msgflow.cli.show.window_line import window_line
-from msgflow.clocks import read_clock_sync
+from msgflow.clocks.clocks_file import read_clock_sync
 from msgflow.database import Database
 from msgflow.errors import TraceError
 from msgflow.ingest import ingest
-from msgflow.links import LinksFile, read_links
+from msgflow.links.links_file import LinksFile, read_links
 from msgflow.sql.interrupt import until_interrupted
-from msgflow.watch import Watcher, WindowReport, finished_chunks, watch_finished, watch_live
 from msgflow.watch import chunk as chunk_module
 from msgflow.watch import history as history_module
 from msgflow.watch.arrivals import Arrivals
-from msgflow.watch.chunk import Chunk
+from msgflow.watch.chunk import Chunk, finished_chunks
+from msgflow.watch.follow import watch_finished, watch_live
 from msgflow.watch.learned_answers import LearnedAnswers
+from msgflow.watch.watcher import Watcher
+from msgflow.watch.window_report import WindowReport
 from msgflow_sim import (
     Host,
     Node,

@@ -15,14 +15,14 @@ from msgflow.cli.show.keys import noted_keys
 from msgflow.cli.show.window_line import verdict_words
 from msgflow.run.window import format_epoch
 from msgflow.text.values import NULL, count, format_duration, printable
-from msgflow.watch import violation_line
+from msgflow.watch.alarm import violation_line
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from rich.console import Console, RenderableType
 
-    from msgflow.watch import WindowReport
+    from msgflow.watch.window_report import WindowReport
 
 Row = dict[str, Any]
 

@@ -8,7 +8,7 @@ from msgflow.run.window import format_epoch
 from msgflow.text.values import count, format_duration, printable
 
 if TYPE_CHECKING:
-    from msgflow.watch import WindowReport
+    from msgflow.watch.window_report import WindowReport
 
 # Of format_epoch: hours to milliseconds.
 _TIME = slice(11, 23)

@@ -10,7 +10,7 @@ from rich.console import Console, RenderableType
 
 from msgflow.cli.show.watch_screen import WatchScreen
 from msgflow.run.window import Window
-from msgflow.watch import WindowReport
+from msgflow.watch.window_report import WindowReport
 
 START_NS = 1_700_000_000_000_000_000
 MS = 1_000_000
