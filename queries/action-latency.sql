@@ -53,10 +53,7 @@
 -- note: goals
 WITH measured AS (
     SELECT
-        run_id,
-        action_name,
-        action_server_id,
-        action_client_id,
+        run_id, action_name, action_server_id, action_client_id,
         count(*) AS goals,
         count(*) FILTER (is_accepted) AS accepted,
         count(*) FILTER (NOT is_accepted) AS rejected,
@@ -80,20 +77,11 @@ WITH measured AS (
     GROUP BY run_id, action_name, action_server_id, action_client_id
 )
 SELECT
-    m.run_id,
-    m.action_name,
+    m.run_id, m.action_name,
     main.node_label(sn.full_name, sp.name, sp.pid) AS server,
     main.node_label(cn.full_name, cp.name, cp.pid) AS client,
-    m.goals,
-    m.accepted,
-    m.rejected,
-    m.not_answered,
-    m.asked,
-    m.finished,
-    m.cancelled,
-    m.doubtful,
-    m.overlapping,
-    m.feedback,
+    m.goals, m.accepted, m.rejected, m.not_answered, m.asked, m.finished, m.cancelled, m.doubtful,
+    m.overlapping, m.feedback,
     m.accept[1] AS accept_median_ns,
     m.accept[2] AS accept_p95_ns,
     m.accept[3] AS accept_p99_ns,
@@ -112,9 +100,7 @@ SELECT
     m.result[3] AS result_p95_ns,
     m.result[4] AS result_p99_ns,
     m.result[5] AS result_max_ns,
-    m.loss_affected,
-    m.action_server_id,
-    m.action_client_id
+    m.loss_affected, m.action_server_id, m.action_client_id
 FROM measured AS m
 LEFT JOIN main.service AS s ON m.action_server_id = s.service_id
 LEFT JOIN main.process AS sp ON s.process_id = sp.process_id

@@ -138,15 +138,10 @@ reader AS (
 ),
 piece AS (
     SELECT
-        c.run_id,
-        c.flow_rank,
-        c.position,
+        c.run_id, c.flow_rank, c.position,
         c.from_ns - min(CASE WHEN c.position = 1 THEN c.from_ns END)
             OVER (PARTITION BY c.flow_rank) AS at_ns,
-        c.duration_ns,
-        c.hop,
-        c.part,
-        c.activity,
+        c.duration_ns, c.hop, c.part, c.activity,
         CASE
             WHEN c.activity = 'network_or_idle'
                 AND coalesce(c.state, 'unknown') IN ('sleeping', 'unknown')
@@ -164,15 +159,8 @@ piece AS (
             WHEN c.request_id IS NOT NULL THEN printf('Service(%s)', v.service_name)
             ELSE coalesce(p.topic_name, s.topic_name, '?')
         END AS what,
-        c.is_certain,
-        c.from_ns,
-        c.callback_instance_id,
-        c.publication_id,
-        c.take_id,
-        c.latency_ns,
-        c.path_id,
-        c.state,
-        c.wakers,
+        c.is_certain, c.from_ns, c.callback_instance_id, c.publication_id, c.take_id, c.latency_ns,
+        c.path_id, c.state, c.wakers,
         printf('%s %d', coalesce(t.name, '?'), t.tid) AS thread,
         c.priority,
         CASE
@@ -251,8 +239,7 @@ sorted AS (
 ),
 summed AS MATERIALIZED (
     SELECT
-        run_id,
-        flow_rank,
+        run_id, flow_rank,
         CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(at_ns) END AS at_ns,
         sum(duration_ns)::BIGINT AS duration_ns,
         CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(hop) END AS hop,
@@ -285,10 +272,7 @@ summed AS MATERIALIZED (
         CASE
             WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(publication_id)
         END AS publication_id,
-        take_id,
-        latency_ns,
-        path_id,
-        row_key,
+        take_id, latency_ns, path_id, row_key,
         min(position) AS position
     FROM sorted
     GROUP BY run_id, flow_rank, take_id, latency_ns, path_id, row_key
@@ -314,27 +298,9 @@ doubted AS (
 SELECT
     s.run_id,
     s.flow_rank AS rank,
-    s.at_ns,
-    s.duration_ns,
-    s.hop,
-    s.part,
-    s.activity,
-    s.state,
-    s.who,
-    s.node,
-    s.what,
-    s.share,
-    s.pieces,
-    s.is_certain,
-    s.thread,
-    s.wakers,
-    s.priority,
-    s.who_priority,
-    s.from_ns,
-    s.callback_instance_id,
-    s.publication_id,
-    s.take_id,
-    s.latency_ns,
+    s.at_ns, s.duration_ns, s.hop, s.part, s.activity, s.state, s.who, s.node, s.what, s.share,
+    s.pieces, s.is_certain, s.thread, s.wakers, s.priority, s.who_priority, s.from_ns,
+    s.callback_instance_id, s.publication_id, s.take_id, s.latency_ns,
     -- The path of a flow of a thousand hops is long: only the first of its rows has it.
     CASE WHEN s.place = 1 THEN d.is_ambiguous END AS is_ambiguous,
     CASE

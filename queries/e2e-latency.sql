@@ -120,8 +120,7 @@ affected AS (
 ),
 reason AS (
     SELECT
-        run_id,
-        path_id,
+        run_id, path_id,
         string_agg(reason || ' ' || number, ', ' ORDER BY number DESC, reason) AS reasons
     FROM (
         SELECT run_id, path_id, reason, count(*) AS number
@@ -133,8 +132,7 @@ reason AS (
 ),
 completeness AS (
     SELECT
-        run_id,
-        path_id,
+        run_id, path_id,
         count(*) AS roots,
         histogram(status)::MAP(VARCHAR, BIGINT) AS number
     FROM root
@@ -142,8 +140,7 @@ completeness AS (
 ),
 latency AS (
     SELECT
-        run_id,
-        path_id,
+        run_id, path_id,
         count(latency_ns) AS pairs,
         count(*) - count(latency_ns) AS stored,
         count(*) FILTER (WHERE is_ambiguous) AS ambiguous,
@@ -182,10 +179,7 @@ SELECT
     l.longest.latency_ns AS max_ns,
     -l.longest.before_ns AS max_root_ns,
     -l.longest.before_take AS max_take_id,
-    l.sink_event,
-    p.is_cut,
-    r.reasons,
-    p.path
+    l.sink_event, p.is_cut, r.reasons, p.path
 FROM named_path AS p
 LEFT JOIN completeness AS c ON p.path_id = c.path_id
 LEFT JOIN affected AS a ON p.path_id = a.path_id

@@ -116,8 +116,7 @@ SELECT
     m.hostname AS host,
     m.nodes,
     m.name AS process,
-    m.pid,
-    m.tid,
+    m.pid, m.tid,
     m.kind AS executor_kind,
     greatest(m.last_ns - m.first_ns, 0) AS seen_ns,
     CASE WHEN m.has_states OR m.kind = 'events' THEN coalesce(s.wait_ns, 0) END AS wait_ns,
@@ -132,8 +131,7 @@ SELECT
     coalesce(c.callbacks, 0) AS callbacks,
     coalesce(s.callback_ns, 0) / nullif(greatest(m.last_ns - m.first_ns, 0), 0)::DOUBLE
         AS callback_share,
-    m.executor_id,
-    m.thread_id
+    m.executor_id, m.thread_id
 FROM member AS m
 LEFT JOIN summed AS s ON m.thread_id = s.thread_id
 LEFT JOIN callback AS c ON m.thread_id = c.thread_id

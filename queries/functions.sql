@@ -109,16 +109,9 @@ SELECT
     f.run_id,
     coalesce(l.node, main.node_label(NULL, p.name, p.pid)) AS node,
     coalesce(l.label, 'outside of callbacks') AS callback,
-    f.function,
-    t.self_share,
-    t.total_share,
-    t.self_ns,
-    t.total_ns,
+    f.function, t.self_share, t.total_share, t.self_ns, t.total_ns,
     t.total_ns // c.calls AS per_call_ns,
-    c.calls,
-    t.self_samples,
-    t.samples,
-    f.file,
+    c.calls, t.self_samples, t.samples, f.file,
     l.callback_id AS callback_id,
     coalesce(l.is_internal, false) AS is_internal
 FROM found AS t

@@ -68,8 +68,7 @@ found AS (
     GROUP BY run_id, object
 )
 SELECT
-    run.run_id,
-    object.object,
+    run.run_id, object.object,
     coalesce(found.row_count, 0) AS row_count
 FROM main.run
 CROSS JOIN object

@@ -12,20 +12,10 @@
 -- column: detail VARCHAR     Numbers, and what they mean
 -- column: phase VARCHAR      What it is about: input or recording
 -- brief: severity, name, count, detail, subject
-SELECT
-    run_id,
-    severity,
-    name,
-    count,
-    subject,
-    detail,
-    phase
+SELECT run_id, severity, name, count, subject, detail, phase
 FROM main.finding
 WHERE list_contains($runs, run_id)
 ORDER BY
     run_id,
     list_position(['error', 'warning', 'info'], severity),
-    name,
-    trace_id,
-    subject,
-    detail
+    name, trace_id, subject, detail

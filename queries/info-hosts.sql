@@ -9,8 +9,7 @@
 -- column: clock_method VARCHAR                How its clock was corrected; none: as recorded
 -- column: clock_uncertainty_ns BIGINT [ns]    Bound of the error of that correction
 SELECT
-    host.run_id,
-    host.hostname,
+    host.run_id, host.hostname,
     (SELECT count(*) FROM main.trace WHERE trace.host_id = host.host_id) AS trace_count,
     (SELECT count(*) FROM main.process WHERE process.host_id = host.host_id) AS process_count,
     clock.method AS clock_method,

@@ -135,12 +135,7 @@ measured AS (
     JOIN main.run AS r ON b.run_id = r.run_id
 )
 SELECT
-    run_id,
-    scope,
-    subject,
-    measure,
-    affected,
-    total,
+    run_id, scope, subject, measure, affected, total,
     100 * affected / nullif(total, 0) AS affected_percent,
     is_internal
 FROM measured

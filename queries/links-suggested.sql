@@ -188,9 +188,7 @@ synchronous AS (
 ),
 partial AS (
     SELECT
-        node_id,
-        kind,
-        inputs,
+        node_id, kind, inputs,
         list(DISTINCT output_topic ORDER BY output_topic) AS outputs,
         printf(
             '%d of %d publications on %s came after a message of each input since the one before;'
@@ -367,12 +365,9 @@ candidate AS (
     SELECT node_id, kind, inputs, outputs, evidence, doubt, false FROM queued
 )
 SELECT
-    n.run_id,
-    c.kind,
+    n.run_id, c.kind,
     n.full_name AS node,
-    c.inputs,
-    c.outputs,
-    c.evidence,
+    c.inputs, c.outputs, c.evidence,
     nullif(
         concat_ws(
             '; ',
@@ -396,10 +391,7 @@ SELECT
         ),
         ''
     ) AS doubt,
-    n.process,
-    n.pid,
-    n.host,
-    n.is_name_repeated
+    n.process, n.pid, n.host, n.is_name_repeated
 FROM candidate AS c
 JOIN named_node AS n ON c.node_id = n.node_id
 LEFT JOIN received AS r ON c.node_id = r.node_id

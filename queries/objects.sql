@@ -89,14 +89,7 @@ SELECT
     p.name AS process,
     p.pid,
     n.full_name AS node,
-    o.kind,
-    o.name,
-    o.queue_depth,
-    o.goals,
-    o.created_ns,
-    s.symbols,
-    o.object_id,
-    o.is_inferred,
+    o.kind, o.name, o.queue_depth, o.goals, o.created_ns, s.symbols, o.object_id, o.is_inferred,
     o.is_internal
 FROM object AS o
 JOIN main.process AS p ON o.process_id = p.process_id

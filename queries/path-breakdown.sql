@@ -102,8 +102,7 @@ WITH piece AS (
         k.alike_id AS callback_id,
         least(coalesce(p.busy_min_ns, 0), greatest(p.duration_ns, 0)) AS busy_min_ns,
         least(coalesce(p.busy_max_ns, p.duration_ns), greatest(p.duration_ns, 0)) AS busy_max_ns,
-        a.run_queue_ns,
-        a.executor_ns,
+        a.run_queue_ns, a.executor_ns,
         -- The time up to a take is three parts, all others are one.
         unnest(
             CASE
@@ -145,11 +144,7 @@ part AS (
 ),
 measured AS (
     SELECT
-        path_id,
-        hop,
-        part,
-        callback_id,
-        is_of_reader,
+        path_id, hop, part, callback_id, is_of_reader,
         min(rank) AS rank,
         -- DISTINCT would tell all flows apart, not only these: that takes most of the memory.
         count(*) FILTER (WHERE NOT is_turning)
@@ -178,10 +173,7 @@ doubted AS (
     GROUP BY path_id
 )
 SELECT
-    p.run_id,
-    m.path_id,
-    m.hop,
-    m.part,
+    p.run_id, m.path_id, m.hop, m.part,
     CASE
         WHEN m.part IN ('network_or_idle', 'until_arrival') THEN 'between nodes'
         ELSE coalesce(l.node, main.node_label(n.full_name, r.name, r.pid))
@@ -195,9 +187,7 @@ SELECT
     m.quantiles[2] AS p95_ns,
     m.max_ns,
     round(m.total_ns / nullif(sum(m.total_ns) OVER (PARTITION BY m.path_id), 0), 4) AS share,
-    m.total_ns,
-    p.is_cut,
-    p.path
+    m.total_ns, p.is_cut, p.path
 FROM measured AS m
 JOIN doubted AS d ON m.path_id = d.path_id
 JOIN message AS p ON m.path_id = p.path_id AND p.hop = 1
@@ -218,5 +208,4 @@ ORDER BY
         ],
         m.part
     ),
-    m.part,
-    m.callback_id
+    m.part, m.callback_id

@@ -63,10 +63,7 @@ SELECT
     coalesce(t.tid, m.other_tid) AS tid,
     m.running_ns,
     m.running_ns / c.length_ns AS share,
-    m.most_share,
-    m.cpus,
-    m.frequency_hz,
-    m.thread_id
+    m.most_share, m.cpus, m.frequency_hz, m.thread_id
 FROM measured AS m
 JOIN traced AS c ON m.run_id = c.run_id AND m.host_id = c.host_id
 JOIN main.host AS h ON m.host_id = h.host_id

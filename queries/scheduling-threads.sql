@@ -36,8 +36,7 @@ WITH state AS (
 ),
 measured AS (
     SELECT
-        run_id,
-        thread_id,
+        run_id, thread_id,
         coalesce(sum(length_ns) FILTER (WHERE state = 'running'), 0)::BIGINT AS running_ns,
         coalesce(sum(length_ns) FILTER (WHERE state = 'preempted'), 0)::BIGINT AS preempted_ns,
         coalesce(sum(length_ns) FILTER (WHERE state = 'runnable'), 0)::BIGINT AS runnable_ns,
@@ -58,17 +57,8 @@ SELECT
     p.name AS process,
     p.pid,
     t.name AS thread,
-    t.tid,
-    m.running_ns,
-    m.preempted_ns,
-    m.runnable_ns,
-    m.sleeping_ns,
-    m.uninterruptible_ns,
-    m.unknown_ns,
-    m.preemptions,
-    m.priority,
-    m.loss_affected,
-    m.thread_id
+    t.tid, m.running_ns, m.preempted_ns, m.runnable_ns, m.sleeping_ns, m.uninterruptible_ns,
+    m.unknown_ns, m.preemptions, m.priority, m.loss_affected, m.thread_id
 FROM measured AS m
 JOIN main.thread AS t ON m.thread_id = t.thread_id
 JOIN main.process AS p ON t.process_id = p.process_id

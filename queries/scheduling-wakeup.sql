@@ -67,14 +67,12 @@ SELECT
     l.nodes,
     p.name AS process,
     t.name AS thread,
-    t.tid,
-    w.priority,
+    t.tid, w.priority,
     w.thread_id IN (SELECT thread_id FROM main.executor_thread) AS is_executor,
     w.count,
     w.quantiles[1] AS median_ns,
     w.quantiles[2] AS p99_ns,
-    w.max_ns,
-    w.total_ns,
+    w.max_ns, w.total_ns,
     n.names AS meanwhile,
     w.thread_id
 FROM waited AS w

@@ -79,9 +79,7 @@ call AS (
 ),
 measured AS (
     SELECT
-        run_id,
-        service_id,
-        client_id,
+        run_id, service_id, client_id,
         count(*) AS requests,
         count(*) FILTER (WHERE is_answered) AS answered,
         count(*) FILTER (WHERE is_not_taken) AS not_taken,
@@ -105,16 +103,8 @@ SELECT
     coalesce(s.service_name, c.service_name) AS service_name,
     main.node_label(sn.full_name, sp.name, sp.pid) AS server,
     main.node_label(cn.full_name, cp.name, cp.pid) AS client,
-    m.requests,
-    m.answered,
-    m.not_taken,
-    m.not_answered,
-    m.not_received,
-    m.negative,
-    m.request_median_ns,
-    m.wait_median_ns,
-    m.callback_median_ns,
-    m.reply_median_ns,
+    m.requests, m.answered, m.not_taken, m.not_answered, m.not_received, m.negative,
+    m.request_median_ns, m.wait_median_ns, m.callback_median_ns, m.reply_median_ns,
     m.response_median_ns,
     m.min_ns AS round_trip_min_ns,
     m.quantiles[1] AS round_trip_median_ns,
@@ -122,8 +112,7 @@ SELECT
     m.quantiles[2] AS round_trip_p95_ns,
     m.quantiles[3] AS round_trip_p99_ns,
     m.max_ns AS round_trip_max_ns,
-    m.service_id,
-    m.client_id,
+    m.service_id, m.client_id,
     coalesce(s.is_internal, c.is_internal, false) AS is_internal
 FROM measured AS m
 LEFT JOIN main.service AS s ON m.service_id = s.service_id

@@ -71,8 +71,7 @@ orphan AS (
     GROUP BY subscription_id
 )
 SELECT
-    s.run_id,
-    s.topic_name,
+    s.run_id, s.topic_name,
     main.node_label(n.full_name, p.name, p.pid) AS subscriber,
     coalesce(d.published, 0) AS published,
     coalesce(d.delivered, 0) AS delivered,
@@ -84,10 +83,7 @@ SELECT
     100 * d.delivered / nullif(d.delivered + d.dropped + d.lost, 0) AS delivered_percent,
     100 * d.lost / nullif(d.delivered + d.dropped + d.lost, 0) AS lost_percent,
     coalesce(o.orphans, 0) AS orphans,
-    d.reasons,
-    o.orphan_reasons,
-    s.subscription_id,
-    s.is_internal
+    d.reasons, o.orphan_reasons, s.subscription_id, s.is_internal
 FROM main.subscription AS s
 JOIN main.process AS p ON s.process_id = p.process_id
 LEFT JOIN main.node AS n ON s.node_id = n.node_id

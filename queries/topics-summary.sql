@@ -31,8 +31,7 @@
 -- note: clocks
 WITH topic AS (
     SELECT
-        run_id,
-        topic_name,
+        run_id, topic_name,
         sum(publisher)::BIGINT AS publisher_count,
         sum(subscription)::BIGINT AS subscription_count,
         bool_or(is_internal) AS is_internal
@@ -48,10 +47,7 @@ WITH topic AS (
 ),
 published AS (
     SELECT
-        b.run_id,
-        p.topic_name,
-        b.publisher_id,
-        b.start_ns,
+        b.run_id, p.topic_name, b.publisher_id, b.start_ns,
         b.start_ns - lag(b.start_ns) OVER (
             PARTITION BY b.publisher_id ORDER BY b.start_ns, b.publication_id
         ) AS period_ns
@@ -61,8 +57,7 @@ published AS (
 ),
 rate AS (
     SELECT
-        run_id,
-        topic_name,
+        run_id, topic_name,
         count(*) AS number,
         (count(*) - 1) * 1e9 / nullif(max(start_ns) - min(start_ns), 0) AS rate_hz,
         quantile_disc(period_ns, 0.5) AS period_median_ns
@@ -89,8 +84,7 @@ outcome AS (
 ),
 delivery AS (
     SELECT
-        run_id,
-        topic_name,
+        run_id, topic_name,
         sum(CASE WHEN status = 'delivered' THEN number ELSE 0 END)::BIGINT AS delivered,
         sum(CASE WHEN status = 'dropped' THEN number ELSE 0 END)::BIGINT AS dropped,
         sum(CASE WHEN status = 'lost' THEN number ELSE 0 END)::BIGINT AS lost,
@@ -104,8 +98,7 @@ delivery AS (
 ),
 latency AS (
     SELECT
-        t.run_id,
-        s.topic_name,
+        t.run_id, s.topic_name,
         quantile_disc(l.latency_ns, [0.5, 0.95]) AS quantiles,
         max(l.latency_ns) AS max_ns
     FROM main.take AS t
@@ -118,14 +111,9 @@ latency AS (
     GROUP BY t.run_id, s.topic_name
 )
 SELECT
-    t.run_id,
-    t.topic_name,
-    t.publisher_count,
-    t.subscription_count,
+    t.run_id, t.topic_name, t.publisher_count, t.subscription_count,
     coalesce(r.number, 0) AS publication_count,
-    r.rate_hz,
-    r.period_median_ns,
-    j.period_deviation_ns,
+    r.rate_hz, r.period_median_ns, j.period_deviation_ns,
     coalesce(d.delivered, 0) AS delivered,
     coalesce(d.dropped, 0) AS dropped,
     coalesce(d.lost, 0) AS lost,

@@ -43,18 +43,11 @@ WITH missing AS (
     JOIN main.take AS t ON o.take_id = t.take_id
 )
 SELECT
-    m.run_id,
-    m.at_ns,
-    m.side,
+    m.run_id, m.at_ns, m.side,
     coalesce(s.topic_name, b.topic_name) AS topic_name,
     main.node_label(bn.full_name, bp.name, bp.pid) AS publisher,
     main.node_label(sn.full_name, sp.name, sp.pid) AS subscriber,
-    m.status,
-    m.reason,
-    m.source_timestamp_ns,
-    m.publication_id,
-    m.take_id,
-    m.subscription_id,
+    m.status, m.reason, m.source_timestamp_ns, m.publication_id, m.take_id, m.subscription_id,
     coalesce(s.is_internal, b.is_internal, false) AS is_internal
 FROM missing AS m
 LEFT JOIN main.subscription AS s ON m.subscription_id = s.subscription_id

@@ -61,8 +61,7 @@ WITH waited AS MATERIALIZED (
 ),
 measured AS (
     SELECT
-        run_id,
-        callback_id,
+        run_id, callback_id,
         count(*) AS count,
         count(*) FILTER (WHERE busy_min_ns > 0) AS delayed_min,
         count(*) FILTER (WHERE coalesce(busy_max_ns, busy_min_ns) > 0) AS delayed_max,
@@ -101,8 +100,7 @@ pair AS (
 ),
 ranked AS (
     SELECT
-        p.callback_id,
-        p.meanwhile_id,
+        p.callback_id, p.meanwhile_id,
         p.overlap_ns / sum(p.overlap_ns) OVER (PARTITION BY p.callback_id) AS share,
         row_number() OVER (
             PARTITION BY p.callback_id ORDER BY p.overlap_ns DESC, p.meanwhile_id
@@ -146,32 +144,16 @@ preemptor AS (
     GROUP BY callback_id
 )
 SELECT
-    m.run_id,
-    l.node,
+    m.run_id, l.node,
     l.label AS callback,
-    m.count,
-    m.delayed_min,
-    m.delayed_max,
-    m.wait_median_ns,
-    m.wait_max_ns,
-    m.busy_worst_ns,
-    m.busy_total_min_ns,
-    m.busy_total_max_ns,
-    m.held_total_max_ns,
-    m.rest_total_min_ns,
+    m.count, m.delayed_min, m.delayed_max, m.wait_median_ns, m.wait_max_ns, m.busy_worst_ns,
+    m.busy_total_min_ns, m.busy_total_max_ns, m.held_total_max_ns, m.rest_total_min_ns,
     m.rest_total_max_ns,
     w.shares AS meanwhile,
-    m.arrived,
-    m.until_arrival_total_ns,
-    m.run_queue_worst_ns,
-    m.run_queue_total_ns,
-    m.preempted_worst_ns,
-    m.preempted_total_ns,
+    m.arrived, m.until_arrival_total_ns, m.run_queue_worst_ns, m.run_queue_total_ns,
+    m.preempted_worst_ns, m.preempted_total_ns,
     p.shares AS cpu_taken_by,
-    m.unknown,
-    m.loss_affected,
-    m.callback_id,
-    l.is_internal
+    m.unknown, m.loss_affected, m.callback_id, l.is_internal
 FROM measured AS m
 JOIN main.callback_label AS l ON m.callback_id = l.callback_id
 LEFT JOIN meanwhile AS w ON m.callback_id = w.callback_id

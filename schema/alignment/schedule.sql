@@ -91,10 +91,7 @@ agreement AS (
     GROUP BY ALL
 )
 SELECT
-    c.candidate_number,
-    c.trace_index,
-    c.clock_key,
-    c.shift_ns,
+    c.candidate_number, c.trace_index, c.clock_key, c.shift_ns,
     coalesce(a.event_count, 0) AS event_count,
     coalesce(a.agreeing_count, 0) AS agreeing_count,
     coalesce(a.unknown_count, 0) AS unknown_count,

@@ -18,14 +18,10 @@ ros AS (
 )
 SELECT
     row_number() OVER (ORDER BY trace_index, clock_key, shift_ns) AS candidate_number,
-    trace_index,
-    clock_key,
-    shift_ns,
-    has_cpus
+    trace_index, clock_key, shift_ns, has_cpus
 FROM (
     SELECT DISTINCT
-        k.trace_index,
-        r.clock_key,
+        k.trace_index, r.clock_key,
         CASE WHEN k.clock_key = r.clock_key OR s.is_of_epoch THEN 0
             ELSE r.clock_origin_ns - k.clock_origin_ns END AS shift_ns,
         k.has_cpus

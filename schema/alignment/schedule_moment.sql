@@ -5,8 +5,7 @@
 --     the CPU there.
 -- grain: one row per event and candidate that covers it
 -- when: staging.schedule_candidate
-SELECT
-    e.candidate_number, e.event_id, e.thread_index, e.at_ns, w.tid, w.contradiction_id
+SELECT e.candidate_number, e.event_id, e.thread_index, e.at_ns, w.tid, w.contradiction_id
 FROM (
     -- Few and narrow columns here and below: all events and all switches are sorted.
     SELECT

@@ -124,11 +124,7 @@ known AS (
     GROUP BY clock_id, other_clock_id
 )
 SELECT
-    p.clock_id,
-    p.other_clock_id,
-    p.received_count,
-    p.sent_count,
-    p.received_packet_count,
+    p.clock_id, p.other_clock_id, p.received_count, p.sent_count, p.received_packet_count,
     p.sent_packet_count,
     p.base_ns + l.moment::BIGINT AS reference_ns,
     p.base_bound_ns + l.middle::BIGINT AS offset_ns,
@@ -139,9 +135,7 @@ SELECT
             ceil(greatest(l.highest * 1e9 - l.drift_ppb, l.drift_ppb - l.lowest * 1e9)), 1
         )
     END::BIGINT AS drift_uncertainty_ppb,
-    l.is_even,
-    k.greatest_uncertainty_ns,
-    k.bounds
+    l.is_even, k.greatest_uncertainty_ns, k.bounds
 FROM pair AS p
 LEFT JOIN line AS l ON p.clock_id = l.clock_id AND p.other_clock_id = l.other_clock_id
 LEFT JOIN miss AS m ON p.clock_id = m.clock_id AND p.other_clock_id = m.other_clock_id

@@ -21,9 +21,7 @@ WITH way AS (
     GROUP BY l.run_id, fh.clock_id, th.clock_id, bucket
 )
 SELECT
-    run_id,
-    from_clock_id,
-    to_clock_id,
+    run_id, from_clock_id, to_clock_id,
     CASE
         WHEN row_number() OVER (
             PARTITION BY run_id, from_clock_id, to_clock_id ORDER BY bucket

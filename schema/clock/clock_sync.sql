@@ -24,16 +24,13 @@ step AS MATERIALIZED (
     FROM pair
     UNION ALL
     SELECT
-        other_clock_id,
-        clock_id,
+        other_clock_id, clock_id,
         reference_ns + offset_ns,
         -offset_ns,
         1 / (1 + drift) - 1,
         ceil(uncertainty_ns / (1 + drift - drift_uncertainty))::BIGINT,
         drift_uncertainty / ((1 + drift) * (1 + drift - drift_uncertainty)),
-        is_even,
-        has_packets,
-        greatest_uncertainty_ns
+        is_even, has_packets, greatest_uncertainty_ns
     FROM pair
 ),
 chain (
@@ -48,10 +45,7 @@ chain (
     UNION
     (
         SELECT
-            c.root_id,
-            s.clock_id,
-            c.clock_id,
-            s.reference_ns,
+            c.root_id, s.clock_id, c.clock_id, s.reference_ns,
             s.offset_ns + c.offset_ns
             + round(c.drift * (s.reference_ns + s.offset_ns - c.reference_ns))::BIGINT,
             s.drift + c.drift + s.drift * c.drift,
@@ -99,8 +93,7 @@ step_bound AS (
     FROM pair AS p, unnest(p.bounds) AS bound (b)
     UNION ALL
     SELECT
-        p.other_clock_id,
-        p.clock_id,
+        p.other_clock_id, p.clock_id,
         b.at_ns + p.offset_ns + round(p.drift * (b.at_ns - p.reference_ns))::BIGINT,
         b.uncertainty_ns * (1 + 2 * derive.clock_drift_limit())
     FROM pair AS p, unnest(p.bounds) AS bound (b)
@@ -170,15 +163,13 @@ summed AS (
 SELECT
     s.clock_id,
     s.root_id AS reference_clock_id,
-    s.reference_ns,
-    s.offset_ns,
+    s.reference_ns, s.offset_ns,
     s.drift_ppb::BIGINT AS drift_ppb,
     s.uncertainty_ns,
     CASE WHEN s.is_even THEN ceil(
         s.drift_uncertainty * 1e9 + abs(s.drift * 1e9 - s.drift_ppb)
     ) END::BIGINT AS drift_uncertainty_ppb,
-    s.has_packets,
-    u.bounds
+    s.has_packets, u.bounds
 FROM sync AS s
 LEFT JOIN (
     SELECT

@@ -7,8 +7,7 @@
 -- grain: one row per host and ten seconds
 WITH difference AS (
     SELECT
-        l.run_id,
-        p.host_id,
+        l.run_id, p.host_id,
         t.source_timestamp_ns // 10_000_000_000 AS bucket,
         min(coalesce(b.dds_ns, b.rmw_ns, b.end_ns) - t.source_timestamp_ns) AS shift_ns,
         max(coalesce(b.dds_ns, b.rmw_ns, b.end_ns) - t.source_timestamp_ns) AS greatest_shift_ns
@@ -20,13 +19,11 @@ WITH difference AS (
     GROUP BY l.run_id, p.host_id, bucket
 )
 SELECT
-    run_id,
-    host_id,
+    run_id, host_id,
     CASE
         WHEN row_number() OVER (PARTITION BY run_id, host_id ORDER BY bucket) > 1
             THEN bucket * 10_000_000_000
         ELSE 0
     END AS from_ns,
-    shift_ns,
-    greatest_shift_ns
+    shift_ns, greatest_shift_ns
 FROM difference

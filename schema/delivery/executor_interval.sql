@@ -6,15 +6,10 @@
 --     executor.
 -- grain: one row per executor event of a thread
 SELECT
-    s.run_id,
-    x.executor_id,
-    s.thread_id,
-    s.state,
-    s.start_ns,
+    s.run_id, x.executor_id, s.thread_id, s.state, s.start_ns,
     lead(CASE WHEN NOT s.is_behind_gap AND d.run_id IS NOT NULL THEN s.start_ns END)
         OVER of_thread AS end_ns,
-    s.callback_instance_id,
-    s.start_event_id
+    s.callback_instance_id, s.start_event_id
 FROM store.executor_state AS s
 LEFT JOIN store.executor_thread AS x ON s.thread_id = x.thread_id
 LEFT JOIN derive.delimited_run AS d ON s.run_id = d.run_id

@@ -237,8 +237,7 @@ replaced AS (
 )
 SELECT
     only_run::BIGINT AS run_id,
-    o.take_id,
-    o.subscription_id,
+    o.take_id, o.subscription_id,
     CASE
         WHEN k.has_gap THEN 'publisher_gap'
         WHEN k.is_before_tracing THEN 'before_tracing'

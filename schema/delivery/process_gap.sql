@@ -45,8 +45,7 @@ active AS MATERIALIZED (
 ),
 absence AS (
     SELECT
-        p.run_id,
-        p.process_id,
+        p.run_id, p.process_id,
         coalesce(b.at_ns, p.start_ns) AS start_ns,
         coalesce(a.at_ns, p.end_ns) AS end_ns
     FROM pause AS p
@@ -78,9 +77,7 @@ gap AS (
     WHERE begin_ns > previous_end_ns
 )
 SELECT
-    run_id,
-    process_id,
-    start_ns,
+    run_id, process_id, start_ns,
     max(end_ns) OVER (
         PARTITION BY run_id, process_id ORDER BY start_ns, end_ns ROWS UNBOUNDED PRECEDING
     ) AS covered_until_ns

@@ -7,9 +7,7 @@
 -- grain: one row per process and recording (the chunks of one trace) that it did something in
 WITH recording AS (
     SELECT
-        r.run_id,
-        r.trace_id,
-        r.recording_id,
+        r.run_id, r.trace_id, r.recording_id,
         min(t.start_ns) OVER chunks AS begin_ns,
         max(t.end_ns) OVER chunks AS end_ns
     FROM derive.recording AS r
@@ -54,11 +52,7 @@ creation AS (
     SELECT run_id, process_id, created_ns FROM store.subscription
 )
 SELECT
-    s.run_id,
-    s.process_id,
-    s.recording_id,
-    s.begin_ns,
-    s.end_ns,
+    s.run_id, s.process_id, s.recording_id, s.begin_ns, s.end_ns,
     CASE WHEN p.first_seen_ns >= s.begin_ns THEN p.first_seen_ns ELSE s.first_ns END AS first_ns,
     s.last_ns,
     -- Its first object was seen to be created before it did anything.

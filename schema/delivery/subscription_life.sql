@@ -38,12 +38,9 @@ showing AS (
     WHERE t.source_timestamp_ns IS NOT NULL
 )
 SELECT
-    s.run_id,
-    s.subscription_id,
+    s.run_id, s.subscription_id,
     derive.own_topic(s.topic_name, s.is_agnocast, h.clock_id) AS topic_name,
-    s.is_agnocast,
-    s.process_id,
-    h.clock_id,
+    s.is_agnocast, s.process_id, h.clock_id,
     nullif(s.queue_depth, 0) AS queue_depth,
     s.created_ns,
     coalesce(r.last_seen_ns, p.last_seen_ns) AS last_seen_ns,

@@ -389,9 +389,7 @@ judged AS (
 )
 SELECT
     only_run::BIGINT AS run_id,
-    publication_id,
-    publisher_id,
-    subscription_id,
+    publication_id, publisher_id, subscription_id,
     CASE
         WHEN arrival_ns IS NULL THEN 'unknown'
         WHEN created_ns > arrival_ns AND may_be_kept THEN 'unknown'

@@ -48,8 +48,7 @@ caller (run_id, called_key, caller_key, client_id, services) AS (
     JOIN called AS d ON c.called_key = d.sender_key
 )
 SELECT
-    c.run_id,
-    c.called_key,
+    c.run_id, c.called_key,
     c.caller_key // 8 AS caller_id,
     list_prepend(coalesce(k.node_id, -k.process_id, 0), c.services)::BIGINT[] AS route
 FROM caller AS c

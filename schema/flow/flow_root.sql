@@ -51,9 +51,7 @@ cause AS (
 ),
 caused AS (
     SELECT
-        c.run_id,
-        c.publication_id,
-        c.publisher_id,
+        c.run_id, c.publication_id, c.publisher_id,
         bool_or(c.is_message) AS is_message,
         min(c.callback_instance_id) AS callback_instance_id
     FROM cause AS c
@@ -74,9 +72,7 @@ way AS (
     GROUP BY publication_id, caller_id
 )
 SELECT
-    r.run_id,
-    r.publication_id,
-    r.publisher_id,
+    r.run_id, r.publication_id, r.publisher_id,
     NOT r.is_message AS is_source,
     CASE WHEN r.callback_instance_id IS NULL THEN 'publication' ELSE 'callback_instance' END
         AS root_kind,

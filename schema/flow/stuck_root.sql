@@ -123,8 +123,7 @@ withheld AS (
     WHERE s.publisher_id IS NOT NULL AND s.publication_id IS NULL AND NOT s.is_cached
 )
 SELECT
-    s.path_id,
-    s.root_key,
+    s.path_id, s.root_key,
     CASE
         WHEN s.publisher_id IS NULL THEN 'callback_not_finished'
         WHEN s.publication_id IS NOT NULL THEN coalesce(u.reason, 'unknown')

@@ -22,9 +22,7 @@ session AS (
 ),
 given AS (
     SELECT
-        s.session,
-        n.vpid,
-        n.procname,
+        s.session, n.vpid, n.procname,
         CASE
             WHEN s.has_containers THEN -s.container
             WHEN a.procname IS NOT NULL

@@ -56,8 +56,7 @@ right_counted AS (
     GROUP BY left_session, right_session, thread, tracepoint
 )
 SELECT
-    l.left_session,
-    l.right_session,
+    l.left_session, l.right_session,
     -- Where one of them lost events, those of the other have no twins.
     2 * sum(l.twin_count) >= sum(least(l.left_count, r.right_count))
         AS is_same

@@ -12,11 +12,6 @@
 -- column: linked_count BIGINT  Inputs with a message
 -- column: is_complete BOOLEAN  Every input has a message
 SELECT
-    run_id,
-    annotation_id,
-    publication_id,
-    callback_instance_id,
-    input_count,
-    linked_count,
+    run_id, annotation_id, publication_id, callback_instance_id, input_count, linked_count,
     linked_count = input_count AS is_complete
 FROM derive.annotation_firing

@@ -67,12 +67,7 @@ on_cpu AS (
 ),
 by_waking AS MATERIALIZED (
     SELECT
-        w.run_id,
-        w.take_id,
-        w.publication_id,
-        w.arrived_ns,
-        w.waker_kind,
-        w.waker_thread_id,
+        w.run_id, w.take_id, w.publication_id, w.arrived_ns, w.waker_kind, w.waker_thread_id,
         coalesce(x.name, o.name) AS waker_name,
         coalesce(d.at_ns < w.arrived_ns, true) AND CASE w.waker_kind
             WHEN 'thread' THEN coalesce(

@@ -7,8 +7,7 @@
 -- column: alike_id BIGINT  The first of those like it
 -- column: objects BIGINT  How many there are of them, with itself
 SELECT
-    c.callback_id,
-    c.run_id,
+    c.callback_id, c.run_id,
     min(c.callback_id) OVER alike AS alike_id,
     count(*) OVER alike AS objects
 FROM store.callback AS c

@@ -9,8 +9,7 @@
 -- column: label VARCHAR  What triggers it
 -- column: is_internal BOOLEAN  Infrastructure of ROS
 SELECT
-    c.callback_id,
-    c.run_id,
+    c.callback_id, c.run_id,
     main.node_label(n.full_name, p.name, p.pid) AS node,
     CASE c.kind
         WHEN 'timer' THEN coalesce(

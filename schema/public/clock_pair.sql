@@ -21,9 +21,7 @@ WITH way AS (
     JOIN store.clock AS t ON w.to_clock_id = t.clock_id
 )
 SELECT
-    run_id,
-    from_clock_id,
-    to_clock_id,
+    run_id, from_clock_id, to_clock_id,
     count(CASE WHEN NOT is_packet THEN 1 END) AS message_count,
     count(CASE WHEN is_packet THEN 1 END) AS packet_count,
     min(CASE WHEN NOT is_packet THEN way_ns END) AS shortest_message_ns,

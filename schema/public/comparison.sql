@@ -104,8 +104,7 @@ outcome AS (
 thing AS (
     -- A root counts once, however often it arrived; not those that could not arrive, or were cut.
     SELECT
-        run_id,
-        subject,
+        run_id, subject,
         false AS is_internal,
         root_ns AS at_ns,
         root_id AS id,
@@ -118,9 +117,7 @@ thing AS (
         END AS value_ns,
         is_first IS NOT false AND status NOT IN ('not_connected', 'cut_by_recording') AS is_unit,
         status = 'reached' AS is_complete,
-        is_loss_affected,
-        is_ambiguous,
-        is_cut
+        is_loss_affected, is_ambiguous, is_cut
     FROM outcome
     UNION ALL
     SELECT
@@ -183,8 +180,7 @@ sided AS MATERIALIZED (
 ),
 measured AS MATERIALIZED (
     SELECT
-        side,
-        subject,
+        side, subject,
         count(value_ns) AS number,
         quantile_disc(value_ns, [0.5, 0.95, 0.99]) AS quantiles,
         avg(value_ns) AS mean_ns,
@@ -202,14 +198,11 @@ measured AS MATERIALIZED (
 -- What each statistic varies with, about its mean: the value, or whether it lies beyond a quantile.
 centred AS MATERIALIZED (
     SELECT
-        s.side,
-        s.subject,
-        m.number,
+        s.side, s.subject, m.number,
         row_number() OVER (
             PARTITION BY s.side, s.subject ORDER BY s.at_ns, s.id, s.value_ns
         ) - 1 AS position,
-        s.at_ns,
-        s.value_ns,
+        s.at_ns, s.value_ns,
         s.value_ns - m.mean_ns AS mean_part,
         (s.value_ns > m.quantiles[1])::BIGINT AS median_part,
         (s.value_ns > m.quantiles[2])::BIGINT AS p95_part,
@@ -231,14 +224,7 @@ spread AS (
 ),
 value AS (
     SELECT
-        m.side,
-        m.subject,
-        m.number,
-        m.share,
-        m.loss_affected,
-        m.ambiguous,
-        w.warm_up_ns,
-        m.is_cut,
+        m.side, m.subject, m.number, m.share, m.loss_affected, m.ambiguous, w.warm_up_ns, m.is_cut,
         unnest(['median', 'mean', 'p95', 'p99', 'max']) AS statistic,
         unnest([0.5, NULL, 0.95, 0.99, 1.0]) AS quantile,
         unnest([
@@ -298,9 +284,7 @@ judged AS (
     LEFT JOIN spread AS s ON p.subject = s.subject AND p.statistic = s.statistic
 )
 SELECT
-    statistic,
-    a_ns,
-    b_ns,
+    statistic, a_ns, b_ns,
     b_ns - a_ns AS difference_ns,
     CASE WHEN a_ns > 0 THEN round(100.0 * (b_ns - a_ns) / a_ns, 3) END AS change_percent,
     CASE WHEN reason IS NULL THEN low_ns END AS low_ns,
@@ -312,19 +296,12 @@ SELECT
         WHEN low_ns > 0 THEN 'B is longer'
         ELSE 'B is shorter'
     END AS verdict,
-    a_count,
-    b_count,
+    a_count, b_count,
     floor(a_independent + 1e-9)::BIGINT AS a_independent,
     floor(b_independent + 1e-9)::BIGINT AS b_independent,
     round(a_share, 4) AS a_share,
     round(b_share, 4) AS b_share,
-    a_loss_affected,
-    b_loss_affected,
-    a_ambiguous,
-    b_ambiguous,
-    a_warm_up_ns,
-    b_warm_up_ns,
-    is_cut,
+    a_loss_affected, b_loss_affected, a_ambiguous, b_ambiguous, a_warm_up_ns, b_warm_up_ns, is_cut,
     subject
 FROM judged
 ORDER BY

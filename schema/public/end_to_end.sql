@@ -89,10 +89,7 @@ way AS MATERIALIZED (
 -- root_key: positive for a callback instance, negative for a publication and, odd, for a take.
 root AS MATERIALIZED (
     SELECT
-        r.run_id,
-        r.publication_id,
-        r.publisher_id,
-        r.route,
+        r.run_id, r.publication_id, r.publisher_id, r.route,
         CASE
             WHEN r.root_kind = 'take' THEN 2 * r.publication_id - 1
             WHEN i.callback_instance_id IS NULL THEN -2 * r.publication_id
@@ -204,8 +201,7 @@ missing AS MATERIALIZED (
 ),
 -- All flows go through here: what is said of a path or of a missing arrival is added at the end.
 outcome AS MATERIALIZED (
-    SELECT
-        a.path_id, a.root_key, e.root_ns, a.take_id, a.sink_ns, a.is_stored, a.is_ambiguous
+    SELECT a.path_id, a.root_key, e.root_ns, a.take_id, a.sink_ns, a.is_stored, a.is_ambiguous
     FROM pair AS a
     JOIN expected AS e ON a.path_id = e.path_id AND a.root_key = e.root_key
     UNION ALL
@@ -250,16 +246,14 @@ ranked AS (
     WINDOW of_root AS (PARTITION BY o.path_id, o.root_key ORDER BY o.sink_ns, o.take_id)
 )
 SELECT
-    r.run_id,
-    r.path_id,
+    r.run_id, r.path_id,
     CASE
         WHEN r.root_key > 0 THEN 'callback_instance'
         WHEN r.root_key % 2 = 0 THEN 'publication'
         ELSE 'take'
     END AS root_kind,
     CASE WHEN r.root_key > 0 THEN r.root_key ELSE -r.root_key // 2 END AS root_id,
-    r.root_ns,
-    r.take_id,
+    r.root_ns, r.take_id,
     CASE WHEN r.take_id IS NOT NULL THEN k.sink_event END AS sink_event,
     r.sink_ns,
     CASE WHEN NOT r.is_stored THEN r.sink_ns - r.root_ns END AS latency_ns,

@@ -74,12 +74,7 @@ trail (
     WHERE list_contains(runs, t.run_id)
     UNION ALL
     SELECT
-        flow_id,
-        path_id,
-        hop,
-        take_id,
-        publication_id,
-        way.next_take_id,
+        flow_id, path_id, hop, take_id, publication_id, way.next_take_id,
         dense_rank() OVER (ORDER BY flow_id, publication_id, way.publications_rank),
         dense_rank() OVER (ORDER BY flow_id, take_id, way.takes_rank)
     FROM (
@@ -87,8 +82,7 @@ trail (
             r.flow_id,
             l.parent_path_id AS path_id,
             r.hop - 1 AS hop,
-            s.take_id,
-            s.publication_id,
+            s.take_id, s.publication_id,
             min(struct_pack(
                 publications_rank := r.publications_rank,
                 takes_rank := r.takes_rank,

@@ -12,10 +12,7 @@
 CREATE OR REPLACE MACRO main.executor_activity_within(runs, window_start_ns, window_end_ns) AS TABLE
 WITH activity AS (
     SELECT
-        a.run_id,
-        a.executor_id,
-        a.thread_id,
-        a.activity,
+        a.run_id, a.executor_id, a.thread_id, a.activity,
         derive.corrected_ns(a.start_ns, p.offset_ns, p.drift_ppb, p.reference_ns) AS start_ns,
         derive.corrected_ns(a.end_ns, p.offset_ns, p.drift_ppb, p.reference_ns) AS end_ns,
         a.callback_instance_id

@@ -14,9 +14,7 @@
 CREATE OR REPLACE MACRO main.executor_pause(runs, window_start_ns, window_end_ns) AS TABLE
 WITH pause AS (
     SELECT
-        q.run_id,
-        q.thread_id,
-        q.activity,
+        q.run_id, q.thread_id, q.activity,
         derive.corrected_ns(q.start_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS start_ns,
         derive.corrected_ns(q.end_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS end_ns
     FROM derive.queue_activity(runs, window_start_ns, window_end_ns) AS q

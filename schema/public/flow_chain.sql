@@ -86,9 +86,7 @@ chain AS (
         - rank() OVER (ORDER BY run_id) + 1 AS number,
         NULL::BIGINT AS parent_number,
         hop_id AS first_hop_id,
-        hop_id,
-        subscription_id,
-        is_last,
+        hop_id, subscription_id, is_last,
         set_bit(nowhere, place, 1) AS visited,
         NULL::BIGINT AS parent_publishers_rank,
         dense_rank() OVER (ORDER BY run_id, publisher_id) AS publishers_rank,
@@ -100,30 +98,17 @@ chain AS (
     QUALIFY number <= max_paths
     UNION ALL
     SELECT
-        run_id,
-        depth,
+        run_id, depth,
         row_number() OVER (ORDER BY run_id, publishers_rank, subscriptions_rank, routes_rank)
         - rank() OVER (ORDER BY run_id) + 1 AS number,
-        parent_number,
-        first_hop_id,
-        hop_id,
-        subscription_id,
-        is_last,
-        visited,
-        parent_publishers_rank,
-        publishers_rank,
-        subscriptions_rank,
-        routes_rank,
-        is_crowded
+        parent_number, first_hop_id, hop_id, subscription_id, is_last, visited,
+        parent_publishers_rank, publishers_rank, subscriptions_rank, routes_rank, is_crowded
     FROM (
         SELECT
             c.run_id,
             c.depth + 1 AS depth,
             c.number AS parent_number,
-            c.first_hop_id,
-            u.hop_id,
-            u.subscription_id,
-            u.is_last,
+            c.first_hop_id, u.hop_id, u.subscription_id, u.is_last,
             set_bit(c.visited, u.place, 1) AS visited,
             c.publishers_rank AS parent_publishers_rank,
             dense_rank() OVER (
@@ -226,13 +211,7 @@ ranked AS (
     FROM limited
 )
 SELECT
-    r.run_id,
-    r.path_id,
-    r.parent_path_id,
-    r.depth,
-    u.publisher_id,
-    u.subscription_id,
-    u.route,
+    r.run_id, r.path_id, r.parent_path_id, r.depth, u.publisher_id, u.subscription_id, u.route,
     f.publisher_id AS first_publisher_id,
     f.route AS first_route,
     u.is_cached,

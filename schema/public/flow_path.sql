@@ -35,8 +35,7 @@ WITH RECURSIVE chain_here AS MATERIALIZED (
 chain AS NOT MATERIALIZED (FROM query_table(chains)),
 called AS (
     SELECT
-        r.route,
-        r.position,
+        r.route, r.position,
         printf(
             '(%s) → %s',
             coalesce(s.service_name, '?'),
@@ -112,19 +111,7 @@ whole AS (
     GROUP BY l.path_id
 )
 SELECT
-    c.run_id,
-    c.path_id,
-    c.parent_path_id,
-    c.depth,
-    w.publishers,
-    w.subscriptions,
-    w.topics,
-    w.routes,
-    w.path,
-    c.publisher_id,
-    c.subscription_id,
-    c.is_cached,
-    c.is_path,
-    c.is_cut
+    c.run_id, c.path_id, c.parent_path_id, c.depth, w.publishers, w.subscriptions, w.topics,
+    w.routes, w.path, c.publisher_id, c.subscription_id, c.is_cached, c.is_path, c.is_cut
 FROM chain AS c
 JOIN whole AS w ON c.path_id = w.path_id

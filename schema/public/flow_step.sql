@@ -163,11 +163,7 @@ arrow AS MATERIALIZED (
     JOIN vertex AS t ON l.to_kind = t.kind AND l.to_id = t.id
 )
 SELECT
-    d.run_id,
-    d.depth,
-    a.from_kind,
-    a.from_id,
-    a.link_kind,
+    d.run_id, d.depth, a.from_kind, a.from_id, a.link_kind,
     CASE
         WHEN a.link_kind IN ('transport', 'callback', 'take_adjacent', 'polled')
             OR derive.is_indirect(a.link_kind)
@@ -175,24 +171,15 @@ SELECT
         WHEN a.link_kind = 'service' AND d.start_ns >= f.end_ns THEN d.start_ns - f.end_ns
     END AS wait_ns,
     coalesce(
-        lt.candidate_count,
-        lc.candidate_count,
+        lt.candidate_count, lc.candidate_count,
         -- What follows from a request or response is followed only if it is certain.
         CASE WHEN a.link_kind = 'take_adjacent' THEN 1 END
     ) AS candidate_count,
     coalesce(lt.is_loss_affected, lc.is_loss_affected) AS is_loss_affected,
-    d.kind,
-    d.id,
-    d.start_ns,
-    d.end_ns,
-    d.node,
-    d.label,
-    d.topic_name,
-    d.symbol,
+    d.kind, d.id, d.start_ns, d.end_ns, d.node, d.label, d.topic_name, d.symbol,
     printf('%s %d', coalesce(h.name, '?'), h.tid) AS thread,
     m.hostname AS host,
-    d.missing,
-    d.reason,
+    d.missing, d.reason,
     coalesce(c.cut_count, 0) AS cut_count,
     coalesce(o.internal_count, 0) AS internal_count
 FROM described AS d
@@ -215,26 +202,16 @@ UNION ALL
 SELECT
     x.run_id,
     d.depth + 1,
-    d.kind,
-    d.id,
+    d.kind, d.id,
     derive.delivery_status(x.reason),
-    NULL,
-    NULL,
-    NULL,
+    NULL, NULL, NULL,
     'subscription',
-    x.subscription_id,
-    NULL,
-    NULL,
+    x.subscription_id, NULL, NULL,
     main.node_label(n.full_name, o.name, o.pid),
     coalesce(s.topic_name, '?'),
-    s.topic_name,
-    NULL,
-    NULL,
-    m.hostname,
+    s.topic_name, NULL, NULL, m.hostname,
     'take',
-    x.reason,
-    0,
-    0
+    x.reason, 0, 0
 FROM shown AS v
 JOIN described AS d ON v.key = d.key
 JOIN derive.flow_end AS x ON x.kind = 'publication' AND v.id = x.id

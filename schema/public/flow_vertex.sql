@@ -39,8 +39,7 @@ SELECT
     t.process_id,
     main.node_label(n.full_name, o.name, o.pid),
     coalesce(s.topic_name, '?'),
-    s.topic_name,
-    NULL,
+    s.topic_name, NULL,
     CASE
         WHEN x.id IS NOT NULL THEN 'publication'
         WHEN i.take_id IS NULL AND y.take_id IS NULL AND z.take_id IS NOT NULL THEN 'copy'
@@ -89,8 +88,7 @@ SELECT
     CASE WHEN c.client_id IS NULL THEN '?'
         ELSE main.node_label(n.full_name, o.name, o.pid) END,
     coalesce(c.service_name, s.service_name, '?'),
-    NULL,
-    NULL,
+    NULL, NULL,
     CASE
         WHEN q.sent_ns IS NULL THEN 'sending'
         WHEN q.taken_ns IS NULL THEN 'take'

@@ -28,8 +28,7 @@ whole AS (
     SELECT group_id, sum(samples) AS samples FROM seen GROUP BY group_id
 )
 SELECT
-    s.group_id,
-    w.stack_frame_id,
+    s.group_id, w.stack_frame_id,
     coalesce(sum(s.samples) FILTER (WHERE is_self), 0)::BIGINT AS self_samples,
     sum(s.samples)::BIGINT AS samples,
     sum(CASE WHEN is_self THEN s.cpu_ns WHEN s.cpu_ns IS NOT NULL THEN 0 END)::BIGINT AS self_ns,

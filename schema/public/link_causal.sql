@@ -13,20 +13,14 @@
 -- column: is_loss_affected
 -- column: is_followed BOOLEAN  Flows and paths follow it
 SELECT
-    l.run_id,
-    l.callback_instance_id,
-    l.take_id,
-    l.publication_id,
-    l.kind,
-    l.annotation_id,
+    l.run_id, l.callback_instance_id, l.take_id, l.publication_id, l.kind, l.annotation_id,
     CASE l.kind
         WHEN 'direct' THEN 0
         WHEN 'take_adjacent' THEN b.start_ns - t.taken_ns
         WHEN 'polled' THEN b.start_ns - t.taken_ns
         ELSE b.start_ns - i.end_ns
     END AS wait_ns,
-    l.candidate_count,
-    l.is_loss_affected,
+    l.candidate_count, l.is_loss_affected,
     derive.is_followed(l.kind, l.candidate_count) AS is_followed
 FROM store.link_causal AS l
 LEFT JOIN main.callback_instance AS i

@@ -11,9 +11,7 @@
 -- column: start_ns BIGINT [epoch ns]  Begin
 -- column: end_ns BIGINT [epoch ns]  End
 SELECT
-    s.run_id,
-    s.node_id,
-    s.state,
+    s.run_id, s.node_id, s.state,
     derive.corrected_ns(s.start_ns, p.offset_ns, p.drift_ppb, p.reference_ns) AS start_ns,
     derive.corrected_ns(s.end_ns, p.offset_ns, p.drift_ppb, p.reference_ns) AS end_ns
 FROM derive.node_state AS s

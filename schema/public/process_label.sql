@@ -8,13 +8,11 @@
 -- column: nodes VARCHAR        Full names of its first two nodes, and how many more it has; without
 --     nodes its name and id, in brackets
 SELECT
-    p.run_id,
-    p.process_id,
+    p.run_id, p.process_id,
     main.node_label(
         array_to_string(n.names[:2], ', ')
         || CASE WHEN len(n.names) > 2 THEN printf(', %d more', len(n.names) - 2) ELSE '' END,
-        p.name,
-        p.pid
+        p.name, p.pid
     ) AS nodes
 FROM main.process AS p
 LEFT JOIN (

@@ -37,12 +37,7 @@ way AS (
         AND l.run_id IN (SELECT run_id FROM store.clock GROUP BY run_id HAVING count(*) > 1)
 )
 SELECT
-    w.run_id,
-    w.publication_id,
-    w.take_id,
-    w.from_host_id,
-    w.to_host_id,
-    w.latency_ns,
+    w.run_id, w.publication_id, w.take_id, w.from_host_id, w.to_host_id, w.latency_ns,
     CASE
         WHEN w.is_comparable THEN ceil(
             coalesce(

@@ -103,9 +103,7 @@ told AS (
     ) = 1
 )
 SELECT
-    p.interval_id,
-    p.from_ns,
-    p.to_ns,
+    p.interval_id, p.from_ns, p.to_ns,
     coalesce(t.wakers, 0) AS wakers,
     coalesce(t.thread_id, p.thread_id) AS thread_id,
     coalesce(
@@ -113,11 +111,7 @@ SELECT
         -- Also of a thread whose states are all at other times.
         CASE WHEN p.thread_id IN (SELECT thread_id FROM store.thread_state) THEN 'unknown' END
     ) AS state,
-    t.priority,
-    t.by_kind,
-    t.by_thread_id,
-    t.by_other_thread_id,
-    t.by_priority,
+    t.priority, t.by_kind, t.by_thread_id, t.by_other_thread_id, t.by_priority,
     coalesce(t.is_loss_affected, false) AS is_loss_affected
 FROM piece AS p
 LEFT JOIN told AS t ON p.interval_id = t.interval_id AND p.from_ns = t.from_ns

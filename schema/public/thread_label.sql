@@ -7,8 +7,7 @@
 -- column: label VARCHAR     Nodes of its process (main.process_label), and its name; without nodes
 --     its name
 SELECT
-    t.run_id,
-    t.thread_id,
+    t.run_id, t.thread_id,
     CASE
         WHEN l.nodes LIKE '/%' THEN l.nodes || coalesce(' ' || nullif(t.name, p.name), '')
         ELSE coalesce(t.name, '?')

@@ -36,8 +36,7 @@ endpoint AS (
     LEFT JOIN taken AS m ON e.subscription_id = m.subscription_id
 )
 SELECT
-    run_id,
-    topic_name,
+    run_id, topic_name,
     bool_or(is_internal) AS is_internal,
     coalesce(list(DISTINCT publisher ORDER BY publisher) FILTER (publisher IS NOT NULL), [])
         AS publishers,

@@ -27,8 +27,7 @@ direct AS (
 ),
 -- Its own message is one of the set, or none: there is no direct link.
 filtered AS (
-    SELECT
-        o.annotation_id, b.publication_id, i.callback_instance_id
+    SELECT o.annotation_id, b.publication_id, i.callback_instance_id
     FROM store.annotation AS a
     JOIN store.annotation_output AS o ON a.annotation_id = o.annotation_id
     JOIN store.publication AS b ON o.publisher_id = b.publisher_id
@@ -40,10 +39,7 @@ filtered AS (
     WHERE a.kind = 'approximate_sync' AND b.start_event_id < i.effective_end_event_id
 )
 SELECT
-    a.run_id,
-    a.annotation_id,
-    b.publication_id,
-    d.callback_instance_id,
+    a.run_id, a.annotation_id, b.publication_id, d.callback_instance_id,
     coalesce(n.input_count, 0) AS input_count,
     coalesce(l.link_count, 0) + (i.annotation_id IS NOT NULL)::BIGINT AS linked_count
 FROM store.annotation AS a

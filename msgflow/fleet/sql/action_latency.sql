@@ -32,10 +32,7 @@
 --     goals, accepted, rejected, finished, cancelled, server, accept_p99_most_ns, not_answered,
 --     doubtful
 SELECT
-    g.label_group,
-    a.action_name,
-    a.server,
-    a.client,
+    g.label_group, a.action_name, a.server, a.client,
     count(DISTINCT a.run) AS runs,
     sum(a.goals)::BIGINT AS goals,
     sum(a.accepted)::BIGINT AS accepted,

@@ -24,9 +24,7 @@
 -- brief: node, callback, median_ns, max_ns, p95_ns, runs, count, period_median_ns, p99_ns, mean_ns
 WITH merged AS (
     SELECT
-        g.label_group,
-        c.node,
-        c.callback,
+        g.label_group, c.node, c.callback,
         count(DISTINCT c.run) AS runs,
         sum(c.count)::BIGINT AS count,
         sum(c.open)::BIGINT AS open,
@@ -46,26 +44,16 @@ WITH merged AS (
     GROUP BY g.label_group, c.node, c.callback
 )
 SELECT
-    m.label_group,
-    m.node,
-    m.callback,
-    m.runs,
-    m.count,
-    m.open,
-    m.period_min_ns,
+    m.label_group, m.node, m.callback, m.runs, m.count, m.open, m.period_min_ns,
     coalesce(
         m.period_median_ns, greatest(m.period_min_ns, least(m.period_max_ns, p.median_ns))
     ) AS period_median_ns,
-    m.period_max_ns,
-    m.min_ns,
+    m.period_max_ns, m.min_ns,
     coalesce(m.median_ns, greatest(m.min_ns, least(m.max_ns, d.median_ns))) AS median_ns,
     round(m.total_ns / nullif(m.count - m.open, 0))::BIGINT AS mean_ns,
     coalesce(m.p95_ns, greatest(m.min_ns, least(m.max_ns, d.p95_ns))) AS p95_ns,
     coalesce(m.p99_ns, greatest(m.min_ns, least(m.max_ns, d.p99_ns))) AS p99_ns,
-    m.max_ns,
-    m.total_ns,
-    m.symbol,
-    m.is_internal
+    m.max_ns, m.total_ns, m.symbol, m.is_internal
 FROM merged AS m
 LEFT JOIN distributed AS d
     ON d.measure = 'callback_duration' AND m.label_group = d.label_group

@@ -12,11 +12,7 @@ WITH summed AS (
 ),
 ranked AS (
     SELECT
-        label_group,
-        measure,
-        node,
-        subject,
-        bucket,
+        label_group, measure, node, subject, bucket,
         sum(number) OVER (
             PARTITION BY label_group, measure, node, subject ORDER BY bucket
         ) AS upto,
@@ -25,10 +21,7 @@ ranked AS (
 ),
 quantile AS (
     SELECT
-        label_group,
-        measure,
-        node,
-        subject,
+        label_group, measure, node, subject,
         min(bucket) FILTER (WHERE upto >= ceil(0.5 * total)) AS median,
         min(bucket) FILTER (WHERE upto >= ceil(0.95 * total)) AS p95,
         min(bucket) FILTER (WHERE upto >= ceil(0.99 * total)) AS p99
@@ -36,10 +29,7 @@ quantile AS (
     GROUP BY label_group, measure, node, subject
 )
 SELECT
-    label_group,
-    measure,
-    node,
-    subject,
+    label_group, measure, node, subject,
     round(sign(median) * 2 / 2.02 * pow(1.02::DOUBLE, abs(median) - 1))::BIGINT AS median_ns,
     round(sign(p95) * 2 / 2.02 * pow(1.02::DOUBLE, abs(p95) - 1))::BIGINT AS p95_ns,
     round(sign(p99) * 2 / 2.02 * pow(1.02::DOUBLE, abs(p99) - 1))::BIGINT AS p99_ns

@@ -53,8 +53,7 @@ WITH arrival AS MATERIALIZED (
 ),
 completeness AS (
     SELECT
-        label_group,
-        path,
+        label_group, path,
         count(*) AS roots,
         histogram(status)::MAP(VARCHAR, BIGINT) AS number
     FROM arrival
@@ -72,8 +71,7 @@ affected AS (
 ),
 reason AS (
     SELECT
-        label_group,
-        path,
+        label_group, path,
         string_agg(reason || ' ' || number, ', ' ORDER BY number DESC, reason) AS reasons
     FROM (
         SELECT label_group, path, reason, count(*) AS number
@@ -85,8 +83,7 @@ reason AS (
 ),
 latency AS (
     SELECT
-        label_group,
-        path,
+        label_group, path,
         count(latency_ns) AS pairs,
         count(*) - count(latency_ns) AS stored,
         count(*) FILTER (WHERE is_ambiguous) AS ambiguous,
@@ -101,8 +98,7 @@ latency AS (
 ),
 known AS (
     SELECT
-        g.label_group,
-        e.path,
+        g.label_group, e.path,
         count(DISTINCT e.run) AS runs,
         sum(e.looped)::BIGINT AS looped,
         bool_or(e.is_cut) AS is_cut
@@ -111,8 +107,7 @@ known AS (
     GROUP BY g.label_group, e.path
 )
 SELECT
-    k.label_group,
-    k.runs,
+    k.label_group, k.runs,
     coalesce(c.roots, 0) AS roots,
     coalesce(c.number['reached'], 0) AS reached,
     coalesce(c.number['superseded'], 0) AS superseded,
@@ -126,17 +121,12 @@ SELECT
     coalesce(l.ambiguous, 0) AS ambiguous,
     coalesce(l.pairs, 0) AS pairs,
     coalesce(l.stored, 0) AS stored,
-    k.looped,
-    l.min_ns,
+    k.looped, l.min_ns,
     l.quantiles[1] AS median_ns,
     l.mean_ns,
     l.quantiles[2] AS p95_ns,
     l.quantiles[3] AS p99_ns,
-    l.max_ns,
-    l.sink_event,
-    k.is_cut,
-    r.reasons,
-    k.path
+    l.max_ns, l.sink_event, k.is_cut, r.reasons, k.path
 FROM known AS k
 LEFT JOIN completeness AS c ON k.label_group = c.label_group AND k.path = c.path
 LEFT JOIN affected AS a ON k.label_group = a.label_group AND k.path = a.path

@@ -23,10 +23,7 @@
 -- brief: process, callback_share, callback_share_max, runs, threads, callback_ns, blocked_ns,
 --     wait_ns, callbacks, host, select_ns, take_ns, seen_ns, unknown_ns, executor_kind
 SELECT
-    g.label_group,
-    u.host,
-    u.process,
-    u.executor_kind,
+    g.label_group, u.host, u.process, u.executor_kind,
     count(DISTINCT u.run) AS runs,
     count(*) AS threads,
     sum(u.seen_ns)::BIGINT AS seen_ns,

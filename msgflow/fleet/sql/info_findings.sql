@@ -19,9 +19,7 @@
 -- column: cure VARCHAR        What to do about it
 -- brief: severity, title, runs, count, worst_run, subject, places, cure
 SELECT
-    g.label_group,
-    f.severity,
-    f.name,
+    g.label_group, f.severity, f.name,
     any_value(f.title) AS title,
     count(DISTINCT f.run) AS runs,
     count(*) AS places,

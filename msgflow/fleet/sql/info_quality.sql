@@ -15,8 +15,7 @@
 -- brief: scope, topic, measure, runs, affected, total, affected_percent
 -- answer: affected
 SELECT
-    g.label_group,
-    q.scope,
+    g.label_group, q.scope,
     CASE WHEN q.scope = 'topic' THEN q.subject END AS topic,
     q.measure,
     count(DISTINCT q.run) FILTER (WHERE q.affected > 0) AS runs,

@@ -25,9 +25,7 @@ spread AS (
     GROUP BY p.path
 )
 SELECT
-    p.path,
-    p.run,
-    p.median_ns,
+    p.path, p.run, p.median_ns,
     round(s.usual)::BIGINT AS usual_ns,
     100 * (p.median_ns - s.usual) / nullif(s.usual, 0) AS change_percent
 FROM page_point AS p

@@ -14,8 +14,7 @@
 -- column: dropped BIGINT          Flows that ended in a full queue
 -- column: lost BIGINT             Flows that were lost on the way
 SELECT
-    f.path,
-    f.run,
+    f.path, f.run,
     quantile_disc(f.latency_ns, 0.5) FILTER (WHERE f.status = 'reached') AS median_ns,
     quantile_disc(f.latency_ns, 0.99) FILTER (WHERE f.status = 'reached') AS p99_ns,
     max(f.latency_ns) FILTER (WHERE f.status = 'reached') AS max_ns,

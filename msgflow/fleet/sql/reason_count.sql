@@ -18,20 +18,14 @@ part AS (
 ),
 counted AS (
     SELECT
-        label_group,
-        topic_name,
-        subscriber,
-        name,
+        label_group, topic_name, subscriber, name,
         regexp_extract(text, '^(.*) \d+$', 1) AS reason,
         sum(regexp_extract(text, ' (\d+)$', 1)::BIGINT) AS number
     FROM part
     GROUP BY label_group, topic_name, subscriber, name, reason
 )
 SELECT
-    label_group,
-    topic_name,
-    subscriber,
-    name,
+    label_group, topic_name, subscriber, name,
     string_agg(reason || ' ' || number, ', ' ORDER BY number DESC, reason) AS text
 FROM counted
 GROUP BY label_group, topic_name, subscriber, name

@@ -22,10 +22,7 @@
 -- brief: service_name, client, round_trip_median_most_ns, round_trip_p99_most_ns,
 --     round_trip_max_ns, runs, requests, answered, server, not_taken, not_answered, not_received
 SELECT
-    g.label_group,
-    s.service_name,
-    s.server,
-    s.client,
+    g.label_group, s.service_name, s.server, s.client,
     count(DISTINCT s.run) AS runs,
     sum(s.requests)::BIGINT AS requests,
     sum(s.answered)::BIGINT AS answered,

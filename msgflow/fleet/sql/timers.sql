@@ -23,9 +23,7 @@
 -- brief: node, callback, count, missed, lateness_p99_most_ns, lateness_max_ns, jitter_p99_most_ns,
 --     runs, lateness_median_most_ns, bunched
 SELECT
-    g.label_group,
-    t.node,
-    t.callback,
+    g.label_group, t.node, t.callback,
     count(DISTINCT t.run) AS runs,
     sum(t.count)::BIGINT AS count,
     sum(t.missed)::BIGINT AS missed,

@@ -28,9 +28,7 @@
 -- answer: delivered, dropped, lost, unknown
 WITH merged AS (
     SELECT
-        g.label_group,
-        d.topic_name,
-        d.subscriber,
+        g.label_group, d.topic_name, d.subscriber,
         count(DISTINCT d.run) AS runs,
         count(DISTINCT d.run) FILTER (WHERE d.dropped + d.lost > 0) AS lossy_runs,
         sum(d.published)::BIGINT AS published,
@@ -47,18 +45,8 @@ WITH merged AS (
     GROUP BY g.label_group, d.topic_name, d.subscriber
 )
 SELECT
-    m.label_group,
-    m.topic_name,
-    m.subscriber,
-    m.runs,
-    m.lossy_runs,
-    m.published,
-    m.delivered,
-    m.dropped,
-    m.lost,
-    m.not_connected,
-    m.cut_by_recording,
-    m.unknown,
+    m.label_group, m.topic_name, m.subscriber, m.runs, m.lossy_runs, m.published, m.delivered,
+    m.dropped, m.lost, m.not_connected, m.cut_by_recording, m.unknown,
     100.0::DOUBLE * m.delivered / nullif(m.delivered + m.dropped + m.lost, 0) AS delivered_percent,
     100.0::DOUBLE * m.lost / nullif(m.delivered + m.dropped + m.lost, 0) AS lost_percent,
     m.orphans,

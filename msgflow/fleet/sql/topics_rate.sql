@@ -18,9 +18,7 @@
 -- brief: topic_name, publisher, rate_hz, period_median_least_ns, period_median_most_ns,
 --     period_max_ns, runs, count, period_min_ns
 SELECT
-    g.label_group,
-    p.topic_name,
-    p.publisher,
+    g.label_group, p.topic_name, p.publisher,
     count(DISTINCT p.run) AS runs,
     sum(p.count)::BIGINT AS count,
     CASE

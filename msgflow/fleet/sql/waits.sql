@@ -25,9 +25,7 @@
 --     delayed_min, delayed_max, busy_total_min_ns, busy_total_max_ns
 WITH merged AS (
     SELECT
-        g.label_group,
-        w.node,
-        w.callback,
+        g.label_group, w.node, w.callback,
         count(DISTINCT w.run) AS runs,
         sum(w.count)::BIGINT AS count,
         sum(w.delayed_min)::BIGINT AS delayed_min,
@@ -47,23 +45,10 @@ WITH merged AS (
     GROUP BY g.label_group, w.node, w.callback
 )
 SELECT
-    m.label_group,
-    m.node,
-    m.callback,
-    m.runs,
-    m.count,
-    m.delayed_min,
-    m.delayed_max,
+    m.label_group, m.node, m.callback, m.runs, m.count, m.delayed_min, m.delayed_max,
     coalesce(m.wait_median_ns, least(m.wait_max_ns, d.median_ns)) AS wait_median_ns,
-    m.wait_max_ns,
-    m.busy_worst_ns,
-    m.busy_total_min_ns,
-    m.busy_total_max_ns,
-    m.rest_total_min_ns,
-    m.rest_total_max_ns,
-    m.unknown,
-    m.loss_affected,
-    m.is_internal
+    m.wait_max_ns, m.busy_worst_ns, m.busy_total_min_ns, m.busy_total_max_ns, m.rest_total_min_ns,
+    m.rest_total_max_ns, m.unknown, m.loss_affected, m.is_internal
 FROM merged AS m
 LEFT JOIN distributed AS d
     ON d.measure = 'callback_wait' AND m.label_group = d.label_group

@@ -29,15 +29,9 @@ wanted AS (
     WHERE path = $path OR NOT EXISTS (SELECT 1 FROM fitting WHERE path = $path)
 )
 SELECT
-    w.latency_ns,
-    r.name,
-    w.run,
+    w.latency_ns, r.name, w.run,
     list_transform(map_entries(r.labels), lambda entry: entry.key || '=' || entry.value) AS labels,
-    w.root_ns,
-    w.path,
-    r.source,
-    w.root_kind,
-    w.root_id,
+    w.root_ns, w.path, r.source, w.root_kind, w.root_id,
     r.database_part IS NOT NULL AS has_database
 FROM wanted AS w
 JOIN run AS r ON w.run = r.run

@@ -22,8 +22,7 @@ WITH missing AS (
 SELECT
     s.topic_name AS topic,
     main.node_label(n.full_name, p.name, p.pid) AS subscriber,
-    m.status,
-    m.reason,
+    m.status, m.reason,
     count(*) AS count,
     min(m.at_ns) - $origin_ns AS first_at,
     max(m.at_ns) - $origin_ns AS last_at,

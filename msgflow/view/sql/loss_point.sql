@@ -23,8 +23,7 @@ SELECT
     $start_ns - $origin_ns + (m.at_ns - $start_ns) // e.width * e.width AS start_at,
     e.width AS length,
     s.topic_name AS topic,
-    m.status,
-    m.reason,
+    m.status, m.reason,
     count(*) AS count,
     coalesce(s.is_internal, false) AS is_internal
 FROM missing AS m

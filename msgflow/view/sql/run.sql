@@ -10,8 +10,7 @@
 -- column: host_count BIGINT  Machines and containers
 -- column: msgflow_version VARCHAR  Version that read it
 SELECT
-    r.run_id,
-    r.name,
+    r.run_id, r.name,
     r.start_ns::VARCHAR AS start_text,
     r.end_ns - r.start_ns AS length,
     (SELECT sum(event_count)::BIGINT FROM main.trace AS t WHERE t.run_id = r.run_id)

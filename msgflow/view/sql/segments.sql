@@ -9,9 +9,7 @@
 -- column: flags UTINYINT  As in segment.sql
 -- column: count, busy
 SELECT
-    row_key,
-    kind,
-    id,
+    row_key, kind, id,
     start_ns - $origin_ns AS start_at,
     end_ns - start_ns AS length,
     flags,
@@ -21,9 +19,7 @@ FROM segment
 WHERE $bin_ns IS NULL OR end_ns - start_ns >= $bin_ns
 UNION ALL
 SELECT
-    row_key,
-    kind,
-    NULL,
+    row_key, kind, NULL,
     $bin_ns * ((start_ns - $origin_ns) // $bin_ns) AS start_at,
     $bin_ns,
     bit_or(flags),

@@ -31,8 +31,7 @@ SELECT
             THEN coalesce(2 * waker_thread_id, 2 * waker_other_thread_id + 1) END,
         -1
     ) AS id,
-    start_ns,
-    end_ns,
+    start_ns, end_ns,
     (is_loss_affected::UTINYINT + CASE waker_kind
         WHEN 'timer' THEN 16
         WHEN 'interrupt' THEN 32

@@ -37,8 +37,7 @@ WHERE c.reference_clock_id <> o.reference_clock_id
 UNION ALL
 SELECT
     $run_id,
-    n.name,
-    0,
+    n.name, 0,
     printf('the clock of %s stays apart: no message between it and the others is known', n.name)
 FROM clock_name AS n
 WHERE n.clock_id NOT IN (

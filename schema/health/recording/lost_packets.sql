@@ -13,8 +13,7 @@
 -- severity: error
 -- when: store.gap WHERE kind = 'packets'
 SELECT
-    run_id,
-    trace_id,
+    run_id, trace_id,
     count(*) AS count,
     printf(
         '%s on %s, %.3f s in all',

@@ -9,8 +9,7 @@
 -- severity: warning
 -- when: store.gap WHERE kind = 'pause'
 SELECT
-    run_id,
-    trace_id,
+    run_id, trace_id,
     count(*) AS count,
     printf(
         '%s, %.3f s in all, the longest %.3f s',

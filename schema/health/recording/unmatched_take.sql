@@ -11,8 +11,7 @@
 -- severity: warning
 -- when: store.orphan_take
 SELECT
-    run_id,
-    trace_id,
+    run_id, trace_id,
     sum(number) AS count,
     'messages received whose publication is not known'
     || CASE WHEN has_no_stamp THEN ', and that carry no stamp: ' ELSE ': ' END

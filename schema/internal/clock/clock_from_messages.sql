@@ -5,12 +5,7 @@
 --     and how far it can be wrong at some moments, a list.
 -- grain: one row per clock
 SELECT
-    clock_id,
-    offset_ns,
-    drift_ppb,
-    reference_ns,
-    uncertainty_ns,
-    drift_uncertainty_ppb,
+    clock_id, offset_ns, drift_ppb, reference_ns, uncertainty_ns, drift_uncertainty_ppb,
     reference_clock_id,
     CASE
         WHEN clock_id = reference_clock_id THEN 'none'

@@ -69,9 +69,7 @@ every AS (
 SELECT
     round(e.b_ns - e.a_ns)::BIGINT AS difference_ns,
     round((e.b_ns - e.a_ns) / nullif(w.b_ns - w.a_ns, 0), 4) AS share,
-    e.node,
-    e.part,
-    e.what,
+    e.node, e.part, e.what,
     round(e.a_ns)::BIGINT AS a_mean_ns,
     round(e.b_ns)::BIGINT AS b_mean_ns,
     e.path

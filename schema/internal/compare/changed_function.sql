@@ -39,9 +39,7 @@ call AS (
 ),
 compared AS (
     SELECT
-        c.node,
-        c.label,
-        s.function,
+        c.node, c.label, s.function,
         coalesce(sum(s.cpu_ns) FILTER (WHERE s.is_a), 0) / any_value(c.a_calls) AS a_ns,
         coalesce(sum(s.cpu_ns) FILTER (WHERE NOT s.is_a), 0) / any_value(c.b_calls) AS b_ns,
         count(*) FILTER (WHERE s.is_a) AS a_samples,

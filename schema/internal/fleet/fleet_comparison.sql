@@ -53,9 +53,7 @@ deepest AS (
 ),
 allowing AS (
     SELECT
-        u.side,
-        u.subject,
-        w.depth,
+        u.side, u.subject, w.depth,
         count(*) FILTER (u.depth >= w.depth) AS units,
         count(*) FILTER (u.depth > 0) AS whole
     FROM deepest AS u
@@ -84,9 +82,7 @@ counted AS (
 ),
 of_side AS (
     SELECT
-        m.side,
-        m.subject,
-        m.statistic,
+        m.side, m.subject, m.statistic,
         sum(m.number)::BIGINT AS flows,
         sum(m.roots) AS roots,
         sum(m.reached) AS reached,
@@ -113,10 +109,7 @@ scaled AS (
 ),
 ranked AS (
     SELECT
-        side,
-        subject,
-        statistic,
-        is_log,
+        side, subject, statistic, is_log,
         CASE WHEN is_log THEN ln(value_ns) ELSE value_ns END AS x,
         row_number() OVER (PARTITION BY side, subject, statistic ORDER BY value_ns, unit) AS nth,
         count(*) OVER (PARTITION BY side, subject, statistic) AS number,
@@ -125,9 +118,7 @@ ranked AS (
 ),
 ends AS (
     SELECT
-        side,
-        subject,
-        statistic,
+        side, subject, statistic,
         any_value(is_log) AS is_log,
         any_value(number) AS number,
         any_value(number - 2 * trimmed) AS kept,
@@ -140,9 +131,7 @@ ends AS (
 ),
 centre AS (
     SELECT
-        e.side,
-        e.subject,
-        e.statistic,
+        e.side, e.subject, e.statistic,
         any_value(e.is_log) AS is_log,
         any_value(e.number) AS number,
         any_value(e.kept) AS kept,
@@ -160,22 +149,8 @@ centre AS (
 ),
 known AS (
     SELECT
-        s.side,
-        s.subject,
-        s.statistic,
-        s.flows,
-        s.roots,
-        s.reached,
-        s.loss_affected,
-        s.ambiguous,
-        s.is_cut,
-        s.units,
-        s.is_enough,
-        c.is_log,
-        c.number,
-        c.kept,
-        c.centre,
-        c.error,
+        s.side, s.subject, s.statistic, s.flows, s.roots, s.reached, s.loss_affected, s.ambiguous,
+        s.is_cut, s.units, s.is_enough, c.is_log, c.number, c.kept, c.centre, c.error,
         c.spread_percent,
         round(CASE WHEN c.is_log THEN exp(c.centre) ELSE c.centre END)::BIGINT AS value_ns
     FROM of_side AS s
@@ -249,9 +224,7 @@ bounded AS (
     FROM judged
 )
 SELECT
-    statistic,
-    a_ns,
-    b_ns,
+    statistic, a_ns, b_ns,
     CASE WHEN a_ns > 0 THEN round(100.0 * (b_ns - a_ns) / a_ns, 3) END AS change_percent,
     CASE WHEN reason IS NULL THEN round(low, 3) END AS low_percent,
     CASE WHEN reason IS NULL THEN round(high, 3) END AS high_percent,
@@ -273,18 +246,10 @@ SELECT
         WHEN reason IS NULL AND is_log THEN round(a_ns * high / 100)
         WHEN reason IS NULL THEN round(difference + off)
     END::BIGINT AS high_ns,
-    a_count,
-    b_count,
-    a_flows,
-    b_flows,
+    a_count, b_count, a_flows, b_flows,
     round(a_share, 4) AS a_share,
     round(b_share, 4) AS b_share,
-    a_loss_affected,
-    b_loss_affected,
-    a_ambiguous,
-    b_ambiguous,
-    is_cut,
-    subject
+    a_loss_affected, b_loss_affected, a_ambiguous, b_ambiguous, is_cut, subject
 FROM bounded
 ORDER BY
     subject, list_position(['median', 'mean', 'p95', 'p99', 'max'], statistic)

@@ -15,8 +15,7 @@
 -- column: count BIGINT  Times in it
 WITH instance AS (
     SELECT
-        run_id,
-        callback_id,
+        run_id, callback_id,
         end_ns - start_ns AS duration_ns,
         start_ns - lag(start_ns) OVER (
             PARTITION BY callback_id ORDER BY start_ns, callback_instance_id
@@ -55,11 +54,7 @@ measured AS (
     WHERE list_contains($runs, t.run_id) AND t.method <> 'callback_only'
 )
 SELECT
-    run_id,
-    measure,
-    node,
-    subject,
-    is_internal,
+    run_id, measure, node, subject, is_internal,
     CASE
         WHEN time_ns = 0 THEN 0
         ELSE sign(time_ns) * (1 + ceil(ln(abs(time_ns)) / ln(1.02)))::BIGINT

@@ -26,9 +26,7 @@ WITH cut AS (
 ),
 measured AS (
     SELECT
-        s.side,
-        s.unit,
-        f.run,
+        s.side, s.unit, f.run,
         f.path AS subject,
         count(value_ns) AS number,
         quantile_disc(value_ns, [0.5, 0.95, 0.99]) AS quantiles,
@@ -40,11 +38,7 @@ measured AS (
         count(value_ns) FILTER (f.is_ambiguous) AS ambiguous
     FROM (
         SELECT
-            run,
-            path,
-            status,
-            is_loss_affected,
-            is_ambiguous,
+            run, path, status, is_loss_affected, is_ambiguous,
             is_first IS NOT false
             AND status NOT IN ('not_connected', 'cut_by_recording') AS is_root,
             CASE
@@ -70,18 +64,9 @@ value AS (
     FROM measured
 )
 SELECT
-    v.side,
-    v.unit,
-    v.run,
-    v.subject,
-    v.statistic,
-    v.value_ns,
+    v.side, v.unit, v.run, v.subject, v.statistic, v.value_ns,
     v.number >= 20 AND v.number * (1 - v.quantile) >= 5 - 1e-9 AS is_enough,
-    v.number,
-    v.roots,
-    v.reached,
-    v.loss_affected,
-    v.ambiguous,
+    v.number, v.roots, v.reached, v.loss_affected, v.ambiguous,
     coalesce(c.is_cut, false) AS is_cut
 FROM value AS v
 LEFT JOIN cut AS c ON v.run = c.run

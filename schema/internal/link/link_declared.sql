@@ -8,8 +8,7 @@
 -- column: inputs BIGINT[]  Subscriptions, in order; NULL: none
 -- column: outputs BIGINT[]  Publishers, in order; NULL: none
 SELECT
-    a.kind,
-    a.process_id,
+    a.kind, a.process_id,
     (
         SELECT list(i.subscription_id ORDER BY i.subscription_id)
         FROM store.annotation_input AS i

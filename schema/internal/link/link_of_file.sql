@@ -41,8 +41,7 @@ SELECT
     i.topics AS inputs,
     o.topics AS outputs,
     CASE WHEN i.node_id <> o.node_id THEN r.full_name END AS inputs_of,
-    a.queue_depth,
-    p.pid,
+    a.queue_depth, p.pid,
     h.hostname AS host,
     n.is_name_repeated
 FROM store.annotation AS a

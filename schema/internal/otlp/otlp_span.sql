@@ -172,11 +172,9 @@ span AS (
 SELECT
     (row_number() OVER (ORDER BY o.start_ns, s.root_key, s.start_ns, s.key) - 1) // $at_once
         AS batch,
-    s.trace_id,
-    s.span_id,
+    s.trace_id, s.span_id,
     p.span_id AS parent_span_id,
-    s.kind,
-    s.id,
+    s.kind, s.id,
     CASE
         WHEN s.kind = 'publication' THEN 'publish ' || s.label
         WHEN s.kind = 'callback_instance' AND s.trigger <> 'subscription' THEN s.label
@@ -201,11 +199,9 @@ SELECT
     t.name AS thread,
     t.tid,
     s.topic_name AS topic,
-    s.service,
-    s.symbol,
+    s.service, s.symbol,
     s.link_kind AS cause,
-    a.candidate_count,
-    f.not_delivered,
+    a.candidate_count, f.not_delivered,
     w.trace_ids AS link_trace_ids,
     w.span_ids AS link_span_ids,
     w.causes AS link_causes

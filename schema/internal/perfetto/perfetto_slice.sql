@@ -78,8 +78,7 @@ link AS (
             WHEN 'take' THEN 2 WHEN 'request' THEN CASE WHEN o.sent_ns IS NULL THEN 4 ELSE 3 END
             ELSE CASE WHEN r.sent_ns IS NULL THEN 6 ELSE 5 END
         END AS to_code,
-        l.to_id,
-        l.link_kind
+        l.to_id, l.link_kind
     FROM main.flow_edge AS l
     LEFT JOIN main.request AS q ON l.from_kind = 'request' AND l.from_id = q.request_id
     LEFT JOIN main.response AS a ON l.from_kind = 'response' AND l.from_id = a.response_id

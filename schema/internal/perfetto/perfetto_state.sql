@@ -35,10 +35,7 @@ SELECT
     thread_id * 8 + 2 AS parent,
     'kernel' AS track_name,
     CASE WHEN state = 'preempted' THEN concat_ws(' by ', state, who) ELSE state END AS name,
-    start_ns,
-    end_ns,
-    cpu,
-    priority,
+    start_ns, end_ns, cpu, priority,
     CASE
         WHEN waker_kind = 'thread' THEN who
         ELSE waker_kind

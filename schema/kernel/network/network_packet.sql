@@ -18,11 +18,7 @@ WITH recorded AS (
     FROM raw.net_if_receive_skb
 )
 SELECT
-    p.event_id,
-    t.trace_id,
-    h.clock_id,
-    p.ts_ns,
-    p.is_sent,
+    p.event_id, t.trace_id, h.clock_id, p.ts_ns, p.is_sent,
     CASE
         WHEN p.source_port IS NULL OR coalesce(p.fragment % 8192, 0) > 0 THEN NULL
         WHEN p.source_address[1] = 127 AND len(p.source_address) = 4 THEN NULL

@@ -17,10 +17,7 @@ WITH overlap AS (
     WHERE p.end_ns > c.start_ns AND p.start_ns < c.end_ns
 )
 SELECT
-    callback_instance_id,
-    preemptor_thread_id,
-    preemptor_other_thread_id,
-    preemptor_priority,
+    callback_instance_id, preemptor_thread_id, preemptor_other_thread_id, preemptor_priority,
     coalesce(sum(length_ns) FILTER (WHERE state = 'preempted'), 0)::BIGINT AS preempted_ns,
     coalesce(sum(length_ns) FILTER (WHERE state = 'runnable'), 0)::BIGINT AS runnable_ns
 FROM overlap

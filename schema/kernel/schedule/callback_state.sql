@@ -14,9 +14,7 @@ begun AS (
 ),
 covered AS (
     SELECT
-        b.callback_instance_id,
-        b.start_ns,
-        b.end_ns,
+        b.callback_instance_id, b.start_ns, b.end_ns,
         unnest(range(coalesce(b.number, e.first_number), s.number + 1)) AS number
     FROM begun AS b
     JOIN extent AS e ON b.thread_id = e.thread_id

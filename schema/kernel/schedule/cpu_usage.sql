@@ -94,14 +94,9 @@ host AS (
     GROUP BY s.clock_key
 )
 SELECT
-    h.host_id,
-    u.cpu,
+    h.host_id, u.cpu,
     u.second * 1_000_000_000 AS start_ns,
-    t.thread_id,
-    u.tid,
-    n.name,
-    u.running_ns,
-    f.frequency_hz
+    t.thread_id, u.tid, n.name, u.running_ns, f.frequency_hz
 FROM usage AS u
 JOIN host AS h ON u.clock_key = h.clock_key
 LEFT JOIN named AS n ON u.clock_key = n.clock_key AND u.tid = n.tid

@@ -22,8 +22,7 @@ wait AS (
 ),
 begin AS (
     SELECT
-        w.thread_id,
-        w.tid,
+        w.thread_id, w.tid,
         w.start_ns AS state_start_ns,
         w.start_ns,
         CASE
@@ -51,17 +50,11 @@ part AS (
 )
 SELECT
     row_number() OVER (ORDER BY p.thread_id, p.tid, p.start_ns) AS number,
-    p.thread_id,
-    p.tid,
-    p.state_start_ns,
-    p.start_ns,
+    p.thread_id, p.tid, p.state_start_ns, p.start_ns,
     lead(p.start_ns, 1, w.end_ns) OVER (
         PARTITION BY p.thread_id, p.tid, p.state_start_ns ORDER BY p.start_ns
     ) AS end_ns,
-    w.state,
-    w.trace_index,
-    p.cpu,
-    w.priority
+    w.state, w.trace_index, p.cpu, w.priority
 FROM part AS p
 JOIN wait AS w
     ON p.thread_id = w.thread_id AND p.tid = w.tid AND p.state_start_ns = w.start_ns

@@ -20,10 +20,7 @@ host AS (
 )
 SELECT
     row_number() OVER (ORDER BY h.host_id, o.tid, o.name) AS other_thread_id,
-    h.host_id,
-    o.tid,
-    o.name,
-    o.clock_key
+    h.host_id, o.tid, o.name, o.clock_key
 FROM (
     SELECT DISTINCT o.clock_key, o.tid, o.name
     FROM seen AS o

@@ -3,13 +3,7 @@
 -- grain: one row per wait for a CPU and stretch of time in which another thread had it
 -- when: staging.cpu_taken
 SELECT
-    c.thread_id,
-    c.state_start_ns,
-    c.wait_start_ns,
-    c.start_ns,
-    c.end_ns,
-    c.state,
-    c.cpu,
+    c.thread_id, c.state_start_ns, c.wait_start_ns, c.start_ns, c.end_ns, c.state, c.cpu,
     t.thread_id AS preemptor_thread_id,
     CASE WHEN t.thread_id IS NULL THEN o.other_thread_id END AS preemptor_other_thread_id,
     c.priority AS preemptor_priority,

@@ -14,8 +14,7 @@ WITH extent AS (
 ),
 life AS (
     SELECT
-        t.thread_id,
-        t.tid,
+        t.thread_id, t.tid,
         greatest(e.start_ns, t.from_ns) AS start_ns,
         least(e.end_ns, t.until_ns) AS end_ns
     FROM staging.thread_tid AS t
@@ -42,8 +41,7 @@ step AS (
 -- traces, the one counts whose waker is known.
 waking AS (
     SELECT
-        k.thread_id,
-        k.tid,
+        k.thread_id, k.tid,
         w.number + CASE WHEN w.is_on THEN 1 ELSE 0 END AS number,
         min_by(k.event_id, (k.at_ns, k.waker_tid IS NULL, k.event_id)) AS event_id,
         min(k.at_ns) AS at_ns
@@ -99,15 +97,12 @@ interval AS (
     UNION ALL
     -- What was before the first switch.
     SELECT
-        s.thread_id,
-        s.tid,
-        s.trace_index,
+        s.thread_id, s.tid, s.trace_index,
         CASE
             WHEN s.is_on OR s.unseen_since_ns IS NOT NULL THEN coalesce(k.at_ns, s.unseen_since_ns)
             ELSE f.start_ns
         END,
-        NULL,
-        s.at_ns,
+        NULL, s.at_ns,
         CASE
             WHEN s.unseen_since_ns IS NOT NULL THEN 'unknown'
             WHEN s.is_on THEN 'runnable'

@@ -4,8 +4,7 @@
 -- when: staging.schedule_interval
 WITH packet AS (
     SELECT
-        s.clock_key,
-        p.discarded_event_count,
+        s.clock_key, p.discarded_event_count,
         coalesce(p.last_event_ns, p.begin_ns) + s.shift_ns AS start_ns,
         coalesce(
             lead(p.begin_ns) OVER (
@@ -21,8 +20,7 @@ WITH packet AS (
 -- reaches as well.
 loss AS (
     SELECT
-        clock_key,
-        start_ns,
+        clock_key, start_ns,
         max(end_ns) OVER (PARTITION BY clock_key ORDER BY start_ns) AS until_ns
     FROM packet
     WHERE discarded_event_count <> 0
@@ -38,12 +36,7 @@ interval AS (
 )
 SELECT
     row_number() OVER (ORDER BY i.thread_id, i.start_ns) AS number,
-    i.thread_id,
-    i.start_ns,
-    i.end_ns,
-    i.state,
-    i.cpu,
-    i.priority,
+    i.thread_id, i.start_ns, i.end_ns, i.state, i.cpu, i.priority,
     p.preemptor_thread_id AS preempted_by_thread_id,
     p.preemptor_other_thread_id AS preempted_by_other_thread_id,
     p.preemptor_priority AS preempted_by_priority,

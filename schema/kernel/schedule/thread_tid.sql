@@ -91,10 +91,7 @@ lived AS (
 ),
 latest AS (
     SELECT
-        v.thread_id,
-        d.source,
-        d.tid,
-        d.declared_ns,
+        v.thread_id, d.source, d.tid, d.declared_ns,
         -- A dump declares all threads at about the same time, contexts do so again and again.
         CASE d.source WHEN 'fork' THEN d.declared_ns ELSE 0 END AS rank_ns
     FROM lived AS v
@@ -120,8 +117,7 @@ declared AS (
 ),
 known AS (
     SELECT
-        v.thread_id,
-        v.clock_key,
+        v.thread_id, v.clock_key,
         coalesce(p.first_ns, v.first_seen_ns) AS first_ns,
         coalesce(p.tid, d.tid) AS tid,
         CASE WHEN d.tid = coalesce(p.tid, d.tid) THEN d.source ELSE 'schedule' END AS source
@@ -131,10 +127,7 @@ known AS (
     WHERE coalesce(p.tid, d.tid) IS NOT NULL
 )
 SELECT
-    thread_id,
-    clock_key,
-    tid,
-    source,
+    thread_id, clock_key, tid, source,
     CASE WHEN row_number() OVER number = 1 THEN -4611686018427387904 ELSE first_ns END AS from_ns,
     lead(first_ns, 1, 4611686018427387904) OVER number AS until_ns
 FROM known

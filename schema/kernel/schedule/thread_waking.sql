@@ -55,12 +55,8 @@ found AS (
         ON d.trace_index = u.trace_index AND d.cpu = u.cpu AND d.at_ns >= u.at_ns
 )
 SELECT
-    thread_id,
-    tid,
-    event_id,
-    at_ns,
+    thread_id, tid, event_id, at_ns,
     coalesce(interrupt, CASE WHEN waker_tid IS NOT NULL THEN 'thread' END) AS kind,
-    clock_key,
-    waker_tid,
+    clock_key, waker_tid,
     CASE WHEN NOT is_contradicted THEN next_comm END AS waker_name
 FROM found

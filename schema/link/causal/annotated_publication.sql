@@ -6,16 +6,8 @@
 -- grain: one row per annotation and publication by one of its outputs
 CREATE OR REPLACE MACRO derive.annotated_publication(only_run) AS TABLE
 SELECT
-    a.run_id,
-    a.annotation_id,
-    a.kind,
-    b.publication_id,
-    b.publisher_id,
-    b.trace_id,
-    b.thread_id,
-    b.start_ns,
-    b.start_event_id,
-    i.callback_instance_id,
+    a.run_id, a.annotation_id, a.kind, b.publication_id, b.publisher_id, b.trace_id, b.thread_id,
+    b.start_ns, b.start_event_id, i.callback_instance_id,
     coalesce(i.start_event_id, b.start_event_id) AS cut_event_id,
     s.subscription_id
 FROM store.annotation AS a

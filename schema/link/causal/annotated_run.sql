@@ -9,11 +9,7 @@ WITH instance AS (
     SELECT
         i.run_id,
         coalesce(c.subscription_id, t.subscription_id) AS subscription_id,
-        i.callback_instance_id,
-        i.trace_id,
-        i.thread_id,
-        i.start_ns,
-        i.start_event_id,
+        i.callback_instance_id, i.trace_id, i.thread_id, i.start_ns, i.start_event_id,
         i.effective_end_event_id
     FROM store.callback_instance AS i
     JOIN store.callback AS c ON i.callback_id = c.callback_id

@@ -11,14 +11,8 @@
 --     publisher_id, kind, annotation_id, candidate_count, is_loss_affected
 CREATE OR REPLACE MACRO derive.causal_link(only_run, links) AS TABLE
 SELECT
-    l.run_id,
-    l.callback_instance_id,
-    l.publication_id,
-    l.take_id,
-    t.subscription_id,
-    l.publisher_id,
-    l.kind,
-    l.annotation_id,
+    l.run_id, l.callback_instance_id, l.publication_id, l.take_id, t.subscription_id,
+    l.publisher_id, l.kind, l.annotation_id,
     greatest(
         l.candidate_count, CASE WHEN m.publication_id IS NOT NULL THEN 2 END
     ) AS candidate_count,

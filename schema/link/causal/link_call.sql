@@ -125,12 +125,9 @@ independent AS (
 )
 SELECT
     only_run AS run_id,
-    l.taken_request_id,
-    l.taken_response_id,
-    l.publication_id,
+    l.taken_request_id, l.taken_response_id, l.publication_id,
     CASE l.kind WHEN 'publisher' THEN l.object_id END AS publisher_id,
-    l.request_id,
-    l.response_id,
+    l.request_id, l.response_id,
     1 + (i.thread_id IS NOT NULL OR coalesce(p.is_ambiguous, false))::BIGINT AS candidate_count
 FROM known AS l
 LEFT JOIN independent AS i

@@ -118,9 +118,7 @@ chosen AS MATERIALIZED (
 )
 SELECT
     b.run_id, b.annotation_id, b.kind, b.publication_id, b.trace_id, b.thread_id, b.start_ns,
-    b.start_event_id,
-    m.callback_instance_id,
-    c.since_ns,
+    b.start_event_id, m.callback_instance_id, c.since_ns,
     CASE
         WHEN c.is_certain AND NOT m.is_close AND (b.publication_count = 1 OR NOT c.may_be_two)
             THEN 1

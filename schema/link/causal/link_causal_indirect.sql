@@ -183,8 +183,7 @@ possible AS (
             WHEN e.effective_end_event_id > p.since_event_id THEN e.callback_instance_id
             ELSE p.last_id
         END AS callback_instance_id,
-        p.since_event_id,
-        p.begun_count
+        p.since_event_id, p.begun_count
     FROM (
         SELECT
             t.annotation_id, t.publication_id, t.subscription_id, t.read_event_id,
@@ -218,8 +217,7 @@ cached AS (
         d.run_id, d.annotation_id, d.kind, d.publication_id, d.trace_id, d.thread_id, d.start_ns,
         d.start_event_id,
         coalesce(
-            n.callback_instance_id,
-            d.callback_instance_id,
+            n.callback_instance_id, d.callback_instance_id,
             CASE WHEN d.kind = 'partial_sync' AND a.outer_id IS NULL
                 THEN p.callback_instance_id END
         ) AS callback_instance_id,
@@ -311,11 +309,7 @@ crossing AS (
     WHERE k.resumed_event_id <= e.start_event_id OR e.begins_between
 )
 SELECT
-    f.run_id,
-    f.callback_instance_id,
-    f.publication_id,
-    f.kind,
-    f.annotation_id,
+    f.run_id, f.callback_instance_id, f.publication_id, f.kind, f.annotation_id,
     -- What may be missing may have been in the set.
     greatest(
         f.candidate_count,

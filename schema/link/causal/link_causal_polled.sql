@@ -32,8 +32,7 @@ around (take_id, event_id, callback_instance_id, parent_id, effective_end_event_
     FROM by_hand AS t
     ASOF JOIN run AS i ON t.thread_id = i.thread_id AND t.start_event_id > i.start_event_id
     UNION ALL
-    SELECT
-        a.take_id, a.event_id, i.callback_instance_id, i.parent_id, i.effective_end_event_id
+    SELECT a.take_id, a.event_id, i.callback_instance_id, i.parent_id, i.effective_end_event_id
     FROM around AS a
     JOIN run AS i ON a.parent_id = i.callback_instance_id
     WHERE a.event_id >= a.effective_end_event_id

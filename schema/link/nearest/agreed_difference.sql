@@ -56,8 +56,7 @@ best AS (
     FROM separated
 )
 SELECT
-    clock_id,
-    stretch,
+    clock_id, stretch,
     min(from_ns) AS least_ns,
     max(until_ns) AS greatest_ns,
     greatest(

@@ -31,8 +31,7 @@ WITH told AS (
     )
 )
 SELECT
-    *,
-    is_known
+    *, is_known
     AND coalesce(
         last_value(CASE WHEN is_known THEN segment END IGNORE NULLS) OVER (
             on_clock ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING

@@ -83,9 +83,7 @@ followed (
     WHERE number = 1
     UNION ALL
     SELECT
-        clock_id,
-        number,
-        stretch,
+        clock_id, number, stretch,
         coalesce(near.difference_ns, jump_ns, previous_ns),
         CASE
             WHEN near.difference_ns > latest_ns THEN 0

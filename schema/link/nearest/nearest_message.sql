@@ -403,9 +403,7 @@ trusted AS (
     GROUP BY clock_id, segment
 )
 SELECT
-    m.run_id,
-    m.topic_name,
-    m.source_timestamp_ns,
+    m.run_id, m.topic_name, m.source_timestamp_ns,
     CASE
         WHEN count(DISTINCT x.publication_id) = 1
             AND NOT bool_or(coalesce(x.is_rivalled, false))

@@ -93,8 +93,7 @@ sharp AS MATERIALIZED (
     FROM derive.sharp_difference('close', 'beside', derive.clock_limit().sharp_stretches)
 ),
 chosen AS MATERIALIZED (
-    SELECT
-        c.clock_id, c.place, c.stretch, c.offset_ns, r.least_ns, r.greatest_ns, r.most_count
+    SELECT c.clock_id, c.place, c.stretch, c.offset_ns, r.least_ns, r.greatest_ns, r.most_count
     FROM course AS c
     JOIN region AS r
         ON c.clock_id = r.clock_id AND c.stretch = r.stretch AND c.offset_ns = r.difference_ns
@@ -133,8 +132,7 @@ placed AS (
         )
 )
 SELECT
-    x.run_id,
-    f.clock_id,
+    x.run_id, f.clock_id,
     x.start_ns + f.stretch * x.stretch_ns + x.stretch_ns // 2 AS at_ns,
     x.start_ns + f.stretch * x.stretch_ns AS start_ns,
     x.start_ns + (f.stretch + 1) * x.stretch_ns AS end_ns,

@@ -33,8 +33,7 @@ WHERE run_id = only_run
     AND coalesce(rmw_ns, rcl_ns) IS NOT NULL
     AND process_id IN (FROM unstamped_process)
 UNION ALL
-SELECT
-    run_id, publication_id, publisher_id, process_id, thread_id, next_event_ns, rcl_ns, true
+SELECT run_id, publication_id, publisher_id, process_id, thread_id, next_event_ns, rcl_ns, true
 FROM unfinished
 WHERE publisher_id IN (SELECT publisher_id FROM unfinished WHERE NOT is_loss_affected)
     AND process_id NOT IN (FROM unstamped_process)

@@ -30,11 +30,7 @@ received AS (
     WHERE t.run_id = only_run AND t.source_timestamp_ns <> 0
 )
 SELECT
-    r.run_id,
-    r.topic_name,
-    r.source_timestamp_ns,
-    r.only_subscription_id,
-    h.clock_id,
+    r.run_id, r.topic_name, r.source_timestamp_ns, r.only_subscription_id, h.clock_id,
     min(r.taken_ns) AS taken_ns
 FROM received AS r
 ANTI JOIN stamped AS x

@@ -146,12 +146,7 @@ mixed_take AS (
         AND process_id IN (SELECT process_id FROM store.process WHERE is_ambiguous)
 )
 SELECT
-    l.run_id,
-    l.publication_id,
-    l.take_id,
-    l.publisher_id,
-    l.subscription_id,
-    l.method,
+    l.run_id, l.publication_id, l.take_id, l.publisher_id, l.subscription_id, l.method,
     greatest(
         l.candidate_count, CASE WHEN coalesce(mb.publication_id, mt.take_id) IS NOT NULL THEN 2 END
     ) AS candidate_count,

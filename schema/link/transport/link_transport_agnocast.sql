@@ -67,10 +67,7 @@ candidate AS (
 )
 SELECT
     only_run::BIGINT AS run_id,
-    publication_id,
-    take_id,
-    publisher_id,
-    subscription_id,
+    publication_id, take_id, publisher_id, subscription_id,
     'agnocast' AS method,
     count(*) OVER (PARTITION BY take_id) AS candidate_count,
     false AS is_loss_affected

@@ -37,11 +37,7 @@ sent AS MATERIALIZED (
     ) - b.end_ns <= derive.clock_limit().write_ns
 )
 SELECT
-    s.run_id,
-    s.publication_id,
-    s.take_id,
-    s.publisher_id,
-    s.subscription_id,
+    s.run_id, s.publication_id, s.take_id, s.publisher_id, s.subscription_id,
     'nearest' AS method,
     s.candidate_count,
     a.publication_id IS NOT NULL AS is_loss_affected

@@ -35,13 +35,11 @@ cleared AS (
     WHERE c.event_id > s.previous_event_id
 ),
 exposed AS (
-    SELECT
-        s.take_id, s.process_id, s.buffer_handle, s.at_ns, s.previous_ns, x.recording_id
+    SELECT s.take_id, s.process_id, s.buffer_handle, s.at_ns, s.previous_ns, x.recording_id
     FROM slot_use AS s
     JOIN derive.exposed_trace AS x ON s.trace_id = x.trace_id
     UNION ALL
-    SELECT
-        s.take_id, s.process_id, s.buffer_handle, s.at_ns, s.previous_ns, x.recording_id
+    SELECT s.take_id, s.process_id, s.buffer_handle, s.at_ns, s.previous_ns, x.recording_id
     FROM slot_use AS s
     JOIN derive.exposed_trace AS x ON s.previous_trace_id = x.trace_id
     WHERE s.previous_trace_id <> s.trace_id
@@ -90,11 +88,7 @@ doubtful AS (
     WHERE coalesce(g.stay_ns >= p.slot_count * p.shortest_ns, true)
 )
 SELECT
-    s.run_id,
-    s.publication_id,
-    s.take_id,
-    b.publisher_id,
-    t.subscription_id,
+    s.run_id, s.publication_id, s.take_id, b.publisher_id, t.subscription_id,
     'ring_buffer' AS method,
     1::BIGINT AS candidate_count,
     false AS is_loss_affected

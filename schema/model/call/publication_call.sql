@@ -133,21 +133,9 @@ complete AS (
         ON x.intra_event_id = i.start_event_id AND x.rcl_handle = i.publisher_handle
 )
 SELECT
-    w.start_event_id,
-    w.end_event_id,
-    w.trace_index,
-    c.thread_id,
-    c.process_id,
-    w.start_ns,
-    w.end_ns,
-    w.intra_ns,
-    w.rclcpp_ns,
-    w.rcl_ns,
-    w.rmw_ns,
-    w.dds_ns,
-    w.publisher_handle,
-    w.rmw_handle,
-    w.writer,
+    w.start_event_id, w.end_event_id, w.trace_index, c.thread_id, c.process_id, w.start_ns,
+    w.end_ns, w.intra_ns, w.rclcpp_ns, w.rcl_ns, w.rmw_ns, w.dds_ns, w.publisher_handle,
+    w.rmw_handle, w.writer,
     w.stamp AS source_timestamp_ns,
     w.callback_event_id
 FROM complete AS w

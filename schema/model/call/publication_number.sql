@@ -47,12 +47,9 @@ rosout AS (
 ),
 resolved AS (
     SELECT
-        w.event_id,
-        w.process_id,
-        w.publisher_handle,
+        w.event_id, w.process_id, w.publisher_handle,
         coalesce(
-            w.rmw_event_id,
-            w.object_event_id,
+            w.rmw_event_id, w.object_event_id,
             CASE
                 WHEN w.may_be_rosout AND o.publisher_count = 1 THEN o.publisher_event_id
             END
@@ -72,8 +69,7 @@ published AS (
     WHERE object_event_id IS NOT NULL
     UNION ALL
     SELECT
-        event_id,
-        process_id,
+        event_id, process_id,
         CASE WHEN publisher_event_id IS NULL THEN publisher_handle END,
         publisher_event_id,
         coalesce(is_rosout, false)

@@ -15,10 +15,7 @@ WITH middleware AS (
     SELECT
         coalesce(d.event_id, m.event_id) AS start_event_id,
         m.event_id AS end_event_id,
-        m.trace_index,
-        m.thread_index,
-        m.message,
-        m.taken,
+        m.trace_index, m.thread_index, m.message, m.taken,
         m.ts_ns AS rmw_ns,
         m.rmw_subscription_handle AS rmw_handle,
         nullif(m.source_timestamp, 0) AS stamp
@@ -89,10 +86,7 @@ rcl_traced AS (
 taken AS (
     SELECT
         t.start_event_id AS event_id,
-        t.end_event_id,
-        t.trace_index,
-        t.thread_id,
-        t.process_id,
+        t.end_event_id, t.trace_index, t.thread_id, t.process_id,
         coalesce(t.rmw_ns, t.rcl_ns, t.caret_ns) AS taken_ns,
         CASE WHEN t.rmw_ns IS NULL AND t.rcl_ns IS NULL THEN 'caret' ELSE 'rmw' END AS method,
         t.rmw_handle AS handle,

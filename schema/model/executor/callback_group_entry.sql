@@ -31,8 +31,7 @@ object AS (
 ),
 filled AS (
     SELECT
-        e.event_id,
-        e.kind,
+        e.event_id, e.kind,
         coalesce(
             max(CASE WHEN o.event_id <= e.event_id THEN o.event_id END), min(o.event_id)
         ) AS object_event_id

@@ -54,9 +54,7 @@ owned AS (
 )
 SELECT
     min(event_id) AS event_id,
-    process_id,
-    callback_group_addr,
-    executor_event_id,
+    process_id, callback_group_addr, executor_event_id,
     arg_min(group_type_name, event_id) AS kind
 FROM owned
 GROUP BY process_id, callback_group_addr, executor_event_id

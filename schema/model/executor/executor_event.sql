@@ -21,10 +21,7 @@ WITH event AS (
     FROM raw.ros2_rclcpp_executor_execute
 )
 SELECT
-    e.event_id,
-    e.ts_ns,
-    c.thread_id,
-    e.kind,
+    e.event_id, e.ts_ns, c.thread_id, e.kind,
     e.previous_executor_event_id AS previous_event_id,
     e.previous_executor_ts_ns AS previous_ns,
     e.previous_executor_label AS previous_kind,

@@ -69,9 +69,7 @@ labelled (thread_id, first_thread_id) USING KEY (thread_id) AS (
     GROUP BY t.other_thread_id
 )
 SELECT
-    l.thread_id,
-    t.process_id,
-    l.first_thread_id,
+    l.thread_id, t.process_id, l.first_thread_id,
     s.thread_id IS NOT NULL AS is_spinning,
     m.executor_event_id
 FROM labelled AS l

@@ -16,11 +16,7 @@ WITH packet AS (
 ),
 covered AS (
     SELECT
-        trace_id,
-        recording_index,
-        begin_ns,
-        covered_until_ns,
-        last_begin_ns,
+        trace_id, recording_index, begin_ns, covered_until_ns, last_begin_ns,
         max(CASE WHEN is_ended_early THEN end_ns END) OVER earlier AS ended_early_ns,
         -- LTTng opens a chunk with an empty packet of every stream that has no event in it yet.
         max(
@@ -47,8 +43,7 @@ covered AS (
 -- the session recorded, and stopping would have written further ones.
 silent AS (
     SELECT
-        trace_id,
-        recording_index,
+        trace_id, recording_index,
         covered_until_ns AS start_ns,
         begin_ns AS end_ns,
         -- Packets of one trace ended before they were full.

@@ -34,8 +34,7 @@ lived AS (
 -- A stretch that two lives share has to be looked at event by event.
 divided AS (
     SELECT
-        v.thread_index,
-        v.life,
+        v.thread_index, v.life,
         min(e.event_id) AS first_event_id,
         max(e.event_id) AS last_event_id,
         min(e.ts_ns) AS first_seen_ns,

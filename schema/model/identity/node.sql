@@ -6,8 +6,7 @@
 -- when: raw.ros2_rcl_node_init, staging.node_use
 WITH known AS (
     SELECT
-        event_id,
-        process_id,
+        event_id, process_id,
         node_name AS name,
         namespace,
         namespace || CASE WHEN namespace LIKE '%/' THEN '' ELSE '/' END || node_name AS full_name,
@@ -71,9 +70,7 @@ placed AS (
 )
 SELECT
     row_number() OVER (ORDER BY event_id) AS node_id,
-    process_id,
-    name,
-    namespace,
+    process_id, name, namespace,
     full_name || coalesce(
         '@' || nullif(
             concat_ws(
@@ -90,8 +87,5 @@ SELECT
         ),
         ''
     ) AS full_name,
-    node_handle,
-    created_ns,
-    is_inferred,
-    event_id
+    node_handle, created_ns, is_inferred, event_id
 FROM placed

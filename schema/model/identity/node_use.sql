@@ -66,9 +66,7 @@ later AS (
         AND u.event_id <= n.event_id
 )
 SELECT
-    u.event_id,
-    u.process_id,
-    u.node_handle,
+    u.event_id, u.process_id, u.node_handle,
     CASE
         WHEN u.precedes_own_node THEN l.node_event_id
         ELSE coalesce(e.node_event_id, l.node_event_id)

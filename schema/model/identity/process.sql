@@ -6,11 +6,7 @@
 -- when: staging.context
 WITH process AS (
     SELECT
-        process_id,
-        host_id,
-        pid_ns,
-        vpid,
-        life,
+        process_id, host_id, pid_ns, vpid, life,
         coalesce(
             any_value(name) FILTER (WHERE vtid = vpid),
             arg_min(name, first_event_id)
@@ -26,14 +22,9 @@ version AS (
     GROUP BY process_id
 )
 SELECT
-    p.process_id,
-    p.host_id,
+    p.process_id, p.host_id,
     p.vpid AS pid,
-    p.name,
-    v.tracetools_version,
-    y.python_version,
-    p.first_seen_ns,
-    p.last_seen_ns,
+    p.name, v.tracetools_version, y.python_version, p.first_seen_ns, p.last_seen_ns,
     p.pid_ns AS pid_namespace,
     p.life::INTEGER AS life,
     m.vpid IS NOT NULL AS is_ambiguous

@@ -15,13 +15,7 @@
 -- `is_other_main`: another thread, or another process name, than that of the rcl_init before.
 WITH every_initialisation AS (
     SELECT
-        p.host_id,
-        p.pid_ns,
-        p.vpid,
-        p.vtid,
-        i.event_id,
-        i.ts_ns,
-        i.trace_index,
+        p.host_id, p.pid_ns, p.vpid, p.vtid, i.event_id, i.ts_ns, i.trace_index,
         lag(p.vtid) OVER process IS DISTINCT FROM p.vtid
         OR lag(p.procname) OVER process IS DISTINCT FROM p.procname AS is_other_main,
         row_number() OVER context > 1 AS is_same_context,

@@ -41,8 +41,7 @@ buffer AS (
     GROUP BY process_id, buffer_handle
 )
 SELECT
-    b.process_id,
-    b.buffer_handle,
+    b.process_id, b.buffer_handle,
     CASE
         WHEN r.subscription_count = 1 AND r.known_count = r.callback_count
             THEN r.subscription_event_id

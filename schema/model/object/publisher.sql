@@ -13,14 +13,9 @@ WITH every_publisher AS (
         min(start_event_id),
         process_id,
         CASE WHEN bool_and(is_rosout) THEN '/rosout' END,
-        unknown_handle,
-        NULL,
-        NULL,
-        NULL,
-        NULL,
+        unknown_handle, NULL, NULL, NULL, NULL,
         bool_and(is_rosout),
-        true,
-        false
+        true, false
     FROM staging.publication_number
     WHERE unknown_handle IS NOT NULL
     GROUP BY process_id, unknown_handle

@@ -57,13 +57,7 @@ with_writer AS (
         ON p.event_id = o.event_id
 )
 SELECT
-    p.event_id,
-    p.process_id,
-    p.topic_name,
-    p.publisher_handle,
-    p.rmw_handle,
-    p.writer,
-    p.gid,
+    p.event_id, p.process_id, p.topic_name, p.publisher_handle, p.rmw_handle, p.writer, p.gid,
     p.queue_depth,
     least(p.ts_ns, p.rmw_created_ns, p.writer_created_ns) AS created_ns,
     staging.is_internal_topic(p.topic_name) AS is_internal,

@@ -9,14 +9,9 @@ WITH rmw_init AS (
     FROM staging.located('ros2_rmw_subscription_init')
 )
 SELECT
-    s.event_id,
-    s.process_id,
-    s.thread_id,
-    s.topic_name,
-    s.subscription_handle,
+    s.event_id, s.process_id, s.thread_id, s.topic_name, s.subscription_handle,
     nullif(s.rmw_subscription_handle, 0) AS rmw_handle,
-    r.gid,
-    s.queue_depth,
+    r.gid, s.queue_depth,
     least(s.ts_ns, r.ts_ns) AS created_ns,
     staging.is_internal_topic(s.topic_name) AS is_internal,
     coalesce(s.rmw_subscription_handle = 0, false) AS is_agnocast

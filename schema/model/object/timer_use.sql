@@ -21,9 +21,7 @@ resolved AS (
         AND u.event_id >= i.event_id
 )
 SELECT
-    event_id,
-    process_id,
-    timer_handle,
+    event_id, process_id, timer_handle,
     coalesce(
         known_event_id,
         min(CASE WHEN known_event_id IS NULL THEN event_id END) OVER (

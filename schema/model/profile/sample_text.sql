@@ -7,9 +7,7 @@
 -- when: raw.stack_sample
 WITH parsed AS (
     SELECT
-        hostname,
-        is_monotonic,
-        stack,
+        hostname, is_monotonic, stack,
         unnest(regexp_extract(
             head,
             '(\d+)/(\d+) +(?:\[(\d+)\] +)?(\d+)\.(\d{6,9}): +(?:(\d+) +)?(\S+?):'

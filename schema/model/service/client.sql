@@ -20,13 +20,7 @@ every_client AS (
 )
 SELECT
     row_number() OVER (ORDER BY c.event_id) AS client_id,
-    c.process_id,
-    n.node_id,
-    c.service_name,
-    c.client_handle,
-    c.rmw_handle,
-    g.gid,
-    c.created_ns,
+    c.process_id, n.node_id, c.service_name, c.client_handle, c.rmw_handle, g.gid, c.created_ns,
     staging.is_internal_service(c.service_name) AS is_internal,
     c.event_id
 FROM every_client AS c

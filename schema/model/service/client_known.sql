@@ -8,10 +8,7 @@ WITH rmw_init AS (
     FROM staging.located('ros2_rmw_client_init')
 )
 SELECT
-    c.event_id,
-    c.process_id,
-    c.service_name,
-    c.client_handle,
+    c.event_id, c.process_id, c.service_name, c.client_handle,
     c.rmw_client_handle AS rmw_handle,
     r.gid,
     c.ts_ns AS created_ns

@@ -27,8 +27,7 @@ SELECT
     row_number() OVER (
         ORDER BY coalesce(f.send_event_id, f.take_event_id), f.take_event_id
     ) AS request_id,
-    f.send_event_id,
-    f.take_event_id,
+    f.send_event_id, f.take_event_id,
     b.start_event_id AS callback_start_event_id,
     coalesce(c.client_event_id, g.client_event_id) AS client_event_id,
     s.service_event_id,

@@ -11,11 +11,7 @@ WITH every_service AS (
 )
 SELECT
     row_number() OVER (ORDER BY s.event_id) AS service_id,
-    s.process_id,
-    n.node_id,
-    s.service_name,
-    s.service_handle,
-    s.rmw_handle,
+    s.process_id, n.node_id, s.service_name, s.service_handle, s.rmw_handle,
     NULL::BLOB AS gid,
     s.created_ns,
     staging.is_internal_service(s.service_name) AS is_internal,

@@ -104,8 +104,7 @@ SELECT goal_id, request_id, 1 AS candidate_count
 FROM followed
 UNION ALL
 SELECT
-    g.goal_id,
-    r.request_id,
+    g.goal_id, r.request_id,
     CASE WHEN coalesce(g.requests, r.requests) = 0 THEN 0 ELSE coalesce(g.goals, r.goals) END
 FROM (FROM placed WHERE goal_id IS NOT NULL) AS g
 FULL JOIN (FROM placed WHERE request_id IS NOT NULL) AS r

@@ -11,8 +11,7 @@ WITH run AS (
 ),
 beside AS (
     SELECT
-        run_id,
-        callback_id,
+        run_id, callback_id,
         start_ns < max(end_ns) OVER (
             PARTITION BY run_id, callback_id ORDER BY start_ns, callback_instance_id
             ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING
@@ -20,8 +19,7 @@ beside AS (
     FROM run
 )
 SELECT
-    b.run_id,
-    b.callback_id,
+    b.run_id, b.callback_id,
     CASE WHEN g.callback_group_id IS NULL THEN 'callback' ELSE 'callback_group' END AS kind,
     coalesce(g.callback_group_id, b.callback_id) AS exclusion_id
 FROM beside AS b

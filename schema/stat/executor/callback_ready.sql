@@ -113,24 +113,15 @@ bounded AS (
     FROM confined
 )
 SELECT
-    run_id,
-    executor_id,
-    thread_id,
-    callback_id,
-    callback_instance_id,
-    since,
-    origin_ns,
+    run_id, executor_id, thread_id, callback_id, callback_instance_id, since, origin_ns,
     earliest_ns,
     -- Published after the polling point: the queue was full, and this message took the place of an
     -- older one.
     greatest(CASE WHEN polled_ns < earliest_ns THEN latest_ns ELSE polled_ns END, earliest_ns)
         AS latest_ns,
-    start_ns,
-    thread_count,
+    start_ns, thread_count,
     coalesce(picked_ns, start_ns) AS picked_ns,
-    wait_start_ns,
-    wait_end_ns,
-    wait_before_ns,
+    wait_start_ns, wait_end_ns, wait_before_ns,
     previous_end_ns AS previous_wait_end_ns,
     coalesce(resumed_ns > coalesce(earliest_ns, polled_ns), false) AS is_loss_affected
 FROM bounded

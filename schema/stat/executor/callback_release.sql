@@ -39,9 +39,7 @@ clock AS MATERIALIZED (FROM derive.process_clock),
 pair AS MATERIALIZED (FROM derive.clock_comparable),
 message AS (
     SELECT
-        t.take_id,
-        t.taken_ns,
-        s.created_ns,
+        t.take_id, t.taken_ns, s.created_ns,
         CASE
             WHEN l.publication_id IS NULL AND t.source_timestamp_ns <= t.taken_ns
                 THEN t.source_timestamp_ns
@@ -81,12 +79,7 @@ request AS (
     JOIN clock AS rc ON receiver.process_id = rc.process_id
 )
 SELECT
-    i.run_id,
-    i.executor_id,
-    i.thread_id,
-    i.callback_id,
-    i.callback_instance_id,
-    i.start_ns,
+    i.run_id, i.executor_id, i.thread_id, i.callback_id, i.callback_instance_id, i.start_ns,
     i.previous_start_ns,
     CASE
         WHEN i.due_ns IS NOT NULL THEN 'timer'

@@ -4,11 +4,7 @@
 -- grain: one row per such stretch
 WITH run AS (
     SELECT
-        r.run_id,
-        r.executor_id,
-        r.callback_id,
-        r.start_ns,
-        r.end_ns,
+        r.run_id, r.executor_id, r.callback_id, r.start_ns, r.end_ns,
         coalesce(r.start_ns > max(r.end_ns) OVER (
             in_time ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING
         ), true) AS is_first
@@ -35,11 +31,7 @@ stretch AS (
     GROUP BY run_id, executor_id, callback_id, stretch
 )
 SELECT
-    run_id,
-    executor_id,
-    callback_id,
-    start_ns,
-    end_ns,
+    run_id, executor_id, callback_id, start_ns, end_ns,
     coalesce(sum(end_ns - start_ns) OVER (
         PARTITION BY run_id, executor_id, callback_id ORDER BY start_ns
         ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING

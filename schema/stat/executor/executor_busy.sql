@@ -9,11 +9,7 @@ SELECT
 FROM derive.executor_full
 UNION ALL
 SELECT
-    r.run_id,
-    r.executor_id,
-    r.start_ns,
-    r.end_ns,
-    r.callback_instance_id,
+    r.run_id, r.executor_id, r.start_ns, r.end_ns, r.callback_instance_id,
     lag(r.end_ns) OVER in_time,
     coalesce(sum(r.end_ns - r.start_ns) OVER (
         in_time ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING

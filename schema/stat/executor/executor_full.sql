@@ -15,8 +15,7 @@ WITH edge AS (
 ),
 level AS (
     SELECT
-        run_id,
-        executor_id,
+        run_id, executor_id,
         at_ns AS start_ns,
         lead(at_ns) OVER in_time AS end_ns,
         sum(step) OVER (in_time ROWS UNBOUNDED PRECEDING) AS running
@@ -24,10 +23,7 @@ level AS (
     WINDOW in_time AS (PARTITION BY run_id, executor_id ORDER BY at_ns, step)
 )
 SELECT
-    l.run_id,
-    l.executor_id,
-    l.start_ns,
-    l.end_ns,
+    l.run_id, l.executor_id, l.start_ns, l.end_ns,
     coalesce(sum(l.end_ns - l.start_ns) OVER (
         PARTITION BY l.run_id, l.executor_id ORDER BY l.start_ns
         ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING

@@ -57,10 +57,7 @@ own AS (
     WHERE r.end_ns IS NULL OR r.end_ns <= w.start_ns
 )
 SELECT
-    run_id,
-    executor_id,
-    start_ns,
-    end_ns,
+    run_id, executor_id, start_ns, end_ns,
     lag(end_ns) OVER in_time AS previous_end_ns,
     max(CASE WHEN end_ns - start_ns >= 1000000 THEN start_ns END) OVER (
         in_time ROWS UNBOUNDED PRECEDING

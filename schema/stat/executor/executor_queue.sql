@@ -19,8 +19,7 @@ stretch AS (
     FROM store.thread_state
     WHERE state IN ('preempted', 'runnable')
     UNION ALL
-    SELECT
-        true, thread_id, start_ns, end_ns, state, preemptor_thread_id, preemptor_other_thread_id
+    SELECT true, thread_id, start_ns, end_ns, state, preemptor_thread_id, preemptor_other_thread_id
     FROM store.preemptor
 ),
 -- What begins and ends a callback needs a CPU: such a wait lies inside of a callback, or outside.
@@ -97,8 +96,7 @@ SELECT
     w.callback_instance_id,
     coalesce(q.run_queue_ns, 0)::BIGINT AS run_queue_ns,
     coalesce(q.preempted_ns, 0)::BIGINT AS preempted_ns,
-    t.cpu_taken_by,
-    t.cpu_taken_ns
+    t.cpu_taken_by, t.cpu_taken_ns
 FROM waiting AS w
 LEFT JOIN queued AS q ON w.callback_instance_id = q.callback_instance_id
 LEFT JOIN taken AS t ON w.callback_instance_id = t.callback_instance_id

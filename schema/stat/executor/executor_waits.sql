@@ -47,10 +47,7 @@ moment AS MATERIALIZED (
 ),
 busy AS MATERIALIZED (
     SELECT
-        m.callback_instance_id,
-        m.callback_id,
-        m.which,
-        m.at_ns,
+        m.callback_instance_id, m.callback_id, m.which, m.at_ns,
         coalesce(b.before_ns + least(m.at_ns, b.end_ns) - b.start_ns, 0) AS until_ns
     FROM moment AS m
     ASOF LEFT JOIN (
@@ -94,8 +91,7 @@ blocking AS (
 ),
 blocked AS (
     SELECT
-        m.callback_instance_id,
-        m.which,
+        m.callback_instance_id, m.which,
         CASE
             WHEN b.end_ns IS NULL THEN 0
             WHEN m.at_ns >= b.end_ns THEN b.before_ns + b.blocked_ns
@@ -139,8 +135,7 @@ poll AS MATERIALIZED (
 ),
 idle AS (
     SELECT
-        m.callback_instance_id,
-        m.which,
+        m.callback_instance_id, m.which,
         coalesce(w.before_ns + least(m.at_ns, w.end_ns) - w.start_ns, 0) AS until_ns
     FROM drowsy AS m
     ASOF LEFT JOIN poll AS w ON m.executor_id = w.executor_id AND m.at_ns >= w.start_ns
@@ -197,12 +192,7 @@ measured AS (
     LEFT JOIN waiting AS w ON r.executor_id = w.executor_id
 )
 SELECT
-    r.run_id,
-    r.callback_instance_id,
-    r.executor_id,
-    r.thread_id,
-    r.callback_id,
-    r.since,
+    r.run_id, r.callback_instance_id, r.executor_id, r.thread_id, r.callback_id, r.since,
     derive.corrected_ns(r.origin_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS origin_ns,
     derive.corrected_ns(r.earliest_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS earliest_ns,
     derive.corrected_ns(r.latest_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS latest_ns,
@@ -211,8 +201,7 @@ SELECT
     r.busy_start_ns - r.busy_latest_ns + r.blocked_min_ns AS busy_min_ns,
     r.busy_start_ns - r.busy_earliest_ns + r.blocked_max_ns AS busy_max_ns,
     CASE WHEN r.earliest_ns IS NOT NULL THEN r.blocked_max_ns END AS blocked_max_ns,
-    r.idle_ns,
-    r.is_loss_affected,
+    r.idle_ns, r.is_loss_affected,
     -- An excluded callback may wait while a thread is idle: then more was held than this says.
     CASE WHEN r.thread_count > 1 AND r.idle_ns IS NOT NULL THEN greatest(
         r.start_ns - r.earliest_ns - r.idle_ns

@@ -151,8 +151,7 @@ described AS (
         s.state,
         s.kind IS NOT NULL AS has_callback,
         coalesce(s.run_event_id > s.state_event_id, false) AS has_run,
-        i.callback_instance_id,
-        i.kind,
+        i.callback_instance_id, i.kind,
         s.state > 0 AND coalesce(s.state_event_id > i.start_event_id, true) AS is_spinning
     FROM split AS s
     LEFT JOIN run_change AS r ON s.thread_id = r.thread_id AND s.run_mark = r.run_mark
@@ -163,9 +162,7 @@ described AS (
 ),
 classified AS (
     SELECT
-        t.run_id,
-        t.thread_id,
-        x.executor_id,
+        t.run_id, t.thread_id, x.executor_id,
         t.at_ns AS start_ns,
         CASE WHEN t.next_step > 0 THEN t.next_ns END AS end_ns,
         t.callback_instance_id,

@@ -30,11 +30,7 @@ run AS (
     LEFT JOIN staging.callback_known AS k ON b.object_event_id = k.event_id
 )
 SELECT
-    r.start_event_id,
-    r.process_id,
-    r.callback_handle,
-    r.is_intra_process,
-    r.callback_event_id,
+    r.start_event_id, r.process_id, r.callback_handle, r.is_intra_process, r.callback_event_id,
     r.kind,
     t.start_event_id AS take_event_id,
     coalesce(r.subscription_event_id, t.subscription_event_id) AS subscription_event_id,

@@ -57,7 +57,6 @@ SELECT
 FROM added AS a
 LEFT JOIN symbol_of AS s ON a.event_id = s.added_event_id
 UNION ALL
-SELECT
-    event_id, ts_ns, process_id, callback, kind, NULL, NULL, NULL, NULL, symbol
+SELECT event_id, ts_ns, process_id, callback, kind, NULL, NULL, NULL, NULL, symbol
 FROM registered
 WHERE added_event_id IS NULL

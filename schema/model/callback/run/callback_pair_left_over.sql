@@ -33,17 +33,10 @@ located AS (
 ),
 callback_event AS MATERIALIZED (
     SELECT
-        e.event_id,
-        e.ts_ns,
-        e.trace_index,
-        e.thread_id,
-        e.process_id,
-        e.callback_handle,
-        e.is_start,
-        e.is_intra_process,
+        e.event_id, e.ts_ns, e.trace_index, e.thread_id, e.process_id, e.callback_handle,
+        e.is_start, e.is_intra_process,
         CASE WHEN c.event_id IS NULL THEN e.previous_call_event_id END AS previous_event_id,
-        e.previous_callback_event_id,
-        e.previous_executor_event_id,
+        e.previous_callback_event_id, e.previous_executor_event_id,
         CASE WHEN x.event_id IS NULL THEN e.previous_executor_event_id END AS executor_event_id,
         coalesce(i.segment, 0) AS segment
     FROM located AS e
