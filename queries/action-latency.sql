@@ -1,4 +1,3 @@
--- name: action-latency
 -- title: Latency of actions by action and client
 -- description: How long goals of actions took, and by part: until the client had the answer, until
 --     the first feedback, until the server had and sent the result, until the client had that.
@@ -46,10 +45,9 @@
 -- column: loss_affected BIGINT       Goals with a gap of a trace while they lasted
 -- column: action_server_id BIGINT    Identity of the action server
 -- column: action_client_id BIGINT    Identity of the action client
--- brief: action_name, client, result_median_ns, result_p99_ns, result_max_ns, goals,
---     loss_affected, result_p95_ns, accepted, rejected, finished, cancelled, server,
---     accept_median_ns, first_feedback_median_ns, execution_median_ns, not_answered, doubtful,
---     overlapping
+-- brief: action_name, client, result_median_ns, result_p99_ns, result_max_ns, goals, loss_affected,
+--     result_p95_ns, accepted, rejected, finished, cancelled, server, accept_median_ns,
+--     first_feedback_median_ns, execution_median_ns, not_answered, doubtful, overlapping
 -- note: goals
 WITH measured AS (
     SELECT

@@ -1,4 +1,3 @@
--- name: callbacks-each
 -- title: Callback instances, one by one, the longest first
 -- description: Each execution of a callback: when it began, how long it ran and on which thread,
 --     which message it was called with, and what it published meanwhile. Instances that never ended

@@ -1,4 +1,3 @@
--- name: callbacks
 -- title: Callback durations and periods
 -- description: How long callbacks ran, and how far apart their starts were. Instances without an
 --     end are counted separately. Where the kernel was traced, CPU time and the time without a CPU

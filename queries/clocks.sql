@@ -1,4 +1,3 @@
--- name: clocks
 -- title: Clocks and how they are corrected
 -- description: The clocks of a run, the hosts that have them, and how their times are corrected.
 --     Times of clocks with the same reference can be compared, to within the sum of their

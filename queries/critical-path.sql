@@ -1,4 +1,3 @@
--- name: critical-path
 -- title: What the slowest flows waited for
 -- description: The slowest flows, piece by piece; of one message: msgflow flow --why. Waits are
 --     replaced by what they waited for, as far as the trace shows; where the kernel was traced,
@@ -17,8 +16,7 @@
 -- param: take BIGINT = NULL  Instead, the longest flow to this take_id; on the command line:
 --     msgflow flow --take ID --why
 -- param: case
--- param: by VARCHAR {piece|node|part} = 'piece'  Rows by piece, by node, or by activity
---     and state
+-- param: by VARCHAR {piece|node|part} = 'piece'  Rows by piece, by node, or by activity  and state
 -- param: detail VARCHAR {short|full} = 'short'  full: every piece and layer of publishing
 -- param: from_event, to_event, max_depth, max_paths
 -- column: run_id
@@ -199,8 +197,7 @@ piece AS (
     LEFT JOIN main.publication AS b ON c.message_id = b.publication_id
     LEFT JOIN main.publisher AS p ON b.publisher_id = p.publisher_id
     -- Who waits for a message is the node that takes it, with a traced callback or without.
-    LEFT JOIN reader AS w
-        ON c.part = 'publish_to_take' AND c.path_id = w.path_id AND c.hop = w.hop
+    LEFT JOIN reader AS w ON c.part = 'publish_to_take' AND c.path_id = w.path_id AND c.hop = w.hop
     LEFT JOIN main.subscription AS s ON w.subscription_id = s.subscription_id
     LEFT JOIN main.process AS r ON coalesce(s.process_id, b.process_id) = r.process_id
     LEFT JOIN main.node AS n ON CASE WHEN s.subscription_id IS NULL THEN p.node_id ELSE s.node_id

@@ -1,4 +1,3 @@
--- name: e2e-latency-age
 -- title: Data age by path
 -- description: How old the data behind the output of a path are. The age of an output (the end of
 --     the path) is that of the newest input (start of a flow) that it reflects. Data stay in use

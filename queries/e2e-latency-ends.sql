@@ -1,4 +1,3 @@
--- name: e2e-latency-ends
 -- title: End-to-end latency between two topics
 -- description: How long it took from the start of a flow (as for e2e-latency) to its end at a node,
 --     over all paths between the topic of its first message and that of its last one. The first

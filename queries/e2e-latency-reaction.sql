@@ -1,4 +1,3 @@
--- name: e2e-latency-reaction
 -- title: Reaction time by path
 -- description: How long it takes at most until something that happens shows at the end of a path.
 --     What happens right after an input (the start of a flow) is seen by the next input at the

@@ -1,4 +1,3 @@
--- name: e2e-latency-response
 -- title: Response time by path, as CARET counts it
 -- description: The four response times of CARET. An input that does not arrive is answered by the
 --     first output of a later one. The inputs that one output answers are its cycle. 'all' is from

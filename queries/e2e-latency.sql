@@ -1,4 +1,3 @@
--- name: e2e-latency
 -- title: End-to-end latency by path
 -- description: How long it took from the start of a flow (the callback of the timer that published,
 --     or the publication itself) to its end (the end of the callback at the end of the path), for
@@ -14,8 +13,7 @@
 -- param: to VARCHAR = NULL  Topics or nodes where flows end, likewise
 -- param: from_event VARCHAR {callback_start|publish} = 'callback_start'  Event that starts
 --     the clock
--- param: to_event VARCHAR {take|callback_start|callback_end} = 'callback_end'  Event that
---     stops it
+-- param: to_event VARCHAR {take|callback_start|callback_end} = 'callback_end'  Event that  stops it
 -- param: case VARCHAR {first|last|newest|every_pair} = 'first'  Arrivals that count: the
 --     first or last of each root, that of the newest root, or all
 -- param: max_depth BIGINT {1..} = 32     Longest path

@@ -1,4 +1,3 @@
--- name: executor-usage
 -- title: What executor threads spent their time on
 -- description: Time of each executor thread by what it did (executor_activity): wait for work, look
 --     for what is ready, take messages, run callbacks, or stand blocked until it gets the lock of a

@@ -1,4 +1,3 @@
--- name: flows
 -- title: Flows, one by one
 -- description: Every flow: when the callback or publication that begins it (its root) started, and
 --     when the end of the path was reached and how long that took, or why it was not.

@@ -1,4 +1,3 @@
--- name: functions
 -- title: Functions that the CPU time of callbacks goes to
 -- description: Which functions ran inside each callback, as samples of perf tell
 --     (docs/functions.md, record --profile), and outside of callbacks, such as in the executor and

@@ -1,4 +1,3 @@
--- name: graph
 -- title: Which node sends what to which, how often and how fast
 -- description: The computation graph: nodes, and the topics, services and actions between them,
 --     with rates and latencies. The services of an action are no rows of their own. As dot,

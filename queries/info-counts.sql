@@ -1,4 +1,3 @@
--- name: info-counts
 -- title: Rows per table
 -- description: How many rows each view has for a run, from hosts to links. Empty views are listed
 --     too.

@@ -1,4 +1,3 @@
--- name: info-findings
 -- title: Data quality
 -- description: What to know before trusting a number: lost events, unknown events, callbacks
 --     without an end, clocks that are apart. The worst comes first; the view finding has the cause

@@ -1,4 +1,3 @@
--- name: info-hosts
 -- title: Machines and containers
 -- description: The hosts of a run, and how their clocks were brought together.
 -- grain: one row per host

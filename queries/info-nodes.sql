@@ -1,4 +1,3 @@
--- name: info-nodes
 -- title: ROS nodes
 -- description: The nodes of a run, and how many publishers, subscriptions, timers, services,
 --     clients, action servers and action clients each has. An action server has three of the

@@ -1,4 +1,3 @@
--- name: info-processes
 -- title: Processes
 -- description: The processes of a run with the number of their threads and nodes.
 -- grain: one row per process life

@@ -1,4 +1,3 @@
--- name: info-quality
 -- title: Data quality: what is missing, and what share of the answers it affects
 -- description: What the traces lack, by trace, process and topic. `affected` of `total` things of a
 --     kind are affected: events that were discarded, time in gaps, callback instances without an

@@ -1,4 +1,3 @@
--- name: info
 -- title: Runs in the database
 -- description: What was ingested, when, and how much of it the tracer lost.
 -- grain: one row per run

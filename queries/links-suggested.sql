@@ -1,4 +1,3 @@
--- name: links-suggested
 -- title: Links that the data suggest
 -- description: Where messages seem to be kept: they lead nowhere, while a timer, or messages on
 --     another topic, lead to publications (periodic_async); callbacks of several subscriptions
@@ -128,8 +127,7 @@ firing_input AS (
 patient AS (
     SELECT f.publisher_id, count(*) AS patient_count
     FROM firing AS f
-    ASOF JOIN input_run AS r
-        ON f.subscription_id = r.subscription_id AND f.start_ns > r.start_ns
+    ASOF JOIN input_run AS r ON f.subscription_id = r.subscription_id AND f.start_ns > r.start_ns
     WHERE r.start_ns > f.emptied_ns
     GROUP BY f.publisher_id
 ),
@@ -160,9 +158,7 @@ synchronous AS (
         any_value(m.firing_count) AS firing_count,
         list(DISTINCT i.topic_name ORDER BY i.topic_name) AS inputs,
         string_agg(
-            printf(
-                '%d of %d messages on %s published', m.own_count, i.run_count, i.topic_name
-            ),
+            printf('%d of %d messages on %s published', m.own_count, i.run_count, i.topic_name),
             ', ' ORDER BY i.topic_name, i.subscription_id
         ) AS evidence,
         min(m.met_count) AS met_count,
@@ -381,9 +377,7 @@ SELECT
                     printf(
                         'the node also receives %s, which may be inputs as well',
                         array_to_string(
-                            list_filter(
-                                r.topics, lambda topic: NOT list_contains(c.inputs, topic)
-                            ),
+                            list_filter(r.topics, lambda topic: NOT list_contains(c.inputs, topic)),
                             ', '
                         )
                     )

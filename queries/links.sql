@@ -1,4 +1,3 @@
--- name: links
 -- title: Declared links
 -- description: Every declared link (annotation) and what it explains: publications, those with a
 --     message of every input, links, and how long messages waited in their caches. Entries of kind

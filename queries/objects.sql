@@ -1,4 +1,3 @@
--- name: objects
 -- title: ROS objects
 -- description: Every publisher, subscription, timer, service and client with its node and process,
 --     and every action server and client, which are made of these. Timers with neither node nor

@@ -1,4 +1,3 @@
--- name: path-breakdown
 -- title: What the latency of each path consists of
 -- description: End-to-end latency of every path, hop by hop, in the order of the path: --sort
 --     share:desc puts the largest part first. The parts add up to the latency: the callback up to
@@ -22,9 +21,8 @@
 --     ('intra', 'rclcpp', 'rcl', 'rmw', 'dds', or 'publish' where it is not known),
 --     'network_or_idle', 'undecided', 'executor_busy', or exactly 'until_arrival', 'run_queue',
 --     'executor'; 'take_to_callback'
--- column: node VARCHAR [node]  Node that runs the callback, waits for it or for the
---     message, or publishes; 'between nodes' where neither worked: network_or_idle and
---     until_arrival
+-- column: node VARCHAR [node]  Node that runs the callback, waits for it or for the message, or
+--     publishes; 'between nodes' where neither worked: network_or_idle and until_arrival
 -- column: what VARCHAR             The callback, or the topic of the message
 -- column: flows BIGINT             Flows with this part
 -- column: ambiguous BIGINT         Flows of the path that pass a link that may be another one (a
@@ -34,8 +32,7 @@
 -- column: mean_ns BIGINT [ns]      Mean duration
 -- column: p95_ns BIGINT [ns]       95 % of the durations are at most this
 -- column: max_ns BIGINT [ns]       Longest duration
--- column: share DOUBLE [share]     Part of the time of all flows of the path, rounded to 4
---     places
+-- column: share DOUBLE [share]     Part of the time of all flows of the path, rounded to 4 places
 -- column: total_ns BIGINT [ns]     Sum over all flows; all parts add up to their time
 -- column: is_cut, path
 -- brief: path, hop, part, node, what, median_ns, share, max_ns, ambiguous, p95_ns, mean_ns,
@@ -196,8 +193,7 @@ LEFT JOIN main.publisher AS b ON h.publisher_id = b.publisher_id
 LEFT JOIN main.subscription AS s ON h.subscription_id = s.subscription_id
 LEFT JOIN main.process AS r
     ON CASE WHEN m.is_of_reader THEN s.process_id ELSE b.process_id END = r.process_id
-LEFT JOIN main.node AS n
-    ON CASE WHEN m.is_of_reader THEN s.node_id ELSE b.node_id END = n.node_id
+LEFT JOIN main.node AS n ON CASE WHEN m.is_of_reader THEN s.node_id ELSE b.node_id END = n.node_id
 LEFT JOIN main.callback_label AS l ON m.callback_id = l.callback_id
 ORDER BY
     p.run_id, p.path, m.path_id, m.hop, m.rank,

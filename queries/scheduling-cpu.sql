@@ -1,4 +1,3 @@
--- name: scheduling-cpu
 -- title: CPU time by thread, of all processes
 -- description: How long each thread had a CPU in the seconds of the time window, as a kernel trace
 --     shows it (docs/scheduling.md), threads of processes without ROS included. The idle threads

@@ -1,4 +1,3 @@
--- name: scheduling-preemption
 -- title: What took the CPU from which thread
 -- description: How often each thread of a ROS process lost the CPU while it had work, to which
 --     thread, and for how long (docs/scheduling.md). Where several threads had the CPU until it got

@@ -1,4 +1,3 @@
--- name: scheduling-threads
 -- title: What threads did, as the kernel saw it
 -- description: How long each thread of a ROS process was in each state, as a kernel trace shows it
 --     (docs/scheduling.md). Without kernel traces there are no rows. Threads that ran longest come

@@ -1,4 +1,3 @@
--- name: scheduling-wakeup
 -- title: How long woken threads waited for a CPU
 -- description: The time from when a thread of a ROS process was woken to when it had a CPU
 --     (docs/scheduling.md). Without the kernel's wakings there are no rows. The longest wait comes

@@ -1,4 +1,3 @@
--- name: scheduling
 -- title: CPU time of callbacks, and what kept them from the CPU
 -- description: How the time of callbacks divides into what their thread did, as a kernel trace
 --     shows it (docs/scheduling.md). The parts add up to the durations. Without kernel traces there

@@ -1,4 +1,3 @@
--- name: service-latency
 -- title: Latency of services by service and client
 -- description: How long service calls took, in total and by part. The round trip is measured on the
 --     client's clock alone, from the sending of the request to the take of the response. The times

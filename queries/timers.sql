@@ -1,4 +1,3 @@
--- name: timers
 -- title: Whether timers keep their period, how late they are called, and why
 -- description: Jitter is how far the time from one start of the callback to the next differs from
 --     the period asked for (from the median, if the trace does not have it). Lateness is the time
@@ -161,9 +160,7 @@ ranked AS (
     SELECT
         callback_id, meanwhile_id,
         overlap_ns / sum(overlap_ns) OVER (PARTITION BY callback_id) AS share,
-        row_number() OVER (
-            PARTITION BY callback_id ORDER BY overlap_ns DESC, meanwhile_id
-        ) AS place
+        row_number() OVER (PARTITION BY callback_id ORDER BY overlap_ns DESC, meanwhile_id) AS place
     FROM pair
 ),
 meanwhile AS (

@@ -1,4 +1,3 @@
--- name: topics-delivery
 -- title: Messages delivered, dropped and lost by topic and subscription
 -- description: What became of the messages published in the time window at each subscription of
 --     their topic. Dropped: the queue was full. Lost: they did not arrive or could not be taken,

@@ -1,4 +1,3 @@
--- name: topics-latency
 -- title: Latency from publication to take by topic and subscription
 -- description: How long messages took from the end of their publication to their take. That
 --     includes the time for which the receiving executor was busy with other callbacks, given as

@@ -1,4 +1,3 @@
--- name: topics-rate
 -- title: Publication rates and periods
 -- description: How many messages each publisher published, at what rate, and how regularly. The
 --     rate is taken from the first to the last publication in the time window.

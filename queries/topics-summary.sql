@@ -1,4 +1,3 @@
--- name: topics-summary
 -- title: Topics at a glance: rate, jitter, drops and latency
 -- description: Of each topic, how often and how regularly it was published, what became of its
 --     messages, and how long they took to be taken, in the time window. The variants rate, delivery

@@ -1,4 +1,3 @@
--- name: topics-unmatched
 -- title: Takes without a publication, and messages that were not taken, each with its reason
 -- description: Every take whose publication is not known, and every message that a subscription of
 --     its topic did not take, in order of time. The query topics --measure delivery counts them.

@@ -1,4 +1,3 @@
--- name: topics
 -- title: Topics
 -- description: The topics of a run: who publishes and subscribes, how many messages were published
 --     and how many were handed over. Publishers and subscriptions without a known topic are a

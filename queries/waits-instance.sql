@@ -1,4 +1,3 @@
--- name: waits-instance
 -- title: Waits of callbacks, one by one
 -- description: For every callback instance: the time since the end of the publication of its
 --     message (or since the timer was due, or the request was sent), for how much of it the
@@ -6,8 +5,7 @@
 --     are left out. Where the kernel was traced, it shows when the message arrived, and for how
 --     long the thread waited for a CPU.
 -- grain: one row per callback instance that is not nested in another
--- param: callback_id BIGINT = NULL  Only instances of this callback_id (query waits lists
---     them)
+-- param: callback_id BIGINT = NULL  Only instances of this callback_id (query waits lists  them)
 -- param: min_busy_ns BIGINT {0..} = 0  Only waits in which the executor may have been busy for that
 --     long [ns]
 -- column: run_id BIGINT             Run

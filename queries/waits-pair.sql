@@ -1,4 +1,3 @@
--- name: waits-pair
 -- title: Which callbacks keep which others waiting
 -- description: For every pair of callbacks of one executor: how long one ran while the other
 --     waited. The literature calls this interference, or blocking if the one that ran should not

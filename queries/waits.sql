@@ -1,4 +1,3 @@
--- name: waits
 -- title: How long callbacks waited, and what their executor ran meanwhile
 -- description: The time from the end of a publication (or from when a timer was due, or a request
 --     was sent) to the start of its callback, and how much of it the executor was busy with other
@@ -129,9 +128,7 @@ taker AS (
     SELECT
         callback_id, name,
         sum(length_ns) / sum(sum(length_ns)) OVER (PARTITION BY callback_id) AS share,
-        row_number() OVER (
-            PARTITION BY callback_id ORDER BY sum(length_ns) DESC, name
-        ) AS place
+        row_number() OVER (PARTITION BY callback_id ORDER BY sum(length_ns) DESC, name) AS place
     FROM taken
     GROUP BY callback_id, name
 ),

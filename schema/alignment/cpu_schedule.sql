@@ -1,4 +1,3 @@
--- name: staging.cpu_schedule
 -- description: For how long a kernel trace says what ran on each CPU: of the length from its first
 --     switch to the last, `known_ns` lie between switches that do not contradict each other, the
 --     first and last such time from `start_ns` to `end_ns`, as the trace has them.

@@ -1,4 +1,3 @@
--- name: staging.schedule_candidate
 -- description: Clocks that a kernel trace may have used, and what has to be added to its times in
 --     each case. LTTng names the clock. perf names none: its times count from the origin of the
 --     clock, or from the epoch.

@@ -1,4 +1,3 @@
--- name: staging.schedule_moment
 -- description: What a kernel trace says of the CPU at each event of a ROS process: which thread
 --     ran there. The next switch tells, and the one before it has to say the same: else some switch
 --     was not recorded, and what ran is not known (`contradiction_id`: the next switch). `tid` left

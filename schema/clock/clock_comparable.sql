@@ -1,4 +1,3 @@
--- name: derive.clock_comparable
 -- description: Whether times of two processes can be compared: they have one clock, or one of the
 --     two clocks was brought to the other's time.
 -- grain: one row per ordered pair of processes of a run

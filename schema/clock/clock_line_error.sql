@@ -1,5 +1,3 @@
--- name: derive.clock_line_error
--- kind: macro
 -- description: How far a possible line is at most from the chosen one: at some moments, with
 --     straight lines in between. `edges` is the name of a table with the edges of hulls, `lines`
 --     that of one as derive.clock_line gives it, `extents` that of one with the begin_moment and

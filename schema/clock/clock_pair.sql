@@ -1,18 +1,15 @@
--- name: derive.clock_pair
--- kind: macro
 -- description: How the times of one clock become those of another, from the messages and packets
 --     between them in both directions. Every line between the two hulls is possible that is no
 --     steeper than clocks can drift apart. The hulls are nearest to each other at the shortest
---     round trip that was observed, once the drift is taken out. There, the middle between them
---     is the offset, and half the distance bounds its error. The drift is that of the possible
---     line through this middle that is parallel to the longest edge of the hulls; the steepest
---     and the flattest possible line bound its error (Duda 1987; Poirier, Roy and Dagenais 2010;
---     Jabbarifar and Dagenais 2014). `bounds` holds how far a possible line is at most from the
---     chosen one: at some moments, with straight lines in between. It grows where nothing passes
---     one way. Where no line is possible, the clocks do not run evenly, or drift apart faster
---     than clocks do. Then the line that misses least is given, and its error at any time is
---     bounded by the fastest message or packet of each stretch. Without any in one of the
---     directions, all is NULL.
+--     round trip that was observed, once the drift is taken out. There, the middle between them is
+--     the offset, and half the distance bounds its error. The drift is that of the possible line
+--     through this middle that is parallel to the longest edge of the hulls; the steepest and the
+--     flattest possible line bound its error (Duda 1987; Poirier, Roy and Dagenais 2010; Jabbarifar
+--     and Dagenais 2014). `bounds` holds how far a possible line is at most from the chosen one: at
+--     some moments, with straight lines in between. It grows where nothing passes one way. Where no
+--     line is possible, the clocks do not run evenly, or drift apart faster than clocks do. Then
+--     the line that misses least is given, and its error at any time is bounded by the fastest
+--     message or packet of each stretch. Without any in one of the directions, all is NULL.
 -- grain: one row per pair of clocks with messages or packets between them
 CREATE OR REPLACE MACRO derive.clock_pair(only_run) AS TABLE
 WITH corner AS MATERIALIZED (

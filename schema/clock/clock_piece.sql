@@ -1,4 +1,3 @@
--- name: derive.clock_piece
 -- description: The bound of the error of the correction of a clock, as straight lines. It is
 --     `uncertainty_ns` at `at_ns`, as the clock showed it, and changes by `growth` per time from
 --     `from_ns` until the next row. Outside the moments for which a bound is known, it grows as

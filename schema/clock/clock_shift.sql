@@ -1,4 +1,3 @@
--- name: derive.clock_shift
 -- description: What to add to a time of one clock to get the earliest time of another clock at
 --     which a message sent then is received: the shortest way of any message in ten seconds.
 --     Holds from `from_ns` of the sender's clock until the next row.

@@ -1,5 +1,3 @@
--- name: derive.clock_sync
--- kind: macro
 -- description: How the times of each clock become those of a reference. The reference is the
 --     first of the clocks that messages or packets in both directions connect. A clock that
 --     exchanges none with the reference is joined through others, along the chain with the

@@ -1,4 +1,3 @@
--- name: derive.several_clocks
 -- description: Runs with several clocks.
 -- grain: one row per run
 SELECT run_id

@@ -1,4 +1,3 @@
--- name: derive.stamp_shift
 -- description: What to add to a stamp made on a host to get the time of its trace: stamps are of
 --     the clock that can be set, which traces do not follow. It is given as the least and the
 --     greatest difference between the publication's layers and its stamp in ten seconds, so that

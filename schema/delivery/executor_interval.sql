@@ -1,5 +1,3 @@
--- name: derive.executor_interval
--- kind: view
 -- description: What executor threads did, as their three events say: a state lasts until the next
 --     such event of the thread. The last one of a thread, or before a gap, has no end. Nor has any
 --     where the recording leaves out events that would end it. Times are by the clock of the

@@ -1,4 +1,3 @@
--- name: derive.expected_arrival
 -- description: When each message could be received at the earliest, on the clock of those who
 --     subscribe to its topic: at the end of its publication. A message that goes through a ring
 --     buffer counts from `rclcpp_intra_publish` on, since it may be taken before publish() returns.

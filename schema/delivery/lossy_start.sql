@@ -1,4 +1,3 @@
--- name: derive.lossy_start
 -- description: Processes that may have lost events while they were created: a gap other than a
 --     pause lies before the first callback instance, or before the process was seen at all. If its
 --     first node was seen to be created before its first callback instance, any gap counts.

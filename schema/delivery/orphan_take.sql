@@ -1,5 +1,3 @@
--- name: derive.orphan_take
--- kind: macro
 -- description: Why the publication of a take is not known: the first reason that holds. The stamp
 --     is compared on the host of each process that could have sent it: those with a publisher of
 --     the topic (known senders), those with one whose topic is not known or whose initialisation
@@ -171,9 +169,7 @@ judged AS (
             bool_and(s.at_ns < s.recorded_from_ns)
         ) AS is_before_tracing,
         bool_or(
-            coalesce(
-                g.covered_until_ns >= s.at_ns - derive.delivery_limit().stamp_slack_ns, false
-            )
+            coalesce(g.covered_until_ns >= s.at_ns - derive.delivery_limit().stamp_slack_ns, false)
         ) AS has_gap,
         coalesce(
             bool_and(s.last_seen_ns < s.latest_ns) FILTER (WHERE s.is_known),
@@ -211,8 +207,7 @@ buffered AS (
         coalesce(b.end_ns, o.created_ns, 0) AS since_ns
     FROM orphan AS o
     LEFT JOIN presence AS p ON o.process_id = p.process_id
-    ASOF LEFT JOIN passed AS b
-        ON o.subscription_id = b.subscription_id AND o.taken_ns > b.taken_ns
+    ASOF LEFT JOIN passed AS b ON o.subscription_id = b.subscription_id AND o.taken_ns > b.taken_ns
     WHERE o.method = 'ring_buffer'
 ),
 kept AS (

@@ -1,5 +1,3 @@
--- name: derive.process_gap
--- kind: macro
 -- description: When each process may have done something that is not in its traces, for ASOF
 --     joins as with derive.recording_gap: in gaps of its recordings; before its first event, if
 --     it existed then; and between two recordings. The tracer tells one process after the other

@@ -1,4 +1,3 @@
--- name: derive.process_presence
 -- description: Where each process was recorded, and from when on. A session that has nothing but
 --     the initialisation of the process does not count: what the process did then is not in it. A
 --     process that existed before is recorded from its first event on, because the tracer tells

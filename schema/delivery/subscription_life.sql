@@ -1,4 +1,3 @@
--- name: derive.subscription_life
 -- description: How long each subscription could take messages, on the clock of its host: from its
 --     creation to the last event of the threads that read it, or until its handle was used again.
 --     A placeholder for the reader of a ring buffer is left out: it may be the same subscription

@@ -1,5 +1,3 @@
--- name: derive.undelivered
--- kind: macro
 -- description: Why a subscription did not take a message of its topic; the first reason that holds.
 --     Everything is compared on the clock of the receiver. A message is lost only between two of
 --     its publisher that were taken: without one, the two were never connected; before the first,

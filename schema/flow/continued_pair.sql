@@ -1,4 +1,3 @@
--- name: derive.continued_pair
 -- description: Subscriptions and publishers that flows go on through, whatever the message: the
 --     pairs of derive.flow_continuation, which are much cheaper to find than its rows.
 -- grain: one row per subscription and publisher that a message of it led to

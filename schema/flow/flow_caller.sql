@@ -1,4 +1,3 @@
--- name: derive.flow_caller
 -- description: What callback instances led to by calling services, with the instance that called
 --     first: it was called by none itself. A request leads to the instance of the service callback,
 --     or is handled without one; its response leads to what the client does with it; both may call

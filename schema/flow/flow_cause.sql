@@ -1,4 +1,3 @@
--- name: derive.flow_cause
 -- description: Causes of publications, each once, however many annotations declare it.
 -- grain: one row per callback instance, or take without one, publication that it led to, and
 --     kind of link

@@ -1,4 +1,3 @@
--- name: derive.flow_continuation
 -- description: How flows go on through a node: from the take of a message to the publications
 --     that the callback of this take led to. It may have led to them by calling services: then
 --     the route to the publication is given (derive.flow_caller), else an empty one. It is

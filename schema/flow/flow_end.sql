@@ -1,4 +1,3 @@
--- name: derive.flow_end
 -- description: Where flows end because the other side of a message is missing, and why: messages
 --     that a subscription of their topic did not take, and takes whose publication is not known.
 -- grain: one row per publication and subscription of its topic that did not take it, and one per

@@ -1,5 +1,3 @@
--- name: derive.flow_hop
--- kind: macro
 -- description: Steps of the computation graph that messages really took: from nowhere (a source) or
 --     a subscription through a publisher to a subscription, by a route of services
 --     (derive.flow_caller) or directly. A step is cached where the message may wait in the node for

@@ -1,4 +1,3 @@
--- name: derive.flow_link
 -- description: All links in one shape: publication to take, take or request to the callback
 --     instance that it was for, callback instance (or a take without one) to publication,
 --     callback instance to request or response. Where no service callback was traced, a request

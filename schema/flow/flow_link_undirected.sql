@@ -1,4 +1,3 @@
--- name: derive.flow_link_undirected
 -- description: All links in both directions.
 -- grain: two rows per link
 SELECT run_id, from_kind, from_id, to_kind, to_id, link_kind

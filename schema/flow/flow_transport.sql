@@ -1,4 +1,3 @@
--- name: derive.flow_transport
 -- description: Messages handed over on the topics of the application, with both objects. ROS's own
 --     topics, self loops and copies that no callback gets are no part of a path. A row is ambiguous
 --     where another publication may have been taken instead.

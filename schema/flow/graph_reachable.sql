@@ -1,5 +1,3 @@
--- name: derive.graph_reachable
--- kind: macro
 -- description: The vertices that can be reached from one vertex along the edges of a table or
 --     view with columns from_kind, from_id, to_kind, to_id. Each vertex comes once; the walk ends
 --     on any graph. Without max_depth, the cost grows with the edges alone. With it, the cost

@@ -1,4 +1,3 @@
--- name: derive.request_sender
 -- description: What sent a request, as flows follow it: a callback instance, or a request or
 --     response that the thread had taken without a callback (derive.vertex_key).
 -- grain: one row per request with a known cause

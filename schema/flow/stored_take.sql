@@ -1,4 +1,3 @@
--- name: derive.stored_take
 -- description: Takes of messages that were published before their subscription existed, and were
 --     stored until then (a publisher that is transient local: latched). The creation of the
 --     subscription decides, so a message that was only sent before the two were connected is not

@@ -1,5 +1,3 @@
--- name: derive.stuck_root
--- kind: macro
 -- description: Why roots of paths did not arrive: the reason at the step at which they got stuck,
 --     and whether the recording may have cut them. It may where no message passed that step later,
 --     or, of messages that were published and not taken, none earlier (their readers were not there

@@ -1,4 +1,3 @@
--- name: overlap.duplicate_count
 -- description: Counts of the events that are left out of a trace because another one has them.
 -- grain: one row per such pair of traces
 SELECT

@@ -1,4 +1,3 @@
--- name: overlap.given_namespace
 -- kind: inline
 -- description: PID namespaces for processes whose events have none. If the sessions of a host are
 --     of several containers, each container but the first gets a number. Else, if several processes

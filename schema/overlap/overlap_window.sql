@@ -1,4 +1,3 @@
--- name: overlap.overlap_window
 -- kind: inline
 -- description: Times in which two sessions recorded the same CPU.
 -- grain: one row per pair of sessions and CPU

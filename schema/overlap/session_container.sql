@@ -1,4 +1,3 @@
--- name: overlap.session_container
 -- kind: inline
 -- description: Containers of a host but the first one. Two sessions of the same threads are of one
 --     container, and so are two that a third one joins. Sessions of other threads under the same

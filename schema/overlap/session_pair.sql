@@ -1,4 +1,3 @@
--- name: overlap.session_pair
 -- kind: inline
 -- description: Pairs of sessions that recorded the same ids of threads at the same time, and
 --     whether these are the same threads: then most events that one of them recorded while both

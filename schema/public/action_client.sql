@@ -1,4 +1,3 @@
--- name: main.action_client
 -- description: Action clients: three clients of services and two subscriptions (action_server).
 -- grain: one row per action client
 -- column: run_id BIGINT  Run that the row belongs to

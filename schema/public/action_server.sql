@@ -1,4 +1,3 @@
--- name: main.action_server
 -- description: Action servers. An action is three services and two topics: NAME/_action/send_goal,
 --     cancel_goal and get_result, NAME/_action/feedback and status.
 -- grain: one row per action server

@@ -1,4 +1,3 @@
--- name: main.annotation_firing
 -- description: Publications that annotations explain. One is complete if every input has a message:
 --     an indirect link comes from it, or the publishing callback instance was called with it. For
 --     partial_sync and approximate_sync: only publications from callback instances of inputs; all

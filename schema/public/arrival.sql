@@ -1,4 +1,3 @@
--- name: main.arrival
 -- description: When messages arrived, where the trace tells. With a kernel trace: the last waking
 --     of the thread before it took the message. If it was awake when the message came, there is no
 --     row. Exact where the take is the first thing that it did then, and a thread of the middleware

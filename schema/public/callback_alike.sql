@@ -1,4 +1,3 @@
--- name: main.callback_alike
 -- description: Answers count some callbacks as one: a node may make many timers of one function
 --     and period, such as a one-shot timer for each event. Every other callback counts alone.
 -- grain: one row per callback object

@@ -1,4 +1,3 @@
--- name: main.callback_label
 -- description: What people call a callback: what triggers it, such as Timer(5 ms) or
 --     Subscription(/scan), and the node that it belongs to. Timers of unknown period are
 --     distinguished by their handles. Functions of Python have their names.

@@ -1,4 +1,3 @@
--- name: main.callback_run
 -- description: Callback instances with the names of what they belong to: those of
 --     main.callback_instance, each with its callback, node, process, host and thread.
 -- grain: one row per callback instance

@@ -1,4 +1,3 @@
--- name: main.clock_pair
 -- description: What passed between hosts of two clocks, and so shows how far these are apart:
 --     messages matched by their stamps alone, requests, responses, and network packets. The
 --     shortest delays in both directions bound the error of a correction. A negative one shows that

@@ -1,14 +1,11 @@
--- name: main.comparison
--- kind: macro
--- description: How a run differs from another one, or from itself at another time, by path, ends
---     of paths, callback or topic: what was measured in each, and the difference with a bootstrap
---     confidence interval.
---     Values that follow each other are alike, so blocks of neighbouring values are resampled
---     (circular block bootstrap). The length of a block is estimated from the values of each run.
---     An interval needs ten blocks in either run, and five independent values beyond a quantile;
---     the maximum has no interval. The same seed gives the same interval. The interval says how
---     surely these two recordings differ. It does not say how much a system differs from itself
---     when it is started again.
+-- description: How a run differs from another one, or from itself at another time, by path, ends of
+--     paths, callback or topic: what was measured in each, and the difference with a bootstrap
+--     confidence interval. Values that follow each other are alike, so blocks of neighbouring
+--     values are resampled (circular block bootstrap). The length of a block is estimated from the
+--     values of each run. An interval needs ten blocks in either run, and five independent values
+--     beyond a quantile; the maximum has no interval. The same seed gives the same interval. The
+--     interval says how surely these two recordings differ. It does not say how much a system
+--     differs from itself when it is started again.
 -- grain: one row per thing compared and statistic; things that only one run has, too
 -- param: what VARCHAR  'paths' (end-to-end latency), 'ends' (the same between two topics, by any
 --     path), 'callbacks' (duration) or 'topics' (from publication to take)
@@ -83,8 +80,7 @@ flow AS (
         [run_a, run_b], from_topic, to_topic, 'callback_start', 'callback_end',
         (-9223372036854775808)::BIGINT, 9223372036854775807, chains := 'path_chain'
     ) AS e
-    JOIN main.flow_path([run_a, run_b], chains := 'path_chain') AS p
-        ON e.path_id = p.path_id
+    JOIN main.flow_path([run_a, run_b], chains := 'path_chain') AS p ON e.path_id = p.path_id
     WHERE what IN ('paths', 'ends')
 ),
 outcome AS (
@@ -166,9 +162,7 @@ side AS (
     FROM (VALUES ('a', run_a, a_window), ('b', run_b, b_window)) AS s (side, run_id, time_window)
     JOIN main.run AS r ON s.run_id = r.run_id
     WHERE derive.known_word('what', what, ['paths', 'ends', 'callbacks', 'topics'])
-        AND derive.known_word(
-            'wanted_case', wanted_case, ['first', 'last', 'newest', 'every_pair']
-        )
+        AND derive.known_word('wanted_case', wanted_case, ['first', 'last', 'newest', 'every_pair'])
 ),
 sided AS MATERIALIZED (
     SELECT

@@ -1,5 +1,3 @@
--- name: main.continued_subscription
--- kind: macro
 -- description: Subscriptions at which flows go on: at least one of their messages led to another
 --     message.
 -- grain: one row per such subscription

@@ -1,5 +1,3 @@
--- name: main.dead_end
--- kind: macro
 -- description: Subscriptions at which flows end although their node publishes: at least three
 --     messages came, and no callback of theirs led to anything, while timers, other messages or
 --     what is outside of callbacks led to publications. Either the node only consumes the messages,

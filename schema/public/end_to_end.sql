@@ -1,5 +1,3 @@
--- name: main.end_to_end
--- kind: macro
 -- description: Roots of paths in the time window, and what became of them. One that reached the
 --     sink has a row per take there, any other a single row with the reason. Roots are callback
 --     instances of timers that published, or publications (always with from_event 'publish'), or
@@ -55,9 +53,7 @@ WITH RECURSIVE chain_here AS MATERIALIZED (
     SELECT
         run_id, path_id, parent_path_id, depth, publisher_id, subscription_id,
         first_publisher_id, first_route, route, is_cached, is_path
-    FROM main.flow_chain(
-        runs, from_topic, to_topic, max_depth := max_depth, max_paths := max_paths
-    )
+    FROM main.flow_chain(runs, from_topic, to_topic, max_depth := max_depth, max_paths := max_paths)
 ),
 chain AS NOT MATERIALIZED (
     SELECT

@@ -1,5 +1,3 @@
--- name: main.end_to_end_between
--- kind: macro
 -- description: Flows between two topics, whatever path they took: rows of main.end_to_end of
 --     several paths become rows of one. A root that arrived by any path has arrived, once for each
 --     message that reflects it. Another has the status that says most: 'cut_by_recording', then

@@ -1,5 +1,3 @@
--- name: main.end_to_end_trail
--- kind: macro
 -- description: The messages on the way of each flow (main.end_to_end_flow), from its root to its
 --     end. Of several ways it is that whose list of publications, then of takes, comes first.
 -- grain: one row per flow and message on its way
@@ -23,9 +21,7 @@ WITH RECURSIVE flow AS NOT MATERIALIZED (
 ),
 chain_here AS MATERIALIZED (
     SELECT path_id, parent_path_id, depth, publisher_id, subscription_id, route
-    FROM main.flow_chain(
-        runs, from_topic, to_topic, max_depth := max_depth, max_paths := max_paths
-    )
+    FROM main.flow_chain(runs, from_topic, to_topic, max_depth := max_depth, max_paths := max_paths)
 ),
 chain AS NOT MATERIALIZED (FROM query_table(chains)),
 -- Before each message of a path but the first: the message that led to it, and how.
@@ -114,8 +110,7 @@ hop (flow_id, hop, take_id, publication_id, previous_take_id, next_take_id) AS (
     UNION ALL
     SELECT h.flow_id, r.hop, r.take_id, r.publication_id, h.take_id, r.next_take_id
     FROM hop AS h
-    JOIN trail AS r
-        ON h.flow_id = r.flow_id AND h.hop + 1 = r.hop AND h.next_take_id = r.take_id
+    JOIN trail AS r ON h.flow_id = r.flow_id AND h.hop + 1 = r.hop AND h.next_take_id = r.take_id
 )
 SELECT flow_id, hop, take_id, publication_id, previous_take_id, next_take_id
 FROM hop

@@ -1,5 +1,3 @@
--- name: main.executor_activity_within
--- kind: macro
 -- description: The rows of main.executor_activity that reach into a time window, far sooner than
 --     selected from all. What began before, and has no end since a gap follows, is among them only
 --     if the gap ends in the window or later.

@@ -1,4 +1,3 @@
--- name: main.executor_interference
 -- description: What the threads of its executor ran while a callback instance waited. Overlaps on
 --     one thread add up to the time for which it was busy; overlaps on several threads may lie side
 --     by side in time.

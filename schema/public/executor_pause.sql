@@ -1,5 +1,3 @@
--- name: main.executor_pause
--- kind: macro
 -- description: What threads of events executors did between callbacks in a time window, as far as
 --     that is known: these rows of main.executor_activity, far sooner.
 -- grain: one row per interval of such a thread outside of callbacks and takes

@@ -1,4 +1,3 @@
--- name: main.executor_state
 -- description: What executor threads did, as their three events say.
 -- grain: one row per interval between two executor events of a thread
 -- column: run_id

@@ -1,4 +1,3 @@
--- name: main.executor_wait
 -- description: How long callback instances waited in their executor, and what for. A trace does not
 --     say when an input arrived: it became ready between earliest_ns and latest_ns. It could not
 --     start (the executor was busy) while all threads ran callbacks, or one ran that excludes it.

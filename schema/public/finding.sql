@@ -1,4 +1,3 @@
--- name: main.finding
 -- description: Things worth knowing about the input or the recording before trusting a number: lost
 --     events, objects not seen to be created, clocks apart.
 -- grain: one row per place at which something was found

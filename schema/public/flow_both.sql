@@ -1,5 +1,3 @@
--- name: main.flow_both
--- kind: macro
 -- description: The flow of one message: a publication, take, callback instance, request or
 --     response, all that it caused, and all that caused it. Other effects of its causes are
 --     omitted.

@@ -1,5 +1,3 @@
--- name: main.flow_chain
--- kind: macro
 -- description: The chains of main.flow_path, each as its last step and a pointer to the chain
 --     without it: the cost of lists of what lies on them would grow with the square of their
 --     length. No subscription comes twice in a chain. What asks several of main.flow_path,
@@ -199,15 +197,12 @@ limited AS (
     LEFT JOIN numbered AS p
         ON n.run_id = p.run_id AND n.depth - 1 = p.depth AND n.parent_number = p.number
     LEFT JOIN ended AS e ON n.run_id = e.run_id AND n.depth = e.depth AND n.number = e.number
-    LEFT JOIN continuable AS c
-        ON n.run_id = c.run_id AND n.depth = c.depth AND n.number = c.number
+    LEFT JOIN continuable AS c ON n.run_id = c.run_id AND n.depth = c.depth AND n.number = c.number
 ),
 ranked AS (
     SELECT
         run_id, path_id, parent_path_id, depth, first_hop_id, hop_id, is_candidate, is_cut,
-        row_number() OVER (
-            PARTITION BY run_id, is_candidate ORDER BY depth, path_id
-        ) AS path_number
+        row_number() OVER (PARTITION BY run_id, is_candidate ORDER BY depth, path_id) AS path_number
     FROM limited
 )
 SELECT

@@ -1,4 +1,3 @@
--- name: main.flow_edge
 -- description: All links in one shape, with the times of both ends: cause and effect of every step
 --     that a message takes.
 -- grain: one row per cause, effect and kind of link, however many annotations declare it
@@ -48,10 +47,8 @@ SELECT
     coalesce(i.start_ns, t.taken_ns),
     b.start_ns
 FROM derive.flow_cause AS l
-LEFT JOIN main.callback_instance AS i
-    ON l.callback_instance_id = i.callback_instance_id
-LEFT JOIN main.take AS t
-    ON l.callback_instance_id IS NULL AND l.take_id = t.take_id
+LEFT JOIN main.callback_instance AS i ON l.callback_instance_id = i.callback_instance_id
+LEFT JOIN main.take AS t ON l.callback_instance_id IS NULL AND l.take_id = t.take_id
 JOIN main.publication AS b ON l.publication_id = b.publication_id
 UNION ALL
 SELECT

@@ -1,5 +1,3 @@
--- name: main.flow_path
--- kind: macro
 -- description: Chains of publishers and subscriptions that flows can take, with all their
 --     beginnings. No subscription comes twice in a chain. Where a service led to a publication, the
 --     chain has the node that called and the services in between. A publisher that is not traced is
@@ -28,9 +26,7 @@ WITH RECURSIVE chain_here AS MATERIALIZED (
     SELECT
         run_id, path_id, parent_path_id, depth, publisher_id, subscription_id, route, is_cached,
         is_path, is_cut
-    FROM main.flow_chain(
-        runs, from_topic, to_topic, max_depth := max_depth, max_paths := max_paths
-    )
+    FROM main.flow_chain(runs, from_topic, to_topic, max_depth := max_depth, max_paths := max_paths)
 ),
 chain AS NOT MATERIALIZED (FROM query_table(chains)),
 called AS (

@@ -1,5 +1,3 @@
--- name: main.flow_step
--- kind: macro
 -- description: The picture of one message: what a publication, take, callback instance, request or
 --     response caused, what it was caused by, or both, with times, names, and what is missing. If a
 --     limit cuts the flow, the vertices nearest to the start are kept.

@@ -1,5 +1,3 @@
--- name: main.flow_vertex
--- kind: macro
 -- description: What vertices of the graph of flows are: when and where each was, what it is called,
 --     and what the trace does not show of it.
 -- grain: one row per vertex
@@ -85,8 +83,7 @@ UNION ALL
 SELECT
     v.key, v.kind, v.id, v.depth, q.run_id, coalesce(q.sent_ns, q.taken_ns), q.taken_ns,
     q.thread_id, h.process_id,
-    CASE WHEN c.client_id IS NULL THEN '?'
-        ELSE main.node_label(n.full_name, o.name, o.pid) END,
+    CASE WHEN c.client_id IS NULL THEN '?' ELSE main.node_label(n.full_name, o.name, o.pid) END,
     coalesce(c.service_name, s.service_name, '?'),
     NULL, NULL,
     CASE

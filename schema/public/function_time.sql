@@ -1,5 +1,3 @@
--- name: main.function_time
--- kind: macro
 -- description: How often functions ran, and were called by what ran, in samples of stacks.
 -- grain: one row per group and function that a sample of the group saw
 -- param: of_samples VARCHAR  Name of the samples, with columns group_id, stack_id and cpu_ns: a

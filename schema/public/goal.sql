@@ -1,4 +1,3 @@
--- name: main.goal
 -- description: Goals of actions, from sending to result, as far as services and topics of the
 --     action show it (Kilted and later). The identity of a goal is not in the trace, and neither is
 --     how it ended. So a result is known to be of a goal if the client asked for it in the callback

@@ -1,4 +1,3 @@
--- name: main.link_causal
 -- description: What caused each publication.
 -- grain: one row per publication, and callback instance, or take without one, that caused it
 -- column: run_id
@@ -23,8 +22,6 @@ SELECT
     l.candidate_count, l.is_loss_affected,
     derive.is_followed(l.kind, l.candidate_count) AS is_followed
 FROM store.link_causal AS l
-LEFT JOIN main.callback_instance AS i
-    ON l.callback_instance_id = i.callback_instance_id
+LEFT JOIN main.callback_instance AS i ON l.callback_instance_id = i.callback_instance_id
 JOIN main.publication AS b ON l.publication_id = b.publication_id
-LEFT JOIN main.take AS t
-    ON l.kind IN ('take_adjacent', 'polled') AND l.take_id = t.take_id
+LEFT JOIN main.take AS t ON l.kind IN ('take_adjacent', 'polled') AND l.take_id = t.take_id

@@ -1,4 +1,3 @@
--- name: main.link_packet
 -- description: Network packets that kernel traces recorded at both ends, between hosts of two
 --     clocks. A negative latency means that the clocks are apart.
 -- grain: one row per network packet and clock that received it from another

@@ -1,4 +1,3 @@
--- name: main.link_transport
 -- description: Messages from publication to take. A negative latency means that the clocks of two
 --     hosts are apart.
 -- grain: one row per take whose publication is known

@@ -1,5 +1,3 @@
--- name: main.looped_arrival
--- kind: macro
 -- description: Later takes at the end of a path that are not arrivals, since a path visits no
 --     subscription twice, but that descend from an arrival there through a loop. Any loop through a
 --     subscription consists of subscriptions that it leads to and that lead back to it.

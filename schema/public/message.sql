@@ -1,4 +1,3 @@
--- name: main.message
 -- description: Messages with the names of what they belong to: every published message, once for
 --     each subscription that took it. A message that none took is a row without a take
 --     (main.stat_delivery says why), one whose publication is not known a row without a

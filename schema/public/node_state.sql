@@ -1,4 +1,3 @@
--- name: main.node_state
 -- description: States of managed nodes (with a lifecycle). The state before the first change lasts
 --     from the creation of the node, or from the first event of its process, the last one until the
 --     last event of the process. A state is left out where the next change leaves another one. A

@@ -1,7 +1,5 @@
--- name: main.process_label
 -- description: What people call a process: its nodes. The name of a process alone tells little:
---     that of each node of rclpy is python3, that of each container of components
---     component_conta.
+--     that of each node of rclpy is python3, that of each container of components component_conta.
 -- grain: one row per process
 -- column: run_id BIGINT        Run that the row belongs to
 -- column: process_id BIGINT    The process

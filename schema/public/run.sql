@@ -1,4 +1,3 @@
--- name: main.run
 -- description: Recordings: the traces that one ingest read. Nothing is ever linked across runs.
 -- grain: one row per ingest of traces that belong together
 -- column: run_id

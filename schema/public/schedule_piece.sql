@@ -1,5 +1,3 @@
--- name: main.schedule_piece
--- kind: macro
 -- description: What threads did in intervals, piece by piece, as a kernel trace shows it. A sleep
 --     that another thread of a ROS process ended is replaced by what that thread did meanwhile, and
 --     so on from waker to waker, until an interrupt or a thread of a process without ROS ends the
@@ -50,8 +48,7 @@ chain AS (
         s.thread_id, s.state, s.priority, s.by_kind, s.by_thread_id, s.by_other_thread_id,
         s.by_priority, s.is_loss_affected
     FROM query_table(intervals) AS i
-    JOIN state AS s
-        ON i.thread_id = s.thread_id AND s.end_ns > i.from_ns AND s.start_ns < i.to_ns
+    JOIN state AS s ON i.thread_id = s.thread_id AND s.end_ns > i.from_ns AND s.start_ns < i.to_ns
     UNION ALL
     SELECT
         c.interval_id, c.wakers + 1,
@@ -78,9 +75,7 @@ boundary AS (
 piece AS MATERIALIZED (
     SELECT
         i.interval_id, i.thread_id, b.at_ns AS from_ns,
-        coalesce(
-            lead(b.at_ns) OVER (PARTITION BY i.interval_id ORDER BY b.at_ns), i.to_ns
-        ) AS to_ns
+        coalesce(lead(b.at_ns) OVER (PARTITION BY i.interval_id ORDER BY b.at_ns), i.to_ns) AS to_ns
     FROM boundary AS b
     JOIN query_table(intervals) AS i ON b.interval_id = i.interval_id
 ),
@@ -98,9 +93,7 @@ told AS (
     ASOF JOIN chain AS c
         ON p.interval_id = c.interval_id AND p.wakers = c.wakers AND p.from_ns >= c.from_ns
     WHERE c.to_ns > p.from_ns
-    QUALIFY row_number() OVER (
-        PARTITION BY p.interval_id, p.from_ns ORDER BY c.wakers DESC
-    ) = 1
+    QUALIFY row_number() OVER (PARTITION BY p.interval_id, p.from_ns ORDER BY c.wakers DESC) = 1
 )
 SELECT
     p.interval_id, p.from_ns, p.to_ns,

@@ -1,4 +1,3 @@
--- name: main.stat_delivery
 -- description: What became of every message at every subscription of its topic. Only the depth of
 --     the queue tells overwriting from loss on the way; incompatible QoS, lifespan and best effort
 --     do not show in a trace. Of a ring buffer whose subscription was not traced, only what was

@@ -1,4 +1,3 @@
--- name: main.stat_orphan
 -- description: Takes whose publication is not known, and why.
 -- grain: one row per take without a publication
 -- column: run_id BIGINT  Run that the row belongs to

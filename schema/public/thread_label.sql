@@ -1,4 +1,3 @@
--- name: main.thread_label
 -- description: What people call a thread: the nodes of its process, and its own name where it
 --     differs from that of the process, as for threads of the middleware.
 -- grain: one row per thread

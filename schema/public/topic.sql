@@ -1,4 +1,3 @@
--- name: main.topic
 -- description: Topics, by name: who publishes and subscribes, and how many messages there were.
 --     Publishers and subscriptions without a known topic are one row of a run.
 -- grain: one row per run and topic

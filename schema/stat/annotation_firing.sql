@@ -1,4 +1,3 @@
--- name: derive.annotation_firing
 -- description: Publications by the outputs of annotations, with the number of inputs that they
 --     have a message of: through an indirect link, or as the message that the publishing callback
 --     instance was called with. Where all inputs have to come together (partial_sync,
@@ -49,8 +48,7 @@ LEFT JOIN input AS n ON a.annotation_id = n.annotation_id
 LEFT JOIN direct AS d ON b.publication_id = d.publication_id
 LEFT JOIN store.annotation_input AS i
     ON a.annotation_id = i.annotation_id AND d.subscription_id = i.subscription_id
-LEFT JOIN linked AS l
-    ON a.annotation_id = l.annotation_id AND b.publication_id = l.publication_id
+LEFT JOIN linked AS l ON a.annotation_id = l.annotation_id AND b.publication_id = l.publication_id
 WHERE a.kind IN ('periodic_async', 'queue')
     OR (a.kind = 'partial_sync' AND i.annotation_id IS NOT NULL)
 UNION ALL
@@ -60,5 +58,4 @@ SELECT
 FROM filtered AS f
 JOIN store.annotation AS a ON f.annotation_id = a.annotation_id
 LEFT JOIN input AS n ON f.annotation_id = n.annotation_id
-LEFT JOIN linked AS l
-    ON f.annotation_id = l.annotation_id AND f.publication_id = l.publication_id
+LEFT JOIN linked AS l ON f.annotation_id = l.annotation_id AND f.publication_id = l.publication_id

@@ -11,14 +11,14 @@ from pathlib import Path
 import duckdb
 import pytest
 from each import each
-from sql_files import LAYERS, SCHEMAS, SqlFile, sql_files, sql_paths
+from sql_files import LAYERS, SqlFile, sql_files, sql_paths
 
 from msgflow.cli.query_command import COMMON_OPTIONS
 from msgflow.database import Database
 from msgflow.db import objects
 from msgflow.query.runner import RESERVED
 from msgflow.query.selection import INTERNAL_COLUMN, KINDS, PATH
-from msgflow.sql.header import Header
+from msgflow.sql.header import SCHEMAS, Header
 from msgflow.sql.statement import internal_sql
 from msgflow.view.page_query import DIRECTORY, page_query
 
@@ -91,11 +91,6 @@ def declared(file: SqlFile) -> list[tuple[str, str]]:
 def test_every_sql_file_lies_in_a_known_folder() -> None:
     assert {layer for layer, _ in sql_paths()} <= set(LAYERS)
     assert FILES
-
-
-@each(FILES)
-def test_the_name_is_the_place(file: SqlFile) -> None:
-    assert file.header.name == file.expected_name
 
 
 @each(FILES)
@@ -277,5 +272,5 @@ def test_defaults_of_a_public_macro_are_those_that_it_declares(
 
 @each([*VIEWS, *MACROS])
 def test_the_database_has_the_object_in_its_schema(file: SqlFile, defined: set[str]) -> None:
+    assert file.header.name == f"{SCHEMAS[file.layer]}.{file.path.stem}"
     assert file.header.name in defined
-    assert file.header.name.startswith(f"{SCHEMAS[file.layer]}.")

@@ -1,4 +1,3 @@
--- name: fleet.action_latency
 -- title: Latency of actions by action and client, of many runs
 -- description: As the query action-latency says it of one run. Quantiles of runs cannot be added
 --     up: the largest of any run stands for them.

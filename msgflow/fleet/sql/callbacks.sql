@@ -1,4 +1,3 @@
--- name: fleet.callbacks
 -- title: Callback durations and periods, of many runs
 -- description: As the query callbacks says it of one run. Quantiles of several callbacks
 --     are off by less than 1 %, all else is exact.

@@ -1,4 +1,3 @@
--- name: fleet.distributed
 -- title: Quantiles of times that were counted in buckets
 -- description: Counts of all runs of a group are added, then the bucket is looked up that holds the
 --     quantile. What stands for a bucket is off by less than 1 % of any time in it.
@@ -13,9 +12,7 @@ WITH summed AS (
 ranked AS (
     SELECT
         label_group, measure, node, subject, bucket,
-        sum(number) OVER (
-            PARTITION BY label_group, measure, node, subject ORDER BY bucket
-        ) AS upto,
+        sum(number) OVER (PARTITION BY label_group, measure, node, subject ORDER BY bucket) AS upto,
         sum(number) OVER (PARTITION BY label_group, measure, node, subject) AS total
     FROM summed
 ),

@@ -1,4 +1,3 @@
--- name: fleet.e2e_latency
 -- title: End-to-end latency by path, of many runs
 -- description: As the query e2e-latency says it of one run, exactly: computed from the flows of all
 --     runs. Paths of one text are one path.

@@ -1,4 +1,3 @@
--- name: fleet.executor_usage
 -- title: What executor threads spent their time on, of many runs
 -- description: As the query executor-usage says it of one run; threads of one process and kind of
 --     executor are put together. The callback share is the share of all their time.

@@ -1,4 +1,3 @@
--- name: fleet.info_quality
 -- title: Data quality: what is missing, and in how many runs
 -- description: What msgflow info --section quality says of each run, added up over all its traces
 --     and over all its processes, and over the runs. Each topic has a row.

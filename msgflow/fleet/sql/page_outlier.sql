@@ -1,4 +1,3 @@
--- name: fleet.page_outlier
 -- title: Runs that stand out, by path
 -- description: Runs whose median is further from that of the others than five times what is usual
 --     (the median of the distances, scaled to a standard deviation) and than a twentieth of it.

@@ -1,4 +1,3 @@
--- name: fleet.page_point
 -- title: Latencies of every path, run by run
 -- kind: inline
 -- description: Quantiles of the first arrivals of each run, and how many flows began, arrived,

@@ -1,4 +1,3 @@
--- name: fleet.page_run
 -- title: Runs, as the page of a lake needs them
 -- description: The chosen runs in the order of their time.
 -- grain: one row per run

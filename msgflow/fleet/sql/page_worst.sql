@@ -1,4 +1,3 @@
--- name: fleet.page_worst
 -- title: The slowest flows of every path
 -- description: Flows that reached the end, by their first arrival.
 -- grain: one row per flow

@@ -1,4 +1,3 @@
--- name: fleet.reason_count
 -- title: Reasons of messages that were not taken, counted over runs
 -- description: Adds up what stands in the column reasons of delivery as 'reason 3, other 2'.
 -- grain: one row per group of runs, topic, receiving node and column

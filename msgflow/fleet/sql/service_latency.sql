@@ -1,4 +1,3 @@
--- name: fleet.service_latency
 -- title: Latency of services by service and client, of many runs
 -- description: As the query service-latency says it of one run. Quantiles of runs cannot be added
 --     up: the largest of any run stands for them.

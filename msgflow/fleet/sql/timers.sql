@@ -1,4 +1,3 @@
--- name: fleet.timers
 -- title: Whether timers keep their period, of many runs
 -- description: As the query timers says it of one run. Quantiles of runs cannot be added up: the
 --     largest of any timer stands for them.

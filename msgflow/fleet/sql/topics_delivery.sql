@@ -1,8 +1,6 @@
--- name: fleet.topics_delivery
 -- title: Messages delivered, dropped and lost by topic and receiver, of many runs
 -- description: As the query topics --measure delivery says it of one run. Counts are added, and the
---     shares are of
---     their sums.
+--     shares are of their sums.
 -- grain: one row per topic, receiving node and group of runs
 -- column: label_group BIGINT        Group of runs
 -- column: topic_name VARCHAR [topic]  Topic

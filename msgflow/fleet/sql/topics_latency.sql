@@ -1,8 +1,6 @@
--- name: fleet.topics_latency
 -- title: Latency from publication to take by topic and receiver, of many runs
 -- description: As the query topics --measure latency says it of one run. Quantiles of several
---     subscriptions
---     are off by less than 1 %, means by less than 1 ns, all else is exact.
+--     subscriptions are off by less than 1 %, means by less than 1 ns, all else is exact.
 -- grain: one row per topic, receiving node and group of runs
 -- like: e2e_latency
 -- column: label_group BIGINT        Group of runs

@@ -1,4 +1,3 @@
--- name: fleet.topics_rate
 -- title: Publication rates and periods, of many runs
 -- description: As the query topics --measure rate says it of one run. The rate is that of all runs
 --     together, without the time between them. Medians and deviations of runs cannot be added up:

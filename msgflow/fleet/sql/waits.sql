@@ -1,4 +1,3 @@
--- name: fleet.waits
 -- title: How long callbacks waited, of many runs
 -- description: As the query waits says it of one run. The median of several callbacks is off
 --     by less than 1 %, all else is exact.

@@ -1,4 +1,3 @@
--- name: fleet.worst
 -- title: The flows of a path that took longest, of all runs
 -- description: Flows that reached the end of the path, by their first arrival, with the recording
 --     that each is in.

@@ -1,4 +1,3 @@
--- name: bar
 -- description: What the timeline draws as a bar: callback instances, publications, takes, requests
 --     and responses of services, from sending to taking, what executor threads did, states of
 --     threads to the kernel, states of managed nodes, and, without a length, events of the user's own tracepoints and messages that

@@ -1,4 +1,3 @@
--- name: callback_point
 -- title: A callback over time
 -- description: Instances of a callback by pieces of time, with the longest of each.
 -- grain: one row per piece of time in which an instance began

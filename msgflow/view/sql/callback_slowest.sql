@@ -1,4 +1,3 @@
--- name: callback_slowest
 -- title: Longest instances of a callback
 -- description: The instances of a callback that ran longest, as callbacks --each lists them.
 -- grain: one row per callback instance

@@ -1,4 +1,3 @@
--- name: edge
 -- title: Links between what a report holds
 -- description: Links of a run whose ends begin in a window, for a page without a database to follow
 --     flows by: the same as main.flow_both follows.

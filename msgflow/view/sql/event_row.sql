@@ -1,4 +1,3 @@
--- name: event_row
 -- description: Rows of the timeline for events of the user's own tracepoints: one for each name, of
 --     the node in whose callbacks they happened, else of the process.
 -- grain: one row per row of the timeline

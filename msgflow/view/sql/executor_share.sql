@@ -1,4 +1,3 @@
--- name: executor_share
 -- title: What executor threads did over time
 -- description: What executor threads did (main.executor_activity) by pieces of time. Of threads
 --     whose executor tells nothing of itself, takes and callbacks alone are known.

@@ -1,4 +1,3 @@
--- name: flow
 -- title: The flow of what was picked
 -- description: Everything that the picked thing caused, or was caused by, or both
 --     (main.flow_both), as bars, and the links between them.

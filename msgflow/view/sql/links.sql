@@ -1,4 +1,3 @@
--- name: links
 -- title: Arrows of the timeline
 -- description: Links that overlap a window: messages from the end of their publication to the take,
 --     publications in the callback instance they came from, and indirect links from the end of the

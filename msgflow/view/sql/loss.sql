@@ -1,4 +1,3 @@
--- name: loss
 -- title: Messages that were not taken, and takes without a publication, by reason
 -- description: What `msgflow query topics --measure unmatched` lists one by one, counted by topic,
 --     receiving node and reason.

@@ -1,4 +1,3 @@
--- name: loss_point
 -- title: Messages that were not taken, and takes without a publication, over time
 -- description: What `msgflow query topics --measure unmatched` lists one by one, counted by pieces
 --     of time, topic and reason.

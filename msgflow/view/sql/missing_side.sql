@@ -1,4 +1,3 @@
--- name: missing_side
 -- description: Messages that a subscription did not take, and takes whose publication is not known.
 -- grain: one row per publication and subscription without a take, or take without a publication
 -- kind: inline

@@ -1,4 +1,3 @@
--- name: place
 -- title: Run of one thing
 -- description: The run that a publication, take, callback instance, request or response is in.
 -- grain: one row, none for an identity that nothing has

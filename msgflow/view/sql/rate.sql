@@ -1,4 +1,3 @@
--- name: rate
 -- title: How much happened over time
 -- description: Publications, takes and callbacks that began, by pieces of time: the curve on which
 --     a window of time is chosen.

@@ -1,4 +1,3 @@
--- name: run
 -- title: Runs to choose from
 -- description: The runs of the database, and how much of the timeline each has.
 -- grain: one row per run

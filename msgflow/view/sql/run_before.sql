@@ -1,4 +1,3 @@
--- name: run_before
 -- title: Run to compare with
 -- description: The run of the same system that was recorded last before a run. Two runs are of one
 --     system if at least half of the nodes of both are in both.

@@ -1,4 +1,3 @@
--- name: service_point
 -- title: Calls of a service over time
 -- description: Calls of one client of a service by pieces of time, with the longest of each.
 -- grain: one row per piece of time in which a call began

@@ -1,4 +1,3 @@
--- name: service_slowest
 -- title: Longest calls of a service
 -- description: The calls of one client of a service with the longest round trip.
 -- grain: one row per request

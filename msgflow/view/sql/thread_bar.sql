@@ -1,4 +1,3 @@
--- name: thread_bar
 -- description: What the kernel did with threads, as bars of the timeline: the states of each thread,
 --     and on each core what ran there, and who lost it to whom. Of other processes nothing but what
 --     took a core from a thread of a ROS process is known.

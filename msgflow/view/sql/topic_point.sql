@@ -1,4 +1,3 @@
--- name: topic_point
 -- title: A topic over time
 -- description: Messages of a topic by pieces of time: how many were published and taken, how long
 --     the takes took from publication to take, and the slowest of them.

@@ -1,4 +1,3 @@
--- name: topic_slowest
 -- title: Slowest messages of a topic
 -- description: The takes of a topic with the longest latency from publication to take.
 -- grain: one row per take

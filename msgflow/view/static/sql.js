@@ -350,9 +350,8 @@ export class SqlPage {
     if (!described) return;
     const shown = h("pre", { className: "plan query-file", tabIndex: 0 });
     const file = () =>
-      queryFile(text, { name: name.value, title: title.value }, described, this.words);
+      queryFile(text, { title: title.value }, described, this.words);
     const fill = () => clear(shown, file());
-    name.addEventListener("input", fill);
     title.addEventListener("input", fill);
     fill();
     clear(

@@ -1,4 +1,3 @@
--- name: finding.call_has_one_cause
 -- title: A call has several causes, or none
 -- description: What a thread sent after a taken request or response has one cause, and is one
 --     message.

@@ -1,4 +1,3 @@
--- name: finding.identity_is_unique
 -- title: Two rows have one identity
 -- description: Publications, takes, callback instances, requests, responses and events of the user
 --     have an identity of their own.

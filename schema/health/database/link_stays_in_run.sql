@@ -1,4 +1,3 @@
--- name: finding.link_stays_in_run
 -- title: A link leads to another run
 -- description: Nothing is linked across runs: the ids of a run are one block.
 -- cause: A mistake in msgflow, or input that it misunderstands.

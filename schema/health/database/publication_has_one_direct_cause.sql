@@ -1,4 +1,3 @@
--- name: finding.publication_has_one_direct_cause
 -- title: A publication was made inside several callback instances
 -- description: A publication is made inside at most one callback instance.
 -- cause: A mistake in msgflow, or input that it misunderstands.

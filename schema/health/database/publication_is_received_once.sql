@@ -1,4 +1,3 @@
--- name: finding.publication_is_received_once
 -- title: A subscription received a publication twice in one way
 -- description: A subscription receives a publication at most once by each way: through the ring
 --     buffer of its process, and through the middleware, whose copy it drops. Only a poll of

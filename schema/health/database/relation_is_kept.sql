@@ -1,4 +1,3 @@
--- name: finding.relation_is_kept
 -- title: A row refers to one that does not exist
 -- description: Every identity in a column that refers to another table is one of a row there.
 -- cause: A mistake in msgflow, or input that it misunderstands.

@@ -1,4 +1,3 @@
--- name: finding.request_has_one_callback_instance
 -- title: A request and its callback instance do not agree
 -- description: A request leads to at most one callback instance, and both say so.
 -- cause: A mistake in msgflow, or input that it misunderstands.

@@ -1,4 +1,3 @@
--- name: finding.take_has_one_callback_instance
 -- title: A take leads to several callback instances
 -- description: A take leads to at most one callback instance.
 -- cause: A mistake in msgflow, or input that it misunderstands.

@@ -1,4 +1,3 @@
--- name: finding.take_has_one_publication
 -- title: A take comes from several publications
 -- description: A take comes from at most one publication.
 -- cause: A mistake in msgflow, or input that it misunderstands.

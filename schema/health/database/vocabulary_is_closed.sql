@@ -1,7 +1,5 @@
--- name: finding.vocabulary_is_closed
 -- title: A word is not of the vocabulary
--- description: Kinds, methods, states, reasons and names of findings are words of the
---     vocabulary.
+-- description: Kinds, methods, states, reasons and names of findings are words of the vocabulary.
 -- cause: A mistake in msgflow, or input that it misunderstands.
 -- cure: Report what msgflow check --detail prints, together with the trace.
 -- grain: one row per word that is not

@@ -1,4 +1,3 @@
--- name: finding.empty_trace
 -- title: A trace is empty
 -- description: The trace has metadata, but no events, and no other part of its recording was given.
 --     What its host or process did is not known.

@@ -1,4 +1,3 @@
--- name: finding.executor_events_left_out
 -- title: Executors without the events that delimit their states
 -- description: An executor says that it waits for work, looks for what is ready, and executes. The
 --     recording has not all of these, so nothing shows when its threads waited, and their states

@@ -1,4 +1,3 @@
--- name: finding.executor_without_events
 -- title: An executor that records no events
 -- description: Threads ran callbacks one after the other, and no event of an executor, although
 --     these events were enabled. What the threads did between callbacks is not known: they have no

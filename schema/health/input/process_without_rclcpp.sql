@@ -1,4 +1,3 @@
--- name: finding.process_without_rclcpp
 -- title: A process that does not use rclcpp
 -- description: The process was seen to create nodes and to publish through rcl, and has no event
 --     of rclcpp, although these were enabled. So there are no callbacks, durations or executor

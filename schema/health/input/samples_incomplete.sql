@@ -1,4 +1,3 @@
--- name: finding.samples_incomplete
 -- title: Samples do not show all functions
 -- description: For a part of the samples it is not known which function ran, or what called it.
 -- cause: A file without symbols; or code that keeps no frame pointers, such as Python before 3.12.

@@ -1,4 +1,3 @@
--- name: finding.unknown_owner
 -- title: Callbacks without a known owner
 -- description: The timer, service or subscription of callbacks that ran is not known.
 -- cause: The session was started after the nodes, or the events of initialisation were not enabled

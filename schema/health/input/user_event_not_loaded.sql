@@ -1,4 +1,3 @@
--- name: finding.user_event_not_loaded
 -- title: Patterns that load no event
 -- description: Patterns of --events load nothing. Events of the kernel belong to no thread of a
 --     process, and --ignore leaves events out. Patterns of what msgflow reads in any case are not

@@ -1,4 +1,3 @@
--- name: finding.busy_waiting
 -- title: An executor that waits busily
 -- description: The threads of an executor looked for work many times as often as they found some.
 --     That costs CPU time, which callbacks may lack, and most of the events of the trace are about

@@ -1,4 +1,3 @@
--- name: finding.clock_not_synchronised
 -- title: Clocks that messages could not bring together
 -- description: The clocks of the run were to be corrected by messages, but nothing connects the
 --     clock with the others, or messages go one way only.

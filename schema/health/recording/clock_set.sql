@@ -1,4 +1,3 @@
--- name: finding.clock_set
 -- title: A clock was set, and messages around that moment have no link
 -- description: Messages are matched by time (Humble, Iron), and the clock that stamps them was set.
 --     What was stamped between the moment until which its difference from the clock of the trace is

@@ -1,4 +1,3 @@
--- name: finding.discarded_events
 -- title: The tracer discarded events
 -- description: Events were lost because the buffers were full. What happened in those gaps is
 --     missing, nothing is paired across them, and results near them are marked is_loss_affected.

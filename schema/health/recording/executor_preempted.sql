@@ -1,4 +1,3 @@
--- name: finding.executor_preempted
 -- title: Other threads take the CPU from an executor
 -- description: Callbacks of an executor with normal priority had work to do, but another thread had
 --     the CPU for more than a tenth of that time. They take that much longer than they compute.

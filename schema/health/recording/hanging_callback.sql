@@ -1,4 +1,3 @@
--- name: finding.hanging_callback
 -- title: A callback that never ended
 -- description: A callback was still running when the recording ended, at least half a second after
 --     the last that its thread did, and ten times as long as it ever took before. What its executor

@@ -1,4 +1,3 @@
--- name: finding.initialisation_lost
 -- title: Events of initialisation were lost
 -- description: Objects were used whose creation is not in the trace, and the trace lost events at
 --     the time when their process started. These objects are placeholders with no name, or with one

@@ -1,4 +1,3 @@
--- name: finding.kernel_events_lost
 -- title: Kernel events were lost
 -- description: Kernel events are missing, on any CPU. States of threads meanwhile are marked
 --     is_loss_affected: a switch or a waking in them may not be seen.

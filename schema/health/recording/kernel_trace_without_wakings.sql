@@ -1,4 +1,3 @@
--- name: finding.kernel_trace_without_wakings
 -- title: The kernel trace does not show what woke threads
 -- description: The kernel trace has switches alone. A sleep includes the wait for a CPU that
 --     follows it, and what ended it is not known: there is no wake-up latency, and critical paths

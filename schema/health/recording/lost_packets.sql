@@ -1,4 +1,3 @@
--- name: finding.lost_packets
 -- title: Whole packets are missing
 -- description: The numbers of the packets skip some, or the stream of one CPU ends before the
 --     events of others. What happened in these packets is missing, and nothing is paired across the

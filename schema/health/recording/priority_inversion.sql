@@ -1,4 +1,3 @@
--- name: finding.priority_inversion
 -- title: Less urgent threads delay an executor with real-time priority
 -- description: An executor with real-time priority lost the CPU to a less urgent thread. Or it
 --     slept in a callback until another thread woke it, and that one had to wait for a CPU which a

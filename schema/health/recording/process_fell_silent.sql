@@ -1,4 +1,3 @@
--- name: finding.process_fell_silent
 -- title: A process that fell silent
 -- description: The process has no event in the last half second of the recording or longer, though
 --     messages were sent to it meanwhile, and its middleware did not say goodbye, as it does when

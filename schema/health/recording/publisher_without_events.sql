@@ -1,4 +1,3 @@
--- name: finding.publisher_without_events
 -- title: A publisher whose publications are not traced
 -- description: Messages of a topic were taken whose publication is not in the traces. A publisher
 --     of the topic was recorded, but not one publication of it. Flows of these messages begin at

@@ -1,4 +1,3 @@
--- name: finding.started_late
 -- title: Tracing started after ROS
 -- description: Objects were used whose creation is not in the trace. They are placeholders with no
 --     name, or with one deduced from messages. So topics and nodes are missing from results. Not

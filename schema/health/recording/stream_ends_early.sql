@@ -1,4 +1,3 @@
--- name: finding.stream_ends_early
 -- title: Streams end before their trace
 -- description: The last packet of a CPU ends more than half a second before the last one of other
 --     CPUs, all chunks and snapshots of the recording considered. Events of that CPU may be missing

@@ -1,4 +1,3 @@
--- name: finding.tracing_paused
 -- title: Tracing was paused
 -- description: All streams of a trace are silent at once between packets. What happened meanwhile
 --     is missing, and nothing is paired across the pause.

@@ -1,4 +1,3 @@
--- name: finding.unmatched_take
 -- title: Messages received whose publication is not known
 -- description: Messages were received whose publication is not known. Their flows begin at the
 --     take.

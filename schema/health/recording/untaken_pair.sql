@@ -1,4 +1,3 @@
--- name: finding.untaken_pair
 -- kind: inline
 -- description: Publishers and subscriptions between which messages ended for one reason: who they
 --     are, in words and by their ids, and how many messages.

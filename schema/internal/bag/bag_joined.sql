@@ -1,4 +1,3 @@
--- name: internal.bag_joined
 -- title: Messages of a bag, and the publications that they may be the messages of
 -- description: A subscription gets a message after it was sent, and soon: within the time in which
 --     99 % of the traced takes of its topic got theirs, of all topics where none is traced. It was

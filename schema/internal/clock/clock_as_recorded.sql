@@ -1,4 +1,3 @@
--- name: internal.clock_as_recorded
 -- title: Clocks without a correction
 -- description: What store.clock holds of the clocks of a run that nothing corrects: their times are
 --     as recorded, counted from the begin of their first trace.

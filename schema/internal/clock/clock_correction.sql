@@ -1,4 +1,3 @@
--- name: internal.clock_correction
 -- title: How far corrected clocks can be wrong
 -- description: Clocks that are corrected to another one, and how well that is known.
 -- grain: one row per clock that is corrected

@@ -1,4 +1,3 @@
--- name: internal.clock_from_messages
 -- title: Clocks as messages and packets correct them
 -- description: What store.clock holds of the clocks of a run that messages and packets bring
 --     together; whether they connect the clock with another one, since it stays as it is if not;

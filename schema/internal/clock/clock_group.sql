@@ -1,4 +1,3 @@
--- name: internal.clock_group
 -- title: Clocks that are together
 -- description: Clocks that are corrected to the same one. The bound of two clocks is the sum of
 --     theirs, and that of the reference is 0.

@@ -1,4 +1,3 @@
--- name: internal.clock_host
 -- title: Hosts of clocks
 -- description: What people call a clock.
 -- grain: one row per clock

@@ -1,4 +1,3 @@
--- name: internal.clock_known
 -- title: Clocks by their names
 -- description: By what a file can name the clocks of a run: their UUID, and the hosts that they are
 --     of.

@@ -1,4 +1,3 @@
--- name: internal.change_part
 -- title: What the changes of paths consist of
 -- description: The difference of the means of a path (`compared`: rows of `main.comparison`) is the
 --     sum of the differences of its parts (`part_a` and `part_b`: rows of `path-breakdown`): the

@@ -1,4 +1,3 @@
--- name: internal.changed_function
 -- title: Functions whose CPU time changed
 -- description: In which functions a callback was more or less CPU time per call than in another
 --     run, what they call not counted. Only callbacks that samples of perf saw in both, and

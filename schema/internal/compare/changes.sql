@@ -1,13 +1,11 @@
--- name: internal.changes
 -- title: What changed
 -- description: A comparison (`compared`: rows of `main.comparison`) with a row for each subject,
 --     those that differ first, then the greatest change of a median.
 -- grain: one row per path, callback or topic
 -- param: only_different BOOLEAN  Leave out rows without a shown difference
--- column: change VARCHAR            'longer', 'shorter', 'both' (of different statistics),
---     'only in A', 'only in B', 'about equal' (less than matters), 'none shown' (the intervals
---     contain 0), or why it is not known:
---     'too few values', 'too few independent values', 'too few resamples'
+-- column: change VARCHAR            'longer', 'shorter', 'both' (of different statistics), 'only in
+--     A', 'only in B', 'about equal' (less than matters), 'none shown' (the intervals contain 0),
+--     or why it is not known: 'too few values', 'too few independent values', 'too few resamples'
 -- column: of VARCHAR                Statistics of which that is said
 -- column: a_median_ns BIGINT [ns]   Median in run A
 -- column: b_median_ns BIGINT [ns]   Median in run B

@@ -1,4 +1,3 @@
--- name: internal.compared_flow
 -- title: Flows of runs that are compared
 -- description: What `internal.fleet_run_value` reads of each run.
 -- grain: one row per path, root and arrival; one per path and root that did not arrive
@@ -25,8 +24,7 @@ SELECT
     e.run_id::VARCHAR AS run, p.path, e.status, e.latency_ns, e.is_first, e.is_last, e.is_newest,
     e.is_loss_affected, e.is_ambiguous, p.is_cut
 FROM main.end_to_end($runs, $from, $to, chains := 'path_chain') AS e
-JOIN main.flow_path($runs, only_paths := true, chains := 'path_chain') AS p
-    ON e.path_id = p.path_id
+JOIN main.flow_path($runs, only_paths := true, chains := 'path_chain') AS p ON e.path_id = p.path_id
 JOIN main.run AS r ON e.run_id = r.run_id
 WHERE e.root_ns >= r.start_ns + round($skip_first * 1e9)::BIGINT
 ORDER BY run, p.path, e.root_ns, e.root_kind, e.root_id, e.sink_ns, e.take_id

@@ -1,4 +1,3 @@
--- name: internal.fleet_comparison
 -- title: How runs of one side differ from those of another
 -- description: Compares two sides by `measured` (rows of `internal.fleet_run_value`). A run, or
 --     what it is a sample of, is one value, however many flows it has. The difference
@@ -143,8 +142,7 @@ centre AS (
         var_samp(greatest(e.lowest, least(e.highest, r.x))) * (any_value(e.number) - 1)
             / any_value(e.kept * (e.kept - 1)) AS error
     FROM ends AS e
-    JOIN ranked AS r
-        ON e.side = r.side AND e.subject = r.subject AND e.statistic = r.statistic
+    JOIN ranked AS r ON e.side = r.side AND e.subject = r.subject AND e.statistic = r.statistic
     GROUP BY e.side, e.subject, e.statistic
 ),
 known AS (
@@ -154,8 +152,7 @@ known AS (
         c.spread_percent,
         round(CASE WHEN c.is_log THEN exp(c.centre) ELSE c.centre END)::BIGINT AS value_ns
     FROM of_side AS s
-    LEFT JOIN centre AS c
-        ON s.side = c.side AND s.subject = c.subject AND s.statistic = c.statistic
+    LEFT JOIN centre AS c ON s.side = c.side AND s.subject = c.subject AND s.statistic = c.statistic
 ),
 paired AS (
     SELECT

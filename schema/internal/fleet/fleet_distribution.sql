@@ -1,4 +1,3 @@
--- name: internal.fleet_distribution
 -- title: How measured times are distributed
 -- description: Counts of durations and latencies in buckets whose limits grow by 2 %. Of several
 --     runs the counts of a bucket are added; a quantile of the sum is off by less than 1 % of its

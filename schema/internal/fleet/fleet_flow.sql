@@ -1,4 +1,3 @@
--- name: internal.fleet_flow
 -- title: Flows of every path, one by one
 -- description: Rows of main.end_to_end with its defaults (from the start of a callback to the end
 --     of one), each with its path. The query e2e-latency summarises these rows for a run. The rows

@@ -1,4 +1,3 @@
--- name: internal.fleet_run_value
 -- title: What each run of two sides takes on each path
 -- description: Statistics of the latency of every path in every run. Reads `flow` and `e2e_latency`
 --     of a lake, and `sided`: the runs (run), the side of each (side, 'a' or 'b') and what it is a

@@ -1,4 +1,3 @@
--- name: internal.run_identity
 -- title: Key of a run
 -- description: What tells a run from others wherever it was read: the identity of its packets, as
 --     the database knows packets again, put together to a hash of 20 hexadecimal digits.

@@ -1,4 +1,3 @@
--- name: internal.flow_steps
 -- title: Steps of a flow
 -- description: The steps of `main.flow_step`, with how long the executor was busy before the
 --     callbacks of takes and requests, and when the thread went on after a publication

@@ -1,4 +1,3 @@
--- name: internal.missing_way
 -- title: Why no path leads from one place to another
 -- description: Where flows that start at one place end, and where those begin that arrive at
 --     another, if no path leads from the one to the other. Of the nodes where flows end, those

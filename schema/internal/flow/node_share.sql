@@ -1,4 +1,3 @@
--- name: internal.node_share
 -- title: Time by node, on a path
 -- description: The share of each node in the time of one path, and the largest of its parts.
 -- grain: one row per node

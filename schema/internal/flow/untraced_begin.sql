@@ -1,4 +1,3 @@
--- name: internal.untraced_begin
 -- title: Where flows of publishers that are not traced begin
 -- description: Topics with such messages, and whether their flows begin with the stamp of each
 --     message, or where its clock may be another one, with its take.

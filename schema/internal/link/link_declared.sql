@@ -1,4 +1,3 @@
--- name: internal.link_declared
 -- title: Links that the trace declares
 -- description: The annotations of a run that its trace declares, with their endpoints: those among
 --     a file are not stored again.

@@ -1,4 +1,3 @@
--- name: internal.link_of_file
 -- title: Links that a file declares
 -- description: The annotations of a run that a file declared, as an entry of a file has them: what
 --     is suggested stands beside them.

@@ -1,4 +1,3 @@
--- name: internal.link_source
 -- title: Indirect links by who declares them
 -- description: How many indirect links of a run a file declares, and how many its trace.
 -- grain: one row

@@ -1,4 +1,3 @@
--- name: internal.link_without_effect
 -- title: Declared links that lead to nothing
 -- description: The indirect links that a file declared for a run and that no message took, with the
 --     reason.

@@ -1,4 +1,3 @@
--- name: internal.topic_of_file
 -- title: Topics that a file of links names, or could name
 -- description: What a file named for a run, and topics that still have no name, as entries of a
 --     file have them: both stand in the file of suggestions.

@@ -1,4 +1,3 @@
--- name: internal.unnamed_endpoint
 -- title: Publishers and subscriptions that a file of links can name
 -- description: Those whose topic the trace does not name, with what messages tell about it.
 -- grain: one row per publisher or subscription

@@ -1,4 +1,3 @@
--- name: internal.mcap_loss
 -- title: Losses of an MCAP file
 -- description: Messages that a subscription did not get, though it was connected.
 -- grain: one row per publication and subscription that did not get it

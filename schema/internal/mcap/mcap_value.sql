@@ -1,4 +1,3 @@
--- name: internal.mcap_value
 -- title: Values of an MCAP file
 -- description: Measured values as messages, in the order of time: latency of paths by the start of
 --     the flow (first arrivals), age of the data at their ends by the output, latency from

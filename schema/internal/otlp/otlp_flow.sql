@@ -1,4 +1,3 @@
--- name: internal.otlp_flow
 -- title: Flows as traces
 -- description: What belongs to flows that reached the end of their paths: callback instances,
 --     publications, takes, and the requests and responses between them.

@@ -1,4 +1,3 @@
--- name: internal.otlp_span
 -- title: Spans of OpenTelemetry
 -- description: Callback instances, publications, takes, requests and responses as spans. What
 --     caused a thing is its parent; of several causes that is the callback that it happened in, or

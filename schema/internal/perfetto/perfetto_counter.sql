@@ -1,4 +1,3 @@
--- name: internal.perfetto_counter
 -- title: Counters in Perfetto
 -- description: The tracks of rates and of queues.
 -- grain: one row per publisher and subscription

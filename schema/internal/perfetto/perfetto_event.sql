@@ -1,4 +1,3 @@
--- name: internal.perfetto_event
 -- title: Events of the user in Perfetto
 -- description: Events of the user's own tracepoints, as moments on their threads.
 -- grain: one row per event

@@ -1,4 +1,3 @@
--- name: internal.perfetto_frame
 -- title: Functions in Perfetto
 -- description: Functions of stacks.
 -- grain: one row per function and file

@@ -1,4 +1,3 @@
--- name: internal.perfetto_gap
 -- title: Gaps in Perfetto
 -- description: Gaps of a host, those that touch as one: slices of a track are disjoint or nested.
 -- grain: one row per gap of a host

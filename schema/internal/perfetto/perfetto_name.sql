@@ -1,4 +1,3 @@
--- name: internal.perfetto_name
 -- title: Names in Perfetto
 -- description: Names of slices. A slice refers to its name by code and id; id 0 is what is not
 --     known. A client has two names: of its requests, and of calls that a callback waited for.

@@ -1,4 +1,3 @@
--- name: internal.perfetto_process
 -- title: Processes in Perfetto
 -- kind: inline
 -- description: The tracks of processes. Two processes (of two hosts, or lives) may have one pid;

@@ -1,4 +1,3 @@
--- name: internal.perfetto_sample
 -- title: Samples of stacks in Perfetto
 -- description: Samples of what threads ran, with their stacks.
 -- grain: one row per sample of a thread that has a track

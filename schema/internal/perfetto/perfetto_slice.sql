@@ -1,4 +1,3 @@
--- name: internal.perfetto_slice
 -- title: Slices in Perfetto
 -- description: Begins and ends of slices of threads and of executors, in the order of each track,
 --     with the links between them. A request whose response a callback waited for lasts until then.

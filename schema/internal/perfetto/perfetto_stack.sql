@@ -1,4 +1,3 @@
--- name: internal.perfetto_stack
 -- title: Stacks in Perfetto
 -- description: The stacks of samples, the outermost call first.
 -- grain: one row per stack

@@ -1,4 +1,3 @@
--- name: internal.perfetto_state
 -- title: Scheduling in Perfetto
 -- description: States of threads, as the kernel recorded them, and what of that ran on which core.
 --     Slices of a track are disjoint.
@@ -36,10 +35,7 @@ SELECT
     'kernel' AS track_name,
     CASE WHEN state = 'preempted' THEN concat_ws(' by ', state, who) ELSE state END AS name,
     start_ns, end_ns, cpu, priority,
-    CASE
-        WHEN waker_kind = 'thread' THEN who
-        ELSE waker_kind
-    END AS woken_by
+    CASE WHEN waker_kind = 'thread' THEN who ELSE waker_kind END AS woken_by
 FROM state
 UNION ALL
 -- Linux has at most 8192 CPUs.

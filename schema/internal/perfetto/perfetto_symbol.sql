@@ -1,4 +1,3 @@
--- name: internal.perfetto_symbol
 -- title: Symbols in Perfetto
 -- description: Symbols of callbacks, which slices refer to by number.
 -- grain: one row per callback with a symbol

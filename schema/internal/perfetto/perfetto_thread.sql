@@ -1,4 +1,3 @@
--- name: internal.perfetto_thread
 -- title: Threads in Perfetto
 -- kind: inline
 -- description: The tracks of threads, and of what their executors did on them.

@@ -1,4 +1,3 @@
--- name: internal.perfetto_value
 -- title: Values of counters in Perfetto
 -- description: The rate of each publisher, from the time since its publication before; and how many
 --     messages of each subscription were published and not yet taken, of those that it took later.
@@ -34,9 +33,7 @@ queue AS (
             PARTITION BY subscription_id ORDER BY at_ns, step DESC, take_id
             ROWS UNBOUNDED PRECEDING
         )::DOUBLE AS value,
-        row_number() OVER (
-            PARTITION BY subscription_id ORDER BY at_ns, step DESC, take_id
-        ) AS place
+        row_number() OVER (PARTITION BY subscription_id ORDER BY at_ns, step DESC, take_id) AS place
     FROM step
 )
 SELECT track, at_ns, value, 0 AS place FROM rate WHERE value IS NOT NULL

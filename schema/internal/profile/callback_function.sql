@@ -1,4 +1,3 @@
--- name: internal.callback_function
 -- title: Functions of a callback
 -- description: The three functions in which a callback was most of its CPU time.
 -- grain: one row per function

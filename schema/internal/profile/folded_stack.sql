@@ -1,4 +1,3 @@
--- name: internal.folded_stack
 -- title: Stacks of a flame graph
 -- description: Stacks that samples saw, below their node and callback, with how often: as tools for
 --     flame graphs read them, the outermost call first.

@@ -1,4 +1,3 @@
--- name: internal.worst_callback
 -- title: The longest run of a callback
 -- description: Of the instances of a callback that ended, the longest that began in the window.
 -- grain: one row, or none

@@ -1,4 +1,3 @@
--- name: internal.worst_goal
 -- title: The goal that took longest
 -- description: Of the goals of an action client to a server in the window, the one whose result
 --     came latest. The request that sent it stands for it.

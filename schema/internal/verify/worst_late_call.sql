@@ -1,4 +1,3 @@
--- name: internal.worst_late_call
 -- title: The latest call of a timer
 -- description: Of the calls of a timer in the window, the one that came latest after it was due.
 -- grain: one row, or none

@@ -1,4 +1,3 @@
--- name: internal.worst_message
 -- title: The message that took longest
 -- description: Of the messages that a subscription took in the window, the one that was longest on
 --     its way.

@@ -1,4 +1,3 @@
--- name: internal.worst_preemption
 -- title: The run of a callback that lost the CPU for longest
 -- description: Of the instances of a callback that began in the window, the one in which other
 --     threads had the CPU for longest.

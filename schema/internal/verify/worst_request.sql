@@ -1,4 +1,3 @@
--- name: internal.worst_request
 -- title: The request that took longest
 -- description: Of the answered requests of a client to a service in the window, the one that was
 --     answered latest.

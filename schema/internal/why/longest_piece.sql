@@ -1,4 +1,3 @@
--- name: internal.longest_piece
 -- title: The longest pieces of a slow flow
 -- description: Rows of critical-path: the longest pieces of one flow, in their order, and behind
 --     them the sum of all others. It has the columns of its input.

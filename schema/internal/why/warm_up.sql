@@ -1,4 +1,3 @@
--- name: internal.warm_up
 -- title: When the system of an explanation had warmed up
 -- description: The moment of the last of the longest latencies, if they all lie at the start. It
 --     reads the flows of an explanation.

@@ -1,4 +1,3 @@
--- name: staging.link_packet
 -- description: Packets that were seen being sent on one clock and received on another. To find
 --     roughly how far two clocks are apart, the times of ends with equal keys are compared, of the
 --     rarest keys first. The difference that most of them agree on to within a second counts,

@@ -1,4 +1,3 @@
--- name: staging.network_packet
 -- description: Packets that kernel traces saw being handed to a network device or coming from one.
 --     `key` is equal for the two ends of a packet's way and, as far as its headers allow, for no
 --     other packet: addresses, ports, the identification of the datagram; for TCP the sequence and

@@ -1,4 +1,3 @@
--- name: staging.callback_preemptor
 -- description: What ran on the CPU for which callback instances waited.
 -- grain: one row per callback instance, and thread that ran meanwhile, with its priority
 -- when: staging.preemptor

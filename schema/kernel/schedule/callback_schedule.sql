@@ -1,4 +1,3 @@
--- name: staging.callback_schedule
 -- description: How the time of callback instances divides into states of their threads.
 -- grain: one row per callback instance that ended, on a thread with known states
 -- when: staging.thread_state

@@ -1,4 +1,3 @@
--- name: staging.callback_state
 -- description: States of the thread during callback instances, cut to them.
 -- grain: one row per callback instance that ended and state that it overlaps
 -- when: staging.thread_state

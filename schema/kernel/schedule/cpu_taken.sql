@@ -1,4 +1,3 @@
--- name: staging.cpu_taken
 -- description: What ran on the CPU for which a thread waited, one thread after the other. What the
 --     next switch contradicts is not known. The other thread ran from `start_ns` to `end_ns`.
 -- grain: one row per wait for a CPU and stretch of time in which another thread had it

@@ -1,4 +1,3 @@
--- name: staging.cpu_wait
 -- description: Waits of threads for a CPU: preempted, or woken. A wait is cut where the thread goes
 --     to another CPU. Where the kernel trace does not say that, a thread that was woken waits for
 --     the CPU on which it goes on.
@@ -39,8 +38,7 @@ begin AS (
 cut AS (
     SELECT m.thread_id, m.tid, w.start_ns AS state_start_ns, m.at_ns AS start_ns, m.cpu
     FROM migration AS m
-    ASOF JOIN wait AS w
-        ON m.thread_id = w.thread_id AND m.tid = w.tid AND m.at_ns > w.start_ns
+    ASOF JOIN wait AS w ON m.thread_id = w.thread_id AND m.tid = w.tid AND m.at_ns > w.start_ns
     WHERE m.at_ns < w.end_ns
 ),
 part AS (
@@ -56,5 +54,4 @@ SELECT
     ) AS end_ns,
     w.state, w.trace_index, p.cpu, w.priority
 FROM part AS p
-JOIN wait AS w
-    ON p.thread_id = w.thread_id AND p.tid = w.tid AND p.state_start_ns = w.start_ns
+JOIN wait AS w ON p.thread_id = w.thread_id AND p.tid = w.tid AND p.state_start_ns = w.start_ns

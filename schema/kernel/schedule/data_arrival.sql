@@ -1,4 +1,3 @@
--- name: staging.data_arrival
 -- description: When messages arrived before they were taken. The listener of the middleware says so
 --     (CARET, with Fast DDS): the first time that its process had one of that stamp. With several
 --     readers in the process it is not known which of them had it then. In an events executor, the

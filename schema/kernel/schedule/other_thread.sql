@@ -1,4 +1,3 @@
--- name: staging.other_thread
 -- description: Threads that are none of a ROS process, but had the CPU while one that is waited
 --     for it, or woke it. The kernel's idle thread of each CPU is one of them.
 -- grain: one row per host, tid and name

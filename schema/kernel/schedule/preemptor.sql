@@ -1,4 +1,3 @@
--- name: staging.preemptor
 -- description: What ran on the CPU for which a thread of a ROS process waited.
 -- grain: one row per wait for a CPU and stretch of time in which another thread had it
 -- when: staging.cpu_taken

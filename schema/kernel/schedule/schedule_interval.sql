@@ -1,4 +1,3 @@
--- name: staging.schedule_interval
 -- description: What each thread of a ROS process did, from switch to switch and waking. A waking
 --     may come before the switch that it undoes. What the next switch contradicts is not known. A
 --     thread that is seen on a CPU without a switch to it got it at some time since its waking.
@@ -46,8 +45,7 @@ waking AS (
         min_by(k.event_id, (k.at_ns, k.waker_tid IS NULL, k.event_id)) AS event_id,
         min(k.at_ns) AS at_ns
     FROM staging.thread_waking AS k
-    ASOF LEFT JOIN step AS w
-        ON k.thread_id = w.thread_id AND k.tid = w.tid AND k.at_ns >= w.at_ns
+    ASOF LEFT JOIN step AS w ON k.thread_id = w.thread_id AND k.tid = w.tid AND k.at_ns >= w.at_ns
     GROUP BY ALL
 ),
 placed AS (
@@ -74,8 +72,7 @@ placed AS (
         END AS state
     FROM step AS s
     JOIN life AS f ON s.thread_id = f.thread_id AND s.tid = f.tid
-    LEFT JOIN waking AS k
-        ON s.thread_id = k.thread_id AND s.tid = k.tid AND s.number = k.number
+    LEFT JOIN waking AS k ON s.thread_id = k.thread_id AND s.tid = k.tid AND s.number = k.number
 ),
 interval AS (
     SELECT
@@ -111,8 +108,7 @@ interval AS (
         s.cpu, s.cpu, s.priority, CASE WHEN s.is_on THEN k.event_id END
     FROM step AS s
     JOIN life AS f ON s.thread_id = f.thread_id AND s.tid = f.tid
-    LEFT JOIN waking AS k
-        ON s.thread_id = k.thread_id AND s.tid = k.tid AND k.number IS NULL
+    LEFT JOIN waking AS k ON s.thread_id = k.thread_id AND s.tid = k.tid AND k.number IS NULL
     WHERE s.number = 1
 )
 SELECT

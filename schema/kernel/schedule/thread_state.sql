@@ -1,4 +1,3 @@
--- name: staging.thread_state
 -- description: States of threads of ROS processes, with what took the CPU and what woke them.
 -- grain: one row per interval in which a thread had one state
 -- when: staging.schedule_interval
@@ -7,9 +6,7 @@ WITH packet AS (
         s.clock_key, p.discarded_event_count,
         coalesce(p.last_event_ns, p.begin_ns) + s.shift_ns AS start_ns,
         coalesce(
-            lead(p.begin_ns) OVER (
-                PARTITION BY p.trace_index, p.stream_index ORDER BY p.position
-            ),
+            lead(p.begin_ns) OVER (PARTITION BY p.trace_index, p.stream_index ORDER BY p.position),
             p.end_ns
         ) + s.shift_ns AS end_ns
     FROM raw.packet AS p

@@ -1,4 +1,3 @@
--- name: staging.thread_tid
 -- description: The number that the kernel has for each thread. A declaration counts: contexts of
 --     switches while its process lived, else the latest of the state dump and its creation; unless
 --     it is of several threads or the schedule contradicts it. Else it is what ran on the CPU at

@@ -1,4 +1,3 @@
--- name: staging.thread_waking
 -- description: When threads of ROS processes were woken, and by what: the interrupt that the CPU
 --     was handling, else the thread that ran there. A switch ends every interrupt. Where the kernel
 --     trace contradicts itself about what ran, only a thread that is seen there is known. `kind` is

@@ -1,5 +1,3 @@
--- name: derive.annotated_publication
--- kind: macro
 -- description: Publications by the outputs of annotations of indirect links, with the callback
 --     instance that they were made in and its subscription. The cut, before which an input has to
 --     be there, is the start of that instance, else that of the publication itself.

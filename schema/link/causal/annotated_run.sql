@@ -1,5 +1,3 @@
--- name: derive.annotated_run
--- kind: macro
 -- description: Instances of the callbacks of subscriptions that are inputs of annotations. Where no
 --     callback of the subscription was traced (rclpy), its takes stand for them: each is over as
 --     soon as it began, and has the negative of its identity.

@@ -1,5 +1,3 @@
--- name: derive.answer_doubtful
--- kind: macro
 -- description: Publications that followed a take without a callback, and may have another cause
 --     than its message. In rclpy a timer shows no event. What it publishes follows some message,
 --     too, and so does what a loop publishes by a clock of its own. So a publisher is doubtful if a

@@ -1,5 +1,3 @@
--- name: derive.approximate_set
--- kind: macro
 -- description: Sets of messages as message_filters (ApproximateTime) makes them, one for each
 --     message that may be the pivot of a set: the latest of the first messages of the inputs that
 --     are still unused. A set is the first message of every input from some moment on, up to the

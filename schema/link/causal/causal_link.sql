@@ -1,5 +1,3 @@
--- name: derive.causal_link
--- kind: macro
 -- description: Causal links as they are stored. In a process that is several with equal ids, the
 --     cause may be one of another process, so there is one candidate more. Annotations take links
 --     away. `independent` says that a publisher does not answer a subscription: links of the kinds

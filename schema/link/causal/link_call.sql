@@ -1,5 +1,3 @@
--- name: derive.link_call
--- kind: macro
 -- when: store.request, store.response
 -- description: What a thread sends after it took a request or a response for which no callback is
 --     traced: clients and action servers of rclcpp run their callbacks right behind the take. The

@@ -1,5 +1,3 @@
--- name: derive.link_causal_approximate
--- kind: macro
 -- description: Messages of the sets that approximately synchronous annotations publish. A
 --     publication inside a callback instance of an input is a firing: that instance showed that a
 --     set is complete (derive.approximate_set). If it did so for sets of several pivots that
@@ -73,10 +71,8 @@ used AS (
         unnest([min(m.stamp_ns), max(m.stamp_ns)]) AS used_ns,
         unnest([1, 2]) AS reading
     FROM complete AS c
-    JOIN complete AS b
-        ON c.annotation_id = b.annotation_id AND c.previous_event_id = b.cut_event_id
-    JOIN member AS m
-        ON b.annotation_id = m.annotation_id AND b.proof_event_id = m.proof_event_id
+    JOIN complete AS b ON c.annotation_id = b.annotation_id AND c.previous_event_id = b.cut_event_id
+    JOIN member AS m ON b.annotation_id = m.annotation_id AND b.proof_event_id = m.proof_event_id
     WHERE c.set_count > 1
     GROUP BY c.annotation_id, c.cut_event_id, m.subscription_id
 ),
@@ -113,8 +109,7 @@ chosen AS MATERIALIZED (
         c.proof_event_id = c.cut_event_id
         AND (c.set_count = 1 OR coalesce(d.is_certain, false)) AS is_certain
     FROM complete AS c
-    LEFT JOIN decided AS d
-        ON c.annotation_id = d.annotation_id AND c.cut_event_id = d.cut_event_id
+    LEFT JOIN decided AS d ON c.annotation_id = d.annotation_id AND c.cut_event_id = d.cut_event_id
 )
 SELECT
     b.run_id, b.annotation_id, b.kind, b.publication_id, b.trace_id, b.thread_id, b.start_ns,

@@ -1,5 +1,3 @@
--- name: derive.link_causal_by_hand
--- kind: macro
 -- description: Publications caused by messages that no callback was called with: what a thread
 --     publishes after such a take (`take_adjacent`), and what a callback instance publishes after
 --     it (`polled`). A publication that may be no answer to the message before it has one candidate

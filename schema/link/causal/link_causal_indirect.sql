@@ -1,5 +1,3 @@
--- name: derive.link_causal_indirect
--- kind: macro
 -- description: Messages that were kept until another callback published, as annotations tell.
 --     `periodic_async`: a publication uses the latest message of each input, whatever was used
 --     before; the caches are never emptied. `partial_sync`: publications need a message of every
@@ -86,8 +84,7 @@ used AS (
     SELECT r.annotation_id, r.callback_instance_id
     FROM run AS r
     JOIN around AS a ON r.callback_instance_id = a.callback_instance_id
-    JOIN firing AS f
-        ON r.annotation_id = f.annotation_id AND a.outer_id = f.callback_instance_id
+    JOIN firing AS f ON r.annotation_id = f.annotation_id AND a.outer_id = f.callback_instance_id
     WHERE r.effective_end_event_id <= f.last_event_id
 ),
 -- Candidates beside those in a cache at the cut, or nested in the firing.
@@ -218,8 +215,7 @@ cached AS (
         d.start_event_id,
         coalesce(
             n.callback_instance_id, d.callback_instance_id,
-            CASE WHEN d.kind = 'partial_sync' AND a.outer_id IS NULL
-                THEN p.callback_instance_id END
+            CASE WHEN d.kind = 'partial_sync' AND a.outer_id IS NULL THEN p.callback_instance_id END
         ) AS callback_instance_id,
         CASE
             WHEN d.kind = 'periodic_async' THEN

@@ -1,5 +1,3 @@
--- name: derive.link_causal_polled
--- kind: macro
 -- description: Messages that a callback instance takes by itself (polling subscriptions), and what
 --     it publishes afterwards. Of each subscription the last message that it took before counts.
 --     An executor that spins inside of a callback takes messages there, too: each has a callback

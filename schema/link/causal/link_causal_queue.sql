@@ -1,5 +1,3 @@
--- name: derive.link_causal_queue
--- kind: macro
 -- description: Messages that wait in a queue until a thread of the node has worked them off, first
 --     in, first out, as annotations of the kind `queue` tell: each publication by an output answers
 --     the oldest message that none answered yet. Where the queue holds no more than `queue_depth`,

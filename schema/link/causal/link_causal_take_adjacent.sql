@@ -1,13 +1,10 @@
--- name: derive.link_causal_take_adjacent
--- kind: macro
 -- description: Publications that a thread makes after it took a message by hand (rclpy, rclc, wait
 --     sets), until its next take. A take of a request or a response counts, too. The link ends at
 --     the begin or end of a callback, at the next event of an executor, and at a gap. What is
 --     published inside a callback instance is caused by that instance instead. Where callbacks of
---     Python are traced, no message causes anything else. What the middleware
---     publishes by itself (it has no publisher, though nothing was lost) has no cause. Timers of
---     rclpy do not show: what they publish is among the rows, and derive.answer_doubtful tells it
---     apart.
+--     Python are traced, no message causes anything else. What the middleware publishes by itself
+--     (it has no publisher, though nothing was lost) has no cause. Timers of rclpy do not show:
+--     what they publish is among the rows, and derive.answer_doubtful tells it apart.
 -- grain: one row per publication made after a take without a callback
 CREATE OR REPLACE MACRO derive.link_causal_take_adjacent(only_run) AS TABLE
 WITH by_hand AS (

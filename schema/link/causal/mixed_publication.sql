@@ -1,5 +1,3 @@
--- name: derive.mixed_publication
--- kind: macro
 -- description: Publications under ids that several processes share: nothing says which of these
 --     processes published.
 -- grain: one row per such publication

@@ -1,5 +1,3 @@
--- name: derive.take_by_hand
--- kind: macro
 -- description: Takes of messages that no callback was called with.
 -- grain: one row per such take
 CREATE OR REPLACE MACRO derive.take_by_hand(only_run) AS TABLE

@@ -1,4 +1,3 @@
--- name: derive.host_gap
 -- description: Gaps in what a host recorded of its processes, for ASOF joins as with
 --     derive.recording_gap. Those of kernel traces are none.
 -- grain: one row per such gap

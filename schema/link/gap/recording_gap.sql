@@ -1,4 +1,3 @@
--- name: derive.recording_gap
 -- description: Gaps of the recordings, for ASOF joins. To see whether a gap touches a window:
 --     take the last gap that starts before the end of the window. One touches it if `start_ns` or
 --     `covered_until_ns` of that gap is at or after the begin of the window.

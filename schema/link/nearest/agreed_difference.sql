@@ -1,5 +1,3 @@
--- name: derive.agreed_difference
--- kind: macro
 -- description: The differences of two clocks that may be the right one: those that nearly as many
 --     messages allow as the best one. They form ranges without a gap, a row each. In a range, the
 --     middle of what most messages allow is furthest from giving a message to another

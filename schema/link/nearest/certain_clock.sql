@@ -1,5 +1,3 @@
--- name: derive.certain_clock
--- kind: macro
 -- description: Where the difference between the clock that stamps messages and that of the traces
 --     is certain. It is so between stretches of time that agree with it: in a stretch beside a
 --     step, or before one that is not known, the clock may have been set already. If a single

@@ -1,5 +1,3 @@
--- name: derive.clock_step
--- kind: macro
 -- description: When a clock that stamps messages was set, and from which difference to which. Until
 --     start_ns its difference is certain, and from end_ns on it is so again. If it is so on neither
 --     side or on one only, all that is known on the other is within the step. A stamp from a step

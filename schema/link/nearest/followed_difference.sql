@@ -1,5 +1,3 @@
--- name: derive.followed_difference
--- kind: macro
 -- description: Which of the differences that messages agree with is the right one, from stretch
 --     to stretch. The clocks of one machine begin together (a few messages are enough to say so),
 --     and then drift: of the differences that a drift can lead to, the one that most messages

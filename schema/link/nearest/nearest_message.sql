@@ -1,5 +1,3 @@
--- name: derive.nearest_message
--- kind: macro
 -- description: Messages matched with publications that carry no stamp. A message was stamped after
 --     its publication was written, and before the publishing thread went on; all writes on the
 --     topic that go on at that moment come into question. A message has one publication and a

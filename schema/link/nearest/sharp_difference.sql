@@ -1,5 +1,3 @@
--- name: derive.sharp_difference
--- kind: macro
 -- description: The difference of two clocks that most messages of some stretches of time allow;
 --     the drift brings each message to the middle of one stretch. The difference is sharp, and
 --     tells messages apart that were published within microseconds, if nearly all messages allow

@@ -1,5 +1,3 @@
--- name: derive.stamp_clock
--- kind: macro
 -- description: How far the clock that stamps messages is from that of the traces, over time. In
 --     each stretch of time, the difference that most messages allow is followed from the stretch
 --     before. Where one difference explains a longer time, the clocks stood; between two such
@@ -54,9 +52,7 @@ agreed AS (
         clock_id, stretch // 2 AS stretch, least_ns, greatest_ns, difference_ns, vote_count,
         most_count
     FROM derive.agreed_difference('allowed')
-    QUALIFY rank() OVER (
-        PARTITION BY clock_id, stretch // 2 ORDER BY most_count DESC, stretch
-    ) = 1
+    QUALIFY rank() OVER (PARTITION BY clock_id, stretch // 2 ORDER BY most_count DESC, stretch) = 1
 ),
 origin AS (
     SELECT clock_id, stretch, avg(is_taken_here::INTEGER) >= 0.5 AS is_taken_here

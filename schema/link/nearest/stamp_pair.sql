@@ -1,5 +1,3 @@
--- name: derive.stamp_pair
--- kind: macro
 -- description: Messages beside publications that may be theirs. A stamp is made after the message
 --     was written and before the publishing thread went on, so each pair allows an interval of
 --     differences between the clock of stamps and that of the trace. If several publications

@@ -1,5 +1,3 @@
--- name: derive.standing_difference
--- kind: macro
 -- description: Where two clocks stood in one relation, and in which. The clocks of one boot run at
 --     one rate and only step (clock_gettime(2)), so this is looked for before any drift. As long
 --     as the ranges of differences overlap from stretch to stretch, one difference may hold. It

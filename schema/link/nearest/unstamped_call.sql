@@ -1,5 +1,3 @@
--- name: derive.unstamped_call
--- kind: macro
 -- description: publish() calls whose message can only be found by time: those of processes that
 --     never show the stamp of a message, and those of publishers for which the middleware has no
 --     event though nothing was lost (rmw_zenoh, which writes messages with buffers to several

@@ -1,5 +1,3 @@
--- name: derive.unstamped_message
--- kind: macro
 -- description: Messages that were taken on the topics of publications without a stamp, unless a
 --     publication with their stamp is known. All takes of one message have its topic and stamp.
 --     Where the middleware has no event of writing, it may have written a message for each
@@ -35,8 +33,7 @@ SELECT
 FROM received AS r
 ANTI JOIN stamped AS x
     ON r.source_timestamp_ns = x.source_timestamp_ns AND r.topic_name = x.topic_name
-ANTI JOIN stamped AS y
-    ON r.source_timestamp_ns = y.source_timestamp_ns AND y.topic_name IS NULL
+ANTI JOIN stamped AS y ON r.source_timestamp_ns = y.source_timestamp_ns AND y.topic_name IS NULL
 JOIN store.process AS o ON r.process_id = o.process_id
 JOIN store.host AS h ON o.host_id = h.host_id
 GROUP BY r.run_id, r.topic_name, r.source_timestamp_ns, r.only_subscription_id, h.clock_id

@@ -1,5 +1,3 @@
--- name: derive.topic_group
--- kind: macro
 -- description: Which publishers and subscriptions whose topic is not known are on one topic, as
 --     far as messages tell. A stamp that only one publication of the run has belongs to one
 --     message: its publisher and those who took it are on one topic. So are those of a message
@@ -76,8 +74,7 @@ slot_use AS (
 pair AS (
     SELECT p.publisher_id, t.subscription_id, count(*) AS message_count
     FROM published AS p
-    JOIN store.take AS t
-        ON p.run_id = t.run_id AND p.source_timestamp_ns = t.source_timestamp_ns
+    JOIN store.take AS t ON p.run_id = t.run_id AND p.source_timestamp_ns = t.source_timestamp_ns
     WHERE t.run_id = only_run AND p.publisher_id IS NOT NULL AND t.subscription_id IS NOT NULL
     GROUP BY p.publisher_id, t.subscription_id
     UNION ALL

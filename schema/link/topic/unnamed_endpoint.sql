@@ -1,5 +1,3 @@
--- name: derive.unnamed_endpoint
--- kind: macro
 -- description: Publishers and subscriptions whose topic the trace does not name, and what an entry
 --     of a file of links knows them by. A handle that occurs twice needs its process and host.
 -- grain: one row per publisher or subscription that was used, and not seen to be initialised

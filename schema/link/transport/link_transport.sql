@@ -1,5 +1,3 @@
--- name: derive.link_transport
--- kind: macro
 -- description: Messages from publication to take, by every method. A self loop is a transform that
 --     is taken by the node that sent it, or by the transform listener of its process: no flow
 --     passes through it. Lost events cannot spoil a link by equal stamps and topics, or by the
@@ -134,8 +132,7 @@ copy AS (
     UNION
     SELECT l.take_id
     FROM link AS l
-    JOIN silent AS n
-        ON l.publisher_id = n.publisher_id AND l.subscription_id = n.subscription_id
+    JOIN silent AS n ON l.publisher_id = n.publisher_id AND l.subscription_id = n.subscription_id
     WHERE l.method <> 'ring_buffer'
 ),
 -- Of processes that are several with equal ids.
@@ -162,8 +159,7 @@ SELECT
     c.take_id IS NOT NULL AS is_copy
 FROM link AS l
 LEFT JOIN store.publisher AS p ON l.publisher_id = p.publisher_id
-LEFT JOIN store.subscription AS s
-    ON l.subscription_id = s.subscription_id
+LEFT JOIN store.subscription AS s ON l.subscription_id = s.subscription_id
 LEFT JOIN store.node AS n ON s.node_id = n.node_id
 LEFT JOIN exposed AS x ON l.take_id = x.take_id
 LEFT JOIN copy AS c ON l.take_id = c.take_id

@@ -1,5 +1,3 @@
--- name: derive.link_transport_agnocast
--- kind: macro
 -- description: Messages through the shared memory of Agnocast, by their number, which counts on one
 --     topic of one kernel, that is of one clock. It needs no order: the event of a publication may
 --     come behind that of a take. When the last user of a topic ends, its numbers begin again. A
@@ -72,6 +70,4 @@ SELECT
     count(*) OVER (PARTITION BY take_id) AS candidate_count,
     false AS is_loss_affected
 FROM candidate
-QUALIFY row_number() OVER (
-    PARTITION BY take_id ORDER BY abs(at_ns - sent_ns), publication_id
-) = 1
+QUALIFY row_number() OVER (PARTITION BY take_id ORDER BY abs(at_ns - sent_ns), publication_id) = 1

@@ -1,5 +1,3 @@
--- name: derive.link_transport_exact
--- kind: macro
 -- description: Messages matched by equal, non-zero source stamps, and equal topics where both are
 --     known, whether from their own initialisation, or from other messages of the two or a file of
 --     links (then `exact_stamp`). If the topic of a side is not known, the pair counts only if the

@@ -1,5 +1,3 @@
--- name: derive.link_transport_nearest
--- kind: macro
 -- description: Takes of the messages whose publication was found by time. A subscription takes a
 --     message once, and those of a publisher in the order in which they were published: what
 --     seems to be older than one taken before is not linked. The link is doubtful where events may

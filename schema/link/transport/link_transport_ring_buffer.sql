@@ -1,5 +1,3 @@
--- name: derive.link_transport_ring_buffer
--- kind: macro
 -- description: Messages between nodes of one process, by the slot of the ring buffer: what is
 --     taken out of a slot was put in last. Exceptions: the buffer was cleared or made anew
 --     meanwhile, or a gap of the trace may hide that the slot was used again. The slots are used
@@ -47,8 +45,7 @@ exposed AS (
 behind_gap AS (
     SELECT e.take_id, e.process_id, e.buffer_handle, e.at_ns - e.previous_ns AS stay_ns
     FROM exposed AS e
-    ASOF JOIN derive.recording_gap AS g
-        ON e.recording_id = g.recording_id AND e.at_ns > g.start_ns
+    ASOF JOIN derive.recording_gap AS g ON e.recording_id = g.recording_id AND e.at_ns > g.start_ns
     WHERE g.start_ns >= e.previous_ns OR g.covered_until_ns > e.previous_ns
 ),
 -- The time from one message put into a buffer to the next, where no gap lies in between.

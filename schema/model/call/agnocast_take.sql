@@ -1,4 +1,3 @@
--- name: staging.agnocast_take
 -- description: Messages that Agnocast handed over, to a callback or to a poll. A poll without a
 --     message got nothing. `handle` tells subscriptions apart: the number of the callback, or the
 --     handle of the subscription that was polled.

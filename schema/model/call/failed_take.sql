@@ -1,4 +1,3 @@
--- name: staging.failed_take
 -- description: Attempts to take from a subscription that took nothing.
 -- grain: one row per rmw_take without a message
 -- when: raw.ros2_rmw_take

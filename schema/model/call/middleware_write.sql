@@ -1,4 +1,3 @@
--- name: staging.middleware_write
 -- description: What instrumented middleware says of one write: begin and end, in either order, or
 --     only one of them.
 -- grain: one row per write

@@ -1,4 +1,3 @@
--- name: staging.publication
 -- kind: inline
 -- description: Publications, numbered in the order of their calls, with their publisher.
 -- grain: one row per publish() call

@@ -1,4 +1,3 @@
--- name: staging.publication_call
 -- description: Layers of publish() calls stitched together. A layer continues the call only if it
 --     directly follows on the thread, comes from an earlier layer, and was given the same message.
 --     An intra-process publication and the inter-process one that directly follows it for the same

@@ -1,4 +1,3 @@
--- name: staging.publication_number
 -- description: The number of each publication, in the order of the calls, and its publisher: by rcl
 --     handle, else rmw handle, else DDS writer, each as initialised last before the call. The rcl
 --     handle of /rosout is that of a temporary object. So a call may have no rclcpp layer, a handle
@@ -50,9 +49,7 @@ resolved AS (
         w.event_id, w.process_id, w.publisher_handle,
         coalesce(
             w.rmw_event_id, w.object_event_id,
-            CASE
-                WHEN w.may_be_rosout AND o.publisher_count = 1 THEN o.publisher_event_id
-            END
+            CASE WHEN w.may_be_rosout AND o.publisher_count = 1 THEN o.publisher_event_id END
         ) AS publisher_event_id,
         w.may_be_rosout AND o.publisher_count > 1 AS is_rosout
     FROM staging.with_latest('by_rmw', 'dds_writer') AS w

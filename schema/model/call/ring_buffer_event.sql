@@ -1,4 +1,3 @@
--- name: staging.ring_buffer_event
 -- description: What intra-process ring buffers were used for. An enqueue outside of any publish()
 --     call is the replay of a message that was kept for a subscription that joined late. A buffer
 --     that is made anew at an address is empty.

@@ -1,4 +1,3 @@
--- name: staging.take
 -- kind: inline
 -- description: Takes, numbered in the order in which they began, with their subscription.
 -- grain: one row per message handed over to a subscription

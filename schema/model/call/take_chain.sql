@@ -1,4 +1,3 @@
--- name: staging.take_chain
 -- description: Layers of one take stitched together, as for publications, and the subscription that
 --     took. A take whose rmw layer failed does not count, although upper layers may report it. Nor
 --     does a take of the middleware itself. It has no rcl layer, although rcl takes are traced. Its
@@ -20,8 +19,7 @@ WITH middleware AS (
         m.rmw_subscription_handle AS rmw_handle,
         nullif(m.source_timestamp, 0) AS stamp
     FROM staging.call('ros2_rmw_take') AS m
-    LEFT JOIN raw.dds_read AS d
-        ON m.previous_event_id = d.event_id AND m.message = d.buffer
+    LEFT JOIN raw.dds_read AS d ON m.previous_event_id = d.event_id AND m.message = d.buffer
 ),
 rcl AS (
     SELECT

@@ -1,4 +1,3 @@
--- name: staging.take_inferred
 -- description: The subscription of messages that did not come through the middleware, where its
 --     initialisation was not traced: that of the ring buffer, else of the callback that was handed
 --     the message without a traced take. A callback that none was traced for is a subscription of
@@ -35,8 +34,7 @@ handed AS (
             AS subscription_event_id,
         bool_and(d.is_inferred) AS is_inferred
     FROM staging.callback_binding AS b
-    SEMI JOIN callback AS c
-        ON b.process_id = c.process_id AND b.callback_handle = c.callback_handle
+    SEMI JOIN callback AS c ON b.process_id = c.process_id AND b.callback_handle = c.callback_handle
     LEFT JOIN dequeue AS d ON b.take_event_id = d.start_event_id
     WHERE b.take_event_id IS NOT NULL
     GROUP BY b.process_id, b.callback_handle, b.callback_event_id

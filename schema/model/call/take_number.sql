@@ -1,4 +1,3 @@
--- name: staging.take_number
 -- description: The number of each take, in the order in which they began, and the callback that it
 --     led to. A subscription callback that ran without any take traced was handed its message all
 --     the same: then both are the same. The subscription may be known from either.

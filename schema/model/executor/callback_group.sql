@@ -1,4 +1,3 @@
--- name: staging.callback_group
 -- description: Callback groups (CARET), with the executors that they were added to.
 -- grain: one row per callback group and executor
 -- when: staging.callback_group_owner

@@ -1,4 +1,3 @@
--- name: staging.callback_group_entry
 -- description: Callbacks in callback groups (CARET), and the executor of each. A group usually is
 --     filled before it is added to an executor; else it was added to it last.
 -- grain: one row per callback in a callback group
@@ -36,8 +35,7 @@ filled AS (
             max(CASE WHEN o.event_id <= e.event_id THEN o.event_id END), min(o.event_id)
         ) AS object_event_id
     FROM entry AS e
-    JOIN object AS o
-        ON e.process_id = o.process_id AND e.kind = o.kind AND e.handle = o.handle
+    JOIN object AS o ON e.process_id = o.process_id AND e.kind = o.kind AND e.handle = o.handle
     GROUP BY e.event_id, e.kind
 ),
 owned AS (

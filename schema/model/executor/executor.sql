@@ -1,4 +1,3 @@
--- name: staging.executor
 -- description: Executors. Stock traces do not name them: there they are deduced from their threads.
 --     One thread with executor events is a single-threaded executor. One without is an events
 --     executor if it was seen to serve what came first first, else it may be any.

@@ -1,4 +1,3 @@
--- name: staging.executor_event
 -- kind: inline
 -- description: What executors say of themselves, with what they said before on the same thread;
 --     before `from_event_id` that was another life of the process. These are most of the events of

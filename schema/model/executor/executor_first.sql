@@ -1,4 +1,3 @@
--- name: staging.executor_first
 -- description: Where the executor of each thread is first heard of.
 -- grain: one row per thread with executor events
 -- when: raw.ros2_rclcpp_executor_get_next_ready, raw.ros2_rclcpp_executor_wait_for_work,

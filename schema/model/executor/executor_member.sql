@@ -1,4 +1,3 @@
--- name: staging.executor_member
 -- description: Which threads work for the same executor: those of a process that execute callbacks
 --     of an executor that names itself, else the same callbacks, directly or through others, or
 --     that take turns in waiting for work. The smallest thread of such a group stands for it.

@@ -1,4 +1,3 @@
--- name: staging.executor_named
 -- description: Executors that name themselves (CARET), or are named by a thread that works for
 --     them (Python). Of some, only the address is known, since their construction was not traced.
 -- grain: one row per executor

@@ -1,4 +1,3 @@
--- name: staging.executor_state
 -- kind: inline
 -- description: The literal reading of the executor's three events: each begins a state. When it
 --     ended is not stored: derive.executor_interval reads it off the next one.

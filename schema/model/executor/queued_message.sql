@@ -1,4 +1,3 @@
--- name: staging.queued_message
 -- description: Messages that threads without executor events took for callbacks, with the one
 --     publication of that stamp on the same host: with its end, and when its thread published next
 --     or ended a callback, since publish() had returned by then. What was published before the

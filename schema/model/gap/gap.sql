@@ -1,4 +1,3 @@
--- name: staging.gap
 -- description: Gaps of the traces: what was lost of them, and when nothing was recorded. A packet
 --     counts the events that were lost since the packet before it ended, on its CPU. They were lost
 --     behind its own last event, until it ended. Where the next packet is opened late, since there

@@ -1,4 +1,3 @@
--- name: staging.pause
 -- description: Silences in which nothing was recorded: tracing had been stopped. All streams of a
 --     recording are silent at once between packets, for a millisecond or longer. A silence is a
 --     pause where it can be nothing else: packets of one trace ended before they were full, not at

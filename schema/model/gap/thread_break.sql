@@ -1,4 +1,3 @@
--- name: staging.thread_break
 -- description: Where the record of a thread breaks: the first of all its events behind each gap, a
 --     loss on the CPU of that event or the one before, or a pause of the trace; or, where
 --     `is_elsewhere`, a loss on other CPUs only, which the thread may have visited meanwhile.

@@ -1,4 +1,3 @@
--- name: staging.context
 -- description: Threads within the life of their process. An event is of the thread and process of
 --     the row that has its thread index, and in whose stretch of event ids it lies.
 -- grain: one row per thread of a process life

@@ -1,4 +1,3 @@
--- name: staging.host
 -- description: Machines and containers. Containers of one machine share its clock, not its name.
 -- grain: one row per clock and hostname
 -- when: staging.placed_source

@@ -1,4 +1,3 @@
--- name: staging.mixed_process
 -- description: Ids that several processes have at one time, whose events nothing tells apart.
 --     Either a thread was on two CPUs at one moment. Or an object of one process was made or used
 --     after another process had made its first. What is used behind a gap proves nothing: its

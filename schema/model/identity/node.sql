@@ -1,4 +1,3 @@
--- name: staging.node
 -- description: Nodes. A handle that objects name but that was never initialised in the trace gets
 --     a row without a name. Nodes of several processes may have one name at a time (two robots, two
 --     domains): behind it stands the host then, or the process, or both.

@@ -1,4 +1,3 @@
--- name: staging.node_use
 -- description: Which initialisation of a node handle each object belongs to: the latest before it.
 --     Any later one is better than none. A publisher may be created inside its node, right before
 --     the node's own event: before Jazzy /rosout is. It belongs to the one right after. Where a

@@ -1,4 +1,3 @@
--- name: staging.process
 -- description: Process lives. The name is that of the main thread (tid = pid), else of the first
 --     thread seen; the version is what rcl_init stated, for display only. The tracer of Python
 --     nodes says that of Python.

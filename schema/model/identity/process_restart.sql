@@ -1,4 +1,3 @@
--- name: staging.process_restart
 -- description: Where a pid begins a new life. That is an rcl_init which is not the first event of
 --     its process, in three cases. (1) Its context handle was initialised before. (2) It is the
 --     first one recorded, and a publisher was made or a callback was seen before it. (3) The main

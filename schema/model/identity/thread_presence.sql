@@ -1,4 +1,3 @@
--- name: staging.thread_presence
 -- description: When each thread was seen, by the name that it had then. A name may come again.
 -- grain: one row per stretch of events of a thread under one name
 -- when: raw.thread_name

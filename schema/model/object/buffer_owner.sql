@@ -1,4 +1,3 @@
--- name: staging.buffer_owner
 -- description: Subscriptions of ring buffers whose initialisation was not traced: what is taken out
 --     of a buffer is for the callback that directly follows. One callback is one subscription,
 --     which may be known; else it is a placeholder by the first dequeue. Where several callbacks

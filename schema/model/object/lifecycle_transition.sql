@@ -1,4 +1,3 @@
--- name: staging.lifecycle_transition
 -- description: State changes of managed nodes, by the state machine that the node created last.
 -- grain: one row per rcl_lifecycle_transition
 -- when: raw.ros2_rcl_lifecycle_transition

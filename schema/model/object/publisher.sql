@@ -1,4 +1,3 @@
--- name: staging.publisher
 -- description: Publishers. A handle that was published on but never initialised in the trace gets a
 --     row without topic, or with /rosout where nothing else is possible.
 -- grain: one row per publisher

@@ -1,4 +1,3 @@
--- name: staging.publisher_known
 -- description: Publishers whose rcl initialisation was traced, with their rmw handle, their GID
 --     (first 16 bytes; all zeros: none) and, where DDS is instrumented, their writer: by GID, or
 --     where one of the two has none, by topic. Each writer belongs to one

@@ -1,4 +1,3 @@
--- name: staging.subscription_known
 -- description: Subscriptions whose rcl initialisation was traced, with rmw handle and GID.
 -- grain: one row per rcl_subscription_init
 -- when: raw.ros2_rcl_subscription_init

@@ -1,4 +1,3 @@
--- name: staging.timer_use
 -- description: Which timer each event means that names an rcl timer handle: the one initialised
 --     last before, else a placeholder by the first use of the handle.
 -- grain: one row per event that attaches a callback (`has_callback`) or a node to a timer; an event

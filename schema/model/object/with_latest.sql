@@ -1,5 +1,3 @@
--- name: staging.with_latest
--- kind: macro
 -- description: Uses of handles, each with the object of that handle that was initialised last
 --     before it, in its process. Both are the names of tables with an event_id, process_id and
 --     handle; uses may have other columns as well.

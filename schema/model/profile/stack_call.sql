@@ -1,4 +1,3 @@
--- name: staging.stack_call
 -- description: The calls of each stack.
 -- grain: one row per stack and call in it
 -- when: staging.stack

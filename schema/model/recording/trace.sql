@@ -1,4 +1,3 @@
--- name: staging.trace
 -- description: Traces read, with what their packets and events say of their extent.
 -- grain: one row per CTF trace
 -- when: staging.placed_source

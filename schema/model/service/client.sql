@@ -1,4 +1,3 @@
--- name: staging.client
 -- description: Service clients. A handle that was used but never initialised in the trace gets a
 --     row without node, and the name of the service that it turned out to call.
 -- grain: one row per client

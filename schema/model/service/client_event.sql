@@ -1,4 +1,3 @@
--- name: staging.client_event
 -- description: Requests that clients sent and responses that they took, each with its client.
 -- grain: one row per rmw_send_request or successful rmw_take_response
 -- when: raw.ros2_rmw_send_request, raw.ros2_rmw_take_response

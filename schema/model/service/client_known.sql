@@ -1,4 +1,3 @@
--- name: staging.client_known
 -- description: Service clients whose initialisation was traced, with the GID by which servers know
 --     them (since Kilted).
 -- grain: one row per rcl_client_init

@@ -1,5 +1,3 @@
--- name: staging.endpoint_event
--- kind: macro
 -- description: What clients, or services, sent and took, each with its client or service: the one
 --     of that handle initialised last before, else a placeholder by the first use of the handle.
 --     Both are the names of tables: events as recorded, with the rmw `handle` they are of, and the

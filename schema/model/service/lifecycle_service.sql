@@ -1,4 +1,3 @@
--- name: staging.lifecycle_service
 -- description: Services of managed nodes, by the callbacks that were added to them. The state
 --     machine of such a node initialises its services, and rclcpp_lifecycle gives rclcpp copies of
 --     them. So the handles that the callbacks are added to are initialised nowhere. Order tells:

@@ -1,4 +1,3 @@
--- name: staging.request
 -- description: Requests; a side that was not traced is NULL.
 -- grain: one row per request and service that took it; one per request that no service took
 -- when: staging.request_origin

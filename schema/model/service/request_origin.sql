@@ -1,4 +1,3 @@
--- name: staging.request_origin
 -- description: Every request with what was traced of it, numbered in the order of sending: both
 --     ends, or only one, and the instance of the service callback.
 -- grain: one row per request and service that took it; one per request that no service took

@@ -1,4 +1,3 @@
--- name: staging.request_pair
 -- description: Requests as they were sent and taken: by the client's GID and its number. Every
 --     service of the name may take it. Where a client came again with the same GID and numbers,
 --     the response tells which request it was, else the order, if as many were taken by a service

@@ -1,4 +1,3 @@
--- name: staging.response
 -- description: Responses with what was traced of each, numbered in the order of sending, and the
 --     request that each answers. A side that was not traced is NULL.
 -- grain: one row per response
@@ -41,9 +40,7 @@ answered AS (
     LEFT JOIN by_client AS c ON cr.request_event_id = c.send_event_id
 )
 SELECT
-    row_number() OVER (
-        ORDER BY coalesce(a.send_event_id, a.take_event_id)
-    ) AS response_id,
+    row_number() OVER (ORDER BY coalesce(a.send_event_id, a.take_event_id)) AS response_id,
     client.client_id, service.service_id, a.request_id,
     coalesce(s.sequence_number, c.sequence_number) AS sequence_number,
     s.ts_ns AS sent_ns,

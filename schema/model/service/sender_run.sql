@@ -1,4 +1,3 @@
--- name: staging.sender_run
 -- description: Callback instances that requests and responses were sent in: the innermost on the
 --     thread that had begun and was not over. Of a step of Python it is the first one of the call.
 -- grain: one row per request or response sent inside a callback instance

@@ -1,4 +1,3 @@
--- name: staging.service
 -- description: Services. One that was used but never initialised in the trace has no node.
 -- grain: one row per service
 -- when: staging.service_known, staging.service_inferred

@@ -1,4 +1,3 @@
--- name: staging.service_event
 -- description: Requests that services took and responses that they sent, each with its service and
 --     the GID of the client.
 -- grain: one row per successful rmw_take_request or rmw_send_response

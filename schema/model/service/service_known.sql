@@ -1,4 +1,3 @@
--- name: staging.service_known
 -- description: Services whose initialisation was traced. No tracepoint tells their GID.
 -- grain: one row per rcl_service_init
 -- when: raw.ros2_rcl_service_init

@@ -1,5 +1,3 @@
--- name: derive.action_object
--- kind: macro
 -- description: Action servers or clients, put together from their objects. rcl creates these one
 --     right after the other, the one of send_goal first: the others are the first of their names
 --     that the process created at that time or later.

@@ -1,5 +1,3 @@
--- name: derive.goal_cancel
--- kind: macro
 -- description: Requests to cancel goals that were accepted: between the take of such a request and
 --     its response, the server publishes the status of its goals if it cancels one. Which goal that
 --     is is known if there is only one.

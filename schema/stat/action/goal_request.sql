@@ -1,5 +1,3 @@
--- name: derive.goal_request
--- kind: macro
 -- description: Goals that were sent to an action server, and what it answered.
 -- grain: one row per goal and action server that took it; one per goal that none took
 -- param: servers VARCHAR  Name of the rows of action servers, see main.goal

@@ -1,5 +1,3 @@
--- name: derive.goal_result
--- kind: macro
 -- description: Which goal a request for a result belongs to. The number of the goal is not in the
 --     trace. A request that a thread sent after it took the answer to a goal, in the same turn, is
 --     for that goal (derive.certain_call). Else what counts is which goals of the client are open:

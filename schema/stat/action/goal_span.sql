@@ -1,5 +1,3 @@
--- name: derive.goal_span
--- kind: macro
 -- description: From when to when an action server was concerned with a goal that it accepted, or
 --     may have: from its answer until it sent the result; without an end if nobody asked for that.
 --     Clients that ask late get it late. Of goals whose results cannot be told apart, the ends are

@@ -1,5 +1,3 @@
--- name: derive.block_length
--- kind: macro
 -- description: How many values that follow each other have to be resampled together, how many in a
 --     row are alike, and by how much intervals have to be wider since blocks are few. `parts` is
 --     the name of a table with a row per value: side, subject, how many values these have, the
@@ -60,9 +58,7 @@ alike AS (
                 avg(pow(w.p95_sum - w.block_length * v.p95_mean, 2) / v.p95_variance),
                 avg(pow(w.p99_sum - w.block_length * v.p99_mean, 2) / v.p99_variance)
             ],
-            lambda each: coalesce(
-                each / w.block_length * w.number / (w.number - w.block_length), 1
-            )
+            lambda each: coalesce(each / w.block_length * w.number / (w.number - w.block_length), 1)
         ) AS times
     FROM whole AS w
     JOIN variance AS v ON w.side = v.side AND w.subject = v.subject

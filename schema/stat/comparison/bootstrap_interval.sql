@@ -1,5 +1,3 @@
--- name: derive.bootstrap_interval
--- kind: macro
 -- description: Ends of the confidence interval of side b less side a, as deviations from the
 --     difference that was measured, by a circular block bootstrap. `measures` is the name of a
 --     table with number, quantiles, mean and values in order of each side and subject, `blocks_of`

@@ -1,4 +1,3 @@
--- name: derive.callback_exclusion
 -- description: Which callbacks of executors of several threads never run at the same time: those
 --     of a mutually exclusive callback group, where the trace tells of groups. Elsewhere a
 --     callback is assumed to exclude only itself, unless it was seen to run beside itself.

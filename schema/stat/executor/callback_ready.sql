@@ -1,5 +1,3 @@
--- name: derive.callback_ready
--- kind: macro
 -- description: Between which moments the input of a callback became ready in its executor. Not
 --     before its release, nor before the subscription was made. In an executor of one thread also
 --     not before it last went to sleep, nor before the last polling point but one, which would have

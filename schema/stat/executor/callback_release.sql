@@ -1,5 +1,3 @@
--- name: derive.callback_release
--- kind: macro
 -- description: Since when a callback instance can have been due (its release), and by when it was
 --     due for certain. A message can have been due since the end of its publication, or since its
 --     stamp where the two clocks cannot be compared; a request since it was sent. A timer is due
@@ -58,8 +56,7 @@ message AS (
     LEFT JOIN store.publication AS b ON l.publication_id = b.publication_id
     LEFT JOIN store.data_arrival AS d ON t.take_id = d.take_id
     LEFT JOIN clock AS bc ON b.process_id = bc.process_id
-    LEFT JOIN pair AS p
-        ON b.process_id = p.process_id AND t.process_id = p.other_process_id
+    LEFT JOIN pair AS p ON b.process_id = p.process_id AND t.process_id = p.other_process_id
 ),
 request AS (
     SELECT

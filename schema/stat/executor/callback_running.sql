@@ -1,4 +1,3 @@
--- name: derive.callback_running
 -- description: Stretches of time in which at least one thread of an executor with several threads
 --     ran a callback. `before_ns` is the sum of the earlier stretches of the callback.
 -- grain: one row per such stretch

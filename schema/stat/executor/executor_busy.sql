@@ -1,4 +1,3 @@
--- name: derive.executor_busy
 -- description: Stretches of time in which no thread of an executor was free to start a callback:
 --     each of them ran one. With the sum of all such time before. Of an executor of one
 --     thread each is one callback instance.

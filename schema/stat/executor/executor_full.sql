@@ -1,4 +1,3 @@
--- name: derive.executor_full
 -- description: Stretches of time in which all threads of an executor with several threads ran
 --     callbacks. `before_ns` is the sum of the earlier stretches.
 -- grain: one row per such stretch

@@ -1,5 +1,3 @@
--- name: derive.executor_meanwhile
--- kind: macro
 -- description: What the threads of its executor ran while a callback instance waited. The messages
 --     of a burst wait for each other: the pairs of all instances are many, those of one instance
 --     are few.

@@ -1,5 +1,3 @@
--- name: derive.executor_poll
--- kind: macro
 -- description: The moments at which executors learned what is ready: the ends of their waits
 --     (polling points). What is not found there waits for the next one. `before_ns` is the sum of
 --     all time spent waiting before. A wait of less than a millisecond may have found something

@@ -1,5 +1,3 @@
--- name: derive.executor_queue
--- kind: macro
 -- description: For how long the thread of a callback instance waited for a CPU before it, outside
 --     of other callbacks, and what had the CPU meanwhile: as a kernel trace shows it.
 -- grain: one row per waiting callback instance whose thread the kernel traced

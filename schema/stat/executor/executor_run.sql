@@ -1,4 +1,3 @@
--- name: derive.executor_run
 -- description: The callback instances that occupied threads of executors, numbered on each thread
 --     in order of time. Callback instances nested in others are part of those. So the rows of one
 --     thread never overlap, and the sum over any stretch of time takes only two look-ups. Times are

@@ -1,5 +1,3 @@
--- name: derive.executor_waits
--- kind: macro
 -- description: How long callback instances waited in their executor, and what for: see
 --     main.executor_wait.
 -- grain: one row per waiting callback instance
@@ -83,10 +81,8 @@ blocking AS (
             coalesce(s.before_ns + least(r.start_ns, s.end_ns) - s.start_ns, 0) AS start_busy_ns,
             coalesce(e.before_ns + least(r.end_ns, e.end_ns) - e.start_ns, 0) AS end_busy_ns
         FROM excluding AS r
-        ASOF LEFT JOIN stretch AS s
-            ON r.executor_id = s.executor_id AND r.start_ns >= s.start_ns
-        ASOF LEFT JOIN stretch AS e
-            ON r.executor_id = e.executor_id AND r.end_ns >= e.start_ns
+        ASOF LEFT JOIN stretch AS s ON r.executor_id = s.executor_id AND r.start_ns >= s.start_ns
+        ASOF LEFT JOIN stretch AS e ON r.executor_id = e.executor_id AND r.end_ns >= e.start_ns
     )
 ),
 blocked AS (
@@ -111,10 +107,7 @@ drowsy AS MATERIALIZED (
     SELECT callback_instance_id, executor_id, 'earliest' AS which, earliest_ns AS at_ns
     FROM ready
     WHERE earliest_ns IS NOT NULL
-        AND (
-            thread_count > 1
-            OR earliest_ns < wait_start_ns AND earliest_ns < previous_wait_end_ns
-        )
+        AND (thread_count > 1 OR earliest_ns < wait_start_ns AND earliest_ns < previous_wait_end_ns)
     UNION ALL
     -- What a thread has picked does not wait for work that others wait for.
     SELECT callback_instance_id, executor_id, 'picked', greatest(picked_ns, earliest_ns)

@@ -1,5 +1,3 @@
--- name: derive.queue_activity
--- kind: macro
 -- description: What the threads of events executors did between callbacks. A kernel trace shows
 --     when they slept: there they waited for work, else they looked for it. Without one, such a
 --     thread waited for certain until the next callback became due: its message was published, or

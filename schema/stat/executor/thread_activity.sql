@@ -1,5 +1,3 @@
--- name: derive.thread_activity
--- kind: macro
 -- description: What executor threads did, in detail (main.executor_activity), by the clock of their
 --     executor: all activities that reach into a window. A few around it may be there as well, and
 --     the end of those behind it is not known.
@@ -39,8 +37,7 @@ closed AS (
         i.run_id, i.thread_id, i.effective_end_event_id AS event_id, any_value(x.at_ns) AS at_ns,
         i.callback_instance_id, i.parent_id
     FROM instance AS i
-    JOIN outside AS x
-        ON i.thread_id = x.thread_id AND i.effective_end_event_id = x.event_id
+    JOIN outside AS x ON i.thread_id = x.thread_id AND i.effective_end_event_id = x.event_id
     WHERE i.end_event_id IS NULL
     GROUP BY ALL
 ),

@@ -1,5 +1,3 @@
--- name: derive.timer_due
--- kind: macro
 -- description: When timers were due: at whole numbers of periods after their creation, at the
 --     first of these moments after the previous call. No event tells that a timer was reset,
 --     cancelled for a while, or runs on simulated time. So a moment is only known where half of the

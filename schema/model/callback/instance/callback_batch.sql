@@ -1,4 +1,3 @@
--- name: staging.callback_batch
 -- description: Takes that come in batches: an executor such as that of r2r takes a message of every
 --     subscription that has one, and calls their callbacks only then. A callback_start of a known
 --     subscription that follows no take of it has the oldest take of that subscription on its

@@ -1,4 +1,3 @@
--- name: staging.callback_binding
 -- description: Callback instances with their callback object, and the take or the request that
 --     they were called with. The callback_start directly follows the take's last layer, or the
 --     rmw_take_request, on its thread, with no event of the executor between the two. Neither an

@@ -1,4 +1,3 @@
--- name: staging.callback_instance
 -- kind: inline
 -- description: Callback instances, numbered in the order in which they began, with the one that
 --     each is nested in.

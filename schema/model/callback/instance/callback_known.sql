@@ -1,4 +1,3 @@
--- name: staging.callback_known
 -- description: Callback objects whose creation was traced, with what they belong to, each by the
 --     event that initialised it. A callback that was only registered has a symbol but no owner; a
 --     function of Python never has one. A service that was not seen to be initialised is known by

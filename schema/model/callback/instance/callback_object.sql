@@ -1,4 +1,3 @@
--- name: staging.callback_object
 -- description: Callback objects, numbered in the order in which they were made. One whose creation
 --     was not traced counts from its first instance.
 -- grain: one row per callback object

@@ -1,4 +1,3 @@
--- name: staging.callback_step
 -- description: Callback instances of Python that go on for something earlier: later steps of a
 --     coroutine, tasks, what is done with a response. Each with what it follows from: the instance
 --     on whose thread, and inside of which, the tracer said so (`step`); else what the thread took

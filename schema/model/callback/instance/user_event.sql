@@ -1,4 +1,3 @@
--- name: staging.user_event
 -- description: Events of the user's own programs, numbered in their order, with the callback
 --     instance inside which each happened: of those that began on its thread the last, unless it
 --     was over; else the nearest one around that which was not over.

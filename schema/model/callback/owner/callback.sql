@@ -1,4 +1,3 @@
--- name: staging.callback
 -- description: Callback objects with what they belong to. One whose creation was not traced learns
 --     its subscription or service from the messages or requests that it was called with (the most
 --     frequent), else what it belongs to from the executor.

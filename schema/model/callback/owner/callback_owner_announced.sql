@@ -1,4 +1,3 @@
--- name: staging.callback_owner_announced
 -- description: Callbacks without a known owner, if the executor said the same before each of their
 --     instances: the handle that it named (NULL if it named none), the timer or subscription of
 --     that handle if the trace has it, and which tracepoints were enabled meanwhile.

@@ -1,4 +1,3 @@
--- name: staging.callback_nesting
 -- description: How deep callback instances are nested on their thread, from 1, and the instance
 --     around each. Others may be inside an instance that has a begin or an end of a callback before
 --     its own end, and inside one that was never seen to end. The latter lasts, for what is inside
@@ -35,8 +34,7 @@ closed_by AS (
     UNION ALL
     SELECT o.start_event_id, x.event_id
     FROM never_ended AS o
-    JOIN staging.executor_first AS x
-        ON o.thread_id = x.thread_id AND x.event_id > o.start_event_id
+    JOIN staging.executor_first AS x ON o.thread_id = x.thread_id AND x.event_id > o.start_event_id
     UNION ALL
     SELECT o.start_event_id, g.event_id
     FROM never_ended AS o

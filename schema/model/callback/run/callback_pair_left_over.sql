@@ -1,4 +1,3 @@
--- name: staging.callback_pair_left_over
 -- description: Begins and ends of callbacks that are not plain, each with its partner. A begin is
 --     paired with the next event of the same callback on its thread, if that is an end. Ends left
 --     over (recursion) belong to the latest begin left over (a callback that spins and is called

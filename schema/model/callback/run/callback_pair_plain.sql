@@ -1,4 +1,3 @@
--- name: staging.callback_pair_plain
 -- description: Begins of callbacks whose end is the next begin or end of any callback on their
 --     thread, with that end. No gap lies between.
 -- grain: one row per such begin and end

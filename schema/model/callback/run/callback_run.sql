@@ -1,4 +1,3 @@
--- name: staging.callback_run
 -- kind: inline
 -- description: Callback instances with their extent and nesting.
 -- grain: one row per callback_start
