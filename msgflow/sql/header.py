@@ -24,6 +24,7 @@ The header ends at the first line that is not a `--` comment. Two spaces end a p
 The name of the object is that of its file; below `schema/` the schema that the objects of its
 folder are in stands before. Only what others put in front of theirs says its kind: `inline`.
 
+- `column`: of what people see: public views, queries, pages, results. Others name columns in SQL.
 - `note: clocks`: rows compare times of hosts, so the runner names clocks that differ.
 - `note: callbacks`: rows are made of callbacks, so the runner names processes that record none.
 - `note: kernel`: rows are made of the kernel's events, so the runner says where there are none.

@@ -1,11 +1,5 @@
--- title: How far corrected clocks can be wrong
 -- description: Clocks that are corrected to another one, and how well that is known.
 -- grain: one row per clock that is corrected
--- column: run_id BIGINT  Run
--- column: reference VARCHAR  Hosts of the clock that it is corrected to
--- column: hosts VARCHAR  Its hosts
--- column: least_ms DOUBLE [ms]  Bound where it is known best; NULL: a file gave the correction
--- column: greatest_ms DOUBLE [ms]  Bound where it is known worst
 WITH known AS (
     SELECT clock_id, min(uncertainty_ns) AS least_ns, max(uncertainty_ns) AS greatest_ns
     FROM main.clock_uncertainty

@@ -1,4 +1,3 @@
--- title: Clocks as messages and packets correct them
 -- description: What store.clock holds of the clocks of a run that messages and packets bring
 --     together; whether they connect the clock with another one, since it stays as it is if not;
 --     and how far it can be wrong at some moments, a list.

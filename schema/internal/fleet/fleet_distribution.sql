@@ -1,17 +1,8 @@
--- title: How measured times are distributed
 -- description: Counts of durations and latencies in buckets whose limits grow by 2 %. Of several
 --     runs the counts of a bucket are added; a quantile of the sum is off by less than 1 % of its
 --     value. Bucket b > 0 holds times above 1.02^(b-2) ns up to 1.02^(b-1) ns, for which
 --     2 / 2.02 * 1.02^(b-1) ns stands; bucket 0 holds zero, -b the times below zero.
 -- grain: one row per measure, node, callback or topic, and bucket
--- column: run_id BIGINT  Run
--- column: measure VARCHAR  'callback_duration', 'callback_period' (from one start to the next),
---     'callback_wait' (as waits has it) or 'transport_latency' (publication to take)
--- column: node VARCHAR  Node of the callback, or the one that received
--- column: subject VARCHAR  What triggers the callback, or the topic
--- column: is_internal BOOLEAN  Infrastructure of ROS
--- column: bucket BIGINT  Bucket of the times, in their order
--- column: count BIGINT  Times in it
 WITH instance AS (
     SELECT
         run_id, callback_id,

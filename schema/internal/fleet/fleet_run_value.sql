@@ -1,23 +1,9 @@
--- title: What each run of two sides takes on each path
 -- description: Statistics of the latency of every path in every run. Reads `flow` and `e2e_latency`
 --     of a lake, and `sided`: the runs (run), the side of each (side, 'a' or 'b') and what it is a
 --     sample of (unit): itself, or the robot that made it, say.
 -- grain: one row per run, path and statistic; paths of one text in a run count together
 -- param: case VARCHAR  'first' or 'last' arrival of each root, 'newest' root of each arrival, or
 --     'every_pair'
--- column: side VARCHAR  'a' or 'b'
--- column: unit VARCHAR  What the run is a sample of
--- column: run VARCHAR  Key of the run
--- column: subject VARCHAR  Nodes and topics of the path
--- column: statistic VARCHAR  'median', 'mean', 'p95', 'p99' or 'max'
--- column: value_ns BIGINT [ns]  Its value in the run; NULL: no flow of it was measured
--- column: is_enough BOOLEAN  At least 20 values in the run, and five beyond the quantile
--- column: number BIGINT  Values of the run
--- column: roots BIGINT  Roots, without those not connected or cut by the recording
--- column: reached BIGINT  Those of them that reached the end
--- column: loss_affected BIGINT  Those of them that have a gap of a trace in their time
--- column: ambiguous BIGINT  Values of flows that pass a link that may be another one
--- column: is_cut BOOLEAN  Paths of the run were left out beyond the limits
 WITH cut AS (
     SELECT run, bool_or(is_cut) AS is_cut
     FROM e2e_latency

@@ -1,4 +1,3 @@
--- title: Steps of a flow
 -- description: The steps of `main.flow_step`, with how long the executor was busy before the
 --     callbacks of takes and requests, and when the thread went on after a publication
 --     (until_ns): writing the message comes after the last event of the call, so that it took until

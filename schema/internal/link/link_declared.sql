@@ -1,11 +1,6 @@
--- title: Links that the trace declares
 -- description: The annotations of a run that its trace declares, with their endpoints: those among
 --     a file are not stored again.
 -- grain: one row per annotation
--- column: kind VARCHAR  Kind of the link
--- column: process_id BIGINT  Process that declares it
--- column: inputs BIGINT[]  Subscriptions, in order; NULL: none
--- column: outputs BIGINT[]  Publishers, in order; NULL: none
 SELECT
     a.kind, a.process_id,
     (

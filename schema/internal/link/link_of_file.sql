@@ -1,16 +1,6 @@
--- title: Links that a file declares
 -- description: The annotations of a run that a file declared, as an entry of a file has them: what
 --     is suggested stands beside them.
 -- grain: one row per annotation of a file
--- column: kind VARCHAR  Kind of the link
--- column: node VARCHAR  Node that publishes
--- column: inputs VARCHAR[]  Topics of its inputs
--- column: outputs VARCHAR[]  Topics of its outputs
--- column: inputs_of VARCHAR  Node that receives the inputs for it; NULL: itself
--- column: queue_depth BIGINT  Of a queue: most messages that wait in it
--- column: pid INTEGER  Process id of the node
--- column: host VARCHAR  Its host
--- column: is_name_repeated BOOLEAN  Several nodes of the run have this name
 WITH input AS (
     SELECT
         i.annotation_id, list(DISTINCT s.topic_name ORDER BY s.topic_name) AS topics,

@@ -1,11 +1,6 @@
--- title: Declared links that lead to nothing
 -- description: The indirect links that a file declared for a run and that no message took, with the
 --     reason.
 -- grain: one row per such annotation
--- column: kind VARCHAR  Kind of the link
--- column: inputs VARCHAR  Topics of its inputs
--- column: outputs VARCHAR  Topics of its outputs
--- column: reason VARCHAR  Why no message took it
 WITH declared AS (
     SELECT a.annotation_id, a.kind
     FROM store.annotation AS a

@@ -1,4 +1,3 @@
--- title: Flows as traces
 -- description: What belongs to flows that reached the end of their paths: callback instances,
 --     publications, takes, and the requests and responses between them.
 -- grain: one row per vertex
@@ -9,7 +8,6 @@
 -- param: via VARCHAR = NULL  Only flows through all of these topics or nodes
 -- param: without VARCHAR = NULL  Only flows through none of these
 -- param: slowest BIGINT = NULL  So many of the slowest flows; NULL: all
--- column: key BIGINT  Its key, as derive.vertex_key computes it
 WITH path AS (
     SELECT path_id
     FROM main.flow_path($runs, $from, $to, only_paths := true)

@@ -1,21 +1,8 @@
--- title: Slices in Perfetto
 -- description: Begins and ends of slices of threads and of executors, in the order of each track,
 --     with the links between them. A request whose response a callback waited for lasts until then.
 --     A link begins at the last and ends at the first moment of a
 --     request or response that was traced.
 -- grain: one row per begin and end of a slice, and per moment
--- column: track BIGINT  Its track
--- column: at_ns BIGINT [epoch ns]  When
--- column: rank INTEGER  0 an end, 1 a begin, 2 a moment
--- column: name BIGINT  Number of its name; NULL: an end
--- column: code INTEGER  What kind of slice it is
--- column: id BIGINT  What it is of
--- column: symbol_id BIGINT  Callback whose symbol it has; NULL: none
--- column: candidate_count BIGINT  How many causes of it are possible; NULL: one
--- column: queue_ns BIGINT [ns]  Of a request that a callback waited for: until the service began
--- column: served_ns BIGINT [ns]  Of the same: the service's callback, until it answered
--- column: outgoing UBIGINT[]  Links that begin there
--- column: incoming UBIGINT[]  Links that end there
 WITH waited AS MATERIALIZED (
     SELECT request_id, returned_ns, queue_ns, served_ns
     FROM main.waited_call

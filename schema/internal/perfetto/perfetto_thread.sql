@@ -1,14 +1,6 @@
--- title: Threads in Perfetto
 -- kind: inline
 -- description: The tracks of threads, and of what their executors did on them.
 -- grain: one row per thread
--- column: track BIGINT  Its track
--- column: parent BIGINT  Track of its process
--- column: pid BIGINT  Pid that Perfetto knows the process by
--- column: tid BIGINT  Its tid, or a number of its own where several threads have that tid
--- column: name VARCHAR  What Perfetto calls it
--- column: has_states BOOLEAN  States of an executor were recorded on it
--- column: state_track BIGINT  Their track
 SELECT
     t.thread_id * 8 + 2 AS track,
     p.track AS parent,

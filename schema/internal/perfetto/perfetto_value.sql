@@ -1,11 +1,6 @@
--- title: Values of counters in Perfetto
 -- description: The rate of each publisher, from the time since its publication before; and how many
 --     messages of each subscription were published and not yet taken, of those that it took later.
 -- grain: one row per value
--- column: track BIGINT  Track of the counter
--- column: at_ns BIGINT [epoch ns]  When
--- column: value DOUBLE  In the unit of the track
--- column: place BIGINT  Order of the values of one moment
 WITH rate AS (
     SELECT
         publisher_id * 8 + 4 AS track, start_ns AS at_ns,

@@ -1,11 +1,6 @@
--- title: The longest run of a callback
 -- description: Of the instances of a callback that ended, the longest that began in the window.
 -- grain: one row, or none
 -- param: key BIGINT  Callback
--- column: duration_ns BIGINT [ns]  How long it took
--- column: at_ns BIGINT [epoch ns]  When it began
--- column: id BIGINT  Its identity
--- column: kind VARCHAR  What it is: 'callback_instance'
 SELECT
     end_ns - start_ns AS duration_ns,
     start_ns AS at_ns,

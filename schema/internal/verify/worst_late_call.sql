@@ -1,11 +1,6 @@
--- title: The latest call of a timer
 -- description: Of the calls of a timer in the window, the one that came latest after it was due.
 -- grain: one row, or none
 -- param: key BIGINT  Its callback
--- column: duration_ns BIGINT [ns]  How long it took
--- column: at_ns BIGINT [epoch ns]  When it began
--- column: id BIGINT  Its identity
--- column: kind VARCHAR  What it is: 'callback_instance'
 SELECT
     wait_ns AS duration_ns,
     start_ns AS at_ns,

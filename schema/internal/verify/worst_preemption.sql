@@ -1,12 +1,7 @@
--- title: The run of a callback that lost the CPU for longest
 -- description: Of the instances of a callback that began in the window, the one in which other
 --     threads had the CPU for longest.
 -- grain: one row, or none
 -- param: key BIGINT  Callback
--- column: duration_ns BIGINT [ns]  How long it had lost the CPU
--- column: at_ns BIGINT [epoch ns]  When it began
--- column: id BIGINT  Its identity
--- column: kind VARCHAR  What it is: 'callback_instance'
 SELECT
     s.preempted_ns AS duration_ns,
     i.start_ns AS at_ns,

@@ -1,12 +1,7 @@
--- title: The request that took longest
 -- description: Of the answered requests of a client to a service in the window, the one that was
 --     answered latest.
 -- grain: one row, or none
 -- param: key BIGINT[]  Service and client
--- column: duration_ns BIGINT [ns]  How long it took
--- column: at_ns BIGINT [epoch ns]  When it began
--- column: id BIGINT  Its identity
--- column: kind VARCHAR  What it is: 'request'
 SELECT
     p.taken_ns - q.sent_ns AS duration_ns,
     q.sent_ns AS at_ns,
