@@ -82,8 +82,7 @@ CREATE OR REPLACE TEMP TABLE critical_flow AS
 WITH path AS (
     SELECT path_id
     FROM named_path
-    WHERE ($via IS NOT NULL OR $without IS NOT NULL)
-        AND main.path_visits(path, $via, $without)
+    WHERE ($via IS NOT NULL OR $without IS NOT NULL) AND main.path_visits(path, $via, $without)
 )
 SELECT
     flow_id, run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns,

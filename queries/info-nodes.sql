@@ -30,8 +30,7 @@ SELECT
     (
         SELECT count(*)
         FROM main.subscription
-        WHERE subscription.node_id = node.node_id
-            AND NOT subscription.is_internal
+        WHERE subscription.node_id = node.node_id AND NOT subscription.is_internal
     ) AS subscription_count,
     (SELECT count(*) FROM main.timer WHERE timer.node_id = node.node_id) AS timer_count,
     (

@@ -148,8 +148,7 @@ met AS (
     ASOF LEFT JOIN input_run AS r
         ON f.subscription_id = r.subscription_id AND f.published_ns >= r.start_ns
     LEFT JOIN fired AS own
-        ON f.publisher_id = own.publisher_id
-        AND r.callback_instance_id = own.callback_instance_id
+        ON f.publisher_id = own.publisher_id AND r.callback_instance_id = own.callback_instance_id
     GROUP BY f.publisher_id, f.output_topic, f.node_id, f.subscription_id
 ),
 synchronous AS (

@@ -32,9 +32,7 @@ WITH outcome AS (
     SELECT d.subscription_id, d.status, d.reason, count(*) AS number
     FROM main.stat_delivery AS d
     JOIN main.publication AS b ON d.publication_id = b.publication_id
-    WHERE list_contains($runs, d.run_id)
-        AND b.start_ns >= $start_ns
-        AND b.start_ns < $end_ns
+    WHERE list_contains($runs, d.run_id) AND b.start_ns >= $start_ns AND b.start_ns < $end_ns
     GROUP BY d.subscription_id, d.status, d.reason
 ),
 delivery AS (
@@ -56,9 +54,7 @@ orphan_outcome AS (
     SELECT o.subscription_id, o.reason, count(*) AS number
     FROM main.stat_orphan AS o
     JOIN main.take AS t ON o.take_id = t.take_id
-    WHERE list_contains($runs, o.run_id)
-        AND t.taken_ns >= $start_ns
-        AND t.taken_ns < $end_ns
+    WHERE list_contains($runs, o.run_id) AND t.taken_ns >= $start_ns AND t.taken_ns < $end_ns
     GROUP BY o.subscription_id, o.reason
 ),
 orphan AS (

@@ -353,9 +353,7 @@ facts AS (
         AND b.has_no_stamp = u.for_no_stamp
         AND b.least_arrival_ns <= u.taken_ns
     ASOF LEFT JOIN ordered AS q
-        ON b.topic_name = q.topic_name
-        AND b.clock_id = q.clock_id
-        AND b.gone_ns >= q.arrival_ns
+        ON b.topic_name = q.topic_name AND b.clock_id = q.clock_id AND b.gone_ns >= q.arrival_ns
 ),
 -- What is said of several messages of a pair alike. Before the first that was taken: whether the
 -- queue had overflowed, so that as many newer ones had come as it holds (a queue of one always is

@@ -47,13 +47,10 @@ stuck AS (
     LEFT JOIN (
         SELECT take_id, publisher_id, route, max(publication_id) AS publication_id
         FROM derive.flow_continuation
-        WHERE list_contains(runs, run_id)
-            AND take_id IN (SELECT last_take.take_id FROM progress)
+        WHERE list_contains(runs, run_id) AND take_id IN (SELECT last_take.take_id FROM progress)
         GROUP BY take_id, publisher_id, route
     ) AS c
-        ON p.last_take.take_id = c.take_id
-        AND n.publisher_id = c.publisher_id
-        AND n.route = c.route
+        ON p.last_take.take_id = c.take_id AND n.publisher_id = c.publisher_id AND n.route = c.route
 ),
 -- When messages passed each step, as far as a root got stuck there: each of one clock.
 delivered AS (

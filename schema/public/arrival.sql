@@ -43,8 +43,7 @@ taken AS (
     FROM main.link_transport AS l
     JOIN main.take AS t ON l.take_id = t.take_id
     JOIN main.publication AS b ON l.publication_id = b.publication_id
-    WHERE l.latency_ns IS NOT NULL
-        AND t.thread_id IN (SELECT thread_id FROM main.thread_state)
+    WHERE l.latency_ns IS NOT NULL AND t.thread_id IN (SELECT thread_id FROM main.thread_state)
 ),
 woken AS (
     SELECT k.*, w.at_ns AS arrived_ns, w.waker_kind, w.waker_thread_id, w.waker_other_thread_id

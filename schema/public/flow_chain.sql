@@ -119,9 +119,7 @@ chain AS (
             c.is_crowded OR count(*) OVER (PARTITION BY c.run_id) > max_paths AS is_crowded
         FROM chain AS c
         JOIN useful AS u ON c.subscription_id = u.from_subscription_id
-        WHERE c.depth < max_depth
-            AND NOT c.is_last
-            AND get_bit(c.visited, u.place) = 0
+        WHERE c.depth < max_depth AND NOT c.is_last AND get_bit(c.visited, u.place) = 0
     )
     QUALIFY number <= max_paths
 ),

@@ -21,8 +21,7 @@ direct AS (
     FROM store.link_causal AS l
     JOIN store.callback_instance AS i ON l.callback_instance_id = i.callback_instance_id
     JOIN store.callback AS c ON i.callback_id = c.callback_id
-    WHERE l.kind = 'direct'
-        AND l.publisher_id IN (SELECT publisher_id FROM store.annotation_output)
+    WHERE l.kind = 'direct' AND l.publisher_id IN (SELECT publisher_id FROM store.annotation_output)
 ),
 -- Its own message is one of the set, or none: there is no direct link.
 filtered AS (

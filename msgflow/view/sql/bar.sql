@@ -102,9 +102,7 @@ FROM main.user_event AS u
 LEFT JOIN main.callback_instance AS i ON u.callback_instance_id = i.callback_instance_id
 LEFT JOIN main.callback AS c ON i.callback_id = c.callback_id
 JOIN event_row AS r
-    ON u.process_id = r.process_id
-    AND c.node_id IS NOT DISTINCT FROM r.node_id
-    AND u.name = r.name
+    ON u.process_id = r.process_id AND c.node_id IS NOT DISTINCT FROM r.node_id AND u.name = r.name
 UNION ALL
 SELECT
     run_id, -4 * node_id - 1, CASE WHEN state = 'active' THEN 10 ELSE 11 END, -1, start_ns, end_ns, 0

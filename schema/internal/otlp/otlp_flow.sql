@@ -11,8 +11,7 @@
 WITH path AS (
     SELECT path_id
     FROM main.flow_path($runs, $from, $to, only_paths := true)
-    WHERE ($via IS NOT NULL OR $without IS NOT NULL)
-        AND main.path_visits(path, $via, $without)
+    WHERE ($via IS NOT NULL OR $without IS NOT NULL) AND main.path_visits(path, $via, $without)
 ),
 part AS MATERIALIZED (
     SELECT root_kind, root_id, take_id, callback_instance_id, publication_id

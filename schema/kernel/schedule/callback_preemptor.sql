@@ -9,8 +9,7 @@ WITH overlap AS (
     FROM staging.callback_state AS c
     JOIN staging.thread_state AS s ON c.state_number = s.number
     JOIN staging.preemptor AS p
-        ON s.thread_id = p.thread_id
-        AND s.start_ns
+        ON s.thread_id = p.thread_id AND s.start_ns
         = CASE s.state WHEN 'preempted' THEN p.wait_start_ns ELSE p.state_start_ns END
         AND s.state = p.state
     WHERE p.end_ns > c.start_ns AND p.start_ns < c.end_ns

@@ -14,7 +14,5 @@ LEFT JOIN staging.thread_tid AS t
     AND c.start_ns >= t.from_ns
     AND c.start_ns < t.until_ns
 LEFT JOIN staging.other_thread AS o
-    ON c.clock_key = o.clock_key
-    AND c.tid = o.tid
-    AND c.name IS NOT DISTINCT FROM o.name
+    ON c.clock_key = o.clock_key AND c.tid = o.tid AND c.name IS NOT DISTINCT FROM o.name
 ORDER BY c.thread_id, c.start_ns

@@ -14,6 +14,4 @@ JOIN store.publication AS b ON o.publisher_id = b.publisher_id
 LEFT JOIN derive.link_causal_direct(only_run) AS d ON b.publication_id = d.publication_id
 LEFT JOIN store.callback_instance AS i ON d.callback_instance_id = i.callback_instance_id
 LEFT JOIN derive.annotated_run(only_run) AS s ON d.callback_instance_id = s.callback_instance_id
-WHERE a.run_id = only_run
-    AND b.run_id = only_run
-    AND a.kind NOT IN ('direct', 'independent')
+WHERE a.run_id = only_run AND b.run_id = only_run AND a.kind NOT IN ('direct', 'independent')

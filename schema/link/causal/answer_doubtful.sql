@@ -120,8 +120,7 @@ doubtful AS (
 SELECT f.publication_id
 FROM follower AS f
 JOIN usual AS u
-    ON f.subscription_id IS NOT DISTINCT FROM u.subscription_id
-    AND f.publisher_id = u.publisher_id
+    ON f.subscription_id IS NOT DISTINCT FROM u.subscription_id AND f.publisher_id = u.publisher_id
 QUALIFY f.is_between_nodes
     OR f.publisher_id IN (FROM doubtful)
     OR sum(f.number) OVER (

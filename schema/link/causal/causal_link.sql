@@ -32,6 +32,4 @@ ANTI JOIN (
     WHERE run_id = only_run
         AND kind IN ('independent', 'approximate_sync', 'periodic_async', 'queue')
 ) AS d
-    ON l.kind = d.kind
-    AND t.subscription_id = d.subscription_id
-    AND l.publisher_id = d.publisher_id
+    ON l.kind = d.kind AND t.subscription_id = d.subscription_id AND l.publisher_id = d.publisher_id

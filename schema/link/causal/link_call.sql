@@ -86,10 +86,8 @@ sent AS (
         FROM store.link_response AS l
         JOIN store.response AS r ON l.response_id = r.response_id
         JOIN store.callback_instance AS i
-            ON l.callback_instance_id = i.callback_instance_id
-            AND r.sender_thread_id = i.thread_id
-        WHERE l.run_id = only_run
-            AND r.sent_ns BETWEEN i.start_ns AND coalesce(i.end_ns, r.sent_ns)
+            ON l.callback_instance_id = i.callback_instance_id AND r.sender_thread_id = i.thread_id
+        WHERE l.run_id = only_run AND r.sent_ns BETWEEN i.start_ns AND coalesce(i.end_ns, r.sent_ns)
     ) AS i ON r.response_id = i.response_id
     WHERE r.run_id = only_run
 ),

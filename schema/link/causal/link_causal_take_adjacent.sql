@@ -51,9 +51,7 @@ adjacent AS MATERIALIZED (
         a.publisher_id, a.trace_id, a.start_event_id, a.start_ns
     FROM alone AS a
     ASOF JOIN turn AS t
-        ON a.run_id = t.run_id
-        AND a.thread_id = t.thread_id
-        AND a.start_event_id > t.event_id
+        ON a.run_id = t.run_id AND a.thread_id = t.thread_id AND a.start_event_id > t.event_id
     WHERE t.take_id IS NOT NULL
 ),
 -- Requests and responses that the thread took. Only their times are stored, not their events.

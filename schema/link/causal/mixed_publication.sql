@@ -4,5 +4,4 @@
 CREATE OR REPLACE MACRO derive.mixed_publication(only_run) AS TABLE
 SELECT publication_id
 FROM store.publication
-WHERE run_id = only_run
-    AND process_id IN (SELECT process_id FROM store.process WHERE is_ambiguous)
+WHERE run_id = only_run AND process_id IN (SELECT process_id FROM store.process WHERE is_ambiguous)

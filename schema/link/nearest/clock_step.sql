@@ -18,8 +18,7 @@ turn AS (
     FROM (
         FROM known
         WINDOW by_clock AS (PARTITION BY clock_id)
-        QUALIFY is_certain
-            OR at_ns IN (min(at_ns) OVER by_clock, max(at_ns) OVER by_clock)
+        QUALIFY is_certain OR at_ns IN (min(at_ns) OVER by_clock, max(at_ns) OVER by_clock)
     )
     WINDOW on_clock AS (PARTITION BY clock_id ORDER BY at_ns)
 )

@@ -213,8 +213,7 @@ exposed AS (
         WHERE topic_name IN (FROM strange)
     ) AS s ON p.topic_name = s.topic_name
     ANTI JOIN within AS w
-        ON p.publication_id = w.publication_id
-        AND s.only_subscription_id = w.only_subscription_id
+        ON p.publication_id = w.publication_id AND s.only_subscription_id = w.only_subscription_id
 ),
 -- How much of the time the publisher was writing: the more, the more messages fall into it by
 -- chance.

@@ -15,8 +15,7 @@ stamped AS (
     FROM store.publication AS b
     LEFT JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
     LEFT JOIN topic AS w ON p.topic_name = w.topic_name
-    WHERE b.run_id = only_run
-        AND (w.topic_name IS NOT NULL OR p.topic_name IS NULL)
+    WHERE b.run_id = only_run AND (w.topic_name IS NOT NULL OR p.topic_name IS NULL)
 ),
 received AS (
     SELECT

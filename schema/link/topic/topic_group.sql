@@ -63,9 +63,7 @@ slot_use AS (
         lag(r.publication_id) OVER in_slot AS publication_id
     FROM store.ring_buffer_event AS r
     SEMI JOIN unknown_buffer AS u
-        ON r.run_id = u.run_id
-        AND r.process_id = u.process_id
-        AND r.buffer_handle = u.buffer_handle
+        ON r.run_id = u.run_id AND r.process_id = u.process_id AND r.buffer_handle = u.buffer_handle
     WHERE r.run_id = only_run
     WINDOW in_slot AS (
         PARTITION BY r.run_id, r.process_id, r.buffer_handle, r.slot ORDER BY r.event_id

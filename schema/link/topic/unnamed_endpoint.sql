@@ -30,5 +30,4 @@ SELECT
 FROM counted AS e
 JOIN store.process AS p ON e.process_id = p.process_id
 JOIN store.host AS h ON p.host_id = h.host_id
-WHERE e.handle IS NOT NULL
-    AND (e.topic_name IS NULL OR e.is_topic_learned OR e.is_topic_declared)
+WHERE e.handle IS NOT NULL AND (e.topic_name IS NULL OR e.is_topic_learned OR e.is_topic_declared)

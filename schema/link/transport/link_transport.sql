@@ -60,9 +60,7 @@ exposed AS (
         FROM guess AS q
         JOIN derive.exposed_trace AS x ON q.sender_trace_id = x.trace_id
     ) AS u
-    ASOF JOIN gap AS g
-        ON u.recording_id = g.recording_id
-        AND u.sent_until_ns >= g.start_ns
+    ASOF JOIN gap AS g ON u.recording_id = g.recording_id AND u.sent_until_ns >= g.start_ns
     WHERE g.covered_until_ns >= u.sent_ns
     UNION
     SELECT u.run_id, u.take_id
@@ -71,9 +69,7 @@ exposed AS (
         FROM guess AS q
         JOIN derive.exposed_trace AS x ON q.receiver_trace_id = x.trace_id
     ) AS u
-    ASOF JOIN gap AS g
-        ON u.recording_id = g.recording_id
-        AND u.taken_ns >= g.start_ns
+    ASOF JOIN gap AS g ON u.recording_id = g.recording_id AND u.taken_ns >= g.start_ns
     WHERE g.covered_until_ns >= u.received_from_ns
 ),
 intra_process AS (

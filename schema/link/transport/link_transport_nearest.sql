@@ -12,8 +12,7 @@ WITH received AS (
     FROM store.nearest_message AS m
     JOIN store.subscription AS s ON m.run_id = s.run_id AND m.topic_name = s.topic_name
     JOIN store.take AS t
-        ON s.subscription_id = t.subscription_id
-        AND m.source_timestamp_ns = t.source_timestamp_ns
+        ON s.subscription_id = t.subscription_id AND m.source_timestamp_ns = t.source_timestamp_ns
     WHERE m.run_id = only_run AND t.run_id = only_run
     QUALIFY row_number() OVER (
         PARTITION BY t.subscription_id, t.source_timestamp_ns ORDER BY t.take_id

@@ -18,9 +18,7 @@ dequeue AS (
     FROM staging.take_chain AS t
     JOIN staging.buffer_owner AS o
         ON t.process_id = o.process_id AND t.buffer_handle = o.buffer_handle
-    WHERE t.method = 'ring_buffer'
-        AND NOT t.is_known
-        AND o.subscription_event_id IS NOT NULL
+    WHERE t.method = 'ring_buffer' AND NOT t.is_known AND o.subscription_event_id IS NOT NULL
 ),
 callback AS (
     SELECT process_id, callback_handle, callback_event_id, min(start_event_id) AS event_id

@@ -26,8 +26,7 @@ nearest_collector AS (
         ) AS collected_event_id
     FROM to_collector AS a
     JOIN collected AS c
-        ON a.process_id = c.process_id
-        AND a.entities_collector_addr = c.entities_collector_addr
+        ON a.process_id = c.process_id AND a.entities_collector_addr = c.entities_collector_addr
     GROUP BY a.event_id
 ),
 added AS (

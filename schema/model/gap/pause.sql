@@ -136,9 +136,7 @@ usual AS (
         unnest(range(q.start_ns // 1_000_000_000, q.end_ns // 1_000_000_000 + 1)) AS second
     FROM quiet AS q
     ANTI JOIN silence AS s
-        ON q.recording_index = s.recording_index
-        AND q.start_ns < s.end_ns
-        AND q.end_ns > s.start_ns
+        ON q.recording_index = s.recording_index AND q.start_ns < s.end_ns AND q.end_ns > s.start_ns
 ),
 explained AS (
     SELECT s.recording_index, s.start_ns

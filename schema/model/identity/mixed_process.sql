@@ -22,9 +22,7 @@ object AS (
     FROM raw.ros2_rcl_publisher_init AS p
     JOIN suspect AS s ON p.thread_index = s.thread_index
     ASOF JOIN staging.foreign_endpoint AS e
-        ON s.process = e.process
-        AND p.rmw_publisher_handle = e.handle
-        AND p.event_id >= e.event_id
+        ON s.process = e.process AND p.rmw_publisher_handle = e.handle AND p.event_id >= e.event_id
 ),
 used AS (
     SELECT event_id, ts_ns, thread_index, publisher_handle AS handle FROM raw.ros2_rcl_publish

@@ -41,9 +41,7 @@ with_writer AS (
     ASOF LEFT JOIN writer_init AS g
         ON p.process_id = g.process_id AND p.gid = g.gid AND p.event_id >= g.event_id
     ASOF LEFT JOIN (SELECT * FROM writer_init WHERE gid IS NULL) AS t
-        ON p.process_id = t.process_id
-        AND p.dds_topic = t.topic_name
-        AND p.event_id >= t.event_id
+        ON p.process_id = t.process_id AND p.dds_topic = t.topic_name AND p.event_id >= t.event_id
     LEFT JOIN (
         SELECT p.event_id, w.writer, w.ts_ns
         FROM (SELECT * FROM with_rmw WHERE gid IS NULL) AS p

@@ -29,8 +29,7 @@ started AS (
     JOIN store.executor_thread AS x ON i.thread_id = x.thread_id
     JOIN store.callback AS c ON i.callback_id = c.callback_id
     LEFT JOIN derive.timer_due(executors) AS d ON i.callback_instance_id = d.callback_instance_id
-    WHERE i.depth = 1
-        AND x.executor_id IN (SELECT executor_id FROM query_table(executors))
+    WHERE i.depth = 1 AND x.executor_id IN (SELECT executor_id FROM query_table(executors))
 ),
 -- Used by messages and requests, at both ends.
 clock AS MATERIALIZED (FROM derive.process_clock),

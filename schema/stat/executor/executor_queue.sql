@@ -30,8 +30,7 @@ outside AS MATERIALIZED (
         SELECT thread_id, start_ns, end_ns FROM store.callback_instance WHERE parent_id IS NULL
     ) AS i
         ON s.thread_id = i.thread_id AND s.start_ns >= i.start_ns
-    WHERE s.thread_id IN (SELECT thread_id FROM waiting)
-        AND coalesce(i.end_ns <= s.start_ns, true)
+    WHERE s.thread_id IN (SELECT thread_id FROM waiting) AND coalesce(i.end_ns <= s.start_ns, true)
 ),
 -- These follow each other on a thread, so those that overlap a wait are neighbours.
 reached AS (

@@ -73,7 +73,5 @@ JOIN numbered AS t
     AND c.subscription_event_id = t.subscription_event_id
     AND c.since_event_id = t.since_event_id
     AND c.number = t.number
-WHERE NOT c.is_take
-    AND t.is_take
-    AND coalesce(c.previous_executor_event_id < t.event_id, true)
+WHERE NOT c.is_take AND t.is_take AND coalesce(c.previous_executor_event_id < t.event_id, true)
 QUALIFY row_number() OVER (PARTITION BY t.event_id ORDER BY c.event_id) = 1

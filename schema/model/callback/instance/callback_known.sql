@@ -39,9 +39,7 @@ registered AS (
         a.event_id AS added_event_id
     FROM staging.located('ros2_rclcpp_callback_register') AS r
     ASOF LEFT JOIN added AS a
-        ON r.process_id = a.process_id
-        AND r.callback = a.callback
-        AND r.event_id >= a.event_id
+        ON r.process_id = a.process_id AND r.callback = a.callback AND r.event_id >= a.event_id
     WHERE r.symbol NOT LIKE '#msgflow %' OR r.symbol LIKE '#msgflow function %'
 ),
 symbol_of AS (

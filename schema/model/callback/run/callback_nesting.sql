@@ -82,6 +82,4 @@ SELECT
 FROM nested AS i
 LEFT JOIN outer_run AS e ON i.start_event_id = e.start_event_id
 ASOF LEFT JOIN (SELECT * FROM nested WHERE NOT is_plain) AS o
-    ON i.thread_id = o.thread_id
-    AND i.depth - 1 = o.depth
-    AND i.start_event_id > o.start_event_id
+    ON i.thread_id = o.thread_id AND i.depth - 1 = o.depth AND i.start_event_id > o.start_event_id
