@@ -77,8 +77,7 @@ response AS (
         ], recursive := true)
     FROM cycle
     UNION ALL
-    SELECT
-        a.path_id, a.sink_event, a.is_ambiguous, a.root_ns, 'all', a.answer_ns - a.root_ns
+    SELECT a.path_id, a.sink_event, a.is_ambiguous, a.root_ns, 'all', a.answer_ns - a.root_ns
     FROM answered AS a
     JOIN cycle AS c ON a.path_id = c.path_id AND a.answer_ns = c.answer_ns
 ),

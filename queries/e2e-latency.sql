@@ -106,11 +106,7 @@ WITH flow AS (
     FROM path_outcome
 ),
 -- What became of a root is the same in each of its rows, but for gaps in its time.
-root AS (
-    SELECT run_id, path_id, status, reason
-    FROM flow
-    WHERE is_first IS NOT false
-),
+root AS (SELECT run_id, path_id, status, reason FROM flow WHERE is_first IS NOT false),
 affected AS (
     SELECT path_id, count(*) AS number
     FROM (SELECT DISTINCT path_id, root_kind, root_id FROM flow WHERE is_loss_affected)
@@ -129,10 +125,7 @@ reason AS (
     GROUP BY run_id, path_id
 ),
 completeness AS (
-    SELECT
-        run_id, path_id,
-        count(*) AS roots,
-        histogram(status)::MAP(VARCHAR, BIGINT) AS number
+    SELECT run_id, path_id, count(*) AS roots, histogram(status)::MAP(VARCHAR, BIGINT) AS number
     FROM root
     GROUP BY run_id, path_id
 ),

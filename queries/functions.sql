@@ -82,9 +82,7 @@ WITH instance AS (
     JOIN main.callback_instance AS i ON f.callback_instance_id = i.callback_instance_id
     JOIN main.callback_alike AS k ON i.callback_id = k.callback_id
 ),
-counted AS (
-    SELECT callback_id AS group_id, count(*) AS calls FROM instance GROUP BY callback_id
-),
+counted AS (SELECT callback_id AS group_id, count(*) AS calls FROM instance GROUP BY callback_id),
 -- Outside of callbacks, a group is a process: the negative of its id.
 sample AS (
     SELECT coalesce(i.callback_id, -s.process_id) AS group_id, s.stack_id, s.cpu_ns

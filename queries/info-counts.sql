@@ -66,9 +66,7 @@ found AS (
     WHERE list_contains($runs, run_id)
     GROUP BY run_id, object
 )
-SELECT
-    run.run_id, object.object,
-    coalesce(found.row_count, 0) AS row_count
+SELECT run.run_id, object.object, coalesce(found.row_count, 0) AS row_count
 FROM main.run
 CROSS JOIN object
 LEFT JOIN found ON run.run_id = found.run_id AND object.object = found.object

@@ -18,9 +18,7 @@ SELECT
     process.name AS process_name,
     process.tracetools_version, process.python_version,
     (SELECT count(*) FROM main.node WHERE node.process_id = process.process_id) AS node_count,
-    (
-        SELECT count(*) FROM main.thread WHERE thread.process_id = process.process_id
-    ) AS thread_count,
+    (SELECT count(*) FROM main.thread WHERE thread.process_id = process.process_id) AS thread_count,
     process.first_seen_ns,
     process.last_seen_ns - process.first_seen_ns AS duration_ns
 FROM main.process

@@ -63,8 +63,7 @@ input AS (
 ),
 -- Messages lead nowhere, while timers or other messages lead to publications.
 dead_end AS MATERIALIZED (
-    SELECT
-        *, timer_id IS NOT NULL AS is_timed, coalesce(timer_id, trigger_id) IS NULL AS is_outside
+    SELECT *, timer_id IS NOT NULL AS is_timed, coalesce(timer_id, trigger_id) IS NULL AS is_outside
     FROM main.dead_end($runs)
 ),
 queued AS (
@@ -238,9 +237,7 @@ undecided AS (
         OR count(*) < count(DISTINCT publisher_id)
         * (count(DISTINCT timer_id) + count(DISTINCT trigger_id))
 ),
-chosen_by_time AS (
-    SELECT DISTINCT publisher_id FROM synchronous WHERE kind = 'approximate_sync'
-),
+chosen_by_time AS (SELECT DISTINCT publisher_id FROM synchronous WHERE kind = 'approximate_sync'),
 kept AS (
     SELECT
         d.node_id, d.subscription_id, d.is_timed, d.topic_name, d.message_count,

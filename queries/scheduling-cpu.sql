@@ -28,9 +28,7 @@ WITH chosen AS (
 ),
 traced AS (
     SELECT run_id, host_id, max(length_ns) AS length_ns
-    FROM (
-        SELECT run_id, host_id, cpu, sum(running_ns) AS length_ns FROM chosen GROUP BY ALL
-    )
+    FROM (SELECT run_id, host_id, cpu, sum(running_ns) AS length_ns FROM chosen GROUP BY ALL)
     GROUP BY run_id, host_id
 ),
 second AS (

@@ -44,10 +44,7 @@ WITH single_service AS (
     HAVING count(*) = 1
 ),
 answer AS (
-    SELECT
-        request_id,
-        arg_min(sent_ns, response_id) AS sent_ns,
-        min(taken_ns) AS taken_ns
+    SELECT request_id, arg_min(sent_ns, response_id) AS sent_ns, min(taken_ns) AS taken_ns
     FROM main.response
     WHERE list_contains($runs, run_id) AND request_id IS NOT NULL
     GROUP BY request_id

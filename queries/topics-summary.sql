@@ -38,8 +38,7 @@ WITH topic AS (
         SELECT run_id, topic_name, is_internal, 1 AS publisher, 0 AS subscription
         FROM main.publisher
         UNION ALL
-        SELECT run_id, topic_name, is_internal, 0, 1
-        FROM main.subscription
+        SELECT run_id, topic_name, is_internal, 0, 1 FROM main.subscription
     )
     WHERE list_contains($runs, run_id)
     GROUP BY run_id, topic_name

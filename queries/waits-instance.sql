@@ -79,10 +79,7 @@ meanwhile AS (
     GROUP BY p.callback_instance_id
 ),
 taken AS (
-    SELECT
-        callback_instance_id,
-        unnest(cpu_taken_by) AS name,
-        unnest(cpu_taken_ns) AS length_ns
+    SELECT callback_instance_id, unnest(cpu_taken_by) AS name, unnest(cpu_taken_ns) AS length_ns
     FROM waited
 ),
 taker AS (

@@ -121,8 +121,7 @@ meanwhile AS (
     GROUP BY r.callback_id
 ),
 taken AS (
-    SELECT callback_id, unnest(cpu_taken_by) AS name, unnest(cpu_taken_ns) AS length_ns
-    FROM waited
+    SELECT callback_id, unnest(cpu_taken_by) AS name, unnest(cpu_taken_ns) AS length_ns FROM waited
 ),
 taker AS (
     SELECT

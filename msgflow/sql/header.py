@@ -46,8 +46,8 @@ folder are in stands before. Only what others put in front of theirs says its ki
 - `unites`: objects whose rows a macro reads as one table. Its first argument is the name of that
   table, its second the run. An object whose `when` finds no row is left out.
 
-- `like`: other files of the folder, or of `schema/public` (main.NAME). A `param` or a `column` may
-  be a list of names: the first of these files that has it declares it.
+- `like`: other files of the folder, of `schema/public` (main.NAME) or `queries` (queries.NAME). A
+  `param` or a `column` may be a list of names: the first of these files that has it declares it.
 - `variant`: a parameter whose values are queries of their own. The default is this file, and `age`
   stands in the file of the same name with `-age` behind it; a BOOLEAN `each`, in that with `-each`.
   A query may have several: each value of them is one file.
@@ -377,9 +377,10 @@ def _sources(text: str) -> tuple[tuple[str, str], ...]:
 
 
 def _like(name: str, path: Path) -> Header:
-    schema, _, stem = name.rpartition(".")
-    folder = resource_directory("schema") / "public" if schema == "main" else path.parent
-    return _declaring(folder / f"{stem}.sql")
+    room, _, stem = name.rpartition(".")
+    if room == "main":
+        return _declaring(resource_directory("schema") / "public" / f"{stem}.sql")
+    return _declaring((resource_directory(room) if room else path.parent) / f"{stem}.sql")
 
 
 @cache

@@ -44,8 +44,7 @@ relevant AS (
     )
 ),
 thinned (round, clock_id, other_clock_id, sense, moment, bound) AS (
-    SELECT 0, clock_id, other_clock_id, sense, moment, bound
-    FROM relevant
+    SELECT 0, clock_id, other_clock_id, sense, moment, bound FROM relevant
     UNION ALL
     SELECT round + 1, clock_id, other_clock_id, sense, moment, bound
     FROM (

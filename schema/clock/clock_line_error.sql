@@ -75,8 +75,7 @@ apart AS (
     GROUP BY k.clock_id, k.other_clock_id, k.moment
 )
 -- The greater of the two has a corner where they are equal.
-SELECT clock_id, other_clock_id, moment, greatest(below, above) AS error
-FROM apart
+SELECT clock_id, other_clock_id, moment, greatest(below, above) AS error FROM apart
 UNION ALL
 SELECT
     clock_id, other_clock_id, moment + share * (next_moment - moment),

@@ -49,9 +49,7 @@ edge AS MATERIALIZED (
     FROM corner
     GROUP BY clock_id, other_clock_id, sense
 ),
-line AS MATERIALIZED (
-    FROM derive.clock_line('corner', 'edge')
-),
+line AS MATERIALIZED (FROM derive.clock_line('corner', 'edge')),
 -- How far the clocks can be from the line at any time, where no line is possible.
 miss AS (
     SELECT clock_id, other_clock_id, ceil(max(abs(least_miss))) AS greatest_miss

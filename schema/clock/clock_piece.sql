@@ -19,8 +19,6 @@ SELECT
 FROM bound
 WINDOW along AS (PARTITION BY clock_id ORDER BY at_ns)
 UNION ALL
-SELECT
-    run_id, clock_id, -9223372036854775808, min(at_ns), arg_min(uncertainty_ns, at_ns),
-    -fastest
+SELECT run_id, clock_id, -9223372036854775808, min(at_ns), arg_min(uncertainty_ns, at_ns), -fastest
 FROM bound
 GROUP BY run_id, clock_id, fastest

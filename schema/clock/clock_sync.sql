@@ -76,9 +76,7 @@ sync AS MATERIALIZED (
 ),
 -- Each clock and those on the way from it to the root, but for the root itself.
 way (clock_id, via_id, next_clock_id) AS (
-    SELECT clock_id, clock_id, next_clock_id
-    FROM sync
-    WHERE next_clock_id IS NOT NULL
+    SELECT clock_id, clock_id, next_clock_id FROM sync WHERE next_clock_id IS NOT NULL
     UNION ALL
     SELECT w.clock_id, s.clock_id, s.next_clock_id
     FROM way AS w

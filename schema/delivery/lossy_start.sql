@@ -10,13 +10,9 @@ WITH loss AS (
     GROUP BY r.recording_id
 ),
 started AS (
-    SELECT process_id, min(start_ns) AS start_ns
-    FROM store.callback_instance
-    GROUP BY process_id
+    SELECT process_id, min(start_ns) AS start_ns FROM store.callback_instance GROUP BY process_id
 ),
-born AS (
-    SELECT process_id, min(created_ns) AS created_ns FROM store.node GROUP BY process_id
-)
+born AS (SELECT process_id, min(created_ns) AS created_ns FROM store.node GROUP BY process_id)
 SELECT DISTINCT p.run_id, p.process_id
 FROM derive.process_presence AS p
 JOIN loss AS l ON p.recording_id = l.recording_id

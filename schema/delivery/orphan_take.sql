@@ -110,9 +110,7 @@ incomplete AS (
     UNION
     SELECT process_id FROM store.node WHERE run_id = only_run AND is_inferred
 ),
-topic AS (
-    SELECT DISTINCT topic_name FROM orphan WHERE topic_name IS NOT NULL
-),
+topic AS (SELECT DISTINCT topic_name FROM orphan WHERE topic_name IS NOT NULL),
 candidate AS (
     SELECT topic_name, process_id, created_ns, true AS is_known, is_silent
     FROM sending
@@ -125,9 +123,7 @@ candidate AS (
         SELECT (topic_name, process_id) FROM sending WHERE topic_name IS NOT NULL
     )
     UNION ALL
-    SELECT NULL, process_id, min(created_ns), true, false
-    FROM sending
-    GROUP BY process_id
+    SELECT NULL, process_id, min(created_ns), true, false FROM sending GROUP BY process_id
 ),
 sender AS (
     SELECT

@@ -30,8 +30,7 @@ instance AS (
     FROM store.take
     GROUP BY run_id, process_id, trace_id
     UNION ALL
-    SELECT
-        run_id, process_id, trace_id, min(start_ns), max(greatest(start_ns, coalesce(end_ns, 0)))
+    SELECT run_id, process_id, trace_id, min(start_ns), max(greatest(start_ns, coalesce(end_ns, 0)))
     FROM store.callback_instance
     GROUP BY run_id, process_id, trace_id
 ),

@@ -4,11 +4,7 @@
 --     as the one for what comes through the middleware, so that it is not known what it should
 --     have got.
 -- grain: one row per subscription with a handle
-WITH host_end AS (
-    SELECT host_id, max(last_seen_ns) AS end_ns
-    FROM store.process
-    GROUP BY host_id
-),
+WITH host_end AS (SELECT host_id, max(last_seen_ns) AS end_ns FROM store.process GROUP BY host_id),
 reader AS (
     SELECT
         r.subscription_id,

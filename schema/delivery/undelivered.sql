@@ -229,9 +229,7 @@ due AS MATERIALIZED (
         ) AS publisher_row_length
     FROM known
 ),
-due_stretch AS (
-    SELECT DISTINCT subscription_id, derive.stretch(due_ns) AS stretch FROM due
-),
+due_stretch AS (SELECT DISTINCT subscription_id, derive.stretch(due_ns) AS stretch FROM due),
 -- Of a stretch in which no message is due, only the first wait can be the next one after any.
 condensed_wait AS (
     SELECT w.subscription_id, min(w.end_ns) AS end_ns, arg_min(w.start_ns, w.end_ns) AS start_ns
@@ -290,8 +288,7 @@ bounded AS MATERIALIZED (
 -- The place of each missing message among those of its topic, and of the last one before it was
 -- gone. Of any other stretch of time the number of messages is enough.
 wanted_stretch AS (
-    SELECT DISTINCT
-        topic_name, clock_id, derive.stretch(unnest([arrival_ns, gone_ns])) AS stretch
+    SELECT DISTINCT topic_name, clock_id, derive.stretch(unnest([arrival_ns, gone_ns])) AS stretch
     FROM bounded
 ),
 ordered AS MATERIALIZED (
@@ -342,12 +339,9 @@ facts AS (
     ASOF LEFT JOIN (SELECT * FROM derive.empty_take WHERE run_id = only_run) AS f
         ON b.subscription_id = f.subscription_id AND b.arrival_ns <= f.failed_ns
     ASOF LEFT JOIN (
-        SELECT subscription_id, taken_ns, false AS for_no_stamp
-        FROM unidentified
-        WHERE has_no_stamp
+        SELECT subscription_id, taken_ns, false AS for_no_stamp FROM unidentified WHERE has_no_stamp
         UNION ALL
-        SELECT subscription_id, taken_ns, true
-        FROM unidentified
+        SELECT subscription_id, taken_ns, true FROM unidentified
     ) AS u
         ON b.subscription_id = u.subscription_id
         AND b.has_no_stamp = u.for_no_stamp

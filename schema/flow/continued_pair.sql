@@ -6,9 +6,7 @@ WITH pair AS (
     FROM derive.certain_cause
     WHERE take_id IS NOT NULL
     UNION
-    SELECT run_id, subscription_id, publisher_id
-    FROM store.flow_call
-    WHERE take_id IS NOT NULL
+    SELECT run_id, subscription_id, publisher_id FROM store.flow_call WHERE take_id IS NOT NULL
 )
 SELECT p.run_id, p.subscription_id, p.publisher_id
 FROM pair AS p

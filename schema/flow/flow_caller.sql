@@ -15,8 +15,7 @@ answer AS (
     FROM store.callback_instance
     WHERE request_id IS NOT NULL
     UNION ALL
-    SELECT DISTINCT
-        run_id, taken_request_id, derive.vertex_key('request', taken_request_id)
+    SELECT DISTINCT run_id, taken_request_id, derive.vertex_key('request', taken_request_id)
     FROM derive.certain_call
     WHERE taken_request_id IS NOT NULL
     UNION ALL

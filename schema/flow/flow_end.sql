@@ -5,5 +5,4 @@
 SELECT run_id, 'publication' AS kind, publication_id AS id, subscription_id, reason
 FROM store.undelivered
 UNION ALL
-SELECT run_id, 'take', take_id, subscription_id, reason
-FROM store.orphan_take
+SELECT run_id, 'take', take_id, subscription_id, reason FROM store.orphan_take

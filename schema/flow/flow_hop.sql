@@ -5,9 +5,7 @@
 -- grain: one row per run, subscription before (NULL: source), route, publisher and subscription
 CREATE OR REPLACE MACRO derive.flow_hop(only_run) AS TABLE
 WITH carried AS (
-    SELECT DISTINCT publisher_id, subscription_id
-    FROM derive.flow_transport
-    WHERE run_id = only_run
+    SELECT DISTINCT publisher_id, subscription_id FROM derive.flow_transport WHERE run_id = only_run
 ),
 entered AS (
     SELECT

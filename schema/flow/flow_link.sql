@@ -12,11 +12,7 @@ SELECT
 FROM store.link_transport
 WHERE NOT is_self_loop
 UNION ALL
-SELECT
-    run_id,
-    'take', take_id,
-    'callback_instance', callback_instance_id,
-    'callback'
+SELECT run_id, 'take', take_id, 'callback_instance', callback_instance_id, 'callback'
 FROM store.callback_instance
 WHERE take_id IS NOT NULL
 UNION ALL
@@ -28,18 +24,10 @@ SELECT
     kind
 FROM derive.flow_cause
 UNION ALL
-SELECT
-    run_id,
-    'callback_instance', callback_instance_id,
-    'request', request_id,
-    'direct'
+SELECT run_id, 'callback_instance', callback_instance_id, 'request', request_id, 'direct'
 FROM derive.certain_request
 UNION ALL
-SELECT
-    run_id,
-    'request', request_id,
-    'callback_instance', callback_instance_id,
-    'callback'
+SELECT run_id, 'request', request_id, 'callback_instance', callback_instance_id, 'callback'
 FROM store.callback_instance
 WHERE request_id IS NOT NULL
 UNION ALL
@@ -51,17 +39,8 @@ SELECT
 FROM store.link_response AS l
 JOIN store.response AS r ON l.response_id = r.response_id
 UNION ALL
-SELECT
-    run_id,
-    'request', request_id,
-    'response', response_id,
-    'service'
+SELECT run_id, 'request', request_id, 'response', response_id, 'service'
 FROM store.response
 WHERE callback_instance_id IS NULL AND request_id IS NOT NULL
 UNION ALL
-SELECT
-    run_id,
-    from_kind, from_id,
-    to_kind, to_id,
-    'take_adjacent'
-FROM derive.certain_call
+SELECT run_id, from_kind, from_id, to_kind, to_id, 'take_adjacent' FROM derive.certain_call

@@ -11,9 +11,7 @@ CREATE OR REPLACE MACRO derive.graph_reachable(
 WITH RECURSIVE edge AS MATERIALIZED (
     SELECT from_kind, from_id, to_kind, to_id FROM query_table(edges)
 ),
-known AS (
-    SELECT count(*) AS edge_count FROM edge
-),
+known AS (SELECT count(*) AS edge_count FROM edge),
 reached (kind, id) AS (
     SELECT start_kind::VARCHAR, start_id::BIGINT
     FROM known

@@ -22,6 +22,4 @@ reached AS (
     WHERE r.depth <= max_depth
     GROUP BY h.subscription_id, r.depth
 )
-SELECT only_run AS run_id
-FROM reached
-HAVING max(depth) > max_depth OR sum(number) > max_paths
+SELECT only_run AS run_id FROM reached HAVING max(depth) > max_depth OR sum(number) > max_paths

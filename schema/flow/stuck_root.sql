@@ -64,8 +64,7 @@ delivered AS (
     GROUP BY t.publisher_id, t.subscription_id
 ),
 continued AS (
-    SELECT
-        c.subscription_id, c.publisher_id, c.route, max(t.taken_ns) AS last_ns
+    SELECT c.subscription_id, c.publisher_id, c.route, max(t.taken_ns) AS last_ns
     FROM derive.flow_continuation AS c
     JOIN store.take AS t ON c.take_id = t.take_id
     WHERE list_contains(runs, c.run_id) AND c.publisher_id IN (SELECT publisher_id FROM stuck)

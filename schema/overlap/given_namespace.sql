@@ -34,6 +34,4 @@ given AS (
         ON n.host = a.host AND n.vpid = a.vpid AND n.procname = a.procname
     LEFT JOIN process_namespace AS p ON n.host = p.host AND n.vpid = p.vpid
 )
-SELECT session, vpid, procname, pid_ns
-FROM given
-WHERE pid_ns IS NOT NULL
+SELECT session, vpid, procname, pid_ns FROM given WHERE pid_ns IS NOT NULL

@@ -16,11 +16,7 @@ reached (session, member) AS (
     FROM reached AS r
     JOIN twin AS t ON r.member = t.session
 ),
-grouped AS (
-    SELECT session, min(member) AS container
-    FROM reached
-    GROUP BY session
-)
+grouped AS (SELECT session, min(member) AS container FROM reached GROUP BY session)
 SELECT session, container
 FROM grouped
 WHERE container IN (

@@ -25,9 +25,7 @@ taken AS (
 published AS (
     SELECT publisher_id, count(*) AS number
     FROM store.publication
-    WHERE publisher_id IN (
-        SELECT object_id FROM endpoint WHERE kind = 'publisher'
-    )
+    WHERE publisher_id IN (SELECT object_id FROM endpoint WHERE kind = 'publisher')
     GROUP BY publisher_id
 )
 SELECT

@@ -22,9 +22,7 @@
 -- column: run_queue_ns BIGINT [ns]  From the waking until the thread had a CPU; NULL: not known
 -- column: executor_ns BIGINT [ns]  From there until the take; with the two before it is the latency
 WITH waking AS (
-    SELECT
-        s.thread_id, s.end_ns AS at_ns, s.waker_kind, s.waker_thread_id,
-        s.waker_other_thread_id
+    SELECT s.thread_id, s.end_ns AS at_ns, s.waker_kind, s.waker_thread_id, s.waker_other_thread_id
     FROM main.thread_state AS s
     WHERE s.state = 'sleeping'
 ),

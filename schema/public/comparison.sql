@@ -210,12 +210,8 @@ warm_up AS (
     FROM derive.warm_up('centred') AS w
     JOIN side AS s ON w.side = s.side
 ),
-block AS (
-    FROM derive.block_length('centred')
-),
-spread AS (
-    FROM derive.bootstrap_interval('measured', 'block', resamples, confidence, seed)
-),
+block AS (FROM derive.block_length('centred')),
+spread AS (FROM derive.bootstrap_interval('measured', 'block', resamples, confidence, seed)),
 value AS (
     SELECT
         m.side, m.subject, m.number, m.share, m.loss_affected, m.ambiguous, w.warm_up_ns, m.is_cut,

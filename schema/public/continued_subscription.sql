@@ -4,6 +4,4 @@
 -- param: runs BIGINT[]  Runs to look at
 -- column: subscription_id BIGINT  The subscription
 CREATE OR REPLACE MACRO main.continued_subscription(runs) AS TABLE
-SELECT DISTINCT subscription_id
-FROM derive.continued_pair
-WHERE list_contains(runs, run_id)
+SELECT DISTINCT subscription_id FROM derive.continued_pair WHERE list_contains(runs, run_id)

@@ -79,9 +79,7 @@ path AS MATERIALIZED (
     WHERE path_id IN (SELECT prefix_id FROM lineage)
 ),
 -- What recursion looks up stays in memory: one number stands for all that a step has to fit.
-way AS MATERIALIZED (
-    SELECT DISTINCT way_id, publisher_id, subscription_id, route FROM path
-),
+way AS MATERIALIZED (SELECT DISTINCT way_id, publisher_id, subscription_id, route FROM path),
 -- root_key: positive for a callback instance, negative for a publication and, odd, for a take.
 root AS MATERIALIZED (
     SELECT
@@ -106,9 +104,7 @@ root AS MATERIALIZED (
         AND coalesce(root_ns >= window_start_ns, true)
         AND coalesce(root_ns < window_end_ns, true)
 ),
-stored AS MATERIALIZED (
-    SELECT take_id FROM derive.stored_take WHERE list_contains(runs, run_id)
-),
+stored AS MATERIALIZED (SELECT take_id FROM derive.stored_take WHERE list_contains(runs, run_id)),
 transport AS NOT MATERIALIZED (
     SELECT
         publication_id, publisher_id, take_id, subscription_id, is_ambiguous,
@@ -203,11 +199,7 @@ outcome AS MATERIALIZED (
     UNION ALL
     SELECT path_id, root_key, root_ns, NULL, NULL, false, false FROM missing
 ),
-longest AS (
-    SELECT path_id, max(sink_ns - root_ns) AS longest_ns
-    FROM outcome
-    GROUP BY path_id
-),
+longest AS (SELECT path_id, max(sink_ns - root_ns) AS longest_ns FROM outcome GROUP BY path_id),
 -- With time enough for the longest flow it is not the recording that cut a root.
 explained AS (
     SELECT

@@ -33,9 +33,7 @@ link AS MATERIALIZED (
     FROM chain AS c
     JOIN chain AS p ON c.parent_path_id = p.path_id
 ),
-way AS MATERIALIZED (
-    SELECT DISTINCT way_id, route, publisher_id, subscription_id FROM link
-),
+way AS MATERIALIZED (SELECT DISTINCT way_id, route, publisher_id, subscription_id FROM link),
 -- What led to each publication, by way of a callback of the node or of a service that it called.
 continuation AS NOT MATERIALIZED (
     SELECT publication_id, take_id, subscription_id, []::BIGINT[] AS route
@@ -112,5 +110,4 @@ hop (flow_id, hop, take_id, publication_id, previous_take_id, next_take_id) AS (
     FROM hop AS h
     JOIN trail AS r ON h.flow_id = r.flow_id AND h.hop + 1 = r.hop AND h.next_take_id = r.take_id
 )
-SELECT flow_id, hop, take_id, publication_id, previous_take_id, next_take_id
-FROM hop
+SELECT flow_id, hop, take_id, publication_id, previous_take_id, next_take_id FROM hop

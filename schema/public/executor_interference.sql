@@ -11,9 +11,7 @@
 -- column: overlap_ns BIGINT [ns]  Overlap from earliest_ns of the wait on (from latest_ns if that
 --     is unknown)
 -- column: certain_ns BIGINT [ns]  Overlap from latest_ns of the wait on
-WITH executor AS (
-    SELECT executor_id, NULL::BIGINT AS until_ns FROM derive.executor_size
-),
+WITH executor AS (SELECT executor_id, NULL::BIGINT AS until_ns FROM derive.executor_size),
 ready AS (
     SELECT run_id, executor_id, callback_instance_id, earliest_ns, latest_ns, start_ns
     FROM derive.callback_ready('executor')

@@ -29,9 +29,7 @@
 --     or the thread that ran this callback had picked it, and did not start it yet. Not part of
 --     busy_max_ns. Of an executor of one thread: the time between two waits for which it ran no
 --     callback, if that is a millisecond or more. NULL: not known, or less
-WITH executor AS (
-    SELECT executor_id, NULL::BIGINT AS until_ns FROM derive.executor_size
-),
+WITH executor AS (SELECT executor_id, NULL::BIGINT AS until_ns FROM derive.executor_size),
 ready AS (
     SELECT
         run_id, executor_id, thread_id, callback_id, callback_instance_id, since, origin_ns,

@@ -6,8 +6,6 @@
 -- param: start_kind, start_id, max_depth
 -- column: kind, id
 CREATE OR REPLACE MACRO main.flow_both(start_kind, start_id, max_depth := NULL) AS TABLE
-SELECT kind, id
-FROM main.flow_forward(start_kind, start_id, max_depth := max_depth)
+SELECT kind, id FROM main.flow_forward(start_kind, start_id, max_depth := max_depth)
 UNION
-SELECT kind, id
-FROM main.flow_backward(start_kind, start_id, max_depth := max_depth)
+SELECT kind, id FROM main.flow_backward(start_kind, start_id, max_depth := max_depth)

@@ -46,9 +46,7 @@ hop AS MATERIALIZED (
 ),
 -- Only what leads to the end asked for is followed: nothing else needs to be enumerated.
 toward_end (subscription_id) AS (
-    SELECT subscription_id
-    FROM hop
-    WHERE to_topic IS NULL OR is_last
+    SELECT subscription_id FROM hop WHERE to_topic IS NULL OR is_last
     UNION
     SELECT h.from_subscription_id
     FROM toward_end AS l
@@ -131,9 +129,7 @@ list AS MATERIALIZED (
     SELECT
         row_number() OVER (ORDER BY run_id, depth, publishers_rank) AS list_id,
         run_id, depth, publishers_rank, parent_publishers_rank
-    FROM (
-        SELECT DISTINCT run_id, depth, publishers_rank, parent_publishers_rank FROM chain
-    )
+    FROM (SELECT DISTINCT run_id, depth, publishers_rank, parent_publishers_rank FROM chain)
 ),
 around AS (
     SELECT
@@ -155,8 +151,7 @@ walk (point, next_point, entered) USING KEY (point) AS (
         SELECT parent_id, min(list_id) AS child_id FROM around GROUP BY parent_id
     ) AS c ON a.list_id = c.parent_id
     UNION ALL
-    SELECT 2 * list_id + 1, coalesce(2 * next_id, 2 * parent_id + 1), 0
-    FROM around
+    SELECT 2 * list_id + 1, coalesce(2 * next_id, 2 * parent_id + 1), 0 FROM around
     UNION
     SELECT w.point, n.next_point, w.entered + n.entered
     FROM walk AS w

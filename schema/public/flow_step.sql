@@ -47,17 +47,14 @@ WITH RECURSIVE origin AS MATERIALIZED (
     SELECT run_id FROM store.publication
     WHERE start_kind = 'publication' AND publication_id = start_id
     UNION ALL
-    SELECT run_id FROM store.take
-    WHERE start_kind = 'take' AND take_id = start_id
+    SELECT run_id FROM store.take WHERE start_kind = 'take' AND take_id = start_id
     UNION ALL
     SELECT run_id FROM store.callback_instance
     WHERE start_kind = 'callback_instance' AND callback_instance_id = start_id
     UNION ALL
-    SELECT run_id FROM store.request
-    WHERE start_kind = 'request' AND request_id = start_id
+    SELECT run_id FROM store.request WHERE start_kind = 'request' AND request_id = start_id
     UNION ALL
-    SELECT run_id FROM store.response
-    WHERE start_kind = 'response' AND response_id = start_id
+    SELECT run_id FROM store.response WHERE start_kind = 'response' AND response_id = start_id
 ),
 -- Effects on ROS's own topics and services: no branches of the picture.
 aside AS MATERIALIZED (
@@ -99,9 +96,7 @@ edge AS MATERIALIZED (
     ANTI JOIN aside AS a ON l.to_key = a.key
     WHERE direction <> 'backward'
     UNION ALL
-    SELECT true, to_key, from_key
-    FROM link
-    WHERE direction <> 'forward'
+    SELECT true, to_key, from_key FROM link WHERE direction <> 'forward'
 ),
 near (is_backward, key, depth) USING KEY (is_backward, key) AS (
     SELECT s.is_backward, derive.vertex_key(start_kind, start_id)::BIGINT, 0
@@ -148,9 +143,7 @@ left_out AS (
     WHERE NOT s.is_backward
     GROUP BY s.key
 ),
-described AS MATERIALIZED (
-    FROM main.flow_vertex('vertex')
-),
+described AS MATERIALIZED (FROM main.flow_vertex('vertex')),
 arrow AS MATERIALIZED (
     SELECT
         l.from_kind, l.from_id, l.link_kind, l.to_id,

@@ -22,9 +22,7 @@ within AS (
     FROM main.stack_call
     WHERE stack_id IN (SELECT stack_id FROM seen)
 ),
-whole AS (
-    SELECT group_id, sum(samples) AS samples FROM seen GROUP BY group_id
-)
+whole AS (SELECT group_id, sum(samples) AS samples FROM seen GROUP BY group_id)
 SELECT
     s.group_id, w.stack_frame_id,
     coalesce(sum(s.samples) FILTER (WHERE is_self), 0)::BIGINT AS self_samples,

@@ -73,13 +73,10 @@ result AS (
     WHERE p.candidate_count = 1
 ),
 possible AS (
-    SELECT goal_id, any_value(candidate_count) AS candidate_count
-    FROM paired
-    GROUP BY goal_id
+    SELECT goal_id, any_value(candidate_count) AS candidate_count FROM paired GROUP BY goal_id
 ),
 told AS (
-    SELECT
-        f.goal_id, count(*) AS number, min(b.start_ns) AS first_ns, max(b.start_ns) AS last_ns
+    SELECT f.goal_id, count(*) AS number, min(b.start_ns) AS first_ns, max(b.start_ns) AS last_ns
     FROM derive.goal_feedback('server', 'alone') AS f
     JOIN main.publication AS b ON f.publication_id = b.publication_id
     GROUP BY f.goal_id

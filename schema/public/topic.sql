@@ -13,9 +13,7 @@
 WITH published AS (
     SELECT publisher_id, count(*) AS number FROM store.publication GROUP BY publisher_id
 ),
-taken AS (
-    SELECT subscription_id, count(*) AS number FROM store.take GROUP BY subscription_id
-),
+taken AS (SELECT subscription_id, count(*) AS number FROM store.take GROUP BY subscription_id),
 endpoint AS (
     SELECT
         e.run_id, e.topic_name, e.is_internal,

@@ -4,9 +4,7 @@
 --     approximate_sync), only publications from the callback of an input are listed.
 -- grain: one row per annotation and publication that it applies to
 WITH input AS (
-    SELECT annotation_id, count(*) AS input_count
-    FROM store.annotation_input
-    GROUP BY annotation_id
+    SELECT annotation_id, count(*) AS input_count FROM store.annotation_input GROUP BY annotation_id
 ),
 linked AS (
     SELECT annotation_id, publication_id, count(*) AS link_count

@@ -2,24 +2,13 @@
 -- description: As the query callbacks says it of one run. Quantiles of several callbacks
 --     are off by less than 1 %, all else is exact.
 -- grain: one row per node, callback and group of runs
--- column: label_group BIGINT        Group of runs
--- column: node VARCHAR [node]  Node of the callback
--- column: callback VARCHAR [callback]  What triggers it
--- column: runs BIGINT               Runs that have it
+-- like: queries.callbacks, waits
+-- column: label_group, node, callback, runs
 -- column: count BIGINT              Callback instances
--- column: open BIGINT               Instances without an end
--- column: period_min_ns BIGINT [ns]     Shortest time from one start to the next
--- column: period_median_ns BIGINT [ns]  Median time from one start to the next
--- column: period_max_ns BIGINT [ns]     Longest time from one start to the next
--- column: min_ns BIGINT [ns]        Shortest duration
--- column: median_ns BIGINT [ns]     Median duration
--- column: mean_ns BIGINT [ns]       Mean duration
--- column: p95_ns BIGINT [ns]        95 % of the durations are at most this
--- column: p99_ns BIGINT [ns]        99 % of the durations are at most this
--- column: max_ns BIGINT [ns]        Longest duration
--- column: total_ns BIGINT [ns]      Sum of the durations
+-- column: open, period_min_ns, period_median_ns, period_max_ns, min_ns, median_ns, mean_ns, p95_ns,
+--     p99_ns, max_ns, total_ns
 -- column: symbol VARCHAR            Functions registered for it
--- column: is_internal BOOLEAN       Infrastructure of ROS
+-- column: is_internal
 -- brief: node, callback, median_ns, max_ns, p95_ns, runs, count, period_median_ns, p99_ns, mean_ns
 WITH merged AS (
     SELECT

@@ -2,24 +2,15 @@
 -- description: As the query topics --measure delivery says it of one run. Counts are added, and the
 --     shares are of their sums.
 -- grain: one row per topic, receiving node and group of runs
--- column: label_group BIGINT        Group of runs
--- column: topic_name VARCHAR [topic]  Topic
--- column: subscriber VARCHAR [node]  Node that subscribes
--- column: runs BIGINT               Runs that have it
+-- like: queries.topics-delivery, topics_latency
+-- column: label_group, topic_name, subscriber, runs
 -- column: lossy_runs BIGINT         Of these, runs in which messages were dropped or lost
 -- column: published BIGINT          Messages published on the topic
--- column: delivered BIGINT          Of these, taken
--- column: dropped BIGINT            Of these, those that newer ones replaced in a full queue
--- column: lost BIGINT               Of these, lost on the way
+-- column: delivered, dropped, lost
 -- column: not_connected BIGINT      Of these, before or after the two were connected
--- column: cut_by_recording BIGINT   Of these, those that the end of the recording left untaken
--- column: unknown BIGINT            Of these, with an unknown fate
--- column: delivered_percent DOUBLE [%]  Share delivered, of those delivered, dropped or lost
--- column: lost_percent DOUBLE [%]   Share lost, of the same
+-- column: cut_by_recording, unknown, delivered_percent, lost_percent
 -- column: orphans BIGINT            Takes whose publication is not known
--- column: reasons VARCHAR           Why messages were not taken, with counts
--- column: orphan_reasons VARCHAR    Why publications are not known, with counts
--- column: is_internal BOOLEAN       ROS uses the topic for itself
+-- column: reasons, orphan_reasons, is_internal
 -- brief: topic_name, subscriber, delivered, dropped, lost, delivered_percent, runs, lossy_runs,
 --     unknown, lost_percent, published, reasons, not_connected, cut_by_recording, orphans,
 --     orphan_reasons

@@ -1,4 +1,3 @@
--- title: Events of the user in a window
 -- description: Bars of the timeline for events of the user's own tracepoints, those inside of
 --     callback instances.
 -- grain: one row per event

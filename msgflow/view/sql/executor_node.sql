@@ -1,4 +1,3 @@
--- title: Nodes of executors
 -- description: Nodes, and the executors that ran their callbacks.
 -- grain: one row per node and executor that ran a callback of it
 -- column: node VARCHAR  Full name of the node, or its process in brackets

@@ -1,4 +1,3 @@
--- title: The flow of what was picked
 -- description: Everything that the picked thing caused, or was caused by, or both
 --     (main.flow_both), as bars, and the links between them.
 -- grain: one row per vertex of the flow and link that leads to it; one for a vertex without

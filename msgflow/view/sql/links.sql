@@ -1,4 +1,3 @@
--- title: Arrows of the timeline
 -- description: Links that overlap a window: messages from the end of their publication to the take,
 --     publications in the callback instance they came from, and indirect links from the end of the
 --     callback instance with the input to the publication. Doubtful effects of a take are left out.

@@ -1,4 +1,3 @@
--- title: Messages that were not taken, and takes without a publication, by reason
 -- description: What `msgflow query topics --measure unmatched` lists one by one, counted by topic,
 --     receiving node and reason.
 -- grain: one row per topic, receiving node, status and reason

@@ -1,4 +1,3 @@
--- title: Messages that were not taken, and takes without a publication, over time
 -- description: What `msgflow query topics --measure unmatched` lists one by one, counted by pieces
 --     of time, topic and reason.
 -- grain: one row per piece of time, topic and reason
@@ -15,9 +14,7 @@ WITH missing AS (
     FROM missing_side
     WHERE run_id = $run AND at_ns >= $start_ns AND at_ns < $end_ns
 ),
-extent AS (
-    SELECT ($end_ns - $start_ns) // $bins + 1 AS width
-)
+extent AS (SELECT ($end_ns - $start_ns) // $bins + 1 AS width)
 SELECT
     $start_ns - $origin_ns + (m.at_ns - $start_ns) // e.width * e.width AS start_at,
     e.width AS length,

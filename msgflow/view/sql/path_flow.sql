@@ -1,4 +1,3 @@
--- title: Flows of all paths
 -- description: The flows that e2e-latency counts: the first arrival of each root, or why there is
 --     none. Kept by the page for its pictures of single paths.
 -- grain: one row per path and root

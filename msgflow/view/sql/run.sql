@@ -1,4 +1,3 @@
--- title: Runs to choose from
 -- description: The runs of the database, and how much of the timeline each has.
 -- grain: one row per run
 -- column: run_id BIGINT  Identity of the run

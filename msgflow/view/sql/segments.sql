@@ -1,4 +1,3 @@
--- title: Bars of the timeline
 -- description: What the timeline draws in a window. With a bin, bars shorter than it are counted
 --     per row, kind and bin, and only longer ones come one by one.
 -- grain: one row per bar, or per row of the timeline, kind and bin with shorter ones

@@ -1,4 +1,3 @@
--- title: Slowest messages of a topic
 -- description: The takes of a topic with the longest latency from publication to take.
 -- grain: one row per take
 -- param: topic VARCHAR = NULL  Topic; NULL: that without a known name

@@ -1,4 +1,3 @@
--- title: Identities in a window
 -- description: Bounds of the identities of what a window shows. Identities follow time on the clock
 --     of each host, so that links.sql reads little beyond them.
 -- grain: one row

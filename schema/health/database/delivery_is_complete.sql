@@ -63,15 +63,11 @@ undelivered AS (
     JOIN subscription AS s ON u.subscription_id = s.subscription_id
     GROUP BY s.run_id, s.topic_name
 ),
-taken AS (
-    SELECT run_id, count(*) AS number FROM store.take GROUP BY run_id
-),
+taken AS (SELECT run_id, count(*) AS number FROM store.take GROUP BY run_id),
 linked AS (
     SELECT run_id, count(DISTINCT take_id) AS number FROM store.link_transport GROUP BY run_id
 ),
-orphan AS (
-    SELECT run_id, count(DISTINCT take_id) AS number FROM store.orphan_take GROUP BY run_id
-)
+orphan AS (SELECT run_id, count(DISTINCT take_id) AS number FROM store.orphan_take GROUP BY run_id)
 SELECT
     b.run_id,
     b.topic_name AS subject,

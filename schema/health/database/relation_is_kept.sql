@@ -1,5 +1,6 @@
 -- title: A row refers to one that does not exist
--- description: Every identity in a column that refers to another table is one of a row there.
+-- description: Every identity in a column that refers to another table is one of a row there, of
+--     the same run: nothing is linked across runs.
 -- cause: A mistake in msgflow, or input that it misunderstands.
 -- cure: Report what msgflow check --detail prints, together with the trace.
 -- grain: one row per run and column with such identities

@@ -84,5 +84,4 @@ WITH foreign_word AS (
     FROM store.finding
     WHERE name NOT IN (SELECT name FROM derive.finding_kind)
 )
-SELECT run_id, place AS subject, 1 AS count, printf('the word %s', word) AS detail
-FROM foreign_word
+SELECT run_id, place AS subject, 1 AS count, printf('the word %s', word) AS detail FROM foreign_word

@@ -9,8 +9,7 @@
 -- severity: warning
 -- when: staging.executor_undelimited, staging.executor_named
 WITH left_out AS (
-    SELECT process_id, thread_id
-    FROM staging.executor_undelimited
+    SELECT process_id, thread_id FROM staging.executor_undelimited
     UNION
     -- CARET names the kind of the executor. These kinds have events.
     SELECT p.process_id, p.thread_id

@@ -13,9 +13,7 @@
 -- severity: warning
 -- when: staging.callback_pair WHERE thread_id NOT IN (SELECT thread_id FROM staging.executor_first)
 WITH enabled AS (
-    SELECT trace_index
-    FROM staging.declared
-    WHERE name = 'ros2:rclcpp_executor_get_next_ready'
+    SELECT trace_index FROM staging.declared WHERE name = 'ros2:rclcpp_executor_get_next_ready'
 ),
 silent AS (
     SELECT p.process_id, p.thread_id, count(*) AS number

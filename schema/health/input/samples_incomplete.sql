@@ -23,9 +23,7 @@ counted AS (
         mode(file) FILTER (WHERE is_unnamed) AS unnamed_file
     FROM sample
 )
-SELECT
-    cut AS count,
-    printf('%d of %d samples do not show all callers', cut, samples) AS detail
+SELECT cut AS count, printf('%d of %d samples do not show all callers', cut, samples) AS detail
 FROM counted
 WHERE cut >= 0.1 * greatest(samples, 1)
 UNION ALL

@@ -31,8 +31,7 @@ other AS (
     GROUP BY e.name
 ),
 listed AS (
-    SELECT string_agg(printf('%s (%d)', name, event_count), ', ' ORDER BY name) AS names
-    FROM other
+    SELECT string_agg(printf('%s (%d)', name, event_count), ', ' ORDER BY name) AS names FROM other
 )
 SELECT
     count(*) AS count,

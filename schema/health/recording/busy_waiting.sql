@@ -13,8 +13,7 @@
 -- severity: warning
 -- when: store.executor WHERE kind LIKE 'multi_threaded%'
 WITH waited AS (
-    SELECT
-        s.run_id, s.executor_id, count(*) AS number, count(DISTINCT s.thread_id) AS threads
+    SELECT s.run_id, s.executor_id, count(*) AS number, count(DISTINCT s.thread_id) AS threads
     FROM derive.executor_interval AS s
     SEMI JOIN (FROM store.executor WHERE kind LIKE 'multi_threaded%') AS e
         ON s.executor_id = e.executor_id

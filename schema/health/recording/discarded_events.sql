@@ -13,9 +13,7 @@
 -- grain: one row per trace
 -- severity: error
 -- when: store.gap WHERE kind = 'loss'
-WITH damaged AS (
-    SELECT DISTINCT trace_id FROM store.finding WHERE name = 'damaged_trace'
-),
+WITH damaged AS (SELECT DISTINCT trace_id FROM store.finding WHERE name = 'damaged_trace'),
 loss AS (
     SELECT
         g.run_id, g.trace_id,

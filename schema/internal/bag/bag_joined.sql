@@ -6,8 +6,7 @@
 --     topic was sent in that time, and no other message of the bag may be that one too.
 -- grain: one row per message of the bag
 WITH sent AS (
-    SELECT
-        b.publication_id, p.topic_name, coalesce(b.source_timestamp_ns, b.start_ns) AS sent_ns
+    SELECT b.publication_id, p.topic_name, coalesce(b.source_timestamp_ns, b.start_ns) AS sent_ns
     FROM main.publication AS b
     JOIN main.publisher AS p ON b.publisher_id = p.publisher_id
     WHERE b.run_id = $run_id

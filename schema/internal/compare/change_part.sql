@@ -57,9 +57,7 @@ part AS (
     WHERE c.statistic = 'mean' AND c.a_count > 0 AND c.b_count > 0
     GROUP BY s.path, s.node, s.part, s.what
 ),
-whole AS (
-    SELECT path, sum(a_ns) AS a_ns, sum(b_ns) AS b_ns FROM part GROUP BY path
-),
+whole AS (SELECT path, sum(a_ns) AS a_ns, sum(b_ns) AS b_ns FROM part GROUP BY path),
 every AS (
     SELECT path, NULL AS node, 'all' AS part, NULL AS what, a_ns, b_ns FROM whole
     UNION ALL

@@ -7,8 +7,7 @@
 -- param: at_least DOUBLE  Smallest difference that counts as one, as a share of A
 -- param: skip_first, a_window, b_window
 WITH instance AS (
-    SELECT side = 'a' AS is_a, node, label, callback_instance_id
-    FROM compared_instance
+    SELECT side = 'a' AS is_a, node, label, callback_instance_id FROM compared_instance
 ),
 sample AS (
     SELECT i.is_a, i.node, i.label, f.function, s.cpu_ns

@@ -46,9 +46,7 @@ WITH of_run AS (
     GROUP BY side, subject, unit, run
 ),
 deepest AS (
-    SELECT side, subject, unit, max(depth) AS depth
-    FROM of_run
-    GROUP BY side, subject, unit
+    SELECT side, subject, unit, max(depth) AS depth FROM of_run GROUP BY side, subject, unit
 ),
 allowing AS (
     SELECT

@@ -14,11 +14,9 @@ WITH instance AS (
     WHERE list_contains($runs, run_id)
 ),
 of_callback AS (
-    SELECT run_id, 'callback_duration' AS measure, callback_id, duration_ns AS time_ns
-    FROM instance
+    SELECT run_id, 'callback_duration' AS measure, callback_id, duration_ns AS time_ns FROM instance
     UNION ALL
-    SELECT run_id, 'callback_period', callback_id, period_ns
-    FROM instance
+    SELECT run_id, 'callback_period', callback_id, period_ns FROM instance
     UNION ALL
     SELECT run_id, 'callback_wait', callback_id, wait_ns
     FROM main.executor_wait

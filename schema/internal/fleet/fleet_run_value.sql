@@ -4,11 +4,7 @@
 -- grain: one row per run, path and statistic; paths of one text in a run count together
 -- param: case VARCHAR  'first' or 'last' arrival of each root, 'newest' root of each arrival, or
 --     'every_pair'
-WITH cut AS (
-    SELECT run, bool_or(is_cut) AS is_cut
-    FROM e2e_latency
-    GROUP BY run
-),
+WITH cut AS (SELECT run, bool_or(is_cut) AS is_cut FROM e2e_latency GROUP BY run),
 measured AS (
     SELECT
         s.side, s.unit, f.run,

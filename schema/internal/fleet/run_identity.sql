@@ -2,8 +2,7 @@
 --     the database knows packets again, put together to a hash of 20 hexadecimal digits.
 -- grain: one row
 -- param: runs BIGINT[]  One run
-SELECT
-    left(sha256(string_agg(packet, chr(10) ORDER BY packet)), 20) AS run
+SELECT left(sha256(string_agg(packet, chr(10) ORDER BY packet)), 20) AS run
 FROM (
     SELECT DISTINCT
         concat_ws(

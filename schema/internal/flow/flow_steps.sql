@@ -31,8 +31,7 @@ sent AS (
     WHERE publication_id IN (SELECT id FROM step WHERE kind = 'publication')
 ),
 next AS (
-    SELECT run_id, thread_id, start_event_id AS event_id, start_ns AS at_ns
-    FROM store.publication
+    SELECT run_id, thread_id, start_event_id AS event_id, start_ns AS at_ns FROM store.publication
     UNION ALL
     SELECT run_id, thread_id, start_event_id, taken_ns
     FROM store.take

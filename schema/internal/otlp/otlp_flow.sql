@@ -44,5 +44,4 @@ between_them AS (
 )
 SELECT derive.vertex_key(kind, id)::BIGINT AS key FROM passed
 UNION
-SELECT derive.vertex_key(kind, id)::BIGINT FROM between_them
-ORDER BY key
+SELECT derive.vertex_key(kind, id)::BIGINT FROM between_them ORDER BY key

@@ -4,9 +4,7 @@
 --     request or response that was traced.
 -- grain: one row per begin and end of a slice, and per moment
 WITH waited AS MATERIALIZED (
-    SELECT request_id, returned_ns, queue_ns, served_ns
-    FROM main.waited_call
-    WHERE run_id = $run_id
+    SELECT request_id, returned_ns, queue_ns, served_ns FROM main.waited_call WHERE run_id = $run_id
 ),
 slice AS MATERIALIZED (
     SELECT
@@ -117,9 +115,7 @@ event AS (
         end_ns AS far_ns, code, object_id, id, symbol_id
     FROM drawn
     UNION ALL
-    SELECT track, end_ns, 0, start_ns, code, NULL, id, NULL
-    FROM drawn
-    WHERE end_ns > start_ns
+    SELECT track, end_ns, 0, start_ns, code, NULL, id, NULL FROM drawn WHERE end_ns > start_ns
 )
 SELECT
     e.track, e.at_ns, e.rank, e.object_id * 8 + e.code + 1 AS name, e.code, e.id,

@@ -33,5 +33,4 @@ queue AS (
 )
 SELECT track, at_ns, value, 0 AS place FROM rate WHERE value IS NOT NULL
 UNION ALL
-SELECT track, at_ns, value, place FROM queue
-ORDER BY track, at_ns, place
+SELECT track, at_ns, value, place FROM queue ORDER BY track, at_ns, place

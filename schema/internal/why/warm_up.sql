@@ -14,5 +14,4 @@ WITH flow AS (
     WHERE status = 'reached' AND is_first AND latency_ns IS NOT NULL
     QUALIFY number >= 20
 )
-SELECT max(last_ns) AS last_ns
-FROM derive.warm_up('flow')
+SELECT max(last_ns) AS last_ns FROM derive.warm_up('flow')

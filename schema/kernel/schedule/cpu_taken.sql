@@ -21,9 +21,7 @@ extent AS (
     GROUP BY w.number
     HAVING count(*) = 2
 ),
-run AS (
-    SELECT number, unnest(range(first_number, last_number + 1)) AS switch_number FROM extent
-)
+run AS (SELECT number, unnest(range(first_number, last_number + 1)) AS switch_number FROM extent)
 SELECT
     w.thread_id, w.state_start_ns,
     w.start_ns AS wait_start_ns,

@@ -14,11 +14,7 @@ WITH migration AS (
         AND m.ts_ns + s.shift_ns < t.until_ns
     WHERE s.is_joined
 ),
-wait AS (
-    SELECT *
-    FROM staging.schedule_interval
-    WHERE state IN ('preempted', 'runnable')
-),
+wait AS (SELECT * FROM staging.schedule_interval WHERE state IN ('preempted', 'runnable')),
 begin AS (
     SELECT
         w.thread_id, w.tid,

@@ -7,8 +7,7 @@
 -- grain: one row per thread of a process life and number
 -- when: staging.schedule
 WITH dump AS (
-    SELECT
-        trace_index, ts_ns, tid, namespace_tid AS vtid, namespace_pid AS vpid, ns_inum
+    SELECT trace_index, ts_ns, tid, namespace_tid AS vtid, namespace_pid AS vpid, ns_inum
     FROM raw.lttng_statedump_process_state
     WHERE namespace_tid IS NOT NULL
     UNION ALL

@@ -55,9 +55,7 @@ around AS MATERIALIZED (
     QUALIFY count(*) OVER (PARTITION BY p.annotation_id, p.pivot_id) = p.input_count
 ),
 -- Moments that a set may start at: no later one has the same messages.
-start AS (
-    SELECT annotation_id, pivot_id, pivot_ns, last_ns AS start_ns FROM around
-),
+start AS (SELECT annotation_id, pivot_id, pivot_ns, last_ns AS start_ns FROM around),
 possible AS MATERIALIZED (
     SELECT
         s.annotation_id, s.pivot_id, s.start_ns,
@@ -151,8 +149,7 @@ close AS (
     WHERE coalesce(p.cost - n.cost <= a.doubt, true)
     UNION
     -- The clock of the stamps was set back: the filter has its messages in another order.
-    SELECT annotation_id, pivot_id FROM around
-    WHERE is_set_back OR next_event_id < last_event_id
+    SELECT annotation_id, pivot_id FROM around WHERE is_set_back OR next_event_id < last_event_id
 )
 SELECT
     m.annotation_id, m.pivot_id, p.pivot_ns, p.proof_event_id, p.since_ns,

@@ -11,9 +11,7 @@
 -- param: publications VARCHAR  Name of the rows of derive.annotated_publication
 -- param: runs VARCHAR  Name of the rows of derive.annotated_run
 CREATE OR REPLACE MACRO derive.link_causal_approximate(only_run, publications, runs) AS TABLE
-WITH filtered AS MATERIALIZED (
-    FROM derive.approximate_message(only_run, runs)
-),
+WITH filtered AS MATERIALIZED (FROM derive.approximate_message(only_run, runs)),
 published AS MATERIALIZED (
     SELECT
         b.run_id, b.annotation_id, b.kind, b.publication_id, b.trace_id, b.thread_id, b.start_ns,
@@ -36,9 +34,7 @@ firing AS (
     FROM published
     GROUP BY annotation_id, cut_event_id
 ),
-member AS MATERIALIZED (
-    FROM derive.approximate_set(only_run, 'filtered')
-),
+member AS MATERIALIZED (FROM derive.approximate_set(only_run, 'filtered')),
 made AS MATERIALIZED (
     SELECT
         annotation_id, pivot_id, pivot_ns, proof_event_id, since_ns, is_close,

@@ -16,12 +16,8 @@
 --     says what stands for it.
 -- grain: one row per annotation, publication by one of its outputs, and other input with a message
 CREATE OR REPLACE MACRO derive.link_causal_indirect(only_run) AS TABLE
-WITH RECURSIVE annotated AS MATERIALIZED (
-    FROM derive.annotated_publication(only_run)
-),
-input_run AS MATERIALIZED (
-    FROM derive.annotated_run(only_run)
-),
+WITH RECURSIVE annotated AS MATERIALIZED (FROM derive.annotated_publication(only_run)),
+input_run AS MATERIALIZED (FROM derive.annotated_run(only_run)),
 nesting AS (
     SELECT DISTINCT parent_id
     FROM store.callback_instance
@@ -135,10 +131,7 @@ nested AS (
     WHERE e.start_event_id > d.cut_event_id
 ),
 -- Publications of one callback instance share their cut.
-cut AS (
-    SELECT DISTINCT annotation_id, subscription_id, cut_event_id, emptied_event_id
-    FROM demand
-),
+cut AS (SELECT DISTINCT annotation_id, subscription_id, cut_event_id, emptied_event_id FROM demand),
 at_cut AS MATERIALIZED (
     SELECT
         c.annotation_id, c.subscription_id, c.cut_event_id, e.callback_instance_id,

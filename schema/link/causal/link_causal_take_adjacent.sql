@@ -17,9 +17,7 @@ WITH by_hand AS (
         WHERE p.run_id = only_run AND p.python_version IS NOT NULL
     ) AS p ON t.process_id = p.process_id
 ),
-busy AS (
-    SELECT DISTINCT run_id, thread_id FROM by_hand
-),
+busy AS (SELECT DISTINCT run_id, thread_id FROM by_hand),
 -- What a thread turned to: a message that it took by hand, or something else.
 turn AS (
     SELECT run_id, thread_id, event_id, take_id, subscription_id, taken_ns FROM by_hand

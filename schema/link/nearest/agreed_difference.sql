@@ -20,9 +20,7 @@ level AS MATERIALIZED (
     WINDOW by_difference AS (PARTITION BY clock_id, stretch ORDER BY from_ns, step)
 ),
 most AS (
-    SELECT clock_id, stretch, max(vote_count) AS most_count
-    FROM level
-    GROUP BY clock_id, stretch
+    SELECT clock_id, stretch, max(vote_count) AS most_count FROM level GROUP BY clock_id, stretch
 ),
 high AS (
     SELECT l.clock_id, l.stretch, l.from_ns, l.until_ns, l.vote_count, m.most_count

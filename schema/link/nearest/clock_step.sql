@@ -4,9 +4,7 @@
 --     may be by any of the differences that showed.
 -- grain: one row per clock and step, or steps with nothing certain between them
 CREATE OR REPLACE MACRO derive.clock_step(only_run) AS TABLE
-WITH known AS (
-    FROM derive.certain_clock(only_run) WHERE is_known
-),
+WITH known AS (FROM derive.certain_clock(only_run) WHERE is_known),
 turn AS (
     SELECT
         clock_id, segment, at_ns, difference_ns AS behind_ns,

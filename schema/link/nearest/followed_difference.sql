@@ -75,8 +75,7 @@ ballot AS MATERIALIZED (
 followed (
     clock_id, number, stretch, difference_ns, message_count, segment, since_stretch, is_begun
 ) AS (
-    SELECT
-        clock_id, 0::BIGINT, stretch, 0::BIGINT, 0::BIGINT, 0::BIGINT, stretch, false
+    SELECT clock_id, 0::BIGINT, stretch, 0::BIGINT, 0::BIGINT, 0::BIGINT, stretch, false
     FROM ballot
     WHERE number = 1
     UNION ALL

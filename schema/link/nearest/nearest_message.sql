@@ -14,12 +14,8 @@
 -- grain: one row per message that has, or might have, a publication
 -- when: store.stamp_clock
 CREATE OR REPLACE MACRO derive.nearest_message(only_run) AS TABLE
-WITH course AS MATERIALIZED (
-    FROM derive.certain_clock(only_run)
-),
-step AS MATERIALIZED (
-    FROM derive.clock_step(only_run)
-),
+WITH course AS MATERIALIZED (FROM derive.certain_clock(only_run)),
+step AS MATERIALIZED (FROM derive.clock_step(only_run)),
 started AS (
     SELECT
         * EXCLUDE (start_ns), start_ns AS first_ns,
@@ -88,9 +84,7 @@ segment AS MATERIALIZED (
     SELECT clock_id, NULL, start_ns + unnest(differences_ns), end_ns + unnest(differences_ns)
     FROM step
 ),
-publisher AS (
-    SELECT DISTINCT run_id, clock_id, topic_name, publisher_id FROM located
-),
+publisher AS (SELECT DISTINCT run_id, clock_id, topic_name, publisher_id FROM located),
 heard AS (
     SELECT
         m.run_id, m.topic_name, m.source_timestamp_ns, m.only_subscription_id, p.publisher_id,
@@ -347,12 +341,8 @@ left_over AS (
         OR NOT o.is_usual
         OR (o.is_rivalled AND c.candidate_count = 1 AND c.is_prompt)
 ),
-hasty AS MATERIALIZED (
-    SELECT DISTINCT publication_id FROM left_over WHERE is_hasty
-),
-doubtful AS (
-    FROM derive.publication_beside_gap('hasty')
-),
+hasty AS MATERIALIZED (SELECT DISTINCT publication_id FROM left_over WHERE is_hasty),
+doubtful AS (FROM derive.publication_beside_gap('hasty')),
 matched AS (
     SELECT
         topic_name, publisher_id, source_timestamp_ns, only_subscription_id, publication_id,

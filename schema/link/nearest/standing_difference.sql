@@ -33,9 +33,7 @@ allowed AS (
     JOIN span AS s ON p.clock_id = s.clock_id AND p.stretch = s.stretch
 ),
 agreed AS (
-    SELECT
-        clock_id, stretch AS place,
-        arg_max(a, (vote_count, difference_ns)) AS best
+    SELECT clock_id, stretch AS place, arg_max(a, (vote_count, difference_ns)) AS best
     FROM derive.agreed_difference('allowed') AS a
     GROUP BY clock_id, stretch
 ),

@@ -21,9 +21,7 @@ WITH RECURSIVE endpoint AS (
     FROM store.subscription
     WHERE run_id = only_run
 ),
-concerned AS (
-    SELECT DISTINCT run_id FROM endpoint WHERE topic_name IS NULL
-),
+concerned AS (SELECT DISTINCT run_id FROM endpoint WHERE topic_name IS NULL),
 published AS (
     SELECT b.run_id, b.source_timestamp_ns, any_value(b.publisher_id) AS publisher_id
     FROM store.publication AS b

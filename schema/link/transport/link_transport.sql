@@ -36,14 +36,12 @@ guess AS (
         t.taken_ns
     FROM doubtful AS l
     JOIN (
-        SELECT * FROM store.publication
-        WHERE run_id = only_run AND EXISTS (SELECT 1 FROM doubtful)
+        SELECT * FROM store.publication WHERE run_id = only_run AND EXISTS (SELECT 1 FROM doubtful)
     ) AS b ON l.publication_id = b.publication_id
     JOIN store.process AS bp ON b.process_id = bp.process_id
     JOIN store.host AS bh ON bp.host_id = bh.host_id
     JOIN (
-        SELECT * FROM store.take
-        WHERE run_id = only_run AND EXISTS (SELECT 1 FROM doubtful)
+        SELECT * FROM store.take WHERE run_id = only_run AND EXISTS (SELECT 1 FROM doubtful)
     ) AS t ON l.take_id = t.take_id
     JOIN store.process AS tp ON t.process_id = tp.process_id
     JOIN store.host AS th ON tp.host_id = th.host_id

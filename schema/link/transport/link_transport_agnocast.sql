@@ -20,8 +20,7 @@ WITH published AS (
     WHERE e.run_id = only_run
 ),
 received AS (
-    SELECT
-        e.entry_id, t.take_id, t.subscription_id, t.taken_ns AS at_ns, s.topic_name, h.clock_id
+    SELECT e.entry_id, t.take_id, t.subscription_id, t.taken_ns AS at_ns, s.topic_name, h.clock_id
     FROM store.agnocast_entry AS e
     JOIN store.take AS t ON e.take_id = t.take_id
     JOIN store.subscription AS s ON t.subscription_id = s.subscription_id
@@ -31,8 +30,7 @@ received AS (
 ),
 -- Publishers whose creation was not traced tell nothing.
 least AS (
-    SELECT
-        clock_id, topic_name, min(entry_id) AS entry_id, any_value(created_ns) AS created_ns
+    SELECT clock_id, topic_name, min(entry_id) AS entry_id, any_value(created_ns) AS created_ns
     FROM published
     WHERE created_ns IS NOT NULL
     GROUP BY clock_id, topic_name, publisher_id

@@ -58,9 +58,7 @@ filled AS (
     FROM slot_use AS e
     JOIN derive.exposed_trace AS x ON e.trace_id = x.trace_id
     WHERE e.kind = 'enqueue'
-        AND (e.process_id, e.buffer_handle) IN (
-            SELECT (process_id, buffer_handle) FROM behind_gap
-        )
+        AND (e.process_id, e.buffer_handle) IN (SELECT (process_id, buffer_handle) FROM behind_gap)
 ),
 pace AS (
     SELECT

@@ -15,15 +15,9 @@ WITH call AS NOT MATERIALIZED (
 rcl_publisher AS (
     SELECT event_id, process_id, publisher_handle AS handle FROM staging.publisher_known
 ),
-rmw_publisher AS (
-    SELECT event_id, process_id, rmw_handle AS handle FROM staging.publisher_known
-),
-dds_writer AS (
-    SELECT event_id, process_id, writer AS handle FROM staging.publisher_known
-),
-by_rcl AS NOT MATERIALIZED (
-    SELECT * FROM staging.with_latest('call', 'rcl_publisher')
-),
+rmw_publisher AS (SELECT event_id, process_id, rmw_handle AS handle FROM staging.publisher_known),
+dds_writer AS (SELECT event_id, process_id, writer AS handle FROM staging.publisher_known),
+by_rcl AS NOT MATERIALIZED (SELECT * FROM staging.with_latest('call', 'rcl_publisher')),
 -- Few, as a rule, which are looked at twice.
 not_by_rcl AS MATERIALIZED (
     SELECT
@@ -72,5 +66,4 @@ published AS (
         coalesce(is_rosout, false)
     FROM resolved
 )
-SELECT *, row_number() OVER (ORDER BY start_event_id) AS publication_id
-FROM published
+SELECT *, row_number() OVER (ORDER BY start_event_id) AS publication_id FROM published

@@ -70,17 +70,13 @@ located AS (
         AND h.start_event_id < c.until_event_id
     WHERE h.taken IS DISTINCT FROM 0
 ),
-rcl_reader AS (
-    SELECT DISTINCT process_id, rmw_handle FROM located WHERE rcl_ns IS NOT NULL
-),
+rcl_reader AS (SELECT DISTINCT process_id, rmw_handle FROM located WHERE rcl_ns IS NOT NULL),
 known_reader AS (
     SELECT process_id, rmw_handle FROM staging.subscription_known
     UNION
     SELECT process_id, rmw_handle FROM rcl_reader
 ),
-rcl_traced AS (
-    SELECT DISTINCT process_id FROM rcl_reader
-),
+rcl_traced AS (SELECT DISTINCT process_id FROM rcl_reader),
 taken AS (
     SELECT
         t.start_event_id AS event_id,
@@ -100,9 +96,7 @@ taken AS (
             AND (k.process_id IS NOT NULL OR r.process_id IS NULL)
         )
 ),
-subscription AS (
-    SELECT event_id, process_id, rmw_handle AS handle FROM staging.subscription_known
-),
+subscription AS (SELECT event_id, process_id, rmw_handle AS handle FROM staging.subscription_known),
 buffer AS (
     SELECT b.event_id, b.process_id, b.buffer, o.subscription_event_id
     FROM staging.located('ros2_rclcpp_buffer_to_ipb') AS b

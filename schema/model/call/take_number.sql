@@ -22,5 +22,4 @@ every_take AS (
     FROM run
     WHERE take_event_id IS NULL AND (kind = 'subscription' OR is_intra_process)
 )
-SELECT *, row_number() OVER (ORDER BY start_event_id) AS take_id
-FROM every_take
+SELECT *, row_number() OVER (ORDER BY start_event_id) AS take_id FROM every_take

@@ -19,8 +19,7 @@ object AS (
     SELECT event_id, process_id, 'subscription', subscription_handle, subscription_id
     FROM staging.subscription
     UNION ALL
-    SELECT event_id, process_id, 'service', service_handle, service_id
-    FROM staging.service
+    SELECT event_id, process_id, 'service', service_handle, service_id FROM staging.service
     UNION ALL
     -- Copies of services of managed nodes.
     SELECT k.event_id, k.process_id, 'service', k.service_handle, s.service_id

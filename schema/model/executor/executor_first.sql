@@ -2,6 +2,4 @@
 -- grain: one row per thread with executor events
 -- when: raw.ros2_rclcpp_executor_get_next_ready, raw.ros2_rclcpp_executor_wait_for_work,
 --     raw.ros2_rclcpp_executor_execute
-SELECT thread_id, min(event_id) AS event_id
-FROM staging.executor_event
-GROUP BY thread_id
+SELECT thread_id, min(event_id) AS event_id FROM staging.executor_event GROUP BY thread_id

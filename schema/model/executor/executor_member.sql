@@ -49,9 +49,7 @@ tie AS (
     UNION
     SELECT other_thread_id, thread_id FROM neighbour
 ),
-spinning AS (
-    SELECT thread_id FROM staging.executor_first
-),
+spinning AS (SELECT thread_id FROM staging.executor_first),
 member AS (
     SELECT thread_id FROM runs
     UNION

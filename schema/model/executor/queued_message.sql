@@ -6,9 +6,7 @@
 -- when: staging.take_chain WHERE source_timestamp_ns IS NOT NULL AND
 --     thread_id NOT IN (SELECT thread_id FROM staging.executor_first)
 WITH enabled AS (
-    SELECT trace_index
-    FROM staging.declared
-    WHERE name = 'ros2:rclcpp_executor_get_next_ready'
+    SELECT trace_index FROM staging.declared WHERE name = 'ros2:rclcpp_executor_get_next_ready'
 ),
 began AS (
     SELECT thread_id, min(start_ns) AS start_ns FROM staging.callback_pair GROUP BY thread_id

@@ -69,9 +69,7 @@ extent AS (
     FROM staging.callback_run
 ),
 elsewhere AS (
-    SELECT thread_id, event_id
-    FROM staging.near_gap
-    WHERE sequence = 'call' AND NOT is_between
+    SELECT thread_id, event_id FROM staging.near_gap WHERE sequence = 'call' AND NOT is_between
 ),
 exposed AS MATERIALIZED (
     SELECT *

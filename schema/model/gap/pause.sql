@@ -10,9 +10,7 @@
 --     AND begin_ns <= last_begin_ns
 
 -- Kernel traces pause no process.
-WITH packet AS (
-    SELECT * FROM staging.packet WHERE domain IS DISTINCT FROM 'kernel'
-),
+WITH packet AS (SELECT * FROM staging.packet WHERE domain IS DISTINCT FROM 'kernel'),
 covered AS (
     SELECT
         trace_id, recording_index, begin_ns, covered_until_ns, last_begin_ns,
@@ -55,10 +53,7 @@ silent AS (
 ),
 -- When packets were ended before they were full.
 ending AS (
-    SELECT recording_index, end_ns
-    FROM packet
-    WHERE is_ended_early
-    GROUP BY recording_index, end_ns
+    SELECT recording_index, end_ns FROM packet WHERE is_ended_early GROUP BY recording_index, end_ns
 ),
 -- One for all streams, which are ended one after the other.
 flush AS (

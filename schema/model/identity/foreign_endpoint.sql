@@ -24,8 +24,7 @@ identified AS (
     WINDOW process AS (PARTITION BY t.process)
     QUALIFY min(prefix) OVER process < max(prefix) OVER process
 )
-SELECT
-    i.process, i.event_id, i.handle, i.prefix, min(g.start_ns) AS gap_ns
+SELECT i.process, i.event_id, i.handle, i.prefix, min(g.start_ns) AS gap_ns
 FROM identified AS i
 JOIN staging.placed_source AS r ON i.trace_index = r.trace_index
 LEFT JOIN staging.gap AS g ON r.recording_index = g.recording_index AND i.ts_ns < g.covered_until_ns

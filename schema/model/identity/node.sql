@@ -36,8 +36,7 @@ every_node AS (
     FROM unknown
 ),
 lived AS (
-    SELECT
-        process_id, host_id, vpid, min(first_seen_ns) AS first_ns, max(last_seen_ns) AS last_ns
+    SELECT process_id, host_id, vpid, min(first_seen_ns) AS first_ns, max(last_seen_ns) AS last_ns
     FROM staging.context
     GROUP BY process_id, host_id, vpid
 ),

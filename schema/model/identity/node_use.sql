@@ -45,9 +45,7 @@ use AS (
     FROM construction
     WHERE kind <> 'node'
 ),
-node_init AS (
-    SELECT event_id, process_id, node_handle FROM construction WHERE kind = 'node'
-),
+node_init AS (SELECT event_id, process_id, node_handle FROM construction WHERE kind = 'node'),
 earlier AS (
     SELECT u.event_id, n.event_id AS node_event_id
     FROM use AS u

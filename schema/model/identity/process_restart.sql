@@ -40,9 +40,7 @@ initialisation AS (
     )
     GROUP BY ALL
 ),
-thread AS (
-    SELECT DISTINCT thread_index, host_id, pid_ns, vpid, vtid FROM staging.thread_presence
-),
+thread AS (SELECT DISTINCT thread_index, host_id, pid_ns, vpid, vtid FROM staging.thread_presence),
 -- A callback that starts was registered, whether that was recorded or not. A publication shows no
 -- object: what logs to /rosout publishes on a handle that is never made.
 handled AS (
@@ -54,11 +52,9 @@ handled AS (
     SELECT thread_index, event_id, ts_ns, callback, true, true
     FROM raw.ros2_rclcpp_callback_register
     UNION ALL
-    SELECT thread_index, event_id, ts_ns, publisher_handle, false, false
-    FROM raw.ros2_rcl_publish
+    SELECT thread_index, event_id, ts_ns, publisher_handle, false, false FROM raw.ros2_rcl_publish
     UNION ALL
-    SELECT thread_index, event_id, ts_ns, callback, false, true
-    FROM raw.ros2_callback_start
+    SELECT thread_index, event_id, ts_ns, callback, false, true FROM raw.ros2_callback_start
 ),
 -- Objects from before an initialisation: when they are first used after it, and made again.
 old AS (
@@ -79,9 +75,7 @@ old AS (
 -- before and ends afterwards: the life goes on. The thread that initialises again is that of the
 -- new life. Where the first initialisation is not known, it may do so inside a callback.
 surviving AS (
-    SELECT event_id
-    FROM old
-    WHERE used_event_id < coalesce(made_event_id, 9223372036854775807)
+    SELECT event_id FROM old WHERE used_event_id < coalesce(made_event_id, 9223372036854775807)
     UNION
     SELECT c.event_id
     FROM initialisation AS c

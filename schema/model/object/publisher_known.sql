@@ -5,9 +5,7 @@
 -- grain: one row per rcl_publisher_init
 -- when: raw.ros2_rcl_publisher_init
 WITH rmw_init AS (
-    SELECT
-        event_id, ts_ns, process_id, rmw_publisher_handle,
-        staging.gid_bytes(gid) AS gid
+    SELECT event_id, ts_ns, process_id, rmw_publisher_handle, staging.gid_bytes(gid) AS gid
     FROM staging.located('ros2_rmw_publisher_init')
 ),
 writer_init AS (

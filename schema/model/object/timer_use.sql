@@ -11,8 +11,7 @@ WITH use AS (
     FROM staging.located('ros2_rclcpp_timer_link_node')
 ),
 resolved AS (
-    SELECT
-        u.event_id, u.process_id, u.timer_handle, u.has_callback, i.event_id AS known_event_id
+    SELECT u.event_id, u.process_id, u.timer_handle, u.has_callback, i.event_id AS known_event_id
     FROM use AS u
     ASOF LEFT JOIN staging.located('ros2_rcl_timer_init') AS i
         ON u.process_id = i.process_id

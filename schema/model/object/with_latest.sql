@@ -4,9 +4,7 @@
 -- grain: one row per use; `object_event_id` is NULL where no such object was initialised before
 CREATE OR REPLACE MACRO staging.with_latest(uses, objects) AS TABLE
 WITH object AS (
-    SELECT event_id, process_id, handle
-    FROM query_table(objects)
-    WHERE handle IS NOT NULL
+    SELECT event_id, process_id, handle FROM query_table(objects) WHERE handle IS NOT NULL
 ),
 by_handle AS (
     SELECT process_id, handle, min(event_id) AS first_event_id, count(*) > 1 AS is_repeated

@@ -13,9 +13,7 @@ WITH event AS NOT MATERIALIZED (
     FROM raw.ros2_rmw_take_response
     WHERE taken IS DISTINCT FROM 0
 ),
-client AS (
-    SELECT event_id, process_id, rmw_handle AS handle FROM staging.client_known
-)
+client AS (SELECT event_id, process_id, rmw_handle AS handle FROM staging.client_known)
 SELECT
     event_id, ts_ns, thread_id, process_id, is_request, handle AS rmw_handle, sequence_number,
     source_timestamp_ns, object_event_id AS client_event_id, is_inferred

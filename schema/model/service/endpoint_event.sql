@@ -12,9 +12,7 @@ WITH located AS NOT MATERIALIZED (
         AND e.event_id >= c.from_event_id
         AND e.event_id < c.until_event_id
 ),
-resolved AS NOT MATERIALIZED (
-    FROM staging.with_latest('located', objects)
-),
+resolved AS NOT MATERIALIZED (FROM staging.with_latest('located', objects)),
 first_use AS (
     SELECT process_id, handle, min(event_id) AS event_id
     FROM resolved

@@ -16,10 +16,7 @@ taken AS (
     WHERE is_request AND gid IS NOT NULL
 ),
 repeated AS (
-    SELECT gid, sequence_number
-    FROM sent
-    GROUP BY gid, sequence_number
-    HAVING count(*) > 1
+    SELECT gid, sequence_number FROM sent GROUP BY gid, sequence_number HAVING count(*) > 1
     UNION
     SELECT gid, sequence_number
     FROM taken

@@ -30,9 +30,7 @@ single_gid AS (
     HAVING count(*) = 1
 ),
 answered AS (
-    SELECT
-        f.send_event_id, f.take_event_id,
-        coalesce(s.request_id, c.request_id) AS request_id
+    SELECT f.send_event_id, f.take_event_id, coalesce(s.request_id, c.request_id) AS request_id
     FROM found AS f
     LEFT JOIN staging.response_request AS sr ON f.send_event_id = sr.event_id
     LEFT JOIN staging.request_origin AS s ON sr.request_event_id = s.take_event_id

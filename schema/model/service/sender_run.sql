@@ -17,9 +17,7 @@ run AS (
     LEFT JOIN staging.callback_nesting AS p ON r.start_event_id = p.start_event_id
     LEFT JOIN staging.callback_number AS o ON p.parent_event_id = o.start_event_id
 ),
-nesting AS (
-    SELECT DISTINCT thread_id FROM run WHERE parent_id IS NOT NULL
-),
+nesting AS (SELECT DISTINCT thread_id FROM run WHERE parent_id IS NOT NULL),
 -- Whose instance goes on after each event; where one ends at the begin of another, the other.
 edge AS (
     SELECT run.thread_id, start_event_id AS event_id, callback_instance_id, 0 AS rank

@@ -11,9 +11,7 @@ WITH change AS (
 ),
 -- Of one open goal, the sum is its identity.
 summed AS (
-    SELECT
-        action_server_id, at_ns,
-        sum(change) AS change, sum(change * goal_id) AS goal_change
+    SELECT action_server_id, at_ns, sum(change) AS change, sum(change * goal_id) AS goal_change
     FROM change
     GROUP BY action_server_id, at_ns
 ),

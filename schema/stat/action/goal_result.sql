@@ -98,8 +98,7 @@ placed AS (
         count(request_id) OVER (PARTITION BY party, block) AS requests
     FROM parted
 )
-SELECT goal_id, request_id, 1 AS candidate_count
-FROM followed
+SELECT goal_id, request_id, 1 AS candidate_count FROM followed
 UNION ALL
 SELECT
     g.goal_id, r.request_id,

@@ -24,8 +24,7 @@ numbered AS (
     FROM run
 ),
 stretch AS (
-    SELECT
-        run_id, executor_id, callback_id, min(start_ns) AS start_ns, max(end_ns) AS end_ns
+    SELECT run_id, executor_id, callback_id, min(start_ns) AS start_ns, max(end_ns) AS end_ns
     FROM numbered
     GROUP BY run_id, executor_id, callback_id, stretch
 )

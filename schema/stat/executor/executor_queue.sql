@@ -4,8 +4,7 @@
 -- param: waits VARCHAR  Name of rows as of derive.callback_ready
 CREATE OR REPLACE MACRO derive.executor_queue(waits) AS TABLE
 WITH waiting AS MATERIALIZED (
-    SELECT
-        callback_instance_id, thread_id, coalesce(earliest_ns, latest_ns) AS from_ns, start_ns
+    SELECT callback_instance_id, thread_id, coalesce(earliest_ns, latest_ns) AS from_ns, start_ns
     FROM query_table(waits)
     WHERE coalesce(earliest_ns, latest_ns) IS NOT NULL
         AND thread_id IN (SELECT thread_id FROM store.thread_state)

@@ -115,9 +115,7 @@ drowsy AS MATERIALIZED (
     WHERE thread_count > 1
 ),
 -- Whether an executor waits at all is looked up where none of its callbacks shows it.
-silent AS (
-    SELECT executor_id FROM ready GROUP BY executor_id HAVING max(wait_start_ns) IS NULL
-),
+silent AS (SELECT executor_id FROM ready GROUP BY executor_id HAVING max(wait_start_ns) IS NULL),
 looked_up AS (
     SELECT executor_id, max(at_ns) AS until_ns FROM drowsy GROUP BY executor_id
     UNION ALL

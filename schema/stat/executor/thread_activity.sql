@@ -51,8 +51,7 @@ change AS (
     FROM instance
     WHERE end_event_id IS NOT NULL
     UNION ALL
-    SELECT run_id, thread_id, event_id, 1, at_ns, parent_id, 0, NULL
-    FROM closed
+    SELECT run_id, thread_id, event_id, 1, at_ns, parent_id, 0, NULL FROM closed
     UNION ALL
     SELECT
         run_id, thread_id, start_event_id, 2, start_ns, NULL,
@@ -138,9 +137,7 @@ split AS (
     WINDOW on_thread AS (PARTITION BY run_id, thread_id ORDER BY place)
 ),
 run_change AS (
-    SELECT thread_id, event_id * 4 + step AS run_mark, running_id
-    FROM change
-    WHERE step IN (1, 3)
+    SELECT thread_id, event_id * 4 + step AS run_mark, running_id FROM change WHERE step IN (1, 3)
 ),
 described AS (
     SELECT

@@ -30,8 +30,7 @@ step AS (
     ANTI JOIN staging.callback_binding AS c ON t.start_event_id = c.take_event_id
     WHERE t.method <> 'ring_buffer'
     UNION ALL
-    SELECT event_id, thread_id, subscription_event_id, previous_executor_event_id, false
-    FROM begun
+    SELECT event_id, thread_id, subscription_event_id, previous_executor_event_id, false FROM begun
 ),
 unbroken AS (
     SELECT s.*, coalesce(k.resumed_event_id, 0) AS since_event_id

@@ -11,9 +11,7 @@ WITH begun AS NOT MATERIALIZED (
         previous_event_id, previous_executor_event_id
     FROM staging.callback_pair
 ),
-known AS (
-    SELECT event_id, process_id, callback_handle AS handle FROM staging.callback_known
-),
+known AS (SELECT event_id, process_id, callback_handle AS handle FROM staging.callback_known),
 run AS (
     SELECT
         b.event_id AS start_event_id, b.process_id, b.handle AS callback_handle,

@@ -15,8 +15,7 @@ closed_by AS (
     SELECT o.start_event_id, min(e.event_id) AS event_id
     FROM never_ended AS o
     JOIN (
-        SELECT event_id, thread_id, previous_callback_event_id
-        FROM staging.callback_pair_left_over
+        SELECT event_id, thread_id, previous_callback_event_id FROM staging.callback_pair_left_over
         UNION ALL
         SELECT start_event_id, thread_id, previous_callback_event_id
         FROM staging.callback_pair_plain
@@ -42,9 +41,7 @@ closed_by AS (
         ON o.thread_id = g.thread_id AND o.start_event_id < g.event_id
 ),
 effective_end AS (
-    SELECT start_event_id, min(event_id) AS event_id
-    FROM closed_by
-    GROUP BY start_event_id
+    SELECT start_event_id, min(event_id) AS event_id FROM closed_by GROUP BY start_event_id
 ),
 outer_run AS MATERIALIZED (
     SELECT

@@ -70,8 +70,7 @@ left_over AS (
     QUALIFY bool_or(partner_event_id IS NOT NULL) OVER ()
 ),
 paired AS (
-    SELECT
-        event_id, max(partner_event_id) AS partner_event_id, max(partner_ns) AS partner_ns
+    SELECT event_id, max(partner_event_id) AS partner_event_id, max(partner_ns) AS partner_ns
     FROM left_over
     GROUP BY event_id
 )
