@@ -19,10 +19,8 @@ WITH named AS (
     GROUP BY clock_id
 )
 SELECT
-    p.run_id,
-    f.hosts AS from_hosts,
-    t.hosts AS to_hosts,
-    p.message_count, p.packet_count, p.shortest_message_ns, p.shortest_packet_ns
+    p.run_id, f.hosts AS from_hosts, t.hosts AS to_hosts, p.message_count, p.packet_count,
+    p.shortest_message_ns, p.shortest_packet_ns
 FROM main.clock_pair AS p
 LEFT JOIN named AS f ON p.from_clock_id = f.clock_id
 LEFT JOIN named AS t ON p.to_clock_id = t.clock_id

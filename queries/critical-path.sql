@@ -292,11 +292,9 @@ doubted AS (
     FROM critical_flow
 )
 SELECT
-    s.run_id,
-    s.flow_rank AS rank,
-    s.at_ns, s.duration_ns, s.hop, s.part, s.activity, s.state, s.who, s.node, s.what, s.share,
-    s.pieces, s.is_certain, s.thread, s.wakers, s.priority, s.who_priority, s.from_ns,
-    s.callback_instance_id, s.publication_id, s.take_id, s.latency_ns,
+    s.run_id, s.flow_rank AS rank, s.at_ns, s.duration_ns, s.hop, s.part, s.activity, s.state,
+    s.who, s.node, s.what, s.share, s.pieces, s.is_certain, s.thread, s.wakers, s.priority,
+    s.who_priority, s.from_ns, s.callback_instance_id, s.publication_id, s.take_id, s.latency_ns,
     -- The path of a flow of a thousand hops is long: only the first of its rows has it.
     CASE WHEN s.place = 1 THEN d.is_ambiguous END AS is_ambiguous,
     CASE

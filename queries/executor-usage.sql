@@ -111,12 +111,7 @@ callback AS (
     GROUP BY thread_id
 )
 SELECT
-    m.run_id,
-    m.hostname AS host,
-    m.nodes,
-    m.name AS process,
-    m.pid, m.tid,
-    m.kind AS executor_kind,
+    m.run_id, m.hostname AS host, m.nodes, m.name AS process, m.pid, m.tid, m.kind AS executor_kind,
     greatest(m.last_ns - m.first_ns, 0) AS seen_ns,
     CASE WHEN m.has_states OR m.kind = 'events' THEN coalesce(s.wait_ns, 0) END AS wait_ns,
     CASE WHEN m.has_states THEN coalesce(s.select_ns, 0) ELSE nullif(s.select_ns, 0) END

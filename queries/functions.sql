@@ -108,8 +108,7 @@ SELECT
     coalesce(l.label, 'outside of callbacks') AS callback,
     f.function, t.self_share, t.total_share, t.self_ns, t.total_ns,
     t.total_ns // c.calls AS per_call_ns,
-    c.calls, t.self_samples, t.samples, f.file,
-    l.callback_id AS callback_id,
+    c.calls, t.self_samples, t.samples, f.file, l.callback_id AS callback_id,
     coalesce(l.is_internal, false) AS is_internal
 FROM found AS t
 JOIN placed AS g ON t.group_id = g.group_id

@@ -129,8 +129,7 @@ SELECT
     e.run_id, e.kind, e.node, e.name, e.indirect, e.count, e.rate_hz,
     e.quantiles[1] AS median_ns,
     e.quantiles[2] AS p95_ns,
-    x.label AS executor,
-    h.executor_id, e.is_internal
+    x.label AS executor, h.executor_id, e.is_internal
 FROM edge AS e
 LEFT JOIN home AS h ON e.run_id = h.run_id AND e.node = h.node
 LEFT JOIN executor AS x ON h.executor_id = x.executor_id

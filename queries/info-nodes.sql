@@ -18,10 +18,7 @@
 -- brief: node, process_name, publisher_count, subscription_count, timer_count, service_count,
 --     client_count, action_server_count, action_client_count, pid
 SELECT
-    node.run_id,
-    node.full_name AS node,
-    process.name AS process_name,
-    process.pid,
+    node.run_id, node.full_name AS node, process.name AS process_name, process.pid,
     (
         SELECT count(*)
         FROM main.publisher

@@ -357,9 +357,7 @@ candidate AS (
     SELECT node_id, kind, inputs, outputs, evidence, doubt, false FROM queued
 )
 SELECT
-    n.run_id, c.kind,
-    n.full_name AS node,
-    c.inputs, c.outputs, c.evidence,
+    n.run_id, c.kind, n.full_name AS node, c.inputs, c.outputs, c.evidence,
     nullif(
         concat_ws(
             '; ',

@@ -70,8 +70,7 @@ link AS (
 SELECT
     a.run_id, a.kind, a.source,
     main.node_label(n.full_name, p.name, p.pid) AS node,
-    i.topics AS inputs,
-    o.topics AS outputs,
+    i.topics AS inputs, o.topics AS outputs,
     coalesce(f.publications, 0) AS publications,
     coalesce(f.complete, 0) AS complete,
     coalesce(l.links, 0) AS links,

@@ -83,13 +83,8 @@ symbol AS (
     GROUP BY ALL
 )
 SELECT
-    o.run_id,
-    h.hostname AS host,
-    p.name AS process,
-    p.pid,
-    n.full_name AS node,
-    o.kind, o.name, o.queue_depth, o.goals, o.created_ns, s.symbols, o.object_id, o.is_inferred,
-    o.is_internal
+    o.run_id, h.hostname AS host, p.name AS process, p.pid, n.full_name AS node, o.kind, o.name,
+    o.queue_depth, o.goals, o.created_ns, s.symbols, o.object_id, o.is_inferred, o.is_internal
 FROM object AS o
 JOIN main.process AS p ON o.process_id = p.process_id
 JOIN main.host AS h ON p.host_id = h.host_id

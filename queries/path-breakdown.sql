@@ -176,9 +176,7 @@ SELECT
         ELSE coalesce(l.node, main.node_label(n.full_name, r.name, r.pid))
     END AS node,
     coalesce(l.label, h.topic_name) AS what,
-    m.flows,
-    d.flows AS ambiguous,
-    m.overlaps,
+    m.flows, d.flows AS ambiguous, m.overlaps,
     m.quantiles[1] AS median_ns,
     m.mean_ns,
     m.quantiles[2] AS p95_ns,

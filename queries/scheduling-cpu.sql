@@ -51,11 +51,7 @@ measured AS (
     GROUP BY run_id, host_id, thread_id, other_tid
 )
 SELECT
-    m.run_id,
-    h.hostname AS host,
-    l.nodes,
-    p.name AS process,
-    p.pid,
+    m.run_id, h.hostname AS host, l.nodes, p.name AS process, p.pid,
     coalesce(t.name, m.name) AS thread,
     coalesce(t.tid, m.other_tid) AS tid,
     m.running_ns,

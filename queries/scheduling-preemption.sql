@@ -43,10 +43,7 @@ WITH lost AS (
     GROUP BY ALL
 )
 SELECT
-    l.run_id, pl.nodes,
-    p.name AS process,
-    t.name AS thread,
-    t.tid, l.priority,
+    l.run_id, pl.nodes, p.name AS process, t.name AS thread, t.tid, l.priority,
     coalesce(bl.label, o.name) AS preempted_by,
     coalesce(b.tid, o.tid) AS preempted_by_tid,
     l.preempted_by_priority,

@@ -101,14 +101,12 @@ SELECT
     main.node_label(cn.full_name, cp.name, cp.pid) AS client,
     m.requests, m.answered, m.not_taken, m.not_answered, m.not_received, m.negative,
     m.request_median_ns, m.wait_median_ns, m.callback_median_ns, m.reply_median_ns,
-    m.response_median_ns,
-    m.min_ns AS round_trip_min_ns,
+    m.response_median_ns, m.min_ns AS round_trip_min_ns,
     m.quantiles[1] AS round_trip_median_ns,
     m.mean_ns AS round_trip_mean_ns,
     m.quantiles[2] AS round_trip_p95_ns,
     m.quantiles[3] AS round_trip_p99_ns,
-    m.max_ns AS round_trip_max_ns,
-    m.service_id, m.client_id,
+    m.max_ns AS round_trip_max_ns, m.service_id, m.client_id,
     coalesce(s.is_internal, c.is_internal, false) AS is_internal
 FROM measured AS m
 LEFT JOIN main.service AS s ON m.service_id = s.service_id

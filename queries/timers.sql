@@ -178,10 +178,7 @@ meanwhile AS (
     GROUP BY r.callback_id
 )
 SELECT
-    a.run_id, n.node,
-    n.label AS callback,
-    a.objects, a.period_ns,
-    u.median_ns AS period_median_ns,
+    a.run_id, n.node, n.label AS callback, a.objects, a.period_ns, u.median_ns AS period_median_ns,
     c.rate_hz,
     coalesce(c.count, 0) AS count,
     d.missed, k.bunched,
@@ -205,8 +202,7 @@ SELECT
             AND g.place[2] - g.place[1] <= a.period_ns // 10
             THEN 'reset'
     END AS off_grid,
-    d.busy_share, d.run_queue_share,
-    m.shares AS meanwhile,
+    d.busy_share, d.run_queue_share, m.shares AS meanwhile,
     coalesce(c.count - c.loss_affected - coalesce(d.known, 0), 0) AS unknown,
     coalesce(c.loss_affected, 0) AS loss_affected,
     a.symbol, a.timer_id, a.callback_id, n.is_internal

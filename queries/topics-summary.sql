@@ -121,8 +121,7 @@ SELECT
     d.reasons,
     l.quantiles[1] AS latency_median_ns,
     l.quantiles[2] AS latency_p95_ns,
-    l.max_ns AS latency_max_ns,
-    t.is_internal
+    l.max_ns AS latency_max_ns, t.is_internal
 FROM topic AS t
 LEFT JOIN rate AS r ON t.run_id = r.run_id AND t.topic_name IS NOT DISTINCT FROM r.topic_name
 LEFT JOIN jitter AS j ON t.run_id = j.run_id AND t.topic_name IS NOT DISTINCT FROM j.topic_name

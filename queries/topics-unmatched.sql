@@ -36,8 +36,7 @@ WITH missing AS (
     UNION ALL
     SELECT
         o.run_id, t.taken_ns, 'take', NULL, 'orphan', o.reason,
-        t.source_timestamp_ns, NULL, o.take_id, o.subscription_id,
-        t.process_id
+        t.source_timestamp_ns, NULL, o.take_id, o.subscription_id, t.process_id
     FROM main.stat_orphan AS o
     JOIN main.take AS t ON o.take_id = t.take_id
 )

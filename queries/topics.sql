@@ -31,8 +31,7 @@ subscription_message AS (
 
 endpoint AS (
     SELECT
-        publisher.run_id, publisher.topic_name, publisher.is_internal,
-        1 AS publisher_count,
+        publisher.run_id, publisher.topic_name, publisher.is_internal, 1 AS publisher_count,
         0 AS subscription_count,
         coalesce(publisher_message.publication_count, 0) AS publication_count,
         0 AS take_count
@@ -41,9 +40,7 @@ endpoint AS (
     UNION ALL
     SELECT
         subscription.run_id, subscription.topic_name, subscription.is_internal,
-        0 AS publisher_count,
-        1 AS subscription_count,
-        0 AS publication_count,
+        0 AS publisher_count, 1 AS subscription_count, 0 AS publication_count,
         coalesce(subscription_message.take_count, 0) AS take_count
     FROM main.subscription
     LEFT JOIN subscription_message

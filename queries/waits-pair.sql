@@ -74,10 +74,7 @@ measured AS (
     GROUP BY run_id, callback_id, name
 )
 SELECT
-    m.run_id, l.node,
-    l.label AS callback,
-    o.node AS meanwhile_node,
-    o.label AS meanwhile_callback,
+    m.run_id, l.node, l.label AS callback, o.node AS meanwhile_node, o.label AS meanwhile_callback,
     m.meanwhile_thread, m.waits, m.instances, m.overlap_min_ns, m.overlap_max_ns, m.worst_ns,
     m.thread_max_ns,
     m.overlap_max_ns / sum(m.overlap_max_ns) OVER (PARTITION BY m.callback_id) AS share,

@@ -51,9 +51,8 @@
 WITH waited AS MATERIALIZED (
     SELECT
         w.run_id, w.callback_instance_id, k.alike_id AS callback_id, w.wait_ns, w.busy_min_ns,
-        w.busy_max_ns, w.held_max_ns, w.is_loss_affected, w.meanwhile_callback_ids,
-        w.meanwhile_ns, w.until_arrival_ns, w.run_queue_ns, w.preempted_ns, w.cpu_taken_by,
-        w.cpu_taken_ns
+        w.busy_max_ns, w.held_max_ns, w.is_loss_affected, w.meanwhile_callback_ids, w.meanwhile_ns,
+        w.until_arrival_ns, w.run_queue_ns, w.preempted_ns, w.cpu_taken_by, w.cpu_taken_ns
     FROM main.executor_wait_explained($runs) AS w
     JOIN main.callback_alike AS k ON w.callback_id = k.callback_id
     WHERE w.start_ns >= $start_ns AND w.start_ns < $end_ns
@@ -140,16 +139,12 @@ preemptor AS (
     GROUP BY callback_id
 )
 SELECT
-    m.run_id, l.node,
-    l.label AS callback,
-    m.count, m.delayed_min, m.delayed_max, m.wait_median_ns, m.wait_max_ns, m.busy_worst_ns,
-    m.busy_total_min_ns, m.busy_total_max_ns, m.held_total_max_ns, m.rest_total_min_ns,
-    m.rest_total_max_ns,
-    w.shares AS meanwhile,
-    m.arrived, m.until_arrival_total_ns, m.run_queue_worst_ns, m.run_queue_total_ns,
-    m.preempted_worst_ns, m.preempted_total_ns,
-    p.shares AS cpu_taken_by,
-    m.unknown, m.loss_affected, m.callback_id, l.is_internal
+    m.run_id, l.node, l.label AS callback, m.count, m.delayed_min, m.delayed_max, m.wait_median_ns,
+    m.wait_max_ns, m.busy_worst_ns, m.busy_total_min_ns, m.busy_total_max_ns, m.held_total_max_ns,
+    m.rest_total_min_ns, m.rest_total_max_ns, w.shares AS meanwhile, m.arrived,
+    m.until_arrival_total_ns, m.run_queue_worst_ns, m.run_queue_total_ns, m.preempted_worst_ns,
+    m.preempted_total_ns, p.shares AS cpu_taken_by, m.unknown, m.loss_affected, m.callback_id,
+    l.is_internal
 FROM measured AS m
 JOIN main.callback_label AS l ON m.callback_id = l.callback_id
 LEFT JOIN meanwhile AS w ON m.callback_id = w.callback_id

@@ -157,9 +157,7 @@ summed AS (
     GROUP BY a.clock_id, a.at_ns
 )
 SELECT
-    s.clock_id,
-    s.root_id AS reference_clock_id,
-    s.reference_ns, s.offset_ns,
+    s.clock_id, s.root_id AS reference_clock_id, s.reference_ns, s.offset_ns,
     s.drift_ppb::BIGINT AS drift_ppb,
     s.uncertainty_ns,
     CASE WHEN s.is_even THEN ceil(

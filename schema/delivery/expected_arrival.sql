@@ -31,8 +31,7 @@ FROM sent
 WHERE from_clock_id = clock_id
 UNION ALL
 SELECT
-    s.run_id, s.publication_id, s.publisher_id, s.topic_name, s.source_timestamp_ns,
-    s.clock_id,
+    s.run_id, s.publication_id, s.publisher_id, s.topic_name, s.source_timestamp_ns, s.clock_id,
     coalesce(
         s.end_ns + c.shift_ns,
         CASE

@@ -178,21 +178,17 @@ while_set AS MATERIALIZED (
 ),
 known AS (
     SELECT
-        m.publication_id, m.publisher_id, m.subscription_id, m.topic_name, m.clock_id,
-        m.arrival_ns, m.has_no_stamp, s.process_id, s.queue_depth, s.created_ns,
-        s.last_seen_ns, s.replaced_ns, s.host_end_ns, s.shows_takes, s.is_agnocast,
-        m.arrival_ns
+        m.publication_id, m.publisher_id, m.subscription_id, m.topic_name, m.clock_id, m.arrival_ns,
+        m.has_no_stamp, s.process_id, s.queue_depth, s.created_ns, s.last_seen_ns, s.replaced_ns,
+        s.host_end_ns, s.shows_takes, s.is_agnocast, m.arrival_ns
             - CASE
                 WHEN m.has_one_clock OR e.arrival_ns IS NULL THEN 0
                 ELSE derive.delivery_limit().stamp_slack_ns
             END AS least_arrival_ns,
         coalesce(c.longest_ns, derive.delivery_limit().longest_ns) AS longest_ns,
         coalesce(c.patience_ns, derive.delivery_limit().longest_ns) AS patience_ns,
-        c.usual_ns,
-        p.taken_ns AS publisher_taken_ns,
-        p.arrival_ns AS publisher_arrival_ns,
-        n.taken_ns AS any_taken_ns,
-        n.arrival_ns AS next_arrival_ns,
+        c.usual_ns, p.taken_ns AS publisher_taken_ns, p.arrival_ns AS publisher_arrival_ns,
+        n.taken_ns AS any_taken_ns, n.arrival_ns AS next_arrival_ns,
         e.arrival_ns > m.arrival_ns AS is_before_first,
         -- From when on publisher and subscription could know each other: they need not have before.
         greatest(

@@ -11,8 +11,7 @@ JOIN store.publisher AS p ON l.publisher_id = p.publisher_id
 WHERE l.take_id IS NOT NULL AND NOT p.is_internal
 UNION ALL
 SELECT
-    l.run_id, l.take_id, l.subscription_id, l.publication_id, l.publisher_id, l.kind, l.route,
-    false
+    l.run_id, l.take_id, l.subscription_id, l.publication_id, l.publisher_id, l.kind, l.route, false
 FROM store.flow_call AS l
 JOIN store.publisher AS p ON l.publisher_id = p.publisher_id
 WHERE l.take_id IS NOT NULL AND NOT p.is_internal

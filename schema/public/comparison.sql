@@ -100,10 +100,7 @@ outcome AS (
 thing AS (
     -- A root counts once, however often it arrived; not those that could not arrive, or were cut.
     SELECT
-        run_id, subject,
-        false AS is_internal,
-        root_ns AS at_ns,
-        root_id AS id,
+        run_id, subject, false AS is_internal, root_ns AS at_ns, root_id AS id,
         CASE
             WHEN status <> 'reached' THEN NULL
             WHEN wanted_case = 'first' AND NOT is_first THEN NULL
@@ -119,15 +116,11 @@ thing AS (
     SELECT
         i.run_id,
         l.node || ' · ' || l.label AS subject,
-        l.is_internal,
-        i.start_ns AS at_ns,
-        i.callback_instance_id AS id,
+        l.is_internal, i.start_ns AS at_ns, i.callback_instance_id AS id,
         i.end_ns - i.start_ns AS value_ns,
         true AS is_unit,
         i.end_ns IS NOT NULL AS is_complete,
-        i.is_loss_affected,
-        false AS is_ambiguous,
-        false AS is_cut
+        i.is_loss_affected, false AS is_ambiguous, false AS is_cut
     FROM main.callback_instance AS i
     JOIN main.callback_label AS l ON i.callback_id = l.callback_id
     WHERE what IS NOT DISTINCT FROM 'callbacks' AND list_contains([run_a, run_b], i.run_id)
@@ -137,10 +130,7 @@ thing AS (
         coalesce(s.topic_name, '?') || ' → ' || main.node_label(n.full_name, p.name, p.pid)
             AS subject,
         coalesce(s.is_internal, false) AS is_internal,
-        t.taken_ns AS at_ns,
-        t.take_id AS id,
-        l.latency_ns AS value_ns,
-        true AS is_unit,
+        t.taken_ns AS at_ns, t.take_id AS id, l.latency_ns AS value_ns, true AS is_unit,
         l.take_id IS NOT NULL AS is_complete,
         t.is_loss_affected OR coalesce(l.is_loss_affected, false) AS is_loss_affected,
         l.candidate_count > 1 AS is_ambiguous,
@@ -230,19 +220,12 @@ paired AS (
         coalesce(a.subject, b.subject) AS subject,
         coalesce(a.statistic, b.statistic) AS statistic,
         coalesce(a.quantile, b.quantile) AS quantile,
-        a.value_ns AS a_ns,
-        b.value_ns AS b_ns,
+        a.value_ns AS a_ns, b.value_ns AS b_ns,
         coalesce(a.number, 0) AS a_count,
         coalesce(b.number, 0) AS b_count,
-        a.independent AS a_independent,
-        b.independent AS b_independent,
-        a.share AS a_share,
-        b.share AS b_share,
-        a.loss_affected AS a_loss_affected,
-        b.loss_affected AS b_loss_affected,
-        a.ambiguous AS a_ambiguous,
-        b.ambiguous AS b_ambiguous,
-        a.warm_up_ns AS a_warm_up_ns,
+        a.independent AS a_independent, b.independent AS b_independent, a.share AS a_share,
+        b.share AS b_share, a.loss_affected AS a_loss_affected, b.loss_affected AS b_loss_affected,
+        a.ambiguous AS a_ambiguous, b.ambiguous AS b_ambiguous, a.warm_up_ns AS a_warm_up_ns,
         b.warm_up_ns AS b_warm_up_ns,
         coalesce(a.is_cut, false) OR coalesce(b.is_cut, false) AS is_cut
     FROM (SELECT * FROM value WHERE side = 'a') AS a

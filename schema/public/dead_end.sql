@@ -162,8 +162,7 @@ loop AS (
 )
 SELECT
     o.run_id, o.node_id, o.subscription_id, s.topic_name, o.message_count, o.publisher_id,
-    p.topic_name AS output_topic,
-    o.timer_id, o.trigger_id,
+    p.topic_name AS output_topic, o.timer_id, o.trigger_id,
     CASE
         WHEN o.trigger_id IS NOT NULL THEN 'from ' || coalesce(g.topic_name, '?')
         WHEN o.timer_id IS NULL THEN 'outside of callbacks'

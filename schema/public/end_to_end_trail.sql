@@ -73,8 +73,7 @@ trail (
         dense_rank() OVER (ORDER BY flow_id, take_id, way.takes_rank)
     FROM (
         SELECT
-            r.flow_id,
-            l.parent_path_id AS path_id,
+            r.flow_id, l.parent_path_id AS path_id,
             r.hop - 1 AS hop,
             s.take_id, s.publication_id,
             min(struct_pack(

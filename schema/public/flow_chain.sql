@@ -81,8 +81,7 @@ chain AS (
         row_number() OVER (ORDER BY run_id, publisher_id, subscription_id, route)
         - rank() OVER (ORDER BY run_id) + 1 AS number,
         NULL::BIGINT AS parent_number,
-        hop_id AS first_hop_id,
-        hop_id, subscription_id, is_last,
+        hop_id AS first_hop_id, hop_id, subscription_id, is_last,
         set_bit(nowhere, place, 1) AS visited,
         NULL::BIGINT AS parent_publishers_rank,
         dense_rank() OVER (ORDER BY run_id, publisher_id) AS publishers_rank,
@@ -103,8 +102,7 @@ chain AS (
         SELECT
             c.run_id,
             c.depth + 1 AS depth,
-            c.number AS parent_number,
-            c.first_hop_id, u.hop_id, u.subscription_id, u.is_last,
+            c.number AS parent_number, c.first_hop_id, u.hop_id, u.subscription_id, u.is_last,
             set_bit(c.visited, u.place, 1) AS visited,
             c.publishers_rank AS parent_publishers_rank,
             dense_rank() OVER (
@@ -133,8 +131,7 @@ list AS MATERIALIZED (
 ),
 around AS (
     SELECT
-        l.list_id,
-        p.list_id AS parent_id,
+        l.list_id, p.list_id AS parent_id,
         lead(l.list_id) OVER (
             PARTITION BY l.run_id, l.depth, l.parent_publishers_rank ORDER BY l.list_id
         ) AS next_id
@@ -200,9 +197,7 @@ ranked AS (
 )
 SELECT
     r.run_id, r.path_id, r.parent_path_id, r.depth, u.publisher_id, u.subscription_id, u.route,
-    f.publisher_id AS first_publisher_id,
-    f.route AS first_route,
-    u.is_cached,
+    f.publisher_id AS first_publisher_id, f.route AS first_route, u.is_cached,
     r.is_candidate AND r.path_number <= max_paths AS is_path,
     CASE
         WHEN bool_or(r.is_candidate AND r.path_number > max_paths) OVER run THEN true

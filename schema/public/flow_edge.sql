@@ -20,8 +20,7 @@ SELECT
     'take' AS to_kind,
     l.take_id AS to_id,
     'transport' AS link_kind,
-    b.end_ns AS from_ns,
-    t.taken_ns AS to_ns
+    b.end_ns AS from_ns, t.taken_ns AS to_ns
 FROM main.link_transport AS l
 JOIN main.publication AS b ON l.publication_id = b.publication_id
 JOIN main.take AS t ON l.take_id = t.take_id

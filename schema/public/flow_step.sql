@@ -169,8 +169,7 @@ SELECT
     coalesce(lt.is_loss_affected, lc.is_loss_affected) AS is_loss_affected,
     d.kind, d.id, d.start_ns, d.end_ns, d.node, d.label, d.topic_name, d.symbol,
     printf('%s %d', coalesce(h.name, '?'), h.tid) AS thread,
-    m.hostname AS host,
-    d.missing, d.reason,
+    m.hostname AS host, d.missing, d.reason,
     coalesce(c.cut_count, 0) AS cut_count,
     coalesce(o.internal_count, 0) AS internal_count
 FROM described AS d

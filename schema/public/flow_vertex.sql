@@ -17,8 +17,7 @@
 -- column: reason VARCHAR  Why it is missing, as far as known
 CREATE OR REPLACE MACRO main.flow_vertex(vertices) AS TABLE
 SELECT
-    v.key, v.kind, v.id, v.depth, b.run_id, b.start_ns, b.end_ns, b.thread_id,
-    b.process_id,
+    v.key, v.kind, v.id, v.depth, b.run_id, b.start_ns, b.end_ns, b.thread_id, b.process_id,
     main.node_label(n.full_name, o.name, o.pid) AS node,
     coalesce(p.topic_name, '?') AS label,
     p.topic_name,
@@ -33,8 +32,7 @@ LEFT JOIN store.node AS n ON p.node_id = n.node_id
 WHERE v.kind = 'publication'
 UNION ALL
 SELECT
-    v.key, v.kind, v.id, v.depth, t.run_id, t.taken_ns, t.taken_ns, t.thread_id,
-    t.process_id,
+    v.key, v.kind, v.id, v.depth, t.run_id, t.taken_ns, t.taken_ns, t.thread_id, t.process_id,
     main.node_label(n.full_name, o.name, o.pid),
     coalesce(s.topic_name, '?'),
     s.topic_name, NULL,

@@ -148,11 +148,10 @@ torn AS (
         )
 )
 SELECT
-    run_id, goal_id, action_name, action_client_id, action_server_id,
-    sent_ns, taken_ns, answered_ns, answer_taken_ns, is_accepted,
-    result_asked_ns, result_sent_ns, result_taken_ns, result_request_id, result_candidate_count,
-    feedback_count, first_feedback_ns, last_feedback_ns, is_overlapping,
-    cancel_asked_ns, cancel_accepted_ns,
+    run_id, goal_id, action_name, action_client_id, action_server_id, sent_ns, taken_ns,
+    answered_ns, answer_taken_ns, is_accepted, result_asked_ns, result_sent_ns, result_taken_ns,
+    result_request_id, result_candidate_count, feedback_count, first_feedback_ns, last_feedback_ns,
+    is_overlapping, cancel_asked_ns, cancel_accepted_ns,
     answer_taken_ns - sent_ns AS accept_latency_ns,
     result_sent_ns - answered_ns AS execution_ns,
     first_feedback_ns - answered_ns AS first_feedback_latency_ns,

@@ -34,8 +34,7 @@ WITH RECURSIVE state AS MATERIALIZED (
             preempted_by_other_thread_id,
             CASE WHEN waker_kind = 'thread' THEN waker_other_thread_id END
         ) AS by_other_thread_id,
-        preempted_by_priority AS by_priority,
-        is_loss_affected
+        preempted_by_priority AS by_priority, is_loss_affected
     FROM main.thread_state
     WHERE list_contains(runs, run_id)
         AND end_ns > (SELECT min(from_ns) FROM query_table(intervals))

@@ -29,8 +29,7 @@ SELECT
         ELSE 8 * c.callback_id + 5
     END AS row_key,
     0::UTINYINT AS kind,
-    i.callback_instance_id AS id,
-    i.start_ns,
+    i.callback_instance_id AS id, i.start_ns,
     coalesce(i.end_ns, i.start_ns) AS end_ns,
     (coalesce(i.is_loss_affected, false)::UTINYINT + 2 * (i.end_ns IS NULL)::UTINYINT
         + 4 * i.is_intra_process::UTINYINT + 8 * (i.depth > 1)::UTINYINT)::UTINYINT AS flags

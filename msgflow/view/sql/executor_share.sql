@@ -37,8 +37,7 @@ whole AS (
 SELECT
     thread_id,
     $start_ns - $origin_ns + bin * width AS start_at,
-    width AS length,
-    activity,
+    width AS length, activity,
     sum(least(end_at, (bin + 1) * width) - greatest(begin_at, bin * width))::BIGINT AS busy
 FROM whole
 GROUP BY thread_id, bin, width, activity

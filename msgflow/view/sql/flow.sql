@@ -64,9 +64,7 @@ SELECT
     n.kind, n.id, n.row_key,
     n.start_ns - $origin_ns AS start_at,
     n.end_ns - n.start_ns AS length,
-    n.flags, n.is_effect, n.is_cause,
-    c.code AS from_kind,
-    l.from_id, l.link_kind,
+    n.flags, n.is_effect, n.is_cause, c.code AS from_kind, l.from_id, l.link_kind,
     (SELECT count(*) FROM reached) AS vertex_count
 FROM near AS n
 LEFT JOIN link AS l ON n.name = l.to_kind AND n.id = l.to_id

@@ -20,8 +20,7 @@ WITH message AS (
         0::UTINYINT AS link_kind,
         8 * b.publisher_id + 4 AS from_row,
         8 * t.subscription_id + 1 AS to_row,
-        b.end_ns AS from_ns,
-        t.taken_ns AS to_ns,
+        b.end_ns AS from_ns, t.taken_ns AS to_ns,
         coalesce(l.is_loss_affected, false) AS is_loss_affected
     FROM main.link_transport AS l
     JOIN main.publication AS b ON l.publication_id = b.publication_id

@@ -17,9 +17,7 @@ WITH missing AS (
 extent AS (SELECT ($end_ns - $start_ns) // $bins + 1 AS width)
 SELECT
     $start_ns - $origin_ns + (m.at_ns - $start_ns) // e.width * e.width AS start_at,
-    e.width AS length,
-    s.topic_name AS topic,
-    m.status, m.reason,
+    e.width AS length, s.topic_name AS topic, m.status, m.reason,
     count(*) AS count,
     coalesce(s.is_internal, false) AS is_internal
 FROM missing AS m

@@ -69,9 +69,7 @@ linked AS (
 ),
 orphan AS (SELECT run_id, count(DISTINCT take_id) AS number FROM store.orphan_take GROUP BY run_id)
 SELECT
-    b.run_id,
-    b.topic_name AS subject,
-    1 AS count,
+    b.run_id, b.topic_name AS subject, 1 AS count,
     printf(
         '%d messages for subscriptions; %d delivered, or with a reason',
         b.number * s.number - coalesce(n.number, 0),

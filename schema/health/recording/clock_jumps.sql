@@ -19,8 +19,7 @@ WITH step AS (
     )
 )
 SELECT
-    s.run_id,
-    h.hostname AS subject,
+    s.run_id, h.hostname AS subject,
     count(*) AS count,
     printf(
         '%s, the largest %.3f %s',

@@ -18,8 +18,7 @@ callback AS (
     GROUP BY run_id
 )
 SELECT
-    s.run_id,
-    s.affected AS count,
+    s.run_id, s.affected AS count,
     printf(
         '%d of %s of threads, %s', s.affected, derive.counted(s.states, 'state'),
         derive.counted(coalesce(c.affected, 0), 'callback instance')

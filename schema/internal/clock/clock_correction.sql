@@ -6,9 +6,7 @@ WITH known AS (
     GROUP BY clock_id
 )
 SELECT
-    c.run_id,
-    r.hosts AS reference,
-    n.hosts,
+    c.run_id, r.hosts AS reference, n.hosts,
     coalesce(k.least_ns, c.uncertainty_ns) / 1e6 AS least_ms,
     coalesce(k.greatest_ns, c.uncertainty_ns) / 1e6 AS greatest_ms
 FROM main.clock AS c

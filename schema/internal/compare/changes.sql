@@ -65,18 +65,10 @@ SELECT
         ELSE median.verdict
     END AS change,
     coalesce(differing, alike, estimated) AS of,
-    median.a AS a_median_ns,
-    median.b AS b_median_ns,
-    median.percent AS median_percent,
-    median.verdict AS median_verdict,
-    p95.a AS a_p95_ns,
-    p95.b AS b_p95_ns,
-    p95.percent AS p95_percent,
-    p95.verdict AS p95_verdict,
-    longest.a AS a_max_ns,
-    longest.b AS b_max_ns,
-    longest.percent AS max_percent,
-    longest.verdict AS max_verdict,
+    median.a AS a_median_ns, median.b AS b_median_ns, median.percent AS median_percent,
+    median.verdict AS median_verdict, p95.a AS a_p95_ns, p95.b AS b_p95_ns,
+    p95.percent AS p95_percent, p95.verdict AS p95_verdict, longest.a AS a_max_ns,
+    longest.b AS b_max_ns, longest.percent AS max_percent, longest.verdict AS max_verdict,
     a_share, b_share, a_count, b_count, a_ambiguous, b_ambiguous, subject AS path
 FROM subject
 WHERE NOT $only_different OR is_longer OR is_shorter OR only_in IS NOT NULL

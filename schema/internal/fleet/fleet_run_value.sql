@@ -7,8 +7,7 @@
 WITH cut AS (SELECT run, bool_or(is_cut) AS is_cut FROM e2e_latency GROUP BY run),
 measured AS (
     SELECT
-        s.side, s.unit, f.run,
-        f.path AS subject,
+        s.side, s.unit, f.run, f.path AS subject,
         count(value_ns) AS number,
         quantile_disc(value_ns, [0.5, 0.95, 0.99]) AS quantiles,
         avg(value_ns) AS mean_ns,

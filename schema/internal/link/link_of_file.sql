@@ -25,14 +25,9 @@ named AS (
     WHERE run_id = $run_id
 )
 SELECT
-    a.kind,
-    n.full_name AS node,
-    i.topics AS inputs,
-    o.topics AS outputs,
+    a.kind, n.full_name AS node, i.topics AS inputs, o.topics AS outputs,
     CASE WHEN i.node_id <> o.node_id THEN r.full_name END AS inputs_of,
-    a.queue_depth, p.pid,
-    h.hostname AS host,
-    n.is_name_repeated
+    a.queue_depth, p.pid, h.hostname AS host, n.is_name_repeated
 FROM store.annotation AS a
 JOIN input AS i ON a.annotation_id = i.annotation_id
 JOIN output AS o ON a.annotation_id = o.annotation_id

@@ -32,9 +32,7 @@ output AS (
     GROUP BY o.annotation_id
 )
 SELECT
-    d.kind,
-    i.topics AS inputs,
-    o.topics AS outputs,
+    d.kind, i.topics AS inputs, o.topics AS outputs,
     CASE
         WHEN i.first_event_id IS NULL THEN printf('no message on %s was taken', i.topics)
         WHEN o.number = 0 THEN printf('nothing was published on %s', o.topics)

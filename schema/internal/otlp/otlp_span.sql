@@ -143,9 +143,7 @@ span AS (
 SELECT
     (row_number() OVER (ORDER BY o.start_ns, s.root_key, s.start_ns, s.key) - 1) // $at_once
         AS batch,
-    s.trace_id, s.span_id,
-    p.span_id AS parent_span_id,
-    s.kind, s.id,
+    s.trace_id, s.span_id, p.span_id AS parent_span_id, s.kind, s.id,
     CASE
         WHEN s.kind = 'publication' THEN 'publish ' || s.label
         WHEN s.kind = 'callback_instance' AND s.trigger <> 'subscription' THEN s.label
@@ -163,18 +161,9 @@ SELECT
         ELSE s.start_ns END AS from_ns,
     greatest(s.end_ns, from_ns + 1) AS to_ns,
     CASE WHEN s.kind = 'take' THEN s.start_ns - u.end_ns END AS latency_ns,
-    s.node,
-    h.hostname AS host,
-    e.name AS process,
-    e.pid,
-    t.name AS thread,
-    t.tid,
-    s.topic_name AS topic,
-    s.service, s.symbol,
-    s.link_kind AS cause,
-    a.candidate_count, f.not_delivered,
-    w.trace_ids AS link_trace_ids,
-    w.span_ids AS link_span_ids,
+    s.node, h.hostname AS host, e.name AS process, e.pid, t.name AS thread, t.tid,
+    s.topic_name AS topic, s.service, s.symbol, s.link_kind AS cause, a.candidate_count,
+    f.not_delivered, w.trace_ids AS link_trace_ids, w.span_ids AS link_span_ids,
     w.causes AS link_causes
 FROM span AS s
 JOIN described AS o ON s.root_key = o.key

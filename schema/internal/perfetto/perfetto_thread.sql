@@ -3,8 +3,7 @@
 -- grain: one row per thread
 SELECT
     t.thread_id * 8 + 2 AS track,
-    p.track AS parent,
-    p.pid,
+    p.track AS parent, p.pid,
     CASE WHEN count(*) OVER (PARTITION BY t.tid) = 1 THEN t.tid
         ELSE 1500000000 + row_number() OVER (ORDER BY t.thread_id) END AS tid,
     printf('%s %d', coalesce(t.name, '?'), t.tid) AS name,

@@ -20,8 +20,7 @@ covered AS (
     ASOF JOIN staging.thread_state AS s ON b.thread_id = s.thread_id AND b.end_ns > s.start_ns
 )
 SELECT
-    c.callback_instance_id,
-    c.number AS state_number,
+    c.callback_instance_id, c.number AS state_number,
     greatest(c.start_ns, s.start_ns) AS start_ns,
     least(c.end_ns, s.end_ns) AS end_ns,
     s.start_ns > c.start_ns AS is_begin

@@ -17,9 +17,7 @@ WITH migration AS (
 wait AS (SELECT * FROM staging.schedule_interval WHERE state IN ('preempted', 'runnable')),
 begin AS (
     SELECT
-        w.thread_id, w.tid,
-        w.start_ns AS state_start_ns,
-        w.start_ns,
+        w.thread_id, w.tid, w.start_ns AS state_start_ns, w.start_ns,
         CASE
             WHEN m.at_ns >= coalesce(w.left_ns, m.at_ns) THEN m.cpu
             WHEN w.state = 'runnable'

@@ -28,9 +28,7 @@ WITH follower AS MATERIALIZED (
 around AS MATERIALIZED (
     SELECT
         p.annotation_id, p.pivot_id, p.pivot_ns, p.pivot_age_ns, p.subscription_id,
-        l.stamp_ns AS last_ns,
-        l.start_ns AS last_start_ns,
-        l.start_event_id AS last_event_id,
+        l.stamp_ns AS last_ns, l.start_ns AS last_start_ns, l.start_event_id AS last_event_id,
         l.age_ns, l.next_ns, l.next_event_id, l.next_age_ns, l.is_set_back,
         -- Where it goes on after it waited for this input: those with older messages have come.
         CASE

@@ -120,8 +120,7 @@ independent AS (
     WHERE taken_request_id IS NULL AND taken_response_id IS NULL
 )
 SELECT
-    only_run AS run_id,
-    l.taken_request_id, l.taken_response_id, l.publication_id,
+    only_run AS run_id, l.taken_request_id, l.taken_response_id, l.publication_id,
     CASE l.kind WHEN 'publisher' THEN l.object_id END AS publisher_id,
     l.request_id, l.response_id,
     1 + (i.thread_id IS NOT NULL OR coalesce(p.is_ambiguous, false))::BIGINT AS candidate_count

@@ -36,8 +36,7 @@ demand AS MATERIALIZED (
     SELECT
         b.run_id, b.annotation_id, b.kind, b.publication_id,
         b.callback_instance_id AS publishing_id, b.trace_id, b.thread_id, b.start_ns,
-        b.start_event_id, b.cut_event_id,
-        i.subscription_id,
+        b.start_event_id, b.cut_event_id, i.subscription_id,
         CASE
             WHEN n.parent_id IS NULL THEN coalesce(f.first_event_id, b.start_event_id)
             ELSE b.start_event_id
@@ -134,8 +133,7 @@ nested AS (
 cut AS (SELECT DISTINCT annotation_id, subscription_id, cut_event_id, emptied_event_id FROM demand),
 at_cut AS MATERIALIZED (
     SELECT
-        c.annotation_id, c.subscription_id, c.cut_event_id, e.callback_instance_id,
-        e.start_event_id
+        c.annotation_id, c.subscription_id, c.cut_event_id, e.callback_instance_id, e.start_event_id
     FROM cut AS c
     ASOF JOIN ended AS e
         ON c.annotation_id = e.annotation_id
@@ -178,8 +176,7 @@ possible AS (
         SELECT
             t.annotation_id, t.publication_id, t.subscription_id, t.read_event_id,
             greatest(t.input_start_event_id, t.kept_event_id) AS since_event_id,
-            b.run_count AS begun_count,
-            b.last_id
+            b.run_count AS begun_count, b.last_id
         FROM there AS t
         ASOF JOIN begun AS b
             ON t.annotation_id = b.annotation_id
@@ -250,9 +247,7 @@ found AS MATERIALIZED (
     SELECT
         c.run_id, c.annotation_id, c.kind, c.publication_id, c.callback_instance_id,
         c.candidate_count, c.trace_id, c.thread_id, c.start_ns, c.start_event_id,
-        i.trace_id AS input_trace_id,
-        i.thread_id AS input_thread_id,
-        i.start_ns AS input_start_ns,
+        i.trace_id AS input_trace_id, i.thread_id AS input_thread_id, i.start_ns AS input_start_ns,
         least(c.since_ns, i.start_ns) AS since_ns,
         i.start_event_id AS input_start_event_id
     FROM linked AS c

@@ -16,8 +16,7 @@ by_hand AS MATERIALIZED (
 ),
 run AS MATERIALIZED (
     SELECT
-        i.callback_instance_id, i.parent_id, i.thread_id, i.start_event_id,
-        i.effective_end_event_id
+        i.callback_instance_id, i.parent_id, i.thread_id, i.start_event_id, i.effective_end_event_id
     FROM store.callback_instance AS i
     SEMI JOIN by_hand AS t ON i.thread_id = t.thread_id
     WHERE i.run_id = only_run

@@ -29,8 +29,7 @@ started AS (
 located AS (
     SELECT
         b.run_id, b.clock_id, b.topic_name, b.publisher_id, b.thread_id, b.publication_id,
-        b.written_ns, b.next_event_ns, b.has_break, c.segment, c.is_certain,
-        c.difference_ns
+        b.written_ns, b.next_event_ns, b.has_break, c.segment, c.is_certain, c.difference_ns
         + round((b.written_ns - c.at_ns)::DOUBLE * c.drift_ppb / 1e9)::BIGINT AS then_ns,
         -- Where the drift is not known, it may be any that clocks have, also among the messages
         -- that vote.
@@ -149,8 +148,7 @@ beside AS (
 looked_up AS MATERIALIZED (
     SELECT
         topic_name, publisher_id, source_timestamp_ns, only_subscription_id, publication_id,
-        clock_id, goes_on,
-        is_crowded
+        clock_id, goes_on, is_crowded
         OR first_value(source_timestamp_ns) OVER of_publication < opens_ns
         OR coalesce(
             lead(source_timestamp_ns) OVER of_publication - source_timestamp_ns <= 2 * wander_ns,

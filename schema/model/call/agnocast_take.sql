@@ -16,8 +16,7 @@ callback AS (
 ),
 polled AS (
     SELECT
-        event_id, ts_ns, trace_index, thread_id, process_id, entry_id,
-        subscription_handle AS handle
+        event_id, ts_ns, trace_index, thread_id, process_id, entry_id, subscription_handle AS handle
     FROM staging.located('agnocast_agnocast_take')
     WHERE message <> 0
 ),

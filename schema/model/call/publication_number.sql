@@ -54,8 +54,7 @@ published AS (
         event_id AS start_event_id,
         NULL::BIGINT AS process_id,
         NULL::UBIGINT AS unknown_handle,
-        object_event_id AS publisher_event_id,
-        false AS is_rosout
+        object_event_id AS publisher_event_id, false AS is_rosout
     FROM by_rcl
     WHERE object_event_id IS NOT NULL
     UNION ALL

@@ -40,9 +40,7 @@ covered AS (
 -- the session recorded, and stopping would have written further ones.
 silent AS (
     SELECT
-        trace_id, recording_index,
-        covered_until_ns AS start_ns,
-        begin_ns AS end_ns,
+        trace_id, recording_index, covered_until_ns AS start_ns, begin_ns AS end_ns,
         -- Packets of one trace ended before they were full.
         coalesce(ended_early_ns = covered_until_ns, false)
         AND coalesce(previous_trace_id = trace_id, false) AS is_flushed

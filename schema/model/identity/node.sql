@@ -5,13 +5,9 @@
 -- when: raw.ros2_rcl_node_init, staging.node_use
 WITH known AS (
     SELECT
-        event_id, process_id,
-        node_name AS name,
-        namespace,
+        event_id, process_id, node_name AS name, namespace,
         namespace || CASE WHEN namespace LIKE '%/' THEN '' ELSE '/' END || node_name AS full_name,
-        node_handle,
-        ts_ns AS created_ns,
-        false AS is_inferred
+        node_handle, ts_ns AS created_ns, false AS is_inferred
     FROM staging.located('ros2_rcl_node_init')
 ),
 unknown AS (

@@ -21,10 +21,8 @@ version AS (
     GROUP BY process_id
 )
 SELECT
-    p.process_id, p.host_id,
-    p.vpid AS pid,
-    p.name, v.tracetools_version, y.python_version, p.first_seen_ns, p.last_seen_ns,
-    p.pid_ns AS pid_namespace,
+    p.process_id, p.host_id, p.vpid AS pid, p.name, v.tracetools_version, y.python_version,
+    p.first_seen_ns, p.last_seen_ns, p.pid_ns AS pid_namespace,
     p.life::INTEGER AS life,
     m.vpid IS NOT NULL AS is_ambiguous
 FROM process AS p

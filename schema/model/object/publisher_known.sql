@@ -21,8 +21,7 @@ with_rmw AS (
         coalesce(p.rmw_publisher_handle = 0, false) AS is_agnocast,
         CASE WHEN p.rmw_publisher_handle IS DISTINCT FROM 0 THEN 'rt' || p.topic_name END
             AS dds_topic,
-        r.gid,
-        r.ts_ns AS rmw_created_ns
+        r.gid, r.ts_ns AS rmw_created_ns
     FROM staging.located('ros2_rcl_publisher_init') AS p
     ASOF LEFT JOIN rmw_init AS r
         ON p.process_id = r.process_id

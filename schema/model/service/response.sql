@@ -41,11 +41,8 @@ SELECT
     row_number() OVER (ORDER BY coalesce(a.send_event_id, a.take_event_id)) AS response_id,
     client.client_id, service.service_id, a.request_id,
     coalesce(s.sequence_number, c.sequence_number) AS sequence_number,
-    s.ts_ns AS sent_ns,
-    c.ts_ns AS taken_ns,
-    s.thread_id AS sender_thread_id,
-    c.thread_id AS receiver_thread_id,
-    i.callback_instance_id, a.send_event_id, a.take_event_id
+    s.ts_ns AS sent_ns, c.ts_ns AS taken_ns, s.thread_id AS sender_thread_id,
+    c.thread_id AS receiver_thread_id, i.callback_instance_id, a.send_event_id, a.take_event_id
 FROM answered AS a
 LEFT JOIN staging.service_event AS s ON a.send_event_id = s.event_id
 LEFT JOIN staging.client_event AS c ON a.take_event_id = c.event_id

@@ -56,8 +56,7 @@ polled AS (
         p.run_id, p.executor_id, p.thread_id, p.callback_id, p.callback_instance_id, p.start_ns,
         p.previous_start_ns, p.since, p.origin_ns, p.subscribed_ns, p.latest_ns, p.thread_count,
         p.picked_ns, w.end_ns AS polled_ns, w.previous_end_ns, w.asleep_ns,
-        w.start_ns AS wait_start_ns,
-        w.before_ns AS wait_before_ns
+        w.start_ns AS wait_start_ns, w.before_ns AS wait_before_ns
     FROM picked AS p
     ASOF LEFT JOIN derive.executor_poll('sized') AS w
         ON p.executor_id = w.executor_id AND p.picked_ns >= w.end_ns
@@ -119,7 +118,6 @@ SELECT
         AS latest_ns,
     start_ns, thread_count,
     coalesce(picked_ns, start_ns) AS picked_ns,
-    wait_start_ns, wait_end_ns, wait_before_ns,
-    previous_end_ns AS previous_wait_end_ns,
+    wait_start_ns, wait_end_ns, wait_before_ns, previous_end_ns AS previous_wait_end_ns,
     coalesce(resumed_ns > coalesce(earliest_ns, polled_ns), false) AS is_loss_affected
 FROM bounded

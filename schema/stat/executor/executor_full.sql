@@ -14,8 +14,7 @@ WITH edge AS (
 ),
 level AS (
     SELECT
-        run_id, executor_id,
-        at_ns AS start_ns,
+        run_id, executor_id, at_ns AS start_ns,
         lead(at_ns) OVER in_time AS end_ns,
         sum(step) OVER (in_time ROWS UNBOUNDED PRECEDING) AS running
     FROM edge

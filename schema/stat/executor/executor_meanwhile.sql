@@ -46,10 +46,8 @@ pair AS (
     WHERE first_position <= last_position
 )
 SELECT
-    p.run_id, p.callback_instance_id,
-    r.callback_instance_id AS meanwhile_id,
-    r.callback_id AS meanwhile_callback_id,
-    p.executor_id, p.thread_id,
+    p.run_id, p.callback_instance_id, r.callback_instance_id AS meanwhile_id,
+    r.callback_id AS meanwhile_callback_id, p.executor_id, p.thread_id,
     least(r.end_ns, p.start_ns) - greatest(r.start_ns, p.from_ns) AS overlap_ns,
     greatest(least(r.end_ns, p.start_ns) - greatest(r.start_ns, p.latest_ns), 0) AS certain_ns
 FROM pair AS p

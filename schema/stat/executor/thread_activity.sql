@@ -156,8 +156,7 @@ described AS (
 ),
 classified AS (
     SELECT
-        t.run_id, t.thread_id, x.executor_id,
-        t.at_ns AS start_ns,
+        t.run_id, t.thread_id, x.executor_id, t.at_ns AS start_ns,
         CASE WHEN t.next_step > 0 THEN t.next_ns END AS end_ns,
         t.callback_instance_id,
         CASE

@@ -28,8 +28,7 @@ run AS (
 )
 SELECT
     r.start_event_id, r.process_id, r.callback_handle, r.is_intra_process, r.callback_event_id,
-    r.kind,
-    t.start_event_id AS take_event_id,
+    r.kind, t.start_event_id AS take_event_id,
     coalesce(r.subscription_event_id, t.subscription_event_id) AS subscription_event_id,
     coalesce(q.event_id, p.request_event_id) AS request_event_id
 FROM run AS r

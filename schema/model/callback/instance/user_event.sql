@@ -28,10 +28,8 @@ around AS (
 SELECT
     row_number() OVER (ORDER BY e.event_id) AS user_event_id,
     e.trace_index + 1 AS trace_id,
-    e.process_id, e.thread_id,
-    e.cpu_id AS cpu,
-    e.ts_ns AS at_ns,
-    e.name, a.callback_instance_id, e.fields,
+    e.process_id, e.thread_id, e.cpu_id AS cpu, e.ts_ns AS at_ns, e.name, a.callback_instance_id,
+    e.fields,
     coalesce(a.is_loss_affected, false) AS is_loss_affected
 FROM event AS e
 LEFT JOIN (SELECT * FROM around WHERE NOT is_over) AS a ON e.event_id = a.event_id

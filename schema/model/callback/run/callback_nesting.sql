@@ -45,8 +45,7 @@ effective_end AS (
 ),
 outer_run AS MATERIALIZED (
     SELECT
-        p.event_id AS start_event_id,
-        p.thread_id,
+        p.event_id AS start_event_id, p.thread_id,
         coalesce(p.partner_event_id, e.event_id, t.last_event_id + 1) AS effective_end_event_id
     FROM staging.callback_pair_left_over AS p
     JOIN staging.thread AS t ON p.thread_id = t.thread_id
