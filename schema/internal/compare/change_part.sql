@@ -41,10 +41,7 @@ both_sides AS (
         SELECT 'b', path, node, part, what, total_ns FROM part_b
     ) AS p
     -- A part that only one of them can tell would look like a change.
-    LEFT JOIN (
-        FROM spent
-        QUALIFY count(DISTINCT side) OVER (PARTITION BY node, what) = 2
-    ) AS s
+    LEFT JOIN (FROM spent QUALIFY count(DISTINCT side) OVER (PARTITION BY node, what) = 2) AS s
         ON p.side = s.side AND p.node = s.node AND p.what = s.what AND p.part = 'callback'
 ),
 part AS (

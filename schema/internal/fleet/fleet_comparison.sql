@@ -98,12 +98,7 @@ unit AS (
     JOIN counted AS c ON m.side = c.side AND m.subject = c.subject AND m.run = c.run
     GROUP BY m.side, m.unit, m.subject, m.statistic
 ),
-scaled AS (
-    SELECT
-        *,
-        min(value_ns) OVER (PARTITION BY subject) > 0 AS is_log
-    FROM unit
-),
+scaled AS (SELECT *, min(value_ns) OVER (PARTITION BY subject) > 0 AS is_log FROM unit),
 ranked AS (
     SELECT
         side, subject, statistic, is_log,

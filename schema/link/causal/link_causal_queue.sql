@@ -60,9 +60,7 @@ answer AS (
         *, number - surplus_count AS answer_number,
         lag(come_count) OVER in_order AS come_before_count
     FROM counted
-    WINDOW in_order AS (
-        PARTITION BY annotation_id, input_id, publisher_id ORDER BY start_event_id
-    )
+    WINDOW in_order AS (PARTITION BY annotation_id, input_id, publisher_id ORDER BY start_event_id)
     -- One too many has the number of the one before.
     QUALIFY row_number() OVER (
         PARTITION BY annotation_id, input_id, publisher_id, number - surplus_count

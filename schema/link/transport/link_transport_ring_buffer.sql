@@ -16,9 +16,7 @@ WITH slot_use AS (
         lag(publication_id) OVER in_slot AS publication_id
     FROM store.ring_buffer_event
     WHERE run_id = only_run AND kind <> 'clear'
-    WINDOW in_slot AS (
-        PARTITION BY run_id, process_id, buffer_handle, slot ORDER BY event_id
-    )
+    WINDOW in_slot AS (PARTITION BY run_id, process_id, buffer_handle, slot ORDER BY event_id)
 ),
 cleared AS (
     SELECT s.run_id, s.take_id

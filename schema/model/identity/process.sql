@@ -6,10 +6,7 @@
 WITH process AS (
     SELECT
         process_id, host_id, pid_ns, vpid, life,
-        coalesce(
-            any_value(name) FILTER (WHERE vtid = vpid),
-            arg_min(name, first_event_id)
-        ) AS name,
+        coalesce(any_value(name) FILTER (WHERE vtid = vpid), arg_min(name, first_event_id)) AS name,
         min(first_seen_ns) AS first_seen_ns,
         max(last_seen_ns) AS last_seen_ns
     FROM staging.context

@@ -24,9 +24,7 @@ WITH every_initialisation AS (
         ON i.thread_index = p.thread_index AND i.event_id >= p.first_event_id
     WINDOW
         process AS (PARTITION BY p.host_id, p.pid_ns, p.vpid ORDER BY i.event_id),
-        context AS (
-            PARTITION BY p.host_id, p.pid_ns, p.vpid, i.context_handle ORDER BY i.event_id
-        )
+        context AS (PARTITION BY p.host_id, p.pid_ns, p.vpid, i.context_handle ORDER BY i.event_id)
 ),
 -- Most are the first event of their process. `gap_ns`: begin of the first gap behind it.
 initialisation AS (

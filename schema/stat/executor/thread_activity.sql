@@ -117,9 +117,7 @@ situation AS (
     LEFT JOIN reach AS r ON m.thread_id = r.thread_id
     WHERE coalesce(m.event_id >= r.first_event_id, true)
         AND coalesce(m.event_id <= r.last_event_id, true)
-    WINDOW so_far AS (
-        PARTITION BY m.run_id, m.thread_id ORDER BY m.place ROWS UNBOUNDED PRECEDING
-    )
+    WINDOW so_far AS (PARTITION BY m.run_id, m.thread_id ORDER BY m.place ROWS UNBOUNDED PRECEDING)
 ),
 -- A take while the executor executes is what it is about to do anyway.
 split AS (
