@@ -1,7 +1,7 @@
 -- title: A row has several partners, or two do not name each other
 -- description: A publication has one direct cause at most. A subscription receives it at most once
---     by each way: through the ring buffer of its process, and through the middleware, whose copy it
---     drops; only a poll of Agnocast may get again what it got before. A take comes from one
+--     by each way: through the ring buffer of its process, and through the middleware, whose copy
+--     it drops; only a poll of Agnocast may get again what it got before. A take comes from one
 --     publication at most, and leads to one callback instance. A request and its callback instance
 --     name each other. What a thread sent after a taken request or response has one cause, and is
 --     one message.
