@@ -349,8 +349,7 @@ export class SqlPage {
     const described = await this.ask(`DESCRIBE ${text}`);
     if (!described) return;
     const shown = h("pre", { className: "plan query-file", tabIndex: 0 });
-    const file = () =>
-      queryFile(text, { title: title.value }, described, this.words);
+    const file = () => queryFile(text, { title: title.value }, described, this.words);
     const fill = () => clear(shown, file());
     title.addEventListener("input", fill);
     fill();
